@@ -1,0 +1,114 @@
+# Everything runs in .venv, which the first target that needs it creates. Needed on the
+# machine: make, and Python 3.11 or newer with pip. Override with `make test PYTHON=...`.
+
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+export OPENBLAS_NUM_THREADS := 1# the matrices are small: more threads only wait
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_CONSTRAINT := constraints.txt
+export PIP_BUILD_CONSTRAINT := constraints.txt
+
+BIN := .venv/bin
+STAMP := .venv/.stamp
+WORKERS ?= 2# processes that `make test` uses
+ARGS ?=# further arguments of pytest, as in `make test ARGS="-k spline"`
+
+##@ Use
+help: ## list the targets
+	@awk 'BEGIN { FS = ":.*## " } /^##@ / { printf "\n%s\n", substr($$0, 5) } \
+	  /^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
+
+demo: $(STAMP) ## run the paper's moving obstacle, plot it, say where it is
+	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo --no-view
+	@$(BIN)/hsp plot out/demo/*.npz --out out/demo
+	@echo "The log and the figures are in out/demo:" && ls out/demo
+
+##@ Check
+test: $(STAMP) ## run the tests
+	@$(BIN)/python -m pytest -n $(WORKERS) $(ARGS)
+
+lint: $(STAMP) ## ruff, mypy --strict and the floors of the architecture
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check
+	@$(BIN)/mypy --strict
+	@$(BIN)/lint-imports
+
+coverage: $(STAMP) ## run the tests with the kernels uncompiled, report the lines not run
+	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term $(ARGS)
+
+wheel-test: $(STAMP) ## build the wheel, install it elsewhere, use it from there
+	@dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; mkdir "$$dir/cwd"; \
+	echo "Building the wheel and installing it into a fresh environment ..."; \
+	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir "$$dir" .; \
+	$(call new-venv,$(BIN)/python,"$$dir/venv"); \
+	"$$dir/venv/bin/python" -m pip install --quiet "$$dir"/*.whl; \
+	cd "$$dir/cwd"; export PATH="$$dir/venv/bin:$$PATH"; unset PYTHONPATH; \
+	hsp robots; \
+	hsp check paper/4_moving_obstacle; \
+	hsp run paper/4_moving_obstacle --out out --no-view; \
+	echo "The wheel works."
+
+##@ Keep
+format: $(STAMP) ## let ruff format the code and fix what it can
+	@$(BIN)/ruff check --fix --quiet || true
+	@$(BIN)/ruff format
+
+constraints: ## refresh constraints.txt with the newest version of everything
+	@$(find-python); dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; \
+	unset PIP_CONSTRAINT PIP_BUILD_CONSTRAINT; \
+	echo "Resolving with $$python, without constraints ..."; \
+	$(call new-venv,"$$python","$$dir"); \
+	"$$dir/bin/python" -m pip install --quiet '.[test,dev]' hatchling editables; \
+	sed '/^[^#]/d' constraints.txt > "$$dir/new"; \
+	"$$dir/bin/python" -m pip list --format=freeze --exclude hsp_control --exclude pip \
+	  --exclude setuptools --exclude wheel >> "$$dir/new"; \
+	cp "$$dir/new" constraints.txt; echo "Wrote constraints.txt; now: make lint test"
+
+clean: ## remove caches, builds and the demo's output; .venv stays
+	@rm -rf build dist out/demo .coverage .*_cache .hypothesis
+	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
+
+.PHONY: help demo test lint coverage wheel-test format constraints clean
+
+# ------------------------------------------------------------------- the environment
+
+# One environment for everything. Made anew where it is missing or broken, brought up to
+# date where pyproject.toml or constraints.txt is newer than it.
+$(STAMP): pyproject.toml constraints.txt
+	@if ! $(BIN)/python -m pip --version > /dev/null 2>&1; then \
+	  $(find-python); \
+	  echo "Creating .venv with $$python ($$("$$python" --version)) ..."; \
+	  $(call new-venv,"$$python",.venv); \
+	fi
+	@echo "Installing hsp_control and its tools into .venv (a minute or two, once) ..."
+	@$(BIN)/python -m pip install --quiet --editable '.[test,dev]'
+	@touch $@
+
+# Sets the shell variable `python`: PYTHON if given, else the newest one that will do. A
+# candidate is asked, not trusted: some are shims of versions that are not installed.
+define find-python
+python=; for candidate in $(if $(PYTHON),"$(PYTHON)",python3.14 python3.13 python3.12 python3.11 python3); do \
+  if "$$candidate" -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' 2> /dev/null; \
+  then python=$$candidate; break; fi; \
+done; \
+if [ -z "$$python" ]; then \
+  echo "No Python 3.11 or newer with the module venv found$(if $(PYTHON), in PYTHON=$(PYTHON))." >&2; \
+  echo "Install one, or name it: make PYTHON=/path/to/python3.12" >&2; exit 1; \
+fi
+endef
+
+# $(call new-venv,python,folder): a new environment with pip in it. Debian's Python has no
+# ensurepip unless python3-venv is installed; its pip can then fill the environment too.
+define new-venv
+if $(1) -c 'import ensurepip' 2> /dev/null; then \
+  $(1) -m venv --clear $(2); \
+elif $(1) -m pip --version > /dev/null 2>&1; then \
+  $(1) -m venv --clear --without-pip $(2); \
+  $(1) -m pip --python $(2)/bin/python install --quiet pip; \
+else \
+  echo "This Python has neither ensurepip nor pip: install python3-venv, or python3-pip." >&2; exit 1; \
+fi
+endef

@@ -1,0 +1,1 @@
+"""Configurations: from a YAML text to a checked scenario, with errors that help."""

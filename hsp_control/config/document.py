@@ -1,0 +1,169 @@
+"""A configuration as plain data that remembers which line each key came from."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from copy import deepcopy
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from hsp_control.config.keys import KeyPath, split_assignment
+from hsp_control.config.located import locate, located
+from hsp_control.config.overrides import assign
+from hsp_control.config.plain import shortened, shown
+from hsp_control.config.reading import MAX_SIZE, Mark, YamlError, read_yaml
+from hsp_control.exceptions import ConfigError, HspControlError
+from hsp_control.suggest import did_you_mean
+
+_TOO_LARGE = f"larger than {MAX_SIZE // 1_000_000} MB, too much for a configuration"
+
+_LONGEST_ORIGIN = 72
+
+
+class Document:
+    """The plain data of a YAML text, with a location for every key path.
+
+    A key path is the tuple of what the user writes with dots: ``("tasks", 0, "frame")``
+    for ``tasks.0.frame``. All errors read ``file:line: key.path: what is wrong``.
+
+    Attributes:
+        name: The file's path as it was given, for messages.
+    """
+
+    def __init__(
+        self, data: dict[str, Any], marks: dict[KeyPath, Mark], name: str
+    ) -> None:
+        """Take what `Document.parse` found."""
+        self.name = name
+        self._data = data
+        self._origins: dict[KeyPath, Mark | str] = dict(marks)
+
+    @classmethod
+    def read(cls, path: str | PathLike[str]) -> "Document":
+        """Read a YAML file.
+
+        Raises:
+            ConfigError: If it cannot be read, or is not a mapping in plain YAML.
+        """
+        name = fspath(path)
+        try:
+            with Path(name).open("rb") as file:
+                content = file.read(MAX_SIZE + 1)
+        except (OSError, ValueError) as error:
+            raise located(name, _why_unreadable(name, error)) from None
+        if len(content) > MAX_SIZE:
+            raise located(name, _TOO_LARGE)
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            line = content.count(b"\n", 0, error.start) + 1
+            message = f"not UTF-8 text (byte 0x{content[error.start]:02x})"
+            raise located(f"{name}:{line}", message) from None
+        return cls.parse(text, name)
+
+    @classmethod
+    def parse(cls, text: str, name: str = "<string>") -> "Document":
+        """Parse a YAML text; in messages ``name`` stands for its file.
+
+        Raises:
+            ConfigError: If it is not a mapping in plain YAML.
+        """
+        if len(text) > MAX_SIZE:
+            raise located(name, _TOO_LARGE)
+        try:
+            data, marks = read_yaml(text)
+        except YamlError as error:
+            where = f"{name}:{error.line}"
+            raise located(where, error.message, error.path) from None
+        if not isinstance(data, dict):
+            what = "is empty" if data is None else f"is {shown(data)}"
+            message = f"{what}; a configuration is a mapping (key: value)"
+            raise located(f"{name}:{marks[()].line}", message)
+        return cls(data, marks, name)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a copy of the data."""
+        return deepcopy(self._data)
+
+    def override(self, assignment: str) -> None:
+        """Apply ``tasks.0.gains.kp=100``, as given to ``--set`` on the command line.
+
+        The value is YAML. Missing keys are created, for the schema to judge; entries of
+        lists are not. Keys with a dot inside go in quotes: ``frames.'a.b'.parent=x``.
+
+        Raises:
+            ConfigError: If it has another form, or there is no such place.
+        """
+        origin = shortened(f"--set {' '.join(assignment.split())}", _LONGEST_ORIGIN)
+        try:
+            keys, text = split_assignment(assignment)
+            value, _ = read_yaml(text)
+            path = assign(self._data, keys, value)
+        except YamlError as error:
+            raise located(origin, error.message) from None
+        except ValueError as error:
+            raise located(origin, str(error)) from None
+        for inside in [key for key in self._origins if key[: len(path)] == path]:
+            del self._origins[inside]
+        self._origins[path] = origin
+
+    def __contains__(self, path: KeyPath) -> bool:
+        """Say whether there is a value at the key path."""
+        value: Any = self._data
+        for part in path:
+            if isinstance(value, list):
+                value = dict(enumerate(value))
+            if not isinstance(value, dict) or part not in value:
+                return False
+            value = value[part]
+        return True
+
+    def mark(self, path: KeyPath) -> Mark | None:
+        """Return where in the text the key path begins, None if it was overridden.
+
+        A path that does not exist has the mark of its nearest ancestor.
+        """
+        origin = self._origin(path)
+        return origin if isinstance(origin, Mark) else None
+
+    def location(self, path: KeyPath) -> str:
+        """Return ``file.yaml:12``, or ``--set key=value`` if it was overridden."""
+        origin = self._origin(path)
+        return f"{self.name}:{origin.line}" if isinstance(origin, Mark) else origin
+
+    def error(self, path: KeyPath, message: str) -> ConfigError:
+        """Return an error, to be raised, about the value at the key path."""
+        return located(self.location(path), message, path)
+
+    @contextmanager
+    def at(self, *path: str | int) -> Iterator[None]:
+        """Give errors of the package that are raised inside the location of a key path.
+
+        An error keeps its class, and one that has a location keeps that, so of nested
+        blocks the innermost wins::
+
+            with document.at("tasks", 0, "frame"):
+                robot.frame_id("panda_hnad")  # FrameNotFoundError: panda.yaml:7: ...
+
+        Raises:
+            HspControlError: What was raised inside.
+        """
+        try:
+            yield
+        except HspControlError as error:
+            locate(error, self.location(path), path)
+            raise
+
+    def _origin(self, path: KeyPath) -> Mark | str:
+        while path not in self._origins:
+            path = path[:-1]
+        return self._origins[path]
+
+
+def _why_unreadable(name: str, error: OSError | ValueError) -> str:
+    if isinstance(error, IsADirectoryError):
+        return "is a folder; name a file in it"
+    if isinstance(error, FileNotFoundError):
+        near = [file.name for file in Path(name).parent.glob("*.yaml")]
+        return f"no such file{did_you_mean(Path(name).name, near)}"
+    return f"cannot be read: {getattr(error, 'strerror', None) or error}"

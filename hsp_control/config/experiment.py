@@ -1,0 +1,193 @@
+"""An experiment: a configuration turned into objects, ready to run."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from hsp_control.config.build_motion import position_trajectory
+from hsp_control.config.build_parts import (
+    build_fields,
+    build_metric,
+    build_robot,
+    build_start,
+    build_task,
+)
+from hsp_control.config.document import Document
+from hsp_control.config.scenario import Dop853Model, Rk4Model, Scenario
+from hsp_control.config.validation import validate
+from hsp_control.controller import Controller
+from hsp_control.exceptions import ConfigError, SimulationError
+from hsp_control.resources import bundled_configs
+from hsp_control.robot import Array, Robot
+from hsp_control.scene import Obstacle, Scene
+from hsp_control.simulation import (
+    Dop853,
+    Integrator,
+    Rk4,
+    Rollout,
+    SemiImplicitEuler,
+    simulate,
+)
+from hsp_control.suggest import did_you_mean, listing
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """The objects of one configuration.
+
+    Attributes:
+        name: The configuration's name, for file names.
+        scenario: The checked configuration.
+        robot: The robot.
+        controller: Its controller.
+        scene: Its obstacles.
+        q0: Start configuration, shape (nq,).
+        v0: Start velocity, shape (nv,).
+        integrator: How the simulation moves on.
+    """
+
+    name: str
+    scenario: Scenario
+    robot: Robot
+    controller: Controller
+    scene: Scene
+    q0: Array
+    v0: Array
+    integrator: Integrator
+
+    def run(self, on_progress: Callable[[float], None] | None = None) -> Rollout:
+        """Simulate it; see `simulate` for what is raised and kept."""
+        settings = self.scenario.simulation
+        return simulate(
+            self.controller,
+            self.q0,
+            self.v0,
+            duration=settings.duration,
+            control_period=settings.control_period,
+            log_period=settings.log_period,
+            integrator=self.integrator,
+            scene=self.scene,
+            on_progress=on_progress,
+            meta={
+                "name": self.name,
+                "title": self.scenario.title,
+                "config": self.scenario.model_dump(mode="json"),
+            },
+        )
+
+
+def load_experiment(
+    source: str | PathLike[str] | dict[str, Any], *overrides: str
+) -> Experiment:
+    """Build an experiment from a configuration.
+
+    Args:
+        source: The name of a bundled configuration, a path to a YAML file or to a log
+            (whose own configuration is then repeated), or the data itself.
+        overrides: Values to change, each ``key.path=value``.
+
+    Raises:
+        ConfigError: If the configuration does not follow the schema.
+        HspControlError: If it names what does not exist or does not fit; the message
+            says where.
+    """
+    document = read_document(source)
+    for assignment in overrides:
+        document.override(assignment)
+    return build(document)
+
+
+def read_document(source: str | PathLike[str] | dict[str, Any]) -> Document:
+    """Return the configuration's data with the place that each key came from.
+
+    Raises:
+        ConfigError: If there is no such configuration or it is not plain YAML.
+        LogError: If it is a log that cannot be read.
+    """
+    if isinstance(source, dict):
+        return Document(source, {}, "configuration")
+    path = Path(source)
+    if path.suffix == ".npz":
+        config = Rollout.load(path).config
+        if config is None:
+            raise ConfigError(
+                f"{path}: this log was made from Python and holds no configuration"
+            )
+        return Document(config, {}, str(path))
+    known = bundled_configs()
+    if path.suffix in {".yaml", ".yml"} or path.is_file():
+        return Document.read(path)
+    if str(source) in known:
+        return Document.read(known[str(source)])
+    raise ConfigError(
+        f"no configuration {str(source)!r}{did_you_mean(str(source), known)} "
+        f"(a path to a .yaml file, or one of: {listing(known)})"
+    )
+
+
+def build(document: Document) -> Experiment:
+    """Turn a configuration into objects: YAML and Python are two faces of them."""
+    scenario = validate(document, Scenario)
+    folder = Path(document.name).resolve().parent
+    robot, scenario = build_robot(document, scenario, folder)
+    q0 = build_start(document, scenario.start, robot)
+    start = robot.state(0.0, q0, 0.0 * robot.model.createData().tau)
+
+    obstacles = []
+    for name, obstacle in scenario.scene.obstacles.items():
+        with document.at("scene", "obstacles", name):
+            center = position_trajectory(obstacle.center, None)
+            obstacles.append(Obstacle(name, center, obstacle.radius))
+    scene = Scene(obstacles)
+
+    tasks = [
+        build_task(document, name, task, start)
+        for name, task in scenario.tasks.items()
+    ]
+    metric = build_metric(document, scenario.null_space.metric, robot)
+    field = build_fields(document, scenario.null_space.fields, start, scene)
+    with document.at("null_space"):
+        controller = Controller(
+            robot,
+            tasks,
+            field,
+            null_space_gain=scenario.null_space.gain,
+            metric=metric,
+            singularity_threshold=scenario.null_space.singularity_threshold,
+        )
+    velocity = scenario.start.velocity
+    with document.at("start", "velocity"):
+        if velocity == "flow":
+            v0 = controller.flow(0.0, q0)
+        else:
+            v0 = robot.check_tangent(start.v if velocity == "rest" else velocity, "v0")
+    return Experiment(
+        name=Path(document.name).stem,
+        scenario=scenario,
+        robot=robot,
+        controller=controller,
+        scene=scene,
+        q0=q0,
+        v0=v0.copy(),
+        integrator=_integrator(document, scenario),
+    )
+
+
+def _integrator(document: Document, scenario: Scenario) -> Integrator:
+    settings = scenario.simulation
+    model = settings.integrator
+    if isinstance(model, Dop853Model):
+        return Dop853(model.rtol, model.atol)
+    whole = settings.control_period or settings.log_period
+    ratio = whole / model.step
+    with document.at("simulation", "integrator", "step"):
+        if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6 * ratio:
+            period = "control_period" if settings.control_period else "log_period"
+            raise SimulationError(
+                f"{model.step:g} s is not an integer fraction of {period} = {whole:g} s"
+            )
+    return Rk4(model.step) if isinstance(model, Rk4Model) else SemiImplicitEuler(
+        model.step
+    )

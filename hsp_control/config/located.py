@@ -1,0 +1,25 @@
+"""Errors that say where: ``panda.yaml:9: tasks.hand.gains.kp: what is wrong``."""
+
+from hsp_control.config.keys import KeyPath, written
+from hsp_control.exceptions import ConfigError, HspControlError
+
+
+def located(where: str, message: str, path: KeyPath = ()) -> ConfigError:
+    """Return an error about the value at ``path``, which was given at ``where``."""
+    error = ConfigError(_message(where, message, path))
+    error.location = where
+    return error
+
+
+def locate(error: HspControlError, where: str, path: KeyPath) -> None:
+    """Put the location in front of the message, unless the error has one already.
+
+    The error itself is changed, so that its class, attributes and traceback stay.
+    """
+    if error.location is None:
+        error.args = (_message(where, str(error), path), *error.args[1:])
+        error.location = where
+
+
+def _message(where: str, message: str, path: KeyPath) -> str:
+    return ": ".join(part for part in (where, written(path), message) if part)

@@ -1,0 +1,197 @@
+"""Read a YAML text as plain data, and remember where in the text each key stands.
+
+Nothing in a text is ever executed. What PyYAML would pass over in silence (a key given
+twice, a key that is no text, a tag, an alias that grows without bound) is refused.
+"""
+
+import re
+from typing import Any, NamedTuple, NoReturn
+
+import yaml
+
+from hsp_control.config.keys import KeyPath
+from hsp_control.config.plain import shown
+from hsp_control.config.scalars import SCALARS, TAG
+
+MAX_SIZE = 1_000_000
+"""Characters in a text; parsing that many takes seconds."""
+MAX_VALUES = 100_000
+"""Values in a text, counted after its aliases are expanded."""
+MAX_DEPTH = 50
+"""Levels of nesting."""
+
+
+class Mark(NamedTuple):
+    """A place in a text, counted from 1."""
+
+    line: int
+    column: int
+
+
+class YamlError(Exception):
+    """A text that is not the YAML that we accept.
+
+    Attributes:
+        line: The line that the message speaks of.
+        message: What is wrong there.
+        path: The key path that it speaks of, if the text was understood that far.
+    """
+
+    def __init__(self, line: int, message: str, path: KeyPath = ()) -> None:
+        """Keep the three apart: the caller knows the name of the file."""
+        super().__init__(line, message, path)
+        self.line = line
+        self.message = message
+        self.path = path
+
+
+def read_yaml(text: str) -> tuple[Any, dict[KeyPath, Mark]]:
+    """Return the plain data of a text, and the mark of every key path in it.
+
+    Raises:
+        YamlError: If the text is not YAML, or more than plain data.
+    """
+    root = _compose(text)
+    if root is None:
+        return None, {(): Mark(1, 1)}
+    builder = _Builder()
+    builder.marks[()] = _mark(root)
+    return builder.build(root, ()), builder.marks
+
+
+class _Composer(yaml.BaseLoader):
+    """PyYAML's composer, with the scalars of YAML 1.2 and with bounds."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._depth = 0
+        self._count = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        self._depth += 1
+        self._count += 1
+        event = self.peek_event()  # type: ignore[no-untyped-call]
+        _check_bounds(self._depth, self._count, event.start_mark.line + 1)
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+
+for _tag, _scalar in SCALARS.items():
+    if _scalar.pattern is not None:
+        _regex = re.compile(rf"(?:{_scalar.pattern})\Z")
+        _Composer.add_implicit_resolver(_tag, _regex, _scalar.first)
+
+
+def _compose(text: str) -> yaml.Node | None:
+    try:
+        composer = _Composer(text)
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        character = f"U+{ord(text[error.position]):04X}"
+        raise YamlError(line, f"not YAML: the character {character}") from None
+    try:
+        return composer.get_single_node()
+    except yaml.MarkedYAMLError as error:
+        _refuse_syntax(error)
+    except (ValueError, OverflowError):  # raised by the scanner's own int() and chr()
+        message = "not YAML: an escape or a version that is out of range"
+        raise YamlError(composer.line + 1, message) from None
+
+
+class _Builder:
+    """Turns nodes into plain data, a copy for every alias, and collects the marks."""
+
+    def __init__(self) -> None:
+        self.marks: dict[KeyPath, Mark] = {}
+        self._open: set[int] = set()
+        self._count = 0
+
+    def build(self, node: yaml.Node, path: KeyPath) -> Any:
+        self._count += 1
+        _check_bounds(len(path) + 1, self._count, _mark(node).line)
+        if id(node) in self._open:
+            raise YamlError(
+                _mark(node).line, "an alias of a value that contains it", path
+            )
+        self._open.add(id(node))
+        value: Any
+        if isinstance(node, yaml.MappingNode) and node.tag == TAG + "map":
+            value = self._mapping(node, path)
+        elif isinstance(node, yaml.SequenceNode) and node.tag == TAG + "seq":
+            value = self._sequence(node, path)
+        else:
+            value = _value(node, path)
+        self._open.remove(id(node))
+        return value
+
+    def _mapping(self, node: yaml.MappingNode, path: KeyPath) -> dict[str, Any]:
+        mapping: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            key, mark = _key(key_node, path), _mark(key_node)
+            here = (*path, key)
+            if key in mapping:
+                first = self.marks[here].line
+                message = f"the key {key!r} is given twice, first on line {first}"
+                raise YamlError(mark.line, message, here)
+            self.marks[here] = mark
+            mapping[key] = self.build(value_node, here)
+        return mapping
+
+    def _sequence(self, node: yaml.SequenceNode, path: KeyPath) -> list[Any]:
+        items: list[Any] = []
+        for index, item in enumerate(node.value):
+            here = (*path, index)
+            self.marks[here] = _mark(item)
+            items.append(self.build(item, here))
+        return items
+
+
+def _key(node: yaml.Node, path: KeyPath) -> str:
+    line = _mark(node).line
+    if not isinstance(node, yaml.ScalarNode):
+        raise YamlError(line, "a key must be text, not a list or a mapping", path)
+    key = _value(node, path)
+    if not isinstance(key, str):
+        message = f"a key must be text, and {node.value} is not; put it in quotes"
+        raise YamlError(line, message, path)
+    if key == "<<":
+        message = "merge keys (<<) are not supported; write the keys out"
+        raise YamlError(line, message, path)
+    return key
+
+
+def _value(node: yaml.Node, path: KeyPath) -> Any:
+    line = _mark(node).line
+    scalar = SCALARS.get(node.tag)
+    if scalar is None or not isinstance(node, yaml.ScalarNode):
+        tag = node.tag.replace(TAG, "!!")
+        raise YamlError(line, f"the tag {tag!r} is not allowed: plain data only", path)
+    try:
+        return scalar.convert(node.value)
+    except ValueError:
+        what = f"{shown(node.value)} cannot be read as {scalar.name}"
+        raise YamlError(line, what, path) from None
+
+
+def _mark(node: yaml.Node) -> Mark:
+    return Mark(node.start_mark.line + 1, node.start_mark.column + 1)
+
+
+def _check_bounds(depth: int, count: int, line: int) -> None:
+    if depth > MAX_DEPTH:
+        raise YamlError(line, f"nested deeper than {MAX_DEPTH} levels")
+    if count > MAX_VALUES:
+        raise YamlError(line, f"more than {MAX_VALUES} values (aliases expanded)")
+
+
+def _refuse_syntax(error: yaml.MarkedYAMLError) -> NoReturn:
+    mark = error.problem_mark or error.context_mark
+    line = mark.line + 1 if mark is not None else 1
+    problem, context = error.problem or "", error.context or ""
+    if r"'\t'" in problem:
+        raise YamlError(line, "not YAML: a tab; indent with spaces") from None
+    if context and error.context_mark and error.context_mark.line + 1 != line:
+        context += f" from line {error.context_mark.line + 1}"
+    what = ", ".join(part for part in (context, problem) if part)
+    raise YamlError(line, f"not YAML: {what}") from None

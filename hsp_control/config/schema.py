@@ -1,0 +1,135 @@
+"""Ask a pydantic model what it accepts, through its annotations alone."""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from types import UnionType
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+
+from pydantic import BaseModel, RootModel
+from pydantic.fields import FieldInfo
+
+
+class Shape(NamedTuple):
+    """What a value may be.
+
+    Attributes:
+        options: The types that it may have; ``Any`` for one that we cannot look into.
+        metadata: What pydantic was told beside the type: bounds, discriminators.
+    """
+
+    options: tuple[Any, ...]
+    metadata: tuple[Any, ...] = ()
+
+    @property
+    def discriminator(self) -> str | None:
+        """The key whose value chooses among the options, if there is one."""
+        names = (getattr(data, "discriminator", None) for data in self.metadata)
+        return next((name for name in names if isinstance(name, str)), None)
+
+    def bounds(self) -> tuple[int, int | None]:
+        """Return how few and how many entries (or characters) a value may have."""
+        for option in self.options:
+            if get_origin(option) is tuple and Ellipsis not in get_args(option):
+                return len(get_args(option)), len(get_args(option))
+        fewest = _first(getattr(data, "min_length", None) for data in self.metadata)
+        most = _first(getattr(data, "max_length", None) for data in self.metadata)
+        return fewest or 0, most
+
+
+def shape(annotation: Any, *metadata: Any) -> Shape:
+    """Return the shape of an annotation, without the wrapping around its types."""
+    told = tuple(_flat(metadata))
+    if get_origin(annotation) is Annotated:
+        inner, *more = get_args(annotation)
+        return shape(inner, *more, *told)
+    if hasattr(annotation, "__value__"):  # an alias: type Gain = float | list[float]
+        return shape(annotation.__value__, *told)
+    if get_origin(annotation) in (Union, UnionType):
+        options = [o for o in get_args(annotation) if o is not type(None)]
+        if len(options) > 1:
+            return Shape(tuple(options), told)
+        return shape(options[0], *told)
+    if is_model(annotation) and issubclass(annotation, RootModel):
+        return field_shape(annotation.model_fields["root"])
+    return Shape((annotation,), told)
+
+
+def field_shape(field: FieldInfo) -> Shape:
+    """Return the shape of a model's field."""
+    return shape(field.annotation, field)
+
+
+def is_model(option: Any) -> bool:
+    """Say whether a type is a pydantic model."""
+    return isinstance(option, type) and issubclass(option, BaseModel)
+
+
+def fields(option: Any) -> dict[str, FieldInfo]:
+    """Return the fields of a type by the key that the user writes; none if no model."""
+    if not is_model(option):
+        return {}
+    return {
+        info.validation_alias if isinstance(info.validation_alias, str) else name: info
+        for name, info in option.model_fields.items()
+    }
+
+
+def keys(expected: Shape, *, required: bool = False) -> list[str]:
+    """Return the keys (or only the required ones) that a mapping of this shape has."""
+    found: dict[str, FieldInfo] = {}
+    for option in expected.options:
+        found |= fields(option)
+    return [key for key, info in found.items() if info.is_required() or not required]
+
+
+def tagged(options: Iterable[Any], discriminator: str) -> dict[Any, Any]:
+    """Return the option for each value that the discriminator may have."""
+    choices: dict[Any, Any] = {}
+    for option in options:
+        inner = shape(option)
+        if len(inner.options) > 1:
+            nested = tagged(inner.options, discriminator)
+            choices |= dict.fromkeys(nested, option)
+        elif field := fields(inner.options[0]).get(discriminator):
+            choices |= dict.fromkeys(literals(field_shape(field).options), option)
+    return choices
+
+
+def literals(options: Iterable[Any]) -> list[Any]:
+    """Return the values that are listed one by one among the options."""
+    values: list[Any] = []
+    for option in options:
+        if get_origin(option) is Literal:
+            values += get_args(option)
+        elif hasattr(option, "__members__"):  # an Enum
+            values += [member.value for member in option]
+    return values
+
+
+def entry(option: Any, key: str | int) -> Shape | None:
+    """Return the shape of what stands at ``key`` in a value of this type.
+
+    None if the type has no such place, or none that we know of.
+    """
+    if is_model(option):
+        field = fields(option).get(str(key))
+        return None if field is None else field_shape(field)
+    container, arguments = get_origin(option), get_args(option)
+    if not isinstance(container, type) or not arguments:
+        return None
+    if issubclass(container, Mapping):
+        return shape(arguments[1])
+    if container is tuple and Ellipsis not in arguments:
+        known = isinstance(key, int) and key < len(arguments)
+        return shape(arguments[int(key)]) if known else None
+    return shape(arguments[0]) if issubclass(container, Collection) else None
+
+
+def _flat(metadata: Iterable[Any]) -> Iterator[Any]:
+    """Yield each datum, and those that a ``Field(...)`` holds."""
+    for data in metadata:
+        yield data
+        yield from getattr(data, "metadata", ())
+
+
+def _first(values: Iterable[int | None]) -> int | None:
+    return next((value for value in values if value is not None), None)

@@ -1,0 +1,48 @@
+"""Check a document against its schema, and report all mistakes in one error."""
+
+from typing import TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from hsp_control.config.document import Document
+from hsp_control.config.findings import Finding, findings
+from hsp_control.config.schema import shape
+from hsp_control.config.wording import explained
+from hsp_control.exceptions import ConfigError
+
+Model = TypeVar("Model", bound=BaseModel)
+
+_OTHERS = 5
+
+
+def validate(document: Document, model: type[Model]) -> Model:
+    """Return the document as an instance of the pydantic model.
+
+    Raises:
+        ConfigError: If it does not follow the model. The message tells the first
+            mistake in the order of the file, then up to five others, a line each.
+    """
+    try:
+        return model.model_validate(document.to_dict())
+    except ValidationError as error:
+        pending = [(each["loc"], each) for each in error.errors(include_url=False)]
+        found = findings(document, shape(model), pending)
+    raise _summary(document, sorted(found, key=lambda f: _order(document, f)))
+
+
+def _order(document: Document, finding: Finding) -> tuple[bool, tuple[int, ...]]:
+    """Return what sorts findings by their place in the file, overrides at the end."""
+    mark = document.mark(finding.path)
+    return mark is None, tuple(mark or ())
+
+
+def _summary(document: Document, found: list[Finding]) -> ConfigError:
+    errors = [document.error(finding.path, explained(finding)) for finding in found]
+    messages = list(dict.fromkeys(str(error) for error in errors))
+    first, others = errors[0], messages[1:]
+    if others:
+        lines = [messages[0], f"and {len(others)} more:", *others[:_OTHERS]]
+        if len(others) > _OTHERS:
+            lines.append(f"... ({len(others) - _OTHERS} not shown)")
+        first.args = ("\n  ".join(lines).replace("\n  and ", "\nand ", 1),)
+    return first

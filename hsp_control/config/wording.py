@@ -1,0 +1,140 @@
+"""Say in one line what is wrong, what is allowed instead, and what was meant."""
+
+import re
+from collections.abc import Collection, Iterable, Mapping
+from pathlib import Path
+from typing import Any, get_args, get_origin
+
+from hsp_control.config.findings import Finding
+from hsp_control.config.plain import joined, kind, shown
+from hsp_control.config.schema import Shape, is_model, keys, literals, shape, tagged
+from hsp_control.suggest import did_you_mean, listing
+
+_SIMPLE = {
+    float: ("a number", "numbers"),
+    int: ("an integer", "integers"),
+    bool: ("true or false", "booleans"),
+    str: ("text", "texts"),
+    Path: ("a path", "paths"),
+}
+_COMPARISONS = {
+    "greater_than": ("gt", "greater than"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "less than"),
+    "less_than_equal": ("le", "at most"),
+}
+_ENTRIES = ("entry", "entries")
+_LONG_LIST = 40
+
+
+def explained(finding: Finding) -> str:
+    """Return the message for a finding, without its place."""
+    value, expected = finding.value, finding.expected
+    match finding.kind:
+        case "mismatch" if words := _expected(expected.options):
+            return _mismatch(value, words, literals(expected.options))
+        case "extra_forbidden":
+            return f"unknown key {_unknown(value, keys(expected))}"
+        case "missing":
+            required = listing(keys(expected, required=True), _LONG_LIST)
+            plural = "s" if len(value) > 1 else ""
+            missing = ", ".join(map(repr, value))
+            return f"missing key{plural} {missing}; required here: {required}"
+        case "union_tag_invalid" if key := expected.discriminator:
+            return f"unknown {key} {_unknown(value, tagged(expected.options, key))}"
+        case "union_tag_not_found" if key := expected.discriminator:
+            allowed = listing(map(str, tagged(expected.options, key)), _LONG_LIST)
+            return f"missing key {key!r} (allowed: {allowed})"
+        case "literal_error" | "enum" if choices := literals(expected.options):
+            return f"unknown value {_unknown(value, choices)}"
+        case "too_short" | "too_long" | "string_too_short" | "string_too_long":
+            return _wrong_length(finding)
+        case "finite_number":
+            return f"{shown(value)} is not a finite number"
+        case comparison if comparison in _COMPARISONS:
+            return _out_of_bounds(finding)
+        case "value_error" | "assertion_error":
+            return str(finding.error["ctx"]["error"])
+        case "key":
+            return f"the key {_in_pydantics_words(finding)}"
+    return _in_pydantics_words(finding)
+
+
+def _unknown(value: Any, options: Iterable[Any]) -> str:
+    allowed = [str(option) for option in options]
+    near = _near(value, allowed)
+    return f"{shown(value)}{near} (allowed: {listing(allowed, _LONG_LIST)})"
+
+
+def _near(value: Any, options: Iterable[Any]) -> str:
+    return did_you_mean(value, map(str, options)) if isinstance(value, str) else ""
+
+
+def _mismatch(value: Any, words: str, choices: list[Any]) -> str:
+    given = "nothing given" if value is None else f"{shown(value)} is {kind(value)}"
+    return f"{given}; expected {words}{_near(value, choices)}"
+
+
+def _wrong_length(finding: Finding) -> str:
+    value, (fewest, most) = finding.value, finding.expected.bounds()
+    count = len(value)
+    units = ("character", "characters") if isinstance(value, str) else _ENTRIES
+    if fewest == most:
+        needs = f"{fewest}"
+    elif count < fewest:
+        needs = f"at least {fewest}"
+    elif most is not None:
+        needs = f"at most {most}"
+    else:
+        return _in_pydantics_words(finding)
+    return f"{shown(value)} has {count} {units[count != 1]}, needs {needs}"
+
+
+def _out_of_bounds(finding: Finding) -> str:
+    symbol, words = _COMPARISONS[finding.kind]
+    bound = finding.error["ctx"][symbol]
+    low = symbol in ("gt", "ge")
+    wrong = "too small" if low else "too large"
+    if low and bound == 0 and shown(finding.value).startswith("-"):
+        wrong = "negative"
+    limit = f"{bound:g}" if isinstance(bound, float) else f"{bound}"
+    return f"{shown(finding.value)} is {wrong}; must be {words} {limit}"
+
+
+def _in_pydantics_words(finding: Finding) -> str:
+    """Return pydantic's message with the value in the place of its "Input"."""
+    value, message = shown(finding.value), finding.error["msg"]
+    sentence = re.sub(r"^\w+ (?=should )", f"{value} ".replace("\\", r"\\"), message)
+    return sentence if sentence != message else f"{value}: {message}"
+
+
+def _expected(options: Iterable[Any], *, many: bool = False) -> str:
+    """Return the types in plain words, or nothing if one of them has none."""
+    words = [_word(option, many=many) for option in options]
+    return joined(list(dict.fromkeys(words))) if all(words) else ""
+
+
+def _word(option: Any, *, many: bool) -> str:
+    if option in _SIMPLE:
+        return _SIMPLE[option][many]
+    if choices := literals([option]):
+        return joined([shown(choice) for choice in choices])
+    container = get_origin(option) or option
+    if not isinstance(container, type):
+        return ""
+    if is_model(container) or issubclass(container, Mapping):
+        return "mappings" if many else "a mapping"
+    if issubclass(container, Collection):
+        return _list(option, many=many)
+    return ""
+
+
+def _list(option: Any, *, many: bool) -> str:
+    inner = [shape(item) for item in get_args(option) if item is not Ellipsis]
+    items = inner[0].options if inner else ()
+    words = _expected(items, many=True)
+    if words in ("lists of numbers", "lists of integers"):
+        return "matrices" if many else "a matrix"
+    fewest, most = Shape((option,)).bounds()
+    number = f"{fewest} " if fewest == most else ""
+    return f"{'lists' if many else 'a list'} of {number}{words or 'values'}"

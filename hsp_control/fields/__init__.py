@@ -1,0 +1,15 @@
+"""Null-space fields and costs: what self-motion shall do."""
+
+from .cost import Cost as Cost
+from .cost import FunctionCost as FunctionCost
+from .equal_joint_angles import EqualJointAngles as EqualJointAngles
+from .field import FieldSample as FieldSample
+from .field import NullSpaceField as NullSpaceField
+from .field import WeightedSum as WeightedSum
+from .joint_centering import JointCentering as JointCentering
+from .point_distance import PointDistance as PointDistance
+from .rest import Rest as Rest
+from .rest import Uncontrolled as Uncontrolled
+from .target_posture import TargetPosture as TargetPosture
+from .vector_field import FunctionField as FunctionField
+from .vector_field import VectorField as VectorField

@@ -1,0 +1,124 @@
+"""What a null-space field is: a joint velocity g(q, t) that self-motion converges to."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.exceptions import FieldError
+from hsp_control.metrics import MetricSample
+from hsp_control.robot import Array, Robot, RobotState
+
+
+class FieldSample(NamedTuple):
+    """A field at one state.
+
+    Attributes:
+        g: The field, shape (nv,) [rad/s, m/s].
+        g_dot: Its total time derivative ∂g/∂q·v + ∂g/∂t, shape (nv,).
+    """
+
+    g: Array
+    g_dot: Array
+
+    @classmethod
+    def allocate(cls, nv: int) -> "FieldSample":
+        """Return a sample of zeros."""
+        return cls(np.zeros(nv), np.zeros(nv))
+
+
+class NullSpaceField(ABC):
+    """A vector field g(q, t) on the configuration space, in tangent coordinates.
+
+    The null-space velocity converges to its projection P g (Proposition 2). Two kinds
+    exist: a `Cost`, whose field is -W⁻¹∇f, and a `VectorField`, given as it is.
+    Fields add and scale: ``2.0 * centering + obstacle``.
+
+    Attributes:
+        robot: The robot.
+        name: What the log calls it.
+        controls: False for φ_N = 0, which leaves self-motion alone; see `Uncontrolled`.
+    """
+
+    controls: bool = True
+
+    def __init__(self, robot: Robot, name: str) -> None:
+        """Keep the robot and the name."""
+        self.robot = robot
+        self.name = name
+
+    @abstractmethod
+    def evaluate(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> FieldSample:
+        """Write g and its exact total rate into ``out`` and return it.
+
+        Args:
+            state: The robot's state.
+            metric: The joint-space metric there.
+            form: The metric's form, see `hsp_control.metrics`.
+            out: Where to write.
+        """
+
+    @abstractmethod
+    def value(self, state: RobotState) -> float:
+        """Return the number to plot: a cost's value f(q, t), or a field's norm."""
+
+    def __add__(self, other: "NullSpaceField") -> "WeightedSum":
+        return WeightedSum([(1.0, self), (1.0, other)])
+
+    def __rmul__(self, weight: float) -> "WeightedSum":
+        return WeightedSum([(weight, self)])
+
+
+class WeightedSum(NullSpaceField):
+    """g = Σ w_k g_k; a sum of sums is flattened.
+
+    Attributes:
+        terms: The (weight, field) pairs.
+    """
+
+    def __init__(self, terms: Sequence[tuple[float, NullSpaceField]]) -> None:
+        """Add fields of one robot.
+
+        Raises:
+            FieldError: If there is no term, a weight is negative or not finite, or the
+                fields belong to different robots.
+        """
+        if not terms:
+            raise FieldError("a sum of fields needs at least one term")
+        flat: list[tuple[float, NullSpaceField]] = []
+        for weight, field in terms:
+            if not 0.0 <= weight < np.inf:
+                raise FieldError(
+                    f"weight of field {field.name!r} is {weight}; must be at least 0"
+                )
+            if isinstance(field, WeightedSum):
+                flat.extend((weight * inner, term) for inner, term in field.terms)
+            else:
+                flat.append((float(weight), field))
+        robot = flat[0][1].robot
+        if not all(field.controls for _, field in flat):
+            raise FieldError("an uncontrolled null space cannot be part of a sum")
+        if any(field.robot is not robot for _, field in flat):
+            raise FieldError("the fields of a sum belong to different robots")
+        super().__init__(robot, " + ".join(field.name for _, field in flat))
+        self.terms = tuple(flat)
+        self._term = FieldSample.allocate(robot.nv)
+
+    def evaluate(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> FieldSample:
+        """Write the weighted sums of g and g'."""
+        out.g[:] = 0.0
+        out.g_dot[:] = 0.0
+        for weight, field in self.terms:
+            g, g_dot = field.evaluate(state, metric, form, self._term)
+            out.g[:] += weight * g
+            out.g_dot[:] += weight * g_dot
+        return out
+
+    def value(self, state: RobotState) -> float:
+        """Return the weighted sum of the terms' values."""
+        return sum(weight * field.value(state) for weight, field in self.terms)

@@ -1,0 +1,352 @@
+"""Find a robot by name or path and parse it into a Pinocchio model, without its meshes."""
+
+import importlib.util
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, get_args
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+import yaml
+
+from hsp_control.exceptions import (
+    FrameNotFoundError,
+    JointNotFoundError,
+    ModelError,
+    NonFiniteError,
+    RobotNotFoundError,
+    ShapeError,
+)
+from hsp_control.resources import bundled_robots
+from hsp_control.suggest import did_you_mean, listing
+
+Root = Literal["fixed", "planar", "free_flyer"]
+_ROOT_JOINTS = {
+    "planar": pin.JointModelPlanar,
+    "free_flyer": pin.JointModelFreeFlyer,
+}
+
+
+@dataclass(frozen=True)
+class RobotSource:
+    """Where a robot comes from, and what its folder says of it.
+
+    Attributes:
+        name: The name that it was asked for by, or the URDF file's stem.
+        urdf: The URDF file.
+        srdf: The SRDF file (reference postures, disabled collision pairs), if any.
+        root: How the robot stands in the world unless told otherwise.
+        package_dirs: Folders that ``package://`` is looked up in.
+        origin: ``bundled``, ``example-robot-data`` or ``file``.
+        locked: Joints locked unless told otherwise, name to value [rad or m].
+        end_effector: The frame that tasks use by default, if known.
+        home: Joint values of a good start posture, shape (nv,), if known.
+        joint_coordinates: The matrix A of coordinates theta = A q that the literature
+            uses for this robot (``absolute`` for the planar arm), if any.
+    """
+
+    name: str
+    urdf: Path
+    srdf: Path | None = None
+    root: Root = "fixed"
+    package_dirs: tuple[Path, ...] = ()
+    origin: str = "file"
+    locked: Mapping[str, float] = field(default_factory=dict)
+    end_effector: str | None = None
+    home: tuple[float, ...] | None = None
+    joint_coordinates: str | None = None
+
+
+@dataclass(frozen=True)
+class ToolFrame:
+    """A frame added to the model, fixed to one of its frames.
+
+    Attributes:
+        parent: The frame that it is fixed to.
+        translation: Its origin in the parent frame [m], shape (3,).
+        rpy: Its roll, pitch and yaw in the parent frame [rad], as in a URDF.
+    """
+
+    parent: str
+    translation: Sequence[float] = (0.0, 0.0, 0.0)
+    rpy: Sequence[float] = (0.0, 0.0, 0.0)
+
+
+def find_robot(name: str | Path) -> RobotSource:
+    """Find a robot by bundled name, name of example-robot-data, or path to a URDF.
+
+    Args:
+        name: For example ``"panda"``, ``"talos_arm"`` or ``"my_arm/arm.urdf"``.
+
+    Raises:
+        RobotNotFoundError: If there is no such robot; the message names the nearest.
+    """
+    text = os.fspath(name)
+    if text.endswith((".urdf", ".xml")) or os.sep in text:
+        return _from_path(Path(text).expanduser())
+    bundled = bundled_robots()
+    if text in bundled:
+        return _from_bundle(text, bundled[text])
+    others = example_robots()
+    if text in others:
+        return others[text]
+    known = sorted({*bundled, *others})
+    hint = "" if others else "; more with: pip install example-robot-data-loaders"
+    raise RobotNotFoundError(
+        f"no robot {text!r}{did_you_mean(text, known)} "
+        f"(a path to a .urdf file, or one of: {listing(known)}){hint}"
+    )
+
+
+def example_robots() -> dict[str, RobotSource]:
+    """Return the robots of example-robot-data by name; empty if it is not installed."""
+    if importlib.util.find_spec("example_robot_data") is None:
+        return {}
+    from example_robot_data.robots_loader import ROBOTS  # noqa: PLC0415 (optional)
+
+    root = _example_robot_data_folder()
+    sources = {}
+    for name, loader in ROBOTS.items():
+        folder = root / "robots" / loader.path
+        urdf = folder / loader.urdf_subpath / getattr(loader, "urdf_filename", "")
+        srdf = folder / loader.srdf_subpath / getattr(loader, "srdf_filename", "")
+        if urdf.is_file():
+            sources[name] = RobotSource(
+                name=name,
+                urdf=urdf,
+                srdf=srdf if srdf.is_file() else None,
+                root="free_flyer" if loader.free_flyer else "fixed",
+                package_dirs=(root.parent, root / "robots"),
+                origin="example-robot-data",
+            )
+    return sources
+
+
+def load_model(
+    source: RobotSource,
+    *,
+    root: Root | None = None,
+    locked: Mapping[str, float] | None = None,
+    tool_frames: Mapping[str, ToolFrame] | None = None,
+    gravity: Sequence[float] | None = None,
+    mimic: bool = True,
+) -> pin.Model:
+    """Parse the URDF and return the Pinocchio model of the robot that is asked for.
+
+    Args:
+        source: Where the robot comes from.
+        root: ``fixed``, ``planar`` (x, y, yaw) or ``free_flyer``; None: the source's.
+        locked: Joints to lock, name to value [rad or m]; None: the source's. Joints
+            that mimic a locked joint are locked with it.
+        tool_frames: Frames to add, by name.
+        gravity: Acceleration of gravity in the world [m/s²], shape (3,); None: -9.81
+            along z.
+        mimic: Honour ``<mimic>`` (the joint follows its leader and has no freedom of
+            its own) or load such joints as free ones.
+
+    Raises:
+        ModelError: If the URDF does not parse or gives a singular mass matrix.
+        JointNotFoundError: If a joint to lock does not exist.
+        FrameNotFoundError: If a tool frame's parent does not exist.
+    """
+    model = _parse(source.urdf, root or source.root, mimic=mimic)
+    locks = source.locked if locked is None else locked
+    if locks:
+        model = _lock(model, locks)
+    for name, tool in (tool_frames or {}).items():
+        _add_frame(model, name, tool)
+    if gravity is not None:
+        model.gravity.linear = _vector3(gravity, "gravity")
+    _refuse_singular_mass_matrix(model, source)
+    return model
+
+
+def moving_joints(model: pin.Model) -> dict[str, Any]:
+    """Return the joints that have freedoms, by name, in the order of velocities."""
+    named = list(zip(model.names, model.joints, strict=True))[1:]  # not the universe
+    return {name: joint for name, joint in named if joint.nv > 0}
+
+
+def _from_path(path: Path) -> RobotSource:
+    if path.is_dir():
+        raise RobotNotFoundError(f"{path}: is a folder; name the .urdf file in it")
+    if not path.is_file():
+        near = sorted(file.name for file in path.parent.glob("*.urdf"))
+        raise RobotNotFoundError(f"{path}: no such file{did_you_mean(path.name, near)}")
+    # `package://<folder>/...` names a folder somewhere above the URDF.
+    above = tuple(path.resolve().parents)[:5]
+    ros = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
+    return RobotSource(
+        name=path.stem,
+        urdf=path,
+        package_dirs=(*above, *(Path(folder) for folder in ros if folder)),
+    )
+
+
+def _from_bundle(name: str, folder: Path) -> RobotSource:
+    settings: dict[str, Any] = {}
+    file = folder / "robot.yaml"
+    if file.is_file():
+        settings = yaml.safe_load(file.read_text(encoding="utf-8")) or {}
+    packages: tuple[Path, ...] = (folder.parent,)
+    if importlib.util.find_spec("example_robot_data") is not None:
+        packages = (*packages, _example_robot_data_folder().parent)
+    home = settings.get("home")
+    return RobotSource(
+        name=name,
+        urdf=folder / f"{name}.urdf",
+        package_dirs=packages,
+        origin="bundled",
+        locked=dict(settings.get("locked") or {}),
+        end_effector=settings.get("end_effector"),
+        home=tuple(float(x) for x in home) if home is not None else None,
+        joint_coordinates=settings.get("joint_coordinates"),
+    )
+
+
+def _example_robot_data_folder() -> Path:
+    """Return ``<prefix>/share/example-robot-data`` of the installed package.
+
+    The package's own constant names the folder that it was built in; its ``share``
+    stands beside the ``lib`` that its Python modules are in.
+    """
+    spec = importlib.util.find_spec("example_robot_data")
+    assert spec is not None and spec.origin is not None  # the caller has looked
+    for parent in Path(spec.origin).parents:
+        folder = parent / "share" / "example-robot-data"
+        if folder.is_dir():
+            return folder
+    raise RobotNotFoundError(
+        "example-robot-data is installed without its data; "
+        "reinstall it with: pip install --force-reinstall example-robot-data"
+    )
+
+
+def _parse(urdf: Path, root: Root, *, mimic: bool) -> pin.Model:
+    _refuse_malformed_xml(urdf)
+    if root not in get_args(Root):
+        roots = get_args(Root)
+        raise ModelError(
+            f"root {root!r} is not one of {listing(roots)}{did_you_mean(root, roots)}"
+        )
+    try:
+        if root == "fixed":
+            return pin.buildModelFromUrdf(str(urdf), mimic=mimic)
+        joint = _ROOT_JOINTS[root]()
+        return pin.buildModelFromUrdf(str(urdf), joint, "root_joint", mimic=mimic)
+    except (ValueError, RuntimeError) as error:
+        reason = str(error).strip().splitlines()[0]
+        raise ModelError(f"{urdf}: not a robot that can be built: {reason}") from error
+
+
+def _refuse_malformed_xml(urdf: Path) -> None:
+    """Say where the XML breaks; the parser underneath only says that it does."""
+    try:
+        tree = ElementTree.parse(urdf)  # noqa: S314 (entities are refused by expat)
+    except ElementTree.ParseError as error:
+        line, column = error.position
+        raise ModelError(
+            f"{urdf}:{line}:{column + 1}: malformed XML: {error}"
+        ) from error
+    except OSError as error:
+        raise RobotNotFoundError(f"{urdf}: {error.strerror}") from error
+    if tree.getroot().tag != "robot":
+        raise ModelError(
+            f"{urdf}: the top element is <{tree.getroot().tag}>, a URDF's is <robot>"
+        )
+
+
+def _lock(model: pin.Model, locks: Mapping[str, float]) -> pin.Model:
+    names = list(model.names)[1:]
+    reference = pin.neutral(model)
+    ids = set()
+    for name, value in locks.items():
+        if name not in names:
+            raise JointNotFoundError(
+                f"cannot lock {name!r}: no such joint{did_you_mean(name, names)} "
+                f"(the model has {listing(names)})"
+            )
+        if not np.isfinite(value):
+            raise NonFiniteError(f"cannot lock joint {name!r} at {value}")
+        index = model.getJointId(name)
+        joint = model.joints[index]
+        ids.add(index)
+        if joint.nq == 1:
+            reference[joint.idx_q] = value
+        elif joint.nq == 2:  # continuous: (cos, sin)
+            reference[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
+        elif joint.nq > 2:
+            raise ModelError(
+                f"cannot lock {name!r}: it has {joint.nv} freedoms; choose root: fixed"
+            )
+    ids |= {
+        index
+        for index, joint in enumerate(model.joints)
+        if "Mimic" in joint.shortname()
+        and any(model.joints[leader].idx_q == joint.idx_q for leader in ids)
+    }
+    if len(ids) == len(names):
+        raise ModelError("every joint is locked: no freedom is left to control")
+    return pin.buildReducedModel(model, sorted(ids), reference)
+
+
+def _add_frame(model: pin.Model, name: str, tool: ToolFrame) -> None:
+    names = [frame.name for frame in model.frames]
+    if name in names:
+        raise ModelError(f"cannot add tool frame {name!r}: a frame has that name")
+    if tool.parent not in names:
+        raise FrameNotFoundError(
+            f"tool frame {name!r}: no parent frame {tool.parent!r}"
+            f"{did_you_mean(tool.parent, names)} (the model has {listing(names)})"
+        )
+    parent = model.frames[model.getFrameId(tool.parent)]
+    rotation = pin.rpy.rpyToMatrix(_vector3(tool.rpy, f"rpy of {name!r}"))
+    translation = _vector3(tool.translation, f"translation of {name!r}")
+    model.addFrame(
+        pin.Frame(
+            name,
+            parent.parentJoint,
+            model.getFrameId(tool.parent),
+            parent.placement * pin.SE3(rotation, translation),
+            pin.FrameType.OP_FRAME,
+        )
+    )
+
+
+def _refuse_singular_mass_matrix(model: pin.Model, source: RobotSource) -> None:
+    """Refuse a model with a joint that moves no mass, and name the joint.
+
+    Tried at a generic configuration, where only a joint (or a combination of joints)
+    that never moves any mass makes M singular.
+    """
+    if model.nv == 0:
+        raise ModelError(f"{source.urdf}: the robot has no moving joint")
+    spread = np.random.default_rng(0).uniform(-1.0, 1.0, model.nv)
+    configuration = pin.integrate(model, pin.neutral(model), spread)
+    mass_matrix = pin.crba(model, model.createData(), configuration)
+    values, vectors = np.linalg.eigh(mass_matrix)
+    if values[0] > 1e-12 * values[-1]:
+        return
+    weakest = int(np.argmax(np.abs(vectors[:, 0])))
+    culprit = next(
+        name
+        for name, joint in moving_joints(model).items()
+        if joint.idx_v <= weakest < joint.idx_v + joint.nv
+    )
+    raise ModelError(
+        f"{source.urdf}: joint {culprit!r} moves no mass, so its acceleration is not "
+        f"defined (the mass matrix is singular: {values[0]:.1e} of {values[-1]:.1e}); "
+        f"give its links an inertia, or lock it: locked: {{{culprit}: 0.0}}"
+    )
+
+
+def _vector3(values: Sequence[float], what: str) -> np.ndarray:
+    vector = np.asarray(values, dtype=float)
+    if vector.shape != (3,):
+        raise ShapeError(f"{what} has shape {vector.shape}; needs 3 numbers")
+    if not np.isfinite(vector).all():
+        raise NonFiniteError(f"{what} is {vector.tolist()}; needs finite numbers")
+    return vector

@@ -1,0 +1,7 @@
+"""Joint-space metrics."""
+
+from .constant import ConstantMetric as ConstantMetric
+from .identity import IdentityMetric as IdentityMetric
+from .mass_matrix import MassMatrixMetric as MassMatrixMetric
+from .metric import Metric as Metric
+from .metric import MetricSample as MetricSample

@@ -1,0 +1,16 @@
+"""The Euclidean metric of the joints: the paper's own."""
+
+from typing import ClassVar
+
+from hsp_control.robot import RobotState
+from hsp_control.metrics.metric import IDENTITY, Metric, MetricSample
+
+
+class IdentityMetric(Metric):
+    """W = I: every joint's motion counts the same. The sane default."""
+
+    form: ClassVar[int] = IDENTITY
+
+    def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
+        """Leave ``out`` as `MetricSample.allocate` made it: the identity."""
+        return out

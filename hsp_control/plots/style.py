@@ -1,0 +1,131 @@
+"""How figures look: a style that holds in its context alone, and empty figures in it.
+
+Nothing here needs a display: figures own an Agg canvas and pyplot is never imported.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+from cycler import cycler
+from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from hsp_control.plots import palette
+
+STYLE: dict[str, Any] = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": palette.MUTED,
+    "axes.facecolor": palette.PAPER,
+    "axes.grid": True,
+    "axes.labelcolor": palette.INK,
+    "axes.labelsize": 9.0,
+    "axes.linewidth": 0.7,
+    "axes.prop_cycle": cycler(color=palette.SERIES),
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlecolor": palette.INK,
+    "axes.titlelocation": "left",
+    "axes.titlepad": 7.0,
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.formatter.useoffset": False,
+    "figure.facecolor": palette.PAPER,
+    "figure.titlesize": 12.5,
+    "figure.titleweight": "bold",
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "grid.color": palette.GRID,
+    "grid.linewidth": 0.6,
+    "legend.borderaxespad": 0.0,
+    "legend.columnspacing": 1.3,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "legend.handlelength": 1.7,
+    "legend.handletextpad": 0.5,
+    "legend.labelspacing": 0.35,
+    "lines.linewidth": 1.4,
+    "lines.solid_capstyle": "round",
+    "mathtext.default": "regular",
+    "mathtext.fontset": "dejavusans",
+    "pdf.fonttype": 42,  # TrueType, which journals ask for
+    "savefig.dpi": 160,
+    "svg.hashsalt": "hsp_control",  # the same log gives the same file
+    "text.color": palette.INK,
+    "xtick.color": palette.MUTED,
+    "xtick.labelcolor": palette.INK,
+    "xtick.labelsize": 8.0,
+    "xtick.major.size": 3.0,
+    "xtick.minor.size": 1.5,
+    "ytick.color": palette.MUTED,
+    "ytick.labelcolor": palette.INK,
+    "ytick.labelsize": 8.0,
+    "ytick.major.size": 3.0,
+    "ytick.minor.size": 1.5,
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Hold matplotlib's parameters at `STYLE` within the context, and only there."""
+    with mpl.rc_context(STYLE):
+        yield
+
+
+class StyledFigure(Figure):
+    """A figure that is drawn in `style`, wherever it is saved or shown.
+
+    Matplotlib makes ticks when they are first drawn, with the parameters of that moment.
+    """
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw in the style."""
+        with style():
+            super().draw(renderer)
+
+
+def new_figure(width: float, height: float) -> StyledFigure:
+    """Return an empty figure, width and height in inches; call it within `style`."""
+    figure = StyledFigure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def legend_below(axes: Axes, columns: int | None = None) -> None:
+    """Put the legend under the axes, where it hides nothing.
+
+    Args:
+        axes: Axes whose artists have labels; without any, nothing happens.
+        columns: Entries in a row; None: as many as fit beside each other.
+    """
+    handles, labels = axes.get_legend_handles_labels()
+    if not handles:
+        return
+    if columns is None:
+        columns = _fitting(axes, labels)
+    offset = 0.0 if not axes.axison else -34.0 / _points(axes)[1]
+    axes.legend(
+        handles,
+        labels,
+        loc="upper left",
+        bbox_to_anchor=(0.0, min(offset, -0.02)),
+        ncols=columns,
+    )
+
+
+def note(axes: Axes, text: str) -> None:
+    """Add a remark to the legend to be."""
+    axes.plot([], [], linestyle="none", label=plain(text))
+
+
+def plain(name: str) -> str:
+    """Return a name from the log such that matplotlib shows it as it is.
+
+    It would read dollar signs as formulas, and leave names that begin with an underscore
+    out of legends.
+    """
+    shown = name.replace("$", r"\$")
+    return f" {shown}" if shown.startswith("_") else shown

@@ -1,0 +1,156 @@
+"""A rollout: what happened, as named columns that describe themselves, and its file."""
+
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from hsp_control.exceptions import LogError
+from hsp_control.robot import Array
+from hsp_control.suggest import did_you_mean, listing
+
+FORMAT = "hsp_control rollout 1"
+_REQUIRED = ("t", "q", "v", "tau")
+
+
+class Rollout:
+    """One run: columns of equal length, row i at time t[i], and what they mean.
+
+    Attributes:
+        columns: Arrays by name; ``t``, ``q``, ``v``, ``tau`` always exist.
+        meta: JSON data: ``format``, ``status``, ``columns`` (name to unit and
+            meaning), ``robot``, ``tasks``, ``versions``, ``config`` and more.
+    """
+
+    def __init__(self, columns: Mapping[str, Array], meta: dict[str, Any]) -> None:
+        """Keep columns and their description."""
+        self.columns = dict(columns)
+        self.meta = meta
+
+    def __getitem__(self, name: str) -> Array:
+        try:
+            return self.columns[name]
+        except KeyError:
+            raise LogError(
+                f"the log has no column {name!r}{did_you_mean(name, self.columns)} "
+                f"(it has {listing(self.columns, 40)})"
+            ) from None
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        span = f"{self.t[0]:g} to {self.t[-1]:g} s" if len(self) else "empty"
+        return f"Rollout({len(self)} rows, {span}, {self.status})"
+
+    @property
+    def t(self) -> Array:
+        """Time [s], shape (N,)."""
+        return self.columns["t"]
+
+    @property
+    def q(self) -> Array:
+        """Configuration, shape (N, nq)."""
+        return self.columns["q"]
+
+    @property
+    def v(self) -> Array:
+        """Velocity, shape (N, nv)."""
+        return self.columns["v"]
+
+    @property
+    def tau(self) -> Array:
+        """Effort, shape (N, nv)."""
+        return self.columns["tau"]
+
+    @property
+    def status(self) -> str:
+        """``completed``, ``interrupted`` or ``diverged``."""
+        return str(self.meta["status"])
+
+    @property
+    def config(self) -> dict[str, Any] | None:
+        """The resolved configuration that the run came from, if it came from one."""
+        return self.meta.get("config")
+
+    def save(self, path: str | Path) -> Path:
+        """Write one ``.npz`` that NumPy alone reads, without pickles.
+
+        Written beside its place and moved there, so that no half file bears its name.
+
+        Raises:
+            LogError: If the file cannot be written.
+        """
+        path = Path(path)
+        part = path.with_name(f".{path.name}.part")
+        meta = np.array(json.dumps(self.meta, ensure_ascii=False))
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with part.open("wb") as file:
+                np.savez_compressed(
+                    file, allow_pickle=False, meta=meta, **self.columns
+                )
+            os.replace(part, path)
+        except OSError as error:
+            part.unlink(missing_ok=True)
+            reason = error.strerror or str(error)
+            raise LogError(f"{path}: cannot write the log: {reason}") from error
+        return path
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a log.
+
+        Raises:
+            LogError: If the file is missing, truncated, or not a log of this package.
+        """
+        path = Path(path)
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                columns = {name: archive[name] for name in archive.files}
+        except FileNotFoundError:
+            near = [file.name for file in path.parent.glob("*.npz")]
+            raise LogError(
+                f"{path}: no such file{did_you_mean(path.name, near)}"
+            ) from None
+        except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise LogError(
+                f"{path}: not a whole .npz log (cut short, or another file): {reason}"
+            ) from error
+        except Exception as error:  # zlib.error, struct.error, NotImplementedError...
+            raise LogError(
+                f"{path}: not a whole .npz log: {type(error).__name__}: {error}"
+            ) from error
+        return cls(*_checked(path, columns))
+
+
+def _checked(
+    path: Path, columns: dict[str, Array]
+) -> tuple[dict[str, Array], dict[str, Any]]:
+    if "meta" not in columns or columns["meta"].dtype.kind != "U":
+        raise LogError(
+            f"{path}: not a log of hsp_control: it has no text entry 'meta' "
+            f"(it has {listing(columns)})"
+        )
+    try:
+        meta = json.loads(str(columns.pop("meta")))
+    except json.JSONDecodeError as error:
+        raise LogError(f"{path}: its entry 'meta' is not JSON: {error}") from error
+    if not isinstance(meta, dict) or meta.get("format") != FORMAT:
+        found = meta.get("format") if isinstance(meta, dict) else meta
+        raise LogError(f"{path}: its format is {found!r}; this version reads {FORMAT!r}")
+    missing = [name for name in _REQUIRED if name not in columns]
+    if missing:
+        raise LogError(f"{path}: the log lacks the column {missing[0]!r}")
+    rows = {name: np.shape(column)[:1] for name, column in columns.items()}
+    if any(length != rows["t"] for length in rows.values()):
+        raise LogError(f"{path}: the log's columns differ in length")
+    return columns, meta

@@ -1,0 +1,36 @@
+"""Help with names in error messages: the nearest one, and a list that stays short."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+def nearest(word: str, options: Iterable[str]) -> str | None:
+    """Return the option that ``word`` was probably meant to be, or None.
+
+    Upper and lower case count as equal. If nothing is spelled alike, an option that
+    contains the word (or is contained in it) will do: ``hand`` finds ``panda_hand``.
+    """
+    folded = {option.casefold(): option for option in options}
+    target = word.casefold()
+    if close := get_close_matches(target, folded, n=1):
+        return folded[close[0]]
+    related = [
+        option
+        for option in folded
+        if min(len(option), len(target)) >= 3 and (option in target or target in option)
+    ]
+    return folded[min(related, key=len)] if related else None
+
+
+def did_you_mean(word: str, options: Iterable[str]) -> str:
+    """Return ``; did you mean 'x'?`` for the option nearest to ``word``, or nothing."""
+    near = nearest(word, options)
+    return "" if near is None else f"; did you mean {near!r}?"
+
+
+def listing(options: Iterable[str], limit: int = 12) -> str:
+    """Return ``a, b, c``; beyond ``limit`` names ``a, b, c, ... (37 in all)``."""
+    names = list(options)
+    if len(names) <= limit:
+        return ", ".join(names)
+    return f"{', '.join(names[:limit])}, ... ({len(names)} in all)"

@@ -1,0 +1,10 @@
+"""Tasks: what the robot shall track."""
+
+from .frame_orientation import FrameOrientation as FrameOrientation
+from .frame_pose import FramePose as FramePose
+from .frame_position import FramePosition as FramePosition
+from .gains import Gains as Gains
+from .joint_posture import JointPosture as JointPosture
+from .pointing import Pointing as Pointing
+from .task import Task as Task
+from .task import TaskSample as TaskSample

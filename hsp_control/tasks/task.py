@@ -1,0 +1,116 @@
+"""What a task is: rows of J, their rates, and the acceleration that tracks exactly."""
+
+from abc import ABC, abstractmethod
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.exceptions import TaskError
+from hsp_control.kernels import kernel
+from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.tasks.gains import Gains
+
+
+class TaskSample(NamedTuple):
+    """A task at one state; the law wants J a + J'v = a_x.
+
+    Attributes:
+        jacobian: J, shape (m, nv).
+        jacobian_dot: J', shape (m, nv).
+        error: e in the task's own coordinates, desired minus actual, shape (m,).
+        error_rate: e', shape (m,).
+        acceleration: a_x, which makes e'' + Kv e' + Kp e = 0, shape (m,).
+    """
+
+    jacobian: Array
+    jacobian_dot: Array
+    error: Array
+    error_rate: Array
+    acceleration: Array
+
+    @classmethod
+    def allocate(cls, rows: int, nv: int) -> "TaskSample":
+        """Return a sample of zeros."""
+        return cls(
+            np.zeros((rows, nv)),
+            np.zeros((rows, nv)),
+            np.zeros(rows),
+            np.zeros(rows),
+            np.zeros(rows),
+        )
+
+    def rows(self, start: int, stop: int) -> "TaskSample":
+        """Return the sample of some rows, sharing memory."""
+        return TaskSample(*(array[start:stop] for array in self))
+
+
+class Task(ABC):
+    """Something that the robot shall track, with an exactly linear error equation.
+
+    To implement one: call ``super().__init__``, and write `evaluate`, which fills every
+    array of ``out`` such that e'' + Kv e' + Kp e = 0 follows *exactly* from
+    J a + J'v = a_x in the error coordinates that it reports, `reference_rate` and
+    `measure`.
+
+    Attributes:
+        robot: The robot.
+        name: What the log calls it.
+        rows: Number of rows m.
+        Kp: Stiffness, shape (m, m) [1/s²].
+        Kv: Damping, shape (m, m) [1/s].
+    """
+
+    def __init__(self, robot: Robot, rows: int, gains: Gains, name: str) -> None:
+        """Check the gains against the rows and keep them.
+
+        Raises:
+            GainError: If the gains do not fit the rows or do not decay.
+            TaskError: If the task has more rows than the robot has freedoms.
+        """
+        if rows > robot.nv:
+            raise TaskError(
+                f"task {name!r} has {rows} rows; {robot.name} has {robot.nv} freedoms"
+            )
+        if not name or not name.replace("_", "").replace("-", "").isalnum():
+            raise TaskError(
+                f"task name {name!r}: use letters, digits, '_' and '-' (it names the "
+                "log's columns)"
+            )
+        self.robot = robot
+        self.name = name
+        self.rows = rows
+        self.Kp, self.Kv = gains.matrices(rows)
+
+    @abstractmethod
+    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
+        """Return J, J', e, e' and a_x at a state.
+
+        Args:
+            state: The robot's state.
+            out: Where to write; None: a new sample.
+        """
+
+    @abstractmethod
+    def reference_rate(self, state: RobotState) -> Array:
+        """Return J v of a robot on its reference and staying there, shape (m,)."""
+
+    @abstractmethod
+    def measure(self, state: RobotState) -> tuple[Array, Array]:
+        """Return (reference, actual) in the coordinates that a person would plot."""
+
+    def _out(self, out: TaskSample | None) -> TaskSample:
+        return TaskSample.allocate(self.rows, self.robot.nv) if out is None else out
+
+
+@kernel
+def track(
+    feed_forward: Array, Kp: Array, Kv: Array, e: Array, e_dot: Array, out: Array
+) -> None:
+    """Write feed_forward + Kv e' + Kp e."""
+    for i in range(e.shape[0]):
+        total = feed_forward[i]
+        for j in range(e.shape[0]):
+            total += Kv[i, j] * e_dot[j] + Kp[i, j] * e[j]
+        out[i] = total
+
+

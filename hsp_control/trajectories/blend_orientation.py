@@ -1,0 +1,149 @@
+"""From how the body is turned now into a turn that is already under way."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hsp_control.kernels import kernel
+from hsp_control.rotations import (
+    Array,
+    compose_back,
+    cross,
+    jexp3,
+    jexp3_dot,
+    jlog3,
+    log3,
+    rotate,
+    turn,
+)
+from hsp_control.trajectories import checks
+from hsp_control.trajectories.orientation import (
+    OrientationSample,
+    OrientationTrajectory,
+)
+from hsp_control.trajectories.polynomial import QUINTIC, horner
+
+
+class BlendOrientation(OrientationTrajectory):
+    """R(t) = R_d(t) exp(y(t)), with y the quintic that dies with two rates at t0 + T.
+
+    y(t0) and its rates are such that the body starts at R0 with angular velocity ω0 and
+    without angular acceleration. It is C², is R_d itself from t0 + T on, and holds R0
+    at rest before t0. One logarithm is taken, at t0: unlike exp(s log(R0ᵀ R_d)), which
+    jumps where R_d passes half a turn away from R0, this is smooth whatever R_d does.
+
+    Attributes:
+        start: R0, shape (3, 3).
+        trajectory: R_d.
+        duration: T [s].
+        start_angular_velocity: ω0 in the world frame, shape (3,) [rad/s].
+        start_time: t0 [s].
+    """
+
+    __slots__ = (
+        "_coefficients",
+        "duration",
+        "start",
+        "start_angular_velocity",
+        "start_time",
+        "trajectory",
+    )
+
+    def __init__(
+        self,
+        start: ArrayLike,
+        trajectory: OrientationTrajectory,
+        duration: float,
+        start_angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+        start_time: float = 0.0,
+    ) -> None:
+        """Lead from ``start`` into ``trajectory``.
+
+        Args:
+            start: R0, body to world, shape (3, 3).
+            trajectory: R_d.
+            duration: T > 0 [s].
+            start_angular_velocity: ω0 in the world frame, shape (3,) [rad/s].
+            start_time: t0 [s].
+        """
+        self.start = checks.rotation(start, "start")
+        self.trajectory = trajectory
+        self.duration = T = checks.positive(duration, "duration")
+        self.start_angular_velocity = checks.array(
+            start_angular_velocity, "start_angular_velocity", (3,)
+        )
+        self.start_time = checks.number(start_time, "start_time")
+        y, y_dot, y_ddot = self._start_offset()
+        rest = np.zeros(3)
+        self._coefficients = QUINTIC @ np.stack(
+            [y, T * y_dot, T * T * y_ddot, rest, rest, rest]
+        )
+
+    def _start_offset(self) -> tuple[Array, Array, Array]:
+        """Return y, y' and y'' at t0: ω = ω_d + R w = ω0 and ω' = 0, w = Jexp y'."""
+        R_d, omega_d, omega_d_dot = self.trajectory.sample(self.start_time)
+        R, omega = self.start, self.start_angular_velocity
+        E, y = np.empty((3, 3)), np.empty(3)
+        compose_back(R_d, R, E)
+        log3(E, y)
+        J_log, J_exp_dot = np.empty((3, 3)), np.empty((3, 3))
+        jlog3(y, J_log)
+        w = R.T @ (omega - omega_d)
+        w_dot = R.T @ (-omega_d_dot - np.cross(omega, R @ w))
+        y_dot = J_log @ w
+        jexp3_dot(y, y_dot, J_exp_dot)
+        return y, y_dot, J_log @ (w_dot - J_exp_dot @ y_dot)
+
+    def sample(
+        self, t: float, out: OrientationSample | None = None
+    ) -> OrientationSample:
+        """Return the orientation at time t; see `OrientationTrajectory.sample`."""
+        if out is None:
+            out = OrientationSample.allocate()
+        elapsed = t - self.start_time
+        if elapsed < 0.0:
+            out.rotation[:] = self.start
+            out.angular_velocity.fill(0.0)
+            out.angular_acceleration.fill(0.0)
+            return out
+        self.trajectory.sample(t, out)
+        if elapsed < self.duration:
+            work = np.empty((11, 3))
+            _blend(elapsed, self.duration, self._coefficients, work, *out)
+        return out
+
+
+@kernel
+def _blend(
+    elapsed: float,
+    duration: float,
+    coefficients: Array,
+    work: Array,
+    rotation: Array,
+    velocity: Array,
+    acceleration: Array,
+) -> None:
+    """Turn the sample of R_d on by exp(y), in place.
+
+    ω = ω_d + R w and ω' = ω_d' + ω x R w + R w', where w = Jexp y' in the body frame.
+    """
+    y, y_dot, y_ddot = work[0], work[1], work[2]
+    w, w_dot = work[3], work[4]
+    J, J_dot = work[5:8], work[8:11]
+    horner(elapsed / duration, duration, coefficients, y, y_dot, y_ddot)
+    jexp3(y, J)
+    jexp3_dot(y, y_dot, J_dot)
+    rotate(J, y_dot, w)
+    rotate(J_dot, y_dot, w_dot)
+    rotate(J, y_ddot, y_ddot)
+    for i in range(3):
+        w_dot[i] += y_ddot[i]
+    rotate(rotation, y, y)  # R_d exp(y) = exp(R_d y) R_d
+    turn(rotation, y, 1.0, rotation)
+    rotate(rotation, w, w)
+    rotate(rotation, w_dot, w_dot)
+    for i in range(3):
+        velocity[i] += w[i]
+        acceleration[i] += w_dot[i]
+    cross(velocity, w, w)
+    for i in range(3):
+        acceleration[i] += w[i]

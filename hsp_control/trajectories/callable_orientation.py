@@ -1,0 +1,70 @@
+"""Any Python function of time as an orientation."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hsp_control.rotations import Array, compose_back, log3
+from hsp_control.trajectories import checks, differences
+from hsp_control.trajectories.orientation import (
+    OrientationSample,
+    OrientationTrajectory,
+)
+
+
+class CallableOrientation(OrientationTrajectory):
+    """R(t) = f(t), with numerical rates.
+
+    With y(τ) = log(R(t)ᵀ R(t + τ)), y'(0) and y''(0) are exactly the angular velocity
+    and acceleration in the body frame; both are central differences of sixth order over
+    seven points (`differences`), good to about 1e-10 for turns of a few rad/s. The
+    function must be smooth, and defined three steps before and after every time asked
+    for; anything but a rotation matrix raises `TrajectoryError`. To be pickled it must
+    be defined at the top of a module.
+
+    Attributes:
+        function: f, time [s] to a rotation matrix of shape (3, 3), body to world.
+        step: Time between the seven points [s].
+    """
+
+    __slots__ = ("function", "step")
+
+    def __init__(
+        self,
+        function: Callable[[float], ArrayLike],
+        step: float = differences.STEP,
+    ) -> None:
+        """Follow ``function``.
+
+        Args:
+            function: f, time [s] to a rotation matrix of shape (3, 3), body to world.
+            step: Time between the points of the differences [s].
+        """
+        self.function = function
+        self.step = checks.positive(step, "step")
+
+    def sample(
+        self, t: float, out: OrientationSample | None = None
+    ) -> OrientationSample:
+        """Return the orientation at time t; see `OrientationTrajectory.sample`."""
+        if out is None:
+            out = OrientationSample.allocate()
+        R = self._call(t)
+
+        def turned_since(time: float) -> Array:
+            between, y = np.empty((3, 3)), np.empty(3)
+            compose_back(R, self._call(time), between)
+            log3(between, y)
+            return y
+
+        velocity, acceleration = differences.both_derivatives(
+            turned_since, t, self.step
+        )
+        out.rotation[:] = R
+        out.angular_velocity[:] = R @ velocity
+        out.angular_acceleration[:] = R @ acceleration
+        return out
+
+    def _call(self, t: float) -> Array:
+        return checks.rotation(self.function(t), f"function({t:g})")

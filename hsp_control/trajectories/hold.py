@@ -1,0 +1,33 @@
+"""A point that stays."""
+
+from numpy.typing import ArrayLike
+
+from hsp_control.trajectories import checks
+from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+
+
+class Hold(Trajectory):
+    """x(t) = x0.
+
+    Attributes:
+        point: x0, shape (n,).
+    """
+
+    __slots__ = ("point",)
+
+    def __init__(self, point: ArrayLike) -> None:
+        """Stay at ``point``, shape (n,)."""
+        self.point = checks.array(point, "point", (None,))
+
+    @property
+    def dimension(self) -> int:
+        """The number n of coordinates."""
+        return len(self.point)
+
+    def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
+        """Return the point, at rest; see `Trajectory.sample`."""
+        out = self._output(out)
+        out.position[:] = self.point
+        out.velocity.fill(0.0)
+        out.acceleration.fill(0.0)
+        return out

@@ -1,0 +1,85 @@
+"""Polynomials between knots: what lines, splines and minimum jerk are made of."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hsp_control.kernels import kernel
+from hsp_control.rotations import Array
+from hsp_control.trajectories import checks
+from hsp_control.trajectories.polynomial import horner
+from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+
+
+class PiecewisePolynomial(Trajectory):
+    """x(t) = Σ_k c_ik u^k with u = (t - t_i) / (t_{i+1} - t_i) between t_i and t_{i+1}.
+
+    Before the first knot and after the last one the point is held exactly; how smooth
+    the motion is there and at the inner knots is up to the coefficients.
+
+    Attributes:
+        times: The m knots, increasing, shape (m,) [s].
+        waypoints: The points at the knots, shape (m, n).
+    """
+
+    __slots__ = ("_coefficients", "times", "waypoints")
+
+    def __init__(
+        self,
+        times: ArrayLike,
+        coefficients: ArrayLike,
+        end: ArrayLike | None = None,
+    ) -> None:
+        """Join m - 1 polynomials at m knots.
+
+        Args:
+            times: The knots, increasing, shape (m,) [s].
+            coefficients: c, shape (m - 1, degree + 1, n).
+            end: Where to stay afterwards, shape (n,); by default what the last
+                polynomial gives, which rounding may part from a round number.
+        """
+        c = checks.array(coefficients, "coefficients", (None, None, None))
+        last = c[-1].sum(axis=0) if end is None else end
+        self.times = checks.waypoint_times(times, len(c) + 1)
+        self.waypoints = np.vstack([c[:, 0], checks.array(last, "end", c.shape[2:])])
+        self._coefficients = c
+
+    @property
+    def dimension(self) -> int:
+        """The number n of coordinates."""
+        return len(self.waypoints[0])
+
+    def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
+        """Return the point at time t; see `Trajectory.sample`."""
+        out = self._output(out)
+        _evaluate(float(t), self.times, self.waypoints, self._coefficients, *out)
+        return out
+
+
+@kernel
+def _evaluate(
+    t: float,
+    times: Array,
+    waypoints: Array,
+    coefficients: Array,
+    position: Array,
+    velocity: Array,
+    acceleration: Array,
+) -> None:
+    last = times.size - 1
+    if t <= times[0] or t >= times[last]:
+        end = 0 if t <= times[0] else last
+        for j in range(position.size):
+            position[j] = waypoints[end, j]
+            velocity[j] = 0.0
+            acceleration[j] = 0.0
+        return
+    i, after = 0, last  # times[i] <= t < times[i + 1] is found by bisection
+    while after - i > 1:
+        middle = (i + after) // 2
+        if t < times[middle]:
+            after = middle
+        else:
+            i = middle
+    width = times[i + 1] - times[i]
+    u = (t - times[i]) / width
+    horner(u, width, coefficients[i], position, velocity, acceleration)

@@ -1,0 +1,49 @@
+"""Polynomials in u from 0 to 1: evaluation with rates, and the quintic through ends."""
+
+import numpy as np
+
+from hsp_control.kernels import kernel
+from hsp_control.rotations import Array
+
+# Row k gives the coefficient of u^k from (x, x', x'') at u = 0 and then at u = 1.
+QUINTIC: Array = np.array(
+    [
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.5, 0.0, 0.0, 0.0],
+        [-10.0, -6.0, -1.5, 10.0, -4.0, 0.5],
+        [15.0, 8.0, 1.5, -15.0, 7.0, -1.0],
+        [-6.0, -3.0, -0.5, 6.0, -3.0, 0.5],
+    ]
+)
+QUINTIC.setflags(write=False)
+
+
+@kernel
+def horner(
+    u: float,
+    width: float,
+    coefficients: Array,
+    position: Array,
+    velocity: Array,
+    acceleration: Array,
+) -> None:
+    """Write Σ_k c_k u^k and its two time derivatives, where u' = 1 / width.
+
+    Args:
+        u: Where in the interval, from 0 to 1.
+        width: The interval's length [s].
+        coefficients: c, shape (degree + 1, n).
+        position: The value, shape (n,).
+        velocity: Its rate, shape (n,).
+        acceleration: The rate of that, shape (n,).
+    """
+    for j in range(position.size):
+        x, x_dot, half_x_ddot = 0.0, 0.0, 0.0  # Horner's scheme, differentiated along
+        for k in range(coefficients.shape[0] - 1, -1, -1):
+            half_x_ddot = half_x_ddot * u + x_dot
+            x_dot = x_dot * u + x
+            x = x * u + coefficients[k, j]
+        position[j] = x
+        velocity[j] = x_dot / width
+        acceleration[j] = 2.0 * half_x_ddot / (width * width)

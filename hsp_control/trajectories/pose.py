@@ -1,0 +1,80 @@
+"""A body that moves and turns in time."""
+
+from abc import ABC, abstractmethod
+from typing import NamedTuple
+
+from hsp_control.exceptions import TrajectoryError
+from hsp_control.trajectories.immutable import Immutable
+from hsp_control.trajectories.orientation import (
+    OrientationSample,
+    OrientationTrajectory,
+)
+from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+
+
+class PoseSample(NamedTuple):
+    """Where a body is at one instant, and how it moves there, in the world frame."""
+
+    position: TrajectorySample
+    """The body's origin, of dimension 3 [m, m/s, m/s²]."""
+    orientation: OrientationSample
+    """Its rotation, angular velocity and angular acceleration."""
+
+    @classmethod
+    def allocate(cls) -> "PoseSample":
+        """Return a sample at the identity, to be written into."""
+        return cls(TrajectorySample.allocate(3), OrientationSample.allocate())
+
+
+class PoseTrajectory(Immutable, ABC):
+    """A body that moves and turns in time; immutable, defined at every t."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
+        """Return the pose at time t with its two derivatives.
+
+        Args:
+            t: Time [s].
+            out: Where to write; a new sample by default, which shares no memory with
+                the trajectory.
+
+        Returns:
+            ``out``, or the new sample.
+        """
+
+
+class ComposedPose(PoseTrajectory):
+    """A pose whose origin and orientation follow a trajectory each.
+
+    Attributes:
+        position: The origin's trajectory, of dimension 3 [m].
+        orientation: The orientation's trajectory.
+    """
+
+    __slots__ = ("orientation", "position")
+
+    def __init__(
+        self, position: Trajectory, orientation: OrientationTrajectory
+    ) -> None:
+        """Join the two.
+
+        Raises:
+            TrajectoryError: If ``position`` is not a trajectory in space.
+        """
+        if position.dimension != 3:
+            raise TrajectoryError(
+                f"position has dimension {position.dimension}; "
+                "the origin of a pose moves in dimension 3"
+            )
+        self.position = position
+        self.orientation = orientation
+
+    def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
+        """Return the pose at time t; see `PoseTrajectory.sample`."""
+        if out is None:
+            out = PoseSample.allocate()
+        self.position.sample(t, out.position)
+        self.orientation.sample(t, out.orientation)
+        return out

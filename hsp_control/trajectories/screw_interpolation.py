@@ -1,0 +1,120 @@
+"""From pose to pose along a screw."""
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.kernels import kernel
+from hsp_control.rotations import Array, compose_back, jlog3, log3, stumpff, turn
+from hsp_control.trajectories import checks
+from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
+from hsp_control.trajectories.timing import smooth_step
+
+
+class ScrewInterpolation(PoseTrajectory):
+    """M(t) = M0 exp6(s log6(M0⁻¹ M1)), with s the `smooth_step` from rest to rest.
+
+    The straight line of SE(3): the body turns about one fixed axis and advances along
+    it, so that its origin moves on a helix (`ComposedPose` of a `Line` and an
+    `OrientationPath` moves it straight). C², holds M0 before and M1 after.
+
+    Attributes:
+        positions: The origin at start and end, shape (2, 3) [m].
+        rotations: The orientation at start and end, shape (2, 3, 3).
+        duration: T [s].
+        start_time: When it leaves [s].
+    """
+
+    __slots__ = ("_screw", "duration", "positions", "rotations", "start_time")
+
+    def __init__(
+        self,
+        start: pin.SE3,
+        end: pin.SE3,
+        duration: float,
+        start_time: float = 0.0,
+    ) -> None:
+        """Lead from ``start`` to ``end``.
+
+        Args:
+            start: M0, body to world.
+            end: M1, body to world.
+            duration: T > 0 [s].
+            start_time: When it leaves [s].
+        """
+        self.positions = checks.array(
+            [start.translation, end.translation], "positions", (2, 3)
+        )
+        self.rotations = np.stack(
+            [
+                checks.rotation(start.rotation, "start.rotation"),
+                checks.rotation(end.rotation, "end.rotation"),
+            ]
+        )
+        self.duration = checks.positive(duration, "duration")
+        self.start_time = checks.number(start_time, "start_time")
+        self._screw = _screw(self.positions, self.rotations)
+
+    def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
+        """Return the pose at time t; see `PoseTrajectory.sample`."""
+        if out is None:
+            out = PoseSample.allocate()
+        s, s_dot, s_ddot = smooth_step(float(t), self.start_time, self.duration)
+        if 0.0 < s < 1.0:
+            p, R = self.positions[0], self.rotations[0]
+            _advance(s, s_dot, s_ddot, p, R, self._screw, *out.position, *out[1])
+        else:
+            end = int(s)
+            out.position.position[:] = self.positions[end]
+            out.orientation.rotation[:] = self.rotations[end]
+            for rate in (*out.position[1:], *out.orientation[1:]):
+                rate.fill(0.0)
+        return out
+
+
+def _screw(positions: Array, rotations: Array) -> Array:
+    """Return a, b, a x b and a (a·b): the twist of the whole way, in the world frame.
+
+    The body turns by a; b is the velocity of its origin at the start, were it to go in
+    one second: V(a) b = p1 - p0, with the left Jacobian V(y) = Jexp(-y).
+    """
+    body, R, V_inverse = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    compose_back(rotations[0], rotations[1], R)
+    log3(R, body)
+    a = rotations[0] @ body
+    jlog3(-a, V_inverse)
+    b = V_inverse @ (positions[1] - positions[0])
+    return np.stack([a, b, np.cross(a, b), a * (a @ b)])
+
+
+@kernel
+def _advance(
+    s: float,
+    s_dot: float,
+    s_ddot: float,
+    start_position: Array,
+    start_rotation: Array,
+    screw: Array,
+    position: Array,
+    velocity: Array,
+    acceleration: Array,
+    rotation: Array,
+    angular_velocity: Array,
+    angular_acceleration: Array,
+) -> None:
+    """Write the pose exp(s a) R0, p0 + V(s a) s b, and its rates.
+
+    p' = s' f and p'' = s'' f + s'² a x f with f = exp(s a) b.
+    """
+    a, b, a_cross_b, along = screw[0], screw[1], screw[2], screw[3]
+    a_squared = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+    c0, c1, c2, c3, _, _ = stumpff(s * s * a_squared)
+    turn(start_rotation, a, s, rotation)
+    for i in range(3):
+        way = s * (c1 * b[i] + s * c2 * a_cross_b[i] + s * s * c3 * along[i])
+        forward = c0 * b[i] + s * c1 * a_cross_b[i] + s * s * c2 * along[i]
+        inward = c0 * a_cross_b[i] + s * c1 * (along[i] - a_squared * b[i])  # a x f
+        position[i] = start_position[i] + way
+        velocity[i] = s_dot * forward
+        acceleration[i] = s_ddot * forward + s_dot * s_dot * inward
+        angular_velocity[i] = s_dot * a[i]
+        angular_acceleration[i] = s_ddot * a[i]

@@ -1,0 +1,60 @@
+"""A turn at constant rate."""
+
+from numpy.typing import ArrayLike
+
+from hsp_control.kernels import kernel
+from hsp_control.rotations import Array, turn
+from hsp_control.trajectories import checks
+from hsp_control.trajectories.orientation import (
+    OrientationSample,
+    OrientationTrajectory,
+)
+
+
+class Spin(OrientationTrajectory):
+    """R(t) = exp(t ω) R0 with ω = rate · axis, for all t.
+
+    Attributes:
+        rotation: R0, the orientation at t = 0, shape (3, 3).
+        axis: Unit vector in the world frame, shape (3,).
+        rate: Angular rate about it [rad/s].
+    """
+
+    __slots__ = ("_angular_velocity", "axis", "rate", "rotation")
+
+    def __init__(self, rotation: ArrayLike, axis: ArrayLike, rate: float) -> None:
+        """Turn ``rotation`` about ``axis``.
+
+        Args:
+            rotation: R0, the orientation at t = 0, shape (3, 3).
+            axis: Direction in the world frame, of any length but zero, shape (3,).
+            rate: Angular rate about it [rad/s].
+        """
+        self.rotation = checks.rotation(rotation, "rotation")
+        self.axis = checks.direction(axis, "axis")
+        self.rate = checks.number(rate, "rate")
+        self._angular_velocity = self.rate * self.axis
+
+    def sample(
+        self, t: float, out: OrientationSample | None = None
+    ) -> OrientationSample:
+        """Return the orientation at time t; see `OrientationTrajectory.sample`."""
+        if out is None:
+            out = OrientationSample.allocate()
+        _spin(float(t), self._angular_velocity, self.rotation, *out)
+        return out
+
+
+@kernel
+def _spin(
+    t: float,
+    omega: Array,
+    start: Array,
+    rotation: Array,
+    velocity: Array,
+    acceleration: Array,
+) -> None:
+    turn(start, omega, t, rotation)
+    for i in range(3):
+        velocity[i] = omega[i]
+        acceleration[i] = 0.0

@@ -1,0 +1,33 @@
+"""How far along, and how fast: the smooth step from rest to rest."""
+
+from hsp_control.kernels import kernel
+
+
+@kernel
+def smooth_step(
+    t: float, start_time: float, duration: float
+) -> tuple[float, float, float]:
+    """Return s(t) = 10 u³ - 15 u⁴ + 6 u⁵, u = (t - t0) / T, and its two rates.
+
+    It leads from 0 to 1 with zero velocity and acceleration at both ends (of all such
+    motions the one of least jerk), is exactly 0 before and exactly 1 after, hence C².
+    Its peak rates are 1.875 / T and 5.77 / T².
+
+    Args:
+        t: Time [s].
+        start_time: t0 [s].
+        duration: T > 0 [s].
+
+    Returns:
+        s [-], s' [1/s] and s'' [1/s²].
+    """
+    u = (t - start_time) / duration
+    if u <= 0.0:
+        return 0.0, 0.0, 0.0
+    if u >= 1.0:
+        return 1.0, 0.0, 0.0
+    rest = 1.0 - u
+    s = u * u * u * (10.0 + u * (6.0 * u - 15.0))
+    s_dot = 30.0 * u * u * rest * rest / duration
+    s_ddot = 60.0 * u * rest * (rest - u) / (duration * duration)
+    return s, s_dot, s_ddot
