@@ -5,6 +5,8 @@ e'' + Kv e' + Kp e = 0 exactly, and the null-space velocity converges to the pro
 of a field that may move in time.
 """
 
+from .config import Experiment as Experiment
+from .config import load_experiment as load_experiment
 from .controller import Controller as Controller
 from .controller import ControlOutput as ControlOutput
 from .controller import Diagnostics as Diagnostics

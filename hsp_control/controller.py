@@ -5,12 +5,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import ControllerError, GainError, NonFiniteError
 from hsp_control.fields import FieldSample, NullSpaceField, Rest
 from hsp_control.metrics import IdentityMetric, Metric, MetricSample
 from hsp_control.metrics.metric import VARYING
 from hsp_control.resolution import Resolution
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
 from hsp_control.tasks.gains import as_matrix
 
@@ -200,7 +201,8 @@ def _check_parts(robot: Robot, tasks: Sequence[Task], field: NullSpaceField) -> 
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise ControllerError(f"two tasks are called {twice[0]!r}; give them names")
-    for part in (*tasks, field):
+    parts: list[Task | NullSpaceField] = [*tasks, field]
+    for part in parts:
         if part.robot is not robot:
             kind = "task" if isinstance(part, Task) else "field"
             raise ControllerError(
@@ -209,9 +211,9 @@ def _check_parts(robot: Robot, tasks: Sequence[Task], field: NullSpaceField) -> 
             )
     rows = sum(task.rows for task in tasks)
     if rows > robot.nv:
-        parts = ", ".join(f"{task.name}: {task.rows}" for task in tasks)
+        each = ", ".join(f"{task.name}: {task.rows}" for task in tasks)
         raise ControllerError(
-            f"the tasks have {rows} rows ({parts}); "
+            f"the tasks have {rows} rows ({each}); "
             f"{robot.name} has only {robot.nv} freedoms"
         )
 

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.robot import Array, RobotState
+from hsp_control.arrays import Array
+from hsp_control.robot import RobotState
 
 GRADIENT_STEP = 1e-3
 """Step of `gradient` [rad or m]: its fourth-order error balances rounding, 1e-12."""
@@ -39,7 +40,7 @@ def rate_along_flow(function: Callable[[RobotState], Any], state: RobotState) ->
     The total time derivative of any function of (q, t): four evaluations.
     """
     step = RATE_STEP / max(1.0, float(np.abs(state.v).max()))
-    total = 0.0
+    total: Any = 0.0
     for factor, weight in _STENCIL:
         # A copy, because functions may return arrays of the state's own.
         value = np.array(function(state.ahead(factor * step)), dtype=float)

@@ -29,7 +29,7 @@ class GainError(HspControlError, ValueError):
 
 
 class RobotNotFoundError(HspControlError, FileNotFoundError):
-    """No bundled robot, no robot of example-robot-data and no URDF file of that name."""
+    """Neither a bundled robot, nor one of example-robot-data, nor a URDF file."""
 
 
 class ModelError(HspControlError, ValueError):

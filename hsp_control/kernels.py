@@ -1,4 +1,4 @@
-"""The compiled route: small pure functions on arrays, compiled by Numba, readable without it.
+"""The compiled route: small pure functions on arrays, which Numba compiles.
 
 A *kernel* writes its results into arrays that the caller owns, allocates nothing, and
 calls only other kernels. There is one implementation of each: with

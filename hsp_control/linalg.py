@@ -1,11 +1,9 @@
 """Small dense linear algebra as kernels: no allocation, no LAPACK call."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
-
-Array = NDArray[np.float64]
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Find a robot by name or path and parse it into a Pinocchio model, without its meshes."""
+"""Find a robot by name or path and parse it into a Pinocchio model, without meshes."""
 
 import importlib.util
 import os
@@ -105,7 +105,7 @@ def example_robots() -> dict[str, RobotSource]:
     """Return the robots of example-robot-data by name; empty if it is not installed."""
     if importlib.util.find_spec("example_robot_data") is None:
         return {}
-    from example_robot_data.robots_loader import ROBOTS  # noqa: PLC0415 (optional)
+    from example_robot_data.robots_loader import ROBOTS
 
     root = _example_robot_data_folder()
     sources = {}
@@ -214,8 +214,8 @@ def _example_robot_data_folder() -> Path:
     stands beside the ``lib`` that its Python modules are in.
     """
     spec = importlib.util.find_spec("example_robot_data")
-    assert spec is not None and spec.origin is not None  # the caller has looked
-    for parent in Path(spec.origin).parents:
+    origin = spec.origin if spec is not None else None
+    for parent in Path(origin or "").parents:
         folder = parent / "share" / "example-robot-data"
         if folder.is_dir():
             return folder
@@ -238,14 +238,16 @@ def _parse(urdf: Path, root: Root, *, mimic: bool) -> pin.Model:
         joint = _ROOT_JOINTS[root]()
         return pin.buildModelFromUrdf(str(urdf), joint, "root_joint", mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        reason = str(error).strip().splitlines()[0]
+        reason = str(error).strip().splitlines()[-1].removeprefix("hint: ")
+        if mimic and "mimic" in reason:  # Pinocchio wants the leader before it
+            reason += "; load its mimic joints as free ones: mimic=False"
         raise ModelError(f"{urdf}: not a robot that can be built: {reason}") from error
 
 
 def _refuse_malformed_xml(urdf: Path) -> None:
     """Say where the XML breaks; the parser underneath only says that it does."""
     try:
-        tree = ElementTree.parse(urdf)  # noqa: S314 (entities are refused by expat)
+        tree = ElementTree.parse(urdf)
     except ElementTree.ParseError as error:
         line, column = error.position
         raise ModelError(
@@ -253,6 +255,8 @@ def _refuse_malformed_xml(urdf: Path) -> None:
         ) from error
     except OSError as error:
         raise RobotNotFoundError(f"{urdf}: {error.strerror}") from error
+    except (LookupError, ValueError) as error:  # an encoding that nobody knows
+        raise ModelError(f"{urdf}: malformed XML: {error}") from error
     if tree.getroot().tag != "robot":
         raise ModelError(
             f"{urdf}: the top element is <{tree.getroot().tag}>, a URDF's is <robot>"
@@ -282,6 +286,7 @@ def _lock(model: pin.Model, locks: Mapping[str, float]) -> pin.Model:
             raise ModelError(
                 f"cannot lock {name!r}: it has {joint.nv} freedoms; choose root: fixed"
             )
+    _refuse_contradictory_locks(model, locks)
     ids |= {
         index
         for index, joint in enumerate(model.joints)
@@ -291,6 +296,28 @@ def _lock(model: pin.Model, locks: Mapping[str, float]) -> pin.Model:
     if len(ids) == len(names):
         raise ModelError("every joint is locked: no freedom is left to control")
     return pin.buildReducedModel(model, sorted(ids), reference)
+
+
+def _refuse_contradictory_locks(model: pin.Model, locks: Mapping[str, float]) -> None:
+    """A mimic joint is where its leader puts it: it cannot be locked elsewhere."""
+    leaders = {
+        joint.idx_q: name
+        for name, joint in zip(model.names, model.joints, strict=True)
+        if joint.nq > 0
+    }
+    for name in locks:
+        joint = model.joints[model.getJointId(name)]
+        if "Mimic" not in joint.shortname():
+            continue
+        leader, follower = leaders[joint.idx_q], joint.extract()
+        if leader not in locks:
+            raise ModelError(f"cannot lock {name!r}: it mimics {leader!r}; lock that")
+        value = follower.scaling * locks[leader] + follower.offset
+        if abs(value - locks[name]) > 1e-6:
+            raise ModelError(
+                f"cannot lock {name!r} at {locks[name]:g}: it mimics {leader!r}, "
+                f"which puts it at {value:g}"
+            )
 
 
 def _add_frame(model: pin.Model, name: str, tool: ToolFrame) -> None:
@@ -331,15 +358,16 @@ def _refuse_singular_mass_matrix(model: pin.Model, source: RobotSource) -> None:
     if values[0] > 1e-12 * values[-1]:
         return
     weakest = int(np.argmax(np.abs(vectors[:, 0])))
-    culprit = next(
-        name
+    culprit, freedoms = next(
+        (name, joint.nv)
         for name, joint in moving_joints(model).items()
         if joint.idx_v <= weakest < joint.idx_v + joint.nv
     )
+    cure = f"lock it: locked: {{{culprit}: 0.0}}" if freedoms == 1 else "root: fixed"
     raise ModelError(
         f"{source.urdf}: joint {culprit!r} moves no mass, so its acceleration is not "
         f"defined (the mass matrix is singular: {values[0]:.1e} of {values[-1]:.1e}); "
-        f"give its links an inertia, or lock it: locked: {{{culprit}: 0.0}}"
+        f"give its links an inertia, or {cure}"
     )
 
 

@@ -9,8 +9,8 @@ from typing import Any, Self
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import (
     ConfigurationError,
     FrameNotFoundError,
@@ -20,16 +20,14 @@ from hsp_control.exceptions import (
 )
 from hsp_control.kernels import kernel
 from hsp_control.loading import (
-    Root,
     RobotSource,
+    Root,
     ToolFrame,
     find_robot,
     load_model,
     moving_joints,
 )
 from hsp_control.suggest import did_you_mean, listing
-
-Array = NDArray[np.float64]
 
 
 class Robot:
@@ -308,6 +306,7 @@ class FrameKinematics:
     )
 
     def __init__(self, robot: Robot, data: pin.Data, index: int) -> None:
+        """Allocate; `RobotState.frame` fills it."""
         nv = robot.nv
         self.rotation: Array = data.oMf[index].rotation  # views: they follow the data
         self.position: Array = data.oMf[index].translation
@@ -367,10 +366,11 @@ class RobotState:
             or not _take(float(t), q, v, self.q, self.v, self._unit_blocks)
         ):
             # Off the hot path: find out what is wrong, and say it.
-            self.q[:] = robot.check_configuration(q)
-            self.v[:] = robot.check_tangent(v, "velocity v")
+            q = robot.check_configuration(q)
+            v = robot.check_tangent(v, "velocity v")
             if not np.isfinite(t):
                 raise NonFiniteError(f"time t is {t}; needs a finite number of seconds")
+            self.q[:], self.v[:] = q, v
         self.t = float(t)
         self._stamp += 1
         pin.computeJointJacobiansTimeVariation(robot.model, self.data, self.q, self.v)
@@ -420,10 +420,14 @@ class RobotState:
     def mass_matrix_rate(self) -> Array:
         """M' = C + Cᵀ along v, shape (nv, nv)."""
         if self._mass_matrix_rate_stamp != self._stamp:
-            C = pin.computeCoriolisMatrix(
-                self.robot.model, self.data, self.q, self.v
-            )
-            np.add(C, C.T, out=self._mass_matrix_rate)
+            model = self.robot.model
+            if self.robot.mimics:
+                self._mass_matrix_rate[:] = _mass_matrix_difference(
+                    model, self.q, self.v
+                )
+            else:
+                C = pin.computeCoriolisMatrix(model, self.data, self.q, self.v)
+                np.add(C, C.T, out=self._mass_matrix_rate)
             self._mass_matrix_rate_stamp = self._stamp
         return self._mass_matrix_rate
 
@@ -459,22 +463,25 @@ class RobotState:
 
 @kernel
 def _take(
-    t: float, q_in: Array, v_in: Array, q: Array, v: Array, unit_blocks: Array
+    t: float, q_in: Array, v_in: Array, q: Array, v: Array, unit_blocks: Indices
 ) -> bool:
-    """Copy q and v; return whether all is finite and each unit block is of norm 1."""
+    """Copy q and v if all is finite and each unit block is of norm 1; were they?"""
     total = t
     for i in range(q.shape[0]):
-        q[i] = q_in[i]
         total += q_in[i]
     for i in range(v.shape[0]):
-        v[i] = v_in[i]
         total += v_in[i]
     ok = np.isfinite(total)
     for k in range(unit_blocks.shape[0]):
         square = 0.0
         for i in range(unit_blocks[k, 0], unit_blocks[k, 0] + unit_blocks[k, 1]):
-            square += q[i] * q[i]
+            square += q_in[i] * q_in[i]
         ok = ok and abs(square - 1.0) < 2e-6
+    if ok:
+        for i in range(q.shape[0]):
+            q[i] = q_in[i]
+        for i in range(v.shape[0]):
+            v[i] = v_in[i]
     return bool(ok)
 
 
@@ -484,8 +491,8 @@ def _frame_kinematics(
     J_world_dot: Array,
     p: Array,
     v: Array,
-    columns: Array,
-    freedoms: Array,
+    columns: Indices,
+    freedoms: Indices,
     J: Array,
     J_dot: Array,
     velocity: Array,
@@ -533,7 +540,20 @@ def _frame_kinematics(
             drift[i] += J_dot[i, j] * v[j]
 
 
-def _support(model: pin.Model, frame: int) -> tuple[Any, Any]:
+def _mass_matrix_difference(model: pin.Model, q: Array, v: Array) -> Array:
+    """Return M' by fourth-order differences along v, good to 1e-11 of M.
+
+    For robots with mimic joints, which Pinocchio's Coriolis matrix does not know.
+    """
+    data, h = model.createData(), 1e-3 / max(1.0, float(np.abs(v).max()))
+
+    def M(s: float) -> Array:
+        return np.array(pin.crba(model, data, pin.integrate(model, q, s * v)))
+
+    return (8.0 * (M(h) - M(-h)) - (M(2.0 * h) - M(-2.0 * h))) / (12.0 * h)
+
+
+def _support(model: pin.Model, frame: int) -> tuple[Indices, Indices]:
     """Return the columns of Pinocchio's J that move a frame, and their freedoms.
 
     The two differ where joints mimic others: such a joint has a column of its own,
@@ -583,11 +603,7 @@ def _check_vector(vector: Any, size: int, what: str, robot: Robot) -> Array:
     if array.shape != (size,):
         raise ShapeError(
             f"{what} has shape {array.shape}; {robot.name} needs ({size},)"
-            + (
-                f" (nq = {robot.nq}, nv = {robot.nv})"
-                if robot.nq != robot.nv
-                else ""
-            )
+            + (f" (nq = {robot.nq}, nv = {robot.nv})" if robot.nq != robot.nv else "")
         )
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:

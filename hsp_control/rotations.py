@@ -14,12 +14,8 @@ go into ``out``, which must not share memory with a matrix argument.
 
 from math import atan2, factorial, sin, sqrt
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
-
-Array = NDArray[np.float64]
 
 _SERIES_BELOW = 10.0  # s; just above π², so that the logarithm's range has no switch
 _C4_TERMS = tuple(1.0 / factorial(4 + 2 * j) for j in reversed(range(14)))

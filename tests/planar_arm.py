@@ -39,6 +39,8 @@ CARRIED = np.array([[3.0, 2.0, 1.0], [2.0, 2.0, 1.0], [1.0, 1.0, 1.0]])
 # r3 - r2 = θ1 - 2 θ2 + θ3 for the relative angles r2 = θ2 - θ1 and r3 = θ3 - θ2.
 SPREAD = np.array([1.0, -2.0, 1.0])
 
+IDENTITY = np.eye(3)
+
 
 # --- kinematics ----------------------------------------------------------------------
 
@@ -48,7 +50,7 @@ def joint_positions(theta: Array) -> Array:
 
     p_k = Σ_{i ≤ k} (cos θ_i, sin θ_i). Joint one is the origin.
     """
-    return np.cumsum(np.stack([np.cos(theta), np.sin(theta)], axis=1), axis=0)
+    return np.array([np.cos(theta), np.sin(theta)]).T.cumsum(axis=0)
 
 
 def forward_kinematics(theta: Array) -> Array:
@@ -163,64 +165,64 @@ def disk_center(t: float) -> tuple[Array, Array]:
     return c, np.array([0.0, -0.75 * w * np.sin(w * t)])
 
 
-def disk_distance(t: float, theta: Array, link: int) -> float:
-    """Return d, from the end of link 1 or 2 (joint two or three) to the disk's centre."""
-    r = joint_positions(theta)[link - 1] - disk_center(t)[0]
-    return float(np.sqrt(r @ r))
+def disk_distances(t: float, theta: Array) -> Array:
+    """Return d2, d3: from joints two and three to the disk's centre, shape (2,)."""
+    r = joint_positions(theta)[:2] - disk_center(t)[0]
+    return np.sqrt((r**2).sum(axis=1))
 
 
-def disk_cost(t: float, theta: Array, link: int) -> float:
-    """Return f = 1/d²."""
-    return disk_distance(t, theta, link) ** -2
+def disk_cost(t: float, theta: Array) -> float:
+    """Return f = 1/d2² + 1/d3²."""
+    return float((disk_distances(t, theta) ** -2).sum())
 
 
-def disk_cost_gradient(t: float, theta: Array, link: int) -> Array:
-    """Return ∇f = -2 J_kᵀ r / d⁴ with r from the centre to the link's end."""
-    r = joint_positions(theta)[link - 1] - disk_center(t)[0]
-    J_k = columns_up_to(link, jacobian(theta))
-    return -2.0 * J_k.T @ r / (r @ r) ** 2
+def disk_cost_gradient(t: float, theta: Array) -> Array:
+    """Return ∇f = Σ -2 J_kᵀ r_k / d_k⁴ with r_k from the centre to the joint.
+
+    J_k, the Jacobian of the end of link k, is J without the columns of the links
+    beyond, so that J_kᵀ r_k fills the first k rows only.
+    """
+    J = jacobian(theta)
+    gradient = np.zeros(3)
+    for k, r in enumerate(joint_positions(theta)[:2] - disk_center(t)[0], start=1):
+        gradient[:k] -= 2.0 * (r @ J[:, :k]) / (r @ r) ** 2
+    return gradient
 
 
-def disk_cost_gradient_rate(
-    t: float, theta: Array, theta_dot: Array, link: int
-) -> Array:
-    """Return (∇f)' = -2 (J_k'ᵀ r + J_kᵀ r') / d⁴ + 8 (rᵀr') J_kᵀ r / d⁶.
+def disk_cost_gradient_rate(t: float, theta: Array, theta_dot: Array) -> Array:
+    """Return (∇f)', every factor of ∇f = Σ -2 J_kᵀ r_k / d_k⁴ differentiated in turn.
 
-    r' = J_k θ' - c': the disk's own motion, ∂∇f/∂t, comes in through c'.
+    (∇f)' = Σ -2 (J_k'ᵀ r_k + J_kᵀ r_k') / d_k⁴ + 8 (r_kᵀ r_k') J_kᵀ r_k / d_k⁶.
+    r_k' = J_k θ' - c': the disk's own motion, ∂∇f/∂t, comes in through c'.
     """
     c, c_dot = disk_center(t)
-    J_k = columns_up_to(link, jacobian(theta))
-    J_k_dot = columns_up_to(link, jacobian_rate(theta, theta_dot))
-    r = joint_positions(theta)[link - 1] - c
-    r_dot = J_k @ theta_dot - c_dot
-    square = r @ r
-    turning = -2.0 * (J_k_dot.T @ r + J_k.T @ r_dot) / square**2
-    return turning + 8.0 * (r @ r_dot) * (J_k.T @ r) / square**3
-
-
-def columns_up_to(link: int, J: Array) -> Array:
-    """Return J with zeros in the columns of the links beyond: they move no point here."""
-    return J * (np.arange(1, 4) <= link)
+    J, J_dot = jacobian(theta), jacobian_rate(theta, theta_dot)
+    rate = np.zeros(3)
+    for k, r in enumerate(joint_positions(theta)[:2] - c, start=1):
+        J_k, J_k_dot = J[:, :k], J_dot[:, :k]
+        r_dot = J_k @ theta_dot[:k] - c_dot
+        square = r @ r
+        rate[:k] -= 2.0 * (r @ J_k_dot + r_dot @ J_k) / square**2
+        rate[:k] += 8.0 * (r @ r_dot) * (r @ J_k) / square**3
+    return rate
 
 
 def cost(number: int, t: float, theta: Array) -> float:
     """Return the cost f of simulation (1) to (4); zero in the first two."""
     if number <= 2:
         return 0.0
-    f = equal_angles(theta)
-    if number == 4:
-        f += disk_cost(t, theta, 1) + disk_cost(t, theta, 2)
-    return f
+    if number == 3:
+        return equal_angles(theta)
+    return equal_angles(theta) + disk_cost(t, theta)
 
 
 def cost_gradient(number: int, t: float, theta: Array) -> Array:
     """Return ∇f, the partial derivative at fixed t."""
     if number <= 2:
         return np.zeros(3)
-    gradient = equal_angles_gradient(theta)
-    if number == 4:
-        gradient += disk_cost_gradient(t, theta, 1) + disk_cost_gradient(t, theta, 2)
-    return gradient
+    if number == 3:
+        return equal_angles_gradient(theta)
+    return equal_angles_gradient(theta) + disk_cost_gradient(t, theta)
 
 
 def cost_gradient_rate(number: int, t: float, theta: Array, theta_dot: Array) -> Array:
@@ -228,10 +230,9 @@ def cost_gradient_rate(number: int, t: float, theta: Array, theta_dot: Array) ->
     if number <= 2:
         return np.zeros(3)
     rate = equal_angles_gradient_rate(theta_dot)
-    if number == 4:
-        rate += disk_cost_gradient_rate(t, theta, theta_dot, 1)
-        rate += disk_cost_gradient_rate(t, theta, theta_dot, 2)
-    return rate
+    if number == 3:
+        return rate
+    return rate + disk_cost_gradient_rate(t, theta, theta_dot)
 
 
 # --- the law, as printed -------------------------------------------------------------
@@ -259,29 +260,28 @@ class PaperLaw(NamedTuple):
     gram_determinant: float
 
 
-def null_space_error(J: Array, g: Array, v: Array) -> Array:
-    """Return e_N = (I - J⁺J)(g - v)."""
-    J_plus = pseudo_inverse(J)
-    return (np.eye(3) - J_plus @ J) @ (g - v)
-
-
-def null_space_acceleration(
+def null_space_law(
     J: Array, J_dot: Array, g: Array, g_dot: Array, v: Array
-) -> Array:
-    """Return φ_N = (I - J⁺J)(g' + K_N e_N) - (J⁺J'J⁺ + (J⁺)') J (g - v), eq. (13)."""
+) -> tuple[Array, Array]:
+    """Return φ_N and e_N = (I - J⁺J)(g - v).
+
+    φ_N = (I - J⁺J)(g' + K_N e_N) - (J⁺J'J⁺ + (J⁺)') J (g - v), eq. (13).
+    """
     K_N = NULL_SPACE_GAIN
-    J_plus = pseudo_inverse(J)
-    J_plus_dot = pseudo_inverse_rate(J, J_dot)
-    e_N = null_space_error(J, g, v)
-    P = np.eye(3) - J_plus @ J
+    J_plus, J_plus_dot = pseudo_inverse(J), pseudo_inverse_rate(J, J_dot)
+    P = IDENTITY - J_plus @ J
+    e_N = P @ (g - v)
     turning = (J_plus @ J_dot @ J_plus + J_plus_dot) @ J
-    return P @ (g_dot + K_N * e_N) - turning @ (g - v)
+    phi_N = P @ (g_dot + K_N * e_N) - turning @ (g - v)
+    return phi_N, e_N
 
 
 def law(
     t: float, theta: Array, theta_dot: Array, field: tuple[Array, Array] | None
 ) -> PaperLaw:
-    """Return τ = M [J⁺(x_d'' + K_v e' + K_p e - J'v) + φ_N] + N, eq. (7), on the circle.
+    """Return τ = M [J⁺(x_d'' + K_v e' + K_p e - J'v) + φ_N] + N, eq. (7).
+
+    The task is the circle.
 
     Args:
         t: Time [s].
@@ -299,20 +299,20 @@ def law(
     e = x_d - forward_kinematics(theta)
     e_dot = x_d_dot - J @ v
 
-    g, phi_N = np.zeros(3), np.zeros(3)
-    if field is not None:
-        g, g_dot = field
-        phi_N = null_space_acceleration(J, J_dot, g, g_dot, v)
+    J_plus = pseudo_inverse(J)
+    if field is None:
+        phi_N, e_N = np.zeros(3), (IDENTITY - J_plus @ J) @ -v
+    else:
+        phi_N, e_N = null_space_law(J, J_dot, *field, v)
 
-    task = pseudo_inverse(J) @ (x_d_ddot + K_v * e_dot + K_p * e - J_dot @ v)
-    acceleration = task + phi_N
+    acceleration = J_plus @ (x_d_ddot + K_v * e_dot + K_p * e - J_dot @ v) + phi_N
     return PaperLaw(
         tau=mass_matrix(theta) @ acceleration + nonlinear_effects(theta, v),
         acceleration=acceleration,
         null_space_acceleration=phi_N,
         task_error=e,
         task_error_rate=e_dot,
-        null_space_error=null_space_error(J, g, v),
+        null_space_error=e_N,
         gram_determinant=gram_determinant(J),
     )
 
@@ -386,8 +386,9 @@ def simulate_paper(
 
     The law is evaluated inside the integrator's stages. Against runs whose steps end
     on every grid point (rtol 2e-14) the angles of (2) to (4) are good to 1e-12 and the
-    rates to 2e-11, in (2) to 4e-10 where it grazes a singularity at 3.14 s. Those of
-    (1) grow apart tenfold a second: 1e-13 at 2 s, 1e-10 at 5 s, 1e-3 at 10 s.
+    rates to 2e-11, in (2) to 4e-10 where it grazes a singularity at 3.14 s. The angles
+    of (1) lose a digit a second: they are good to 1e-13 at 2 s, 1e-10 at 5 s, 1e-3 at
+    10 s, and a second implementation should be held to them for 2 s only.
 
     Args:
         number: Which of the four.
@@ -435,8 +436,8 @@ def _simulate(
         # The plant's answer to τ, not the command it should equal.
         theta_ddot=np.array(
             [
-                forward_dynamics(th, v, row.tau)
-                for (_, th, v), row in zip(states, laws, strict=True)
+                forward_dynamics(*state[1:], row.tau)
+                for state, row in zip(states, laws, strict=True)
             ]
         ),
         tau=np.array([row.tau for row in laws]),
@@ -444,7 +445,7 @@ def _simulate(
         task_error=np.array([row.task_error for row in laws]),
         null_space_error=np.array([row.null_space_error for row in laws]),
         disk_distance=np.array(
-            [min(disk_distance(s, th, 1), disk_distance(s, th, 2)) for s, th, _ in states]
+            [disk_distances(s, theta_row).min() for s, theta_row, _ in states]
         ),
     )
     # One cached result serves many tests: none may change it for the others.

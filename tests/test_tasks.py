@@ -86,10 +86,11 @@ class Motion:
     q: Array
     v: Array
     a: Array
+    stride: float = 0.03
 
     def __post_init__(self) -> None:
         speed = max(1.0, np.abs(self.v).max(), np.sqrt(np.abs(self.a).max()))
-        self.step = 0.03 / speed
+        self.step = self.stride / speed
         self._data = self.robot.model.createData()
 
     def configuration(self, s: float) -> Array:
@@ -168,6 +169,7 @@ class Family:
     """How to build a kind of task with a known error, and to measure it without it."""
 
     largest = 3.0  # rad or m
+    stride = 0.03  # of differences in the error, as a part of the motion's time scale
     rows: int
 
     def build(
@@ -291,6 +293,7 @@ class Direction(Family):
     motion_of_reference: str
     rows = 2
     largest = 2.5
+    stride = 0.01  # the coordinates end at pi
 
     def build(
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
@@ -397,7 +400,7 @@ class Posture(Family):
 
 def single_joints(robot: Robot) -> list[str]:
     """Return the joints of one freedom."""
-    joints = zip(robot.model.names, robot.model.joints, strict=True)
+    joints = list(zip(robot.model.names, robot.model.joints, strict=True))[1:]
     return [name for name, joint in joints if joint.nv == 1]
 
 
@@ -516,7 +519,7 @@ def place(case: Case, seed: int) -> Motion:
 def test_the_rows_move_as_the_robot_does(case: Case) -> None:
     """J v and J' are the rates of the rows' coordinates and of J itself.
 
-    Coordinates of size 1 and a step of 0.02 s give 1e-14/0.02; pin.log3 adds some.
+    Differences of eighth order leave 1e-11 here, most of it truncation.
     """
     for seed in (1, 2):
         motion = place(case, seed)
@@ -526,14 +529,14 @@ def test_the_rows_move_as_the_robot_does(case: Case) -> None:
         sample = task.evaluate(state)
         assert sample.jacobian.shape == (task.rows, robot.nv)
         rate = motion.derivative(case.family.coordinates(task, motion))
-        np.testing.assert_allclose(sample.jacobian @ motion.v, rate, rtol=0, atol=2e-11)
+        np.testing.assert_allclose(sample.jacobian @ motion.v, rate, rtol=0, atol=1e-10)
 
         def jacobian(s: float, motion: Motion = motion, task: Task = task) -> Array:
             q = motion.configuration(s)
             return task.evaluate(motion.robot.state(TIME + s, q, motion.v)).jacobian
 
         np.testing.assert_allclose(
-            sample.jacobian_dot, motion.derivative(jacobian), rtol=0, atol=2e-11
+            sample.jacobian_dot, motion.derivative(jacobian), rtol=0, atol=1e-10
         )
 
 
@@ -573,7 +576,8 @@ def test_the_law_of_the_error(case: Case, part: float, gains: str) -> None:
     """With J a + J'v = a_x the reported error obeys e'' + Kv e' + Kp e = 0.
 
     At errors up to 3 rad or m (2.5 rad for pointing), in motion, with any motion in
-    the null space. Second differences leave 1e-15/h² of e, 1e-8 of Kp e or less.
+    the null space. What is left, 5e-10 of e, is the rounding of second differences
+    (1e-16/h² with h = 0.5 to 10 ms) and 1e-11 of what Kp e alone amounts to.
     """
     seed = 11
     motion = place(case, seed)
@@ -591,7 +595,7 @@ def test_the_law_of_the_error(case: Case, part: float, gains: str) -> None:
     inverse = np.linalg.pinv(J)
     a = rng.normal(size=robot.nv)
     a += inverse @ (wanted - sample.jacobian_dot @ motion.v - J @ a)
-    motion = Motion(robot, motion.q, motion.v, a)
+    motion = Motion(robot, motion.q, motion.v, a, case.family.stride)
 
     def reported(s: float) -> Array:
         # The error is a function of (t, q): any velocity will do.
@@ -602,9 +606,9 @@ def test_the_law_of_the_error(case: Case, part: float, gains: str) -> None:
     e_dot = motion.derivative(reported)
     e_ddot = motion.derivative(reported, SECOND)
     size = 1.0 + np.abs(e_dot).max() + np.abs(e).max()
-    np.testing.assert_allclose(sample.error_rate, e_dot, rtol=0, atol=1e-10 * size)
+    np.testing.assert_allclose(sample.error_rate, e_dot, rtol=0, atol=3e-10 * size)
     np.testing.assert_allclose(
-        e_ddot, -Kv @ e_dot - Kp @ e, rtol=0, atol=2e-8 * 25.0 * size
+        e_ddot, -Kv @ e_dot - Kp @ e, rtol=0, atol=5e-9 * size
     )
 
 
@@ -631,7 +635,7 @@ def test_reference_rate_is_the_motion_of_who_stays_on_the_reference(case: Case) 
     moving = getattr(case.family, "moves", True) and (
         getattr(case.family, "motion_of_reference", "") not in {"still", "spinning"}
     )
-    assert (np.linalg.norm(rate) > 0.05) == moving
+    assert (np.linalg.norm(rate) > 0.01) == moving
 
 
 @every_task
@@ -762,9 +766,9 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
         r"no frame 'panda_tpc'; did you mean 'panda_tcp'\?",
     ),
     "frame of an orientation": (
-        lambda: FrameOrientation(panda(), "hand_of_panda", HOLD, GAINS),
+        lambda: FrameOrientation(panda(), "hand", HOLD, GAINS),
         FrameNotFoundError,
-        r"no frame 'hand_of_panda'; did you mean",
+        r"^no frame 'hand'; did you mean 'panda_hand'\?",
     ),
     "frame of a pose": (
         lambda: pose(panda(), "nowhere"),

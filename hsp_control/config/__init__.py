@@ -1,1 +1,6 @@
-"""Configurations: from a YAML text to a checked scenario, with errors that help."""
+"""Configurations: from a YAML text to a ready experiment, with errors that help."""
+
+from .experiment import Experiment as Experiment
+from .experiment import load_experiment as load_experiment
+from .scenario import Scenario as Scenario
+from .scenario import json_schema as json_schema

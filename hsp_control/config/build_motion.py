@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
+from hsp_control.arrays import Array
 from hsp_control.config import scenario as s
 from hsp_control.exceptions import TrajectoryError
-from hsp_control.robot import Array
 from hsp_control.trajectories import (
     Circle,
     ComposedPose,

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from hsp_control.arrays import Array
 from hsp_control.config import scenario as s
 from hsp_control.config.build_motion import (
     orientation_trajectory,
@@ -37,7 +38,7 @@ from hsp_control.metrics import (
     MassMatrixMetric,
     Metric,
 )
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Scene
 from hsp_control.tasks import (
     FrameOrientation,
@@ -111,7 +112,8 @@ def build_start(document: Document, model: s.StartModel, robot: Robot) -> Array:
                     f"{robot.name} has no joint coordinates of its own; use joints"
                 )
             theta = robot.check_tangent(model.coordinates, "coordinates")
-            return robot.integrate(robot.neutral(), np.linalg.solve(A, theta))
+            joints = np.asarray(np.linalg.solve(A, theta))
+            return robot.integrate(robot.neutral(), joints)
         if isinstance(model.joints, dict):
             return _moved_joints(document, robot, model.joints)
         if model.joints is not None:

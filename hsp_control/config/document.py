@@ -13,7 +13,7 @@ from hsp_control.config.overrides import assign
 from hsp_control.config.plain import shortened, shown
 from hsp_control.config.reading import MAX_SIZE, Mark, YamlError, read_yaml
 from hsp_control.exceptions import ConfigError, HspControlError
-from hsp_control.suggest import did_you_mean
+from hsp_control.suggest import nearest
 
 _TOO_LARGE = f"larger than {MAX_SIZE // 1_000_000} MB, too much for a configuration"
 
@@ -164,6 +164,9 @@ def _why_unreadable(name: str, error: OSError | ValueError) -> str:
     if isinstance(error, IsADirectoryError):
         return "is a folder; name a file in it"
     if isinstance(error, FileNotFoundError):
-        near = [file.name for file in Path(name).parent.glob("*.yaml")]
-        return f"no such file{did_you_mean(Path(name).name, near)}"
+        files = {file.stem: file.name for file in Path(name).parent.glob("*.yaml")}
+        near = nearest(Path(name).stem, files)
+        return (
+            f"no such file; did you mean {files[near]!r}?" if near else "no such file"
+        )
     return f"cannot be read: {getattr(error, 'strerror', None) or error}"

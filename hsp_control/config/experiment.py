@@ -6,6 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from hsp_control.arrays import Array
 from hsp_control.config.build_motion import position_trajectory
 from hsp_control.config.build_parts import (
     build_fields,
@@ -20,7 +21,7 @@ from hsp_control.config.validation import validate
 from hsp_control.controller import Controller
 from hsp_control.exceptions import ConfigError, SimulationError
 from hsp_control.resources import bundled_configs
-from hsp_control.robot import Array, Robot
+from hsp_control.robot import Robot
 from hsp_control.scene import Obstacle, Scene
 from hsp_control.simulation import (
     Dop853,
@@ -143,8 +144,7 @@ def build(document: Document) -> Experiment:
     scene = Scene(obstacles)
 
     tasks = [
-        build_task(document, name, task, start)
-        for name, task in scenario.tasks.items()
+        build_task(document, name, task, start) for name, task in scenario.tasks.items()
     ]
     metric = build_metric(document, scenario.null_space.metric, robot)
     field = build_fields(document, scenario.null_space.fields, start, scene)
@@ -188,6 +188,8 @@ def _integrator(document: Document, scenario: Scenario) -> Integrator:
             raise SimulationError(
                 f"{model.step:g} s is not an integer fraction of {period} = {whole:g} s"
             )
-    return Rk4(model.step) if isinstance(model, Rk4Model) else SemiImplicitEuler(
-        model.step
+    return (
+        Rk4(model.step)
+        if isinstance(model, Rk4Model)
+        else SemiImplicitEuler(model.step)
     )

@@ -77,14 +77,15 @@ def findings(
 
 def _here(path: KeyPath, expected: Shape, error: ErrorDetails) -> Finding:
     """Return the finding for an error of the value at ``path`` itself."""
-    kind, value, key = error["type"], error["input"], expected.discriminator
+    kind, value = error["type"], error["input"]
     if kind.endswith(("_type", "_parsing", "_from_float")):
         kind = "mismatch"
-    elif kind == "union_tag_invalid" and key is not None:
-        path, value = (*path, key), error["ctx"]["tag"]
-    elif kind == "union_tag_not_found" and key is not None:
-        known = keys(expected)
-        if misspelt := nearest(key, [name for name in value if name not in known]):
+    tag = expected.discriminator
+    if tag is not None and isinstance(value, dict):
+        unknown = [name for name in value if name not in keys(expected)]
+        if kind == "union_tag_invalid":
+            path, value = (*path, tag), value[tag]
+        elif kind == "union_tag_not_found" and (misspelt := nearest(tag, unknown)):
             path, kind, value = (*path, misspelt), "extra_forbidden", misspelt
     return Finding(path, kind, value, expected, error)
 

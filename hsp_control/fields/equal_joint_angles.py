@@ -1,12 +1,14 @@
 """The paper's posture cost: neighbouring joints bend by the same angle."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.cost import Cost
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 
 
 class EqualJointAngles(Cost):
@@ -49,9 +51,7 @@ class EqualJointAngles(Cost):
         indices = [where.start for where in slices]
         # d = D q, one row for each pair of neighbours.
         self._D = np.zeros((len(joints) - 1, robot.nv))
-        for row, (first, second) in enumerate(
-            zip(indices[:-1], indices[1:], strict=True)
-        ):
+        for row, (first, second) in enumerate(pairwise(indices)):
             self._D[row, first], self._D[row, second] = -1.0, 1.0
         self.weight = float(weight)
 

@@ -1,4 +1,4 @@
-"""What a null-space field is: a joint velocity g(q, t) that self-motion converges to."""
+"""What a null-space field is: a joint velocity g(q, t) for self-motion to reach."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import FieldError
 from hsp_control.metrics import MetricSample
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 
 
 class FieldSample(NamedTuple):
@@ -104,7 +105,7 @@ class WeightedSum(NullSpaceField):
         if any(field.robot is not robot for _, field in flat):
             raise FieldError("the fields of a sum belong to different robots")
         super().__init__(robot, " + ".join(field.name for _, field in flat))
-        self.terms = tuple(flat)
+        self.terms: tuple[tuple[float, NullSpaceField], ...] = tuple(flat)
         self._term = FieldSample.allocate(robot.nv)
 
     def evaluate(

@@ -4,9 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.cost import Cost
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 
 
 class JointCentering(Cost):

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.cost import Cost
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle
 from hsp_control.trajectories import TrajectorySample
 

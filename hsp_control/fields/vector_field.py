@@ -5,11 +5,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.differences import rate_along_flow
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.field import FieldSample, NullSpaceField
 from hsp_control.metrics import MetricSample
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 
 
 class VectorField(NullSpaceField):

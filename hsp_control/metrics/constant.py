@@ -5,8 +5,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from hsp_control.exceptions import MetricError
-from hsp_control.robot import RobotState
 from hsp_control.metrics.metric import CONSTANT, Metric, MetricSample
+from hsp_control.robot import RobotState
 
 
 class ConstantMetric(Metric):
@@ -30,21 +30,20 @@ class ConstantMetric(Metric):
         matrix = np.asarray(W, dtype=float)
         if matrix.ndim == 1:
             matrix = np.diag(matrix)
-        if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
             raise MetricError(f"metric has shape {matrix.shape}; needs (nv, nv)")
         if not np.isfinite(matrix).all():
             raise MetricError("metric holds a NaN or an infinity")
         if np.abs(matrix - matrix.T).max() > 1e-12 * np.abs(matrix).max():
             raise MetricError("metric is not symmetric")
-        try:
-            factor = np.linalg.cholesky(matrix)
-        except np.linalg.LinAlgError:
-            least = float(np.linalg.eigvalsh(matrix)[0])
+        values = np.linalg.eigvalsh(matrix)
+        if values[0] <= 1e-12 * values[-1]:  # rounding lifts a 0 to about 1e-16
             raise MetricError(
-                f"metric is not positive definite: its least eigenvalue is {least:.3g}"
-            ) from None
+                "metric is not positive definite: its least eigenvalue is "
+                f"{values[0]:.3g}, its largest {values[-1]:.3g}"
+            )
         self.W = matrix.copy()
-        self._factor = factor
+        self._factor = np.linalg.cholesky(matrix)
 
     @classmethod
     def from_coordinates(cls, A: Any) -> Self:

@@ -2,8 +2,8 @@
 
 from typing import ClassVar
 
-from hsp_control.robot import RobotState
 from hsp_control.metrics.metric import IDENTITY, Metric, MetricSample
+from hsp_control.robot import RobotState
 
 
 class IdentityMetric(Metric):

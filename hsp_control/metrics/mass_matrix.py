@@ -4,8 +4,8 @@ from typing import ClassVar
 
 from hsp_control.exceptions import MetricError
 from hsp_control.linalg import cholesky
-from hsp_control.robot import RobotState
 from hsp_control.metrics.metric import VARYING, Metric, MetricSample
+from hsp_control.robot import RobotState
 
 
 class MassMatrixMetric(Metric):

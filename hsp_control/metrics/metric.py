@@ -5,9 +5,10 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
 from hsp_control.linalg import solve_lower, solve_lower_transposed
-from hsp_control.robot import Array, RobotState
+from hsp_control.robot import RobotState
 
 IDENTITY, CONSTANT, VARYING = 0, 1, 2
 """How much work a metric asks for: no solve; solves; solves and terms in W'."""

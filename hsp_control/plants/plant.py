@@ -2,7 +2,8 @@
 
 from typing import Protocol
 
-from hsp_control.robot import Array, Robot
+from hsp_control.arrays import Array
+from hsp_control.robot import Robot
 
 
 class Plant(Protocol):

@@ -1,6 +1,7 @@
 """The ideal plant: rigid bodies without friction, by the articulated-body algorithm."""
 
-from hsp_control.robot import Array, Robot
+from hsp_control.arrays import Array
+from hsp_control.robot import Robot
 
 
 class RigidBodyPlant:

@@ -9,7 +9,6 @@ from typing import Any
 
 import matplotlib as mpl
 from cycler import cycler
-from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -92,40 +91,3 @@ def new_figure(width: float, height: float) -> StyledFigure:
     figure = StyledFigure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
-
-
-def legend_below(axes: Axes, columns: int | None = None) -> None:
-    """Put the legend under the axes, where it hides nothing.
-
-    Args:
-        axes: Axes whose artists have labels; without any, nothing happens.
-        columns: Entries in a row; None: as many as fit beside each other.
-    """
-    handles, labels = axes.get_legend_handles_labels()
-    if not handles:
-        return
-    if columns is None:
-        columns = _fitting(axes, labels)
-    offset = 0.0 if not axes.axison else -34.0 / _points(axes)[1]
-    axes.legend(
-        handles,
-        labels,
-        loc="upper left",
-        bbox_to_anchor=(0.0, min(offset, -0.02)),
-        ncols=columns,
-    )
-
-
-def note(axes: Axes, text: str) -> None:
-    """Add a remark to the legend to be."""
-    axes.plot([], [], linestyle="none", label=plain(text))
-
-
-def plain(name: str) -> str:
-    """Return a name from the log such that matplotlib shows it as it is.
-
-    It would read dollar signs as formulas, and leave names that begin with an underscore
-    out of legends.
-    """
-    shown = name.replace("$", r"\$")
-    return f" {shown}" if shown.startswith("_") else shown

@@ -9,8 +9,9 @@ With W = I, P u is equation (13), since J⁺J'J⁺ + (J⁺)' = P J'ᵀ(JJᵀ)⁻
 a pseudo-inverse is needed. ``law.md`` §2 has the proof for every metric.
 """
 
+from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
-from hsp_control.linalg import Array, multiply, multiply_transposed
+from hsp_control.linalg import multiply, multiply_transposed
 from hsp_control.metrics.metric import IDENTITY, VARYING, raise_covector
 
 

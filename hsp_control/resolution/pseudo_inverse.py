@@ -4,9 +4,9 @@ Written for the whitened Jacobian B = L⁻¹Jᵀ with W = L Lᵀ, in which every
 the Euclidean one: J# = L⁻ᵀ B q(BᵀB), where q inverts the spectrum.
 """
 
+from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
 from hsp_control.linalg import (
-    Array,
     invert_upper,
     orthogonalise_columns,
     orthonormalise,

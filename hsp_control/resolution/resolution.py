@@ -4,9 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.fields import FieldSample
 from hsp_control.kernels import kernel
-from hsp_control.linalg import Array, orthogonalise_columns
+from hsp_control.linalg import orthogonalise_columns
 from hsp_control.metrics import MetricSample
 from hsp_control.resolution.law import acceleration, null_space_command
 from hsp_control.resolution.pseudo_inverse import weighted_pseudo_inverse

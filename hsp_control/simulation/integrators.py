@@ -11,14 +11,15 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import DOP853
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import SimulationError
-from hsp_control.robot import Array, Robot
+from hsp_control.robot import Robot
 
 Dynamics = Callable[[float, Array, Array], Array]
 """(t, q, v) ↦ v'."""
 
 CHART_RADIUS = 1.0
-"""How far a root may turn [rad] before its chart is laid anew (it is singular at 2π)."""
+"""How far a root may turn [rad] before its chart is laid anew (singular at 2π)."""
 
 
 class Chart:
@@ -44,6 +45,10 @@ class Chart:
             self.robot.model, self.base, delta, pin.ArgumentPosition.ARG1
         )
         return np.concatenate([np.linalg.solve(J_r, v), a])
+
+    def equation(self, dynamics: Dynamics) -> Callable[[float, Array], Array]:
+        """Return the ordinary differential equation (t, y) ↦ y'."""
+        return lambda t, y: self.rate(y, dynamics(t, *self.point(y)))
 
     def worn(self, y: Array) -> bool:
         """Return whether the chart should be laid anew."""
@@ -82,10 +87,7 @@ class Rk4:
         self, robot: Robot, dynamics: Dynamics, t: float, h: float, q: Array, v: Array
     ) -> tuple[Array, Array]:
         chart = Chart(robot, q)
-
-        def slope(t: float, y: Array) -> Array:
-            return chart.rate(y, dynamics(t, *chart.point(y)))
-
+        slope = chart.equation(dynamics)
         y = np.concatenate([np.zeros(robot.nv), v])
         k1 = slope(t, y)
         k2 = slope(t + h / 2, y + h / 2 * k1)
@@ -134,7 +136,7 @@ class Dop853:
         while t < end:
             chart = Chart(robot, q)
             solver = DOP853(
-                lambda s, y, chart=chart: chart.rate(y, dynamics(s, *chart.point(y))),
+                chart.equation(dynamics),
                 t,
                 np.concatenate([np.zeros(robot.nv), v]),
                 end,
@@ -144,7 +146,7 @@ class Dop853:
             )
             while solver.status == "running":
                 message = solver.step()
-                if solver.status == "failed":
+                if message is not None:
                     raise SimulationError(
                         f"the integrator gave up at t = {solver.t:.6g} s: {message}"
                     )

@@ -5,10 +5,10 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
+from hsp_control.arrays import Array
 from hsp_control.controller import Controller, ControlOutput
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Scene
 from hsp_control.simulation.rollout import FORMAT, Rollout
 from hsp_control.trajectories import TrajectorySample
@@ -124,7 +124,9 @@ class Recorder:
                 "controls_null_space": controller.field.controls,
                 "null_space_gain": controller.null_space_gain.tolist(),
                 "metric": type(controller.metric).__name__,
-                "obstacles": {o.name: {"radius": o.radius} for o in self._scene.values()},
+                "obstacles": {
+                    o.name: {"radius": o.radius} for o in self._scene.values()
+                },
                 "versions": versions(),
                 **meta,
             },

@@ -1,7 +1,6 @@
 """A rollout: what happened, as named columns that describe themselves, and its file."""
 
 import json
-import os
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,8 +8,8 @@ from typing import Any, Self
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import LogError
-from hsp_control.robot import Array
 from hsp_control.suggest import did_you_mean, listing
 
 FORMAT = "hsp_control rollout 1"
@@ -94,10 +93,8 @@ class Rollout:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with part.open("wb") as file:
-                np.savez_compressed(
-                    file, allow_pickle=False, meta=meta, **self.columns
-                )
-            os.replace(part, path)
+                np.savez_compressed(file, allow_pickle=False, meta=meta, **self.columns)
+            part.replace(path)
         except OSError as error:
             part.unlink(missing_ok=True)
             reason = error.strerror or str(error)
@@ -146,7 +143,9 @@ def _checked(
         raise LogError(f"{path}: its entry 'meta' is not JSON: {error}") from error
     if not isinstance(meta, dict) or meta.get("format") != FORMAT:
         found = meta.get("format") if isinstance(meta, dict) else meta
-        raise LogError(f"{path}: its format is {found!r}; this version reads {FORMAT!r}")
+        raise LogError(
+            f"{path}: its format is {found!r}; this version reads {FORMAT!r}"
+        )
     missing = [name for name in _REQUIRED if name not in columns]
     if missing:
         raise LogError(f"{path}: the log lacks the column {missing[0]!r}")

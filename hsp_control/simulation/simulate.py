@@ -1,14 +1,16 @@
 """Close the loop: controller, plant and integrator, from a start to a rollout."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.controller import Controller
 from hsp_control.exceptions import HspControlError, SimulationError
 from hsp_control.plants import Plant, RigidBodyPlant
-from hsp_control.robot import Array, RobotState
+from hsp_control.robot import RobotState
 from hsp_control.scene import Scene
 from hsp_control.simulation.integrators import Dop853, Integrator
 from hsp_control.simulation.recorder import Recorder
@@ -95,14 +97,8 @@ def simulate(
                 q, v = integrator.advance(robot, feedback, t, end, q, v)
             for begin, stop in intervals(t, end):
                 held = controller.compute(state.update(begin, q, v)).tau.copy()
-                q, v = integrator.advance(
-                    robot,
-                    lambda s, q, v, held=held: plant.acceleration(s, q, v, held),
-                    begin,
-                    stop,
-                    q,
-                    v,
-                )
+                free = partial(_under, plant, held)
+                q, v = integrator.advance(robot, free, begin, stop, q, v)
             _stop_runaway(end, q, v)
     except KeyboardInterrupt:
         status, message = "interrupted", "stopped by the user"
@@ -111,6 +107,10 @@ def simulate(
         failure.rollout = recorder.rollout("diverged", str(error), **(meta or {}))
         raise failure from error
     return recorder.rollout(status, message, **(meta or {}))
+
+
+def _under(plant: Plant, tau: Array, t: float, q: Array, v: Array) -> Array:
+    return plant.acceleration(t, q, v, tau)
 
 
 def _stop_runaway(t: float, q: Array, v: Array) -> None:

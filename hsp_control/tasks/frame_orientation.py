@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
 from hsp_control.linalg import multiply
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.rotations import (
     compose_back,
     cross,

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.rotations import quaternion_from_rotation
 from hsp_control.tasks.frame_orientation import (
     orientation_acceleration,
@@ -82,7 +83,10 @@ class FramePose(Task):
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' and w_d [m/s, rad/s]."""
         sample = self.trajectory.sample(state.t)
-        velocity, turning = sample.position.velocity, sample.orientation.angular_velocity
+        velocity, turning = (
+            sample.position.velocity,
+            sample.orientation.angular_velocity,
+        )
         return np.concatenate([velocity, turning])
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import TaskError
 from hsp_control.kernels import kernel
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import Task, TaskSample, track
 from hsp_control.trajectories import Trajectory, TrajectorySample
@@ -92,7 +93,7 @@ class FramePosition(Task):
 
 @kernel
 def _frame_position(
-    axes: Array,
+    axes: Indices,
     J_frame: Array,
     J_frame_dot: Array,
     position: Array,

@@ -4,8 +4,8 @@ from typing import Any, Self
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import GainError
-from hsp_control.robot import Array
 
 
 class Gains:
@@ -92,6 +92,8 @@ def _gain(value: Any, name: str) -> Array:
         raise GainError(
             f"{name} is {value!r}; needs numbers, a list or a matrix"
         ) from None
+    if gain.size == 0:
+        raise GainError(f"{name} is empty; needs numbers")
     if gain.ndim > 2 or (gain.ndim == 2 and gain.shape[0] != gain.shape[1]):
         raise GainError(f"{name} has shape {gain.shape}; a matrix gain is square")
     if not np.isfinite(gain).all():

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import TaskError
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import Task, TaskSample, track
 from hsp_control.trajectories import Trajectory, TrajectorySample
@@ -44,15 +45,19 @@ class JointPosture(Task):
 
         Raises:
             JointNotFoundError: If a joint does not exist.
-            TaskError: If a joint has several freedoms (a root: give it a pose task),
-                or the displacement has another dimension.
+            TaskError: If no joint is named, one twice, or one that has several freedoms
+                (a root: give it a pose task), or the displacement has another dimension.
             ShapeError: If the reference has the wrong shape.
         """
         self._reference = robot.check_configuration(reference).copy()
         indices = []
         if joints is None:
             joints = [name for name, joint in robot.joints.items() if joint.nv == 1]
-        for joint in joints:
+        if not joints:
+            raise TaskError(f"task {name!r} names no joint")
+        for k, joint in enumerate(joints):
+            if joint in joints[:k]:
+                raise TaskError(f"task {name!r} names joint {joint!r} twice")
             where = robot.velocity_index(joint)
             if where.stop - where.start != 1:
                 raise TaskError(

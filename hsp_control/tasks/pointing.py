@@ -4,16 +4,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import TaskError
 from hsp_control.kernels import kernel
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.rotations import cross, rotate, rotate_back
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import Task, TaskSample, track
 from hsp_control.trajectories import OrientationSample, OrientationTrajectory
 
 NEAREST_TO_ANTIPODE = 0.02
-"""Below this 1 + cos(angle) the coordinates are held from blowing up (164 degrees)."""
+"""Below this 1 + cos(angle) the coordinates are held from blowing up (168 degrees)."""
 
 
 class Pointing(Task):
@@ -21,7 +22,7 @@ class Pointing(Task):
 
     The error is e = -(n_x, n_y)/(1 + n_z), the stereographic coordinates of the axis
     n seen from the desired direction: |e| = tan(angle/2). In them the error equation is
-    exact up to the antipode (law.md §1); within 16 degrees of it they are held bounded
+    exact up to the antipode (law.md §1); within 12 degrees of it they are held bounded
     and the equation no longer holds.
 
     Attributes:
@@ -184,7 +185,10 @@ def _pointing(
     rotate_back(R_d, c1, turn)
     rotate_back(R_d, c0, moved)
     d00, d10 = -(turn[0] - n[0] * turn[2] / s) / s, -(turn[1] - n[1] * turn[2] / s) / s
-    d01, d11 = (moved[0] - n[0] * moved[2] / s) / s, (moved[1] - n[1] * moved[2] / s) / s
+    d01, d11 = (
+        (moved[0] - n[0] * moved[2] / s) / s,
+        (moved[1] - n[1] * moved[2] / s) / s,
+    )
     det = d00 * d11 - d01 * d10
     if det == 0.0:
         a_x[0] = a_x[1] = 0.0

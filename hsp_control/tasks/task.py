@@ -5,9 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import TaskError
 from hsp_control.kernels import kernel
-from hsp_control.robot import Array, Robot, RobotState
+from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
 
 
@@ -112,5 +113,3 @@ def track(
         for j in range(e.shape[0]):
             total += Kv[i, j] * e_dot[j] + Kp[i, j] * e[j]
         out[i] = total
-
-

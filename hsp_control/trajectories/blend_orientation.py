@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
 from hsp_control.rotations import (
-    Array,
     compose_back,
     cross,
     jexp3,

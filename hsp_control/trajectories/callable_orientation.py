@@ -5,8 +5,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control.rotations import Array, compose_back, log3
-from hsp_control.trajectories import checks, differences
+from hsp_control.arrays import Array
+from hsp_control.rotations import compose_back, log3
+from hsp_control.trajectories import checks, time_derivatives
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
@@ -18,7 +19,7 @@ class CallableOrientation(OrientationTrajectory):
 
     With y(τ) = log(R(t)ᵀ R(t + τ)), y'(0) and y''(0) are exactly the angular velocity
     and acceleration in the body frame; both are central differences of sixth order over
-    seven points (`differences`), good to about 1e-10 for turns of a few rad/s. The
+    seven points (`time_derivatives`), good to about 1e-10 for turns of a few rad/s. The
     function must be smooth, and defined three steps before and after every time asked
     for; anything but a rotation matrix raises `TrajectoryError`. To be pickled it must
     be defined at the top of a module.
@@ -33,7 +34,7 @@ class CallableOrientation(OrientationTrajectory):
     def __init__(
         self,
         function: Callable[[float], ArrayLike],
-        step: float = differences.STEP,
+        step: float = time_derivatives.STEP,
     ) -> None:
         """Follow ``function``.
 
@@ -58,7 +59,7 @@ class CallableOrientation(OrientationTrajectory):
             log3(between, y)
             return y
 
-        velocity, acceleration = differences.both_derivatives(
+        velocity, acceleration = time_derivatives.both_derivatives(
             turned_since, t, self.step
         )
         out.rotation[:] = R

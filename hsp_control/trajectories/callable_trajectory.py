@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 from numpy.typing import ArrayLike
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import TrajectoryError
-from hsp_control.rotations import Array
-from hsp_control.trajectories import checks, differences
+from hsp_control.trajectories import checks, time_derivatives
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 PointFunction = Callable[[float], ArrayLike]
@@ -15,10 +15,11 @@ PointFunction = Callable[[float], ArrayLike]
 class CallableTrajectory(Trajectory):
     """x(t) = f(t); derivatives that are not given are numerical.
 
-    They are central differences of sixth order over seven points (`differences`): good
-    to about 1e-10 for motions of a few rad/s. The function must be smooth, and defined
-    three steps before and after every time asked for; anything but n finite numbers
-    raises `TrajectoryError`. To be pickled it must be defined at the top of a module.
+    They are central differences of sixth order over seven points (`time_derivatives`),
+    good to about 1e-10 for motions of a few rad/s. The function must be smooth, and
+    defined three steps before and after every time asked for; anything but n finite
+    numbers raises `TrajectoryError`. To be pickled it must be defined at the top of a
+    module.
 
     Attributes:
         function: f, time [s] to a point of shape (n,).
@@ -35,7 +36,7 @@ class CallableTrajectory(Trajectory):
         dimension: int,
         velocity: PointFunction | None = None,
         acceleration: PointFunction | None = None,
-        step: float = differences.STEP,
+        step: float = time_derivatives.STEP,
     ) -> None:
         """Follow ``function``.
 
@@ -77,12 +78,12 @@ class CallableTrajectory(Trajectory):
         """Return f' and f'', each by the least differentiation that is left to do."""
         f, v, a = self.function, self.velocity, self.acceleration
         if v is None:
-            rates = differences.both_derivatives(
+            rates = time_derivatives.both_derivatives(
                 lambda s: self._call(f, "function", s), t, self.step
             )
             return rates if a is None else (rates[0], self._call(a, "acceleration", t))
         if a is None:
-            return self._call(v, "velocity", t), differences.first_derivative(
+            return self._call(v, "velocity", t), time_derivatives.first_derivative(
                 lambda s: self._call(v, "velocity", s), t, self.step
             )
         return self._call(v, "velocity", t), self._call(a, "acceleration", t)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.rotations import Array
+from hsp_control.arrays import Array
 from hsp_control.trajectories.immutable import Immutable
 
 

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
-from hsp_control.rotations import Array, compose_back, log3, rotate, turn
+from hsp_control.rotations import compose_back, log3, rotate, turn
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.orientation import (
     OrientationSample,

@@ -2,8 +2,9 @@
 
 from numpy.typing import ArrayLike
 
+from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
-from hsp_control.rotations import Array, turn
+from hsp_control.rotations import turn
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.orientation import (
     OrientationSample,

@@ -2,8 +2,8 @@
 
 from numpy.typing import ArrayLike
 
+from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
-from hsp_control.rotations import Array
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 

@@ -1,0 +1,3 @@
+"""The command line: ``hsp``."""
+
+from .main import main as main

@@ -1,0 +1,188 @@
+"""What each command of ``hsp`` does."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from hsp_control.config import Experiment, json_schema, load_experiment
+from hsp_control.exceptions import ModelError, SimulationError
+from hsp_control.loading import example_robots, find_robot
+from hsp_control.resources import bundled_robots
+from hsp_control.robot import Robot
+from hsp_control.simulation import Rollout
+
+# A pipe or a file has no width of its own: tables then need not be squeezed.
+_out = Console(
+    highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160
+)
+_errors = Console(stderr=True, highlight=False)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Simulate, save the log, say what it shows; keep what was computed."""
+    experiment = load_experiment(options.config, *options.overrides)
+    log = options.out / f"{experiment.name}.npz"
+    status = 0
+    try:
+        rollout = _run_with_progress(experiment)
+    except SimulationError as error:
+        if not isinstance(error.rollout, Rollout) or not len(error.rollout):
+            raise
+        rollout, status = error.rollout, 2
+        print(f"hsp: {error}", file=sys.stderr)
+    if rollout.status == "interrupted":
+        print(f"hsp: stopped by the user at t = {rollout.t[-1]:g} s", file=sys.stderr)
+        status = 2
+    rollout.save(log)
+    _out.print(_summary(rollout))
+    _out.print(f"Log: {log}")
+    if options.view and status == 0:
+        from hsp_control.viewer import view_rollout
+
+        view_rollout(
+            experiment.robot, rollout, experiment.scenario.view, open_browser=True
+        )
+    return status
+
+
+def check(options: argparse.Namespace) -> int:
+    """Build everything, evaluate the law once, and say what was found."""
+    experiment = load_experiment(options.config, *options.overrides)
+    robot, controller = experiment.robot, experiment.controller
+    state = robot.state(0.0, experiment.q0, experiment.v0)
+    output = controller.compute(state)
+    diagnostics = controller.diagnose(state)
+    table = Table(show_header=False, box=None, pad_edge=False)
+    rows = sum(task.rows for task in controller.tasks)
+    table.add_row("robot", f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}")
+    for task in controller.tasks:
+        error = np.linalg.norm(output.task.error[controller.task_rows[task.name]])
+        table.add_row(
+            f"task {task.name}",
+            f"{type(task).__name__}, {task.rows} rows, |e| = {error:.3g} at the start",
+        )
+    table.add_row("null space", f"{robot.nv - rows} freedoms, {controller.field.name}")
+    values = ", ".join(f"{value:.3g}" for value in diagnostics.singular_values)
+    table.add_row("singular values", f"{values} at the start")
+    table.add_row("largest effort", f"{np.abs(output.tau).max():.3g} at the start")
+    _out.print(table)
+    if output.damped:
+        _out.print(
+            "The tasks are singular at the start: the law is bounded there, not exact."
+        )
+    _out.print(f"{options.config}: fine")
+    return 0
+
+
+def plot(options: argparse.Namespace) -> int:
+    """Draw a log's figures."""
+    from hsp_control.plots import save_figures
+
+    rollout = Rollout.load(options.log)
+    folder = options.out or options.log.parent
+    for file in save_figures(
+        rollout, folder, options.log.stem, formats=tuple(options.formats or ["png"])
+    ):
+        _out.print(f"Figure: {file}")
+    return 0
+
+
+def robots(options: argparse.Namespace) -> int:
+    """List all robots, or describe one."""
+    if options.name is not None:
+        _describe(Robot.load(options.name))
+        return 0
+    table = Table(box=None, pad_edge=False)
+    for heading in ("robot", "origin", "root"):
+        table.add_column(heading)
+    for heading in ("nq", "nv", "frames"):
+        table.add_column(heading, justify="right")
+    table.add_column("end effector, or why not")
+    sources = {name: find_robot(name) for name in bundled_robots()}
+    sources |= {k: v for k, v in example_robots().items() if k not in sources}
+    for name, source in sources.items():
+        try:
+            robot = Robot.load(name)
+        except ModelError as error:
+            reason = str(error).removeprefix(f"{source.urdf}: ").split(",")[0]
+            table.add_row(name, source.origin, source.root, "-", "-", "-", reason)
+            continue
+        counts = (str(robot.nq), str(robot.nv), str(len(robot.frame_names)))
+        table.add_row(
+            name, source.origin, source.root, *counts, source.end_effector or ""
+        )
+    _out.print(table)
+    if not example_robots():
+        _out.print("More with: pip install example-robot-data-loaders")
+    return 0
+
+
+def schema(options: argparse.Namespace) -> int:
+    """Print the JSON Schema."""
+    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    return 0
+
+
+def _run_with_progress(experiment: Experiment) -> Rollout:
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeRemainingColumn(),
+        console=_errors,
+        transient=True,
+    ) as progress:
+        bar = progress.add_task(experiment.name, total=1.0)
+        return experiment.run(lambda done: progress.update(bar, completed=done))
+
+
+def _summary(rollout: Rollout) -> Table:
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_row(
+        "run", f"{len(rollout)} rows to t = {rollout.t[-1]:g} s, {rollout.status}"
+    )
+    for task in rollout.meta["tasks"]:
+        error = np.linalg.norm(rollout[f"task.{task}.error"], axis=1)
+        rms = float(np.sqrt(np.mean(error**2)))
+        table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {error[-1]:.3g}")
+    norm = rollout["null_space_norm"]
+    table.add_row("null space", f"|e_N| {norm[0]:.3g} at first, {norm[-1]:.3g} at last")
+    table.add_row(
+        "det(J W⁻¹ Jᵀ)",
+        f"least {rollout['manipulability'].min():.4g}, "
+        f"least singular value {rollout['singular_values'].min():.3g}",
+    )
+    table.add_row("effort", f"largest {np.abs(rollout.tau).max():.3g}")
+    if damped := int(rollout["damped"].sum()):
+        table.add_row(
+            "singular", f"{damped} rows: the law was bounded there, not exact"
+        )
+    return table
+
+
+def _describe(robot: Robot) -> None:
+    _out.print(f"{robot!r} from {_shown(robot.source.urdf)}")
+    lower, upper = robot.position_limits()
+    effort, speed = robot.model.upperEffortLimit, robot.model.upperVelocityLimit
+    table = Table(box=None, pad_edge=False)
+    table.add_column("freedom")
+    for heading in ("lower", "upper", "speed limit", "effort limit"):
+        table.add_column(heading, justify="right")
+    for i, name in enumerate(robot.freedom_names):
+        numbers = (lower[i], upper[i], speed[i], effort[i])
+        table.add_row(name, *(f"{number:.4g}" for number in numbers))
+    _out.print(table)
+    _out.print(f"Frames: {', '.join(robot.frame_names)}")
+
+
+def _shown(path: Path) -> str:
+    try:
+        return str(path.relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)

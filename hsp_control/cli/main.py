@@ -1,0 +1,102 @@
+"""Parse the command line, run one command, and turn every error into one message."""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from hsp_control.exceptions import HspControlError
+from hsp_control.version import __version__
+
+FAILURE = 2
+"""Exit status of anything that did not go as asked."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run ``hsp`` and return its exit status: 0, or 2 after one clear message."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if options.command is None:
+        parser.print_help()
+        return 0
+    # Commands are imported when they are asked for: `hsp --help` answers at once.
+    from hsp_control.cli import commands
+
+    try:
+        return int(getattr(commands, options.command)(options))
+    except HspControlError as error:
+        print(f"hsp: {error}", file=sys.stderr)
+    except BrokenPipeError:  # `hsp schema | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        print(f"hsp: {error.filename}: {error.strerror}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("hsp: stopped by the user", file=sys.stderr)
+    return FAILURE
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="hsp",
+        description="Torque control of redundant robots with a null space that "
+        "provably converges.",
+    )
+    parser.add_argument("--version", action="version", version=f"hsp {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+
+    run = _command(commands, "run", "simulate a configuration and write its log")
+    _add_configuration(run)
+    run.add_argument(
+        "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
+    )
+    run.add_argument(
+        "--view",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="show the run in a browser when it is done",
+    )
+
+    check = _command(commands, "check", "check a configuration without running it")
+    _add_configuration(check)
+
+    plot = _command(commands, "plot", "draw the figures of a log")
+    plot.add_argument("log", type=Path, metavar="LOG", help="a log written by hsp run")
+    plot.add_argument("--out", type=Path, metavar="DIR", help="default: beside the log")
+    plot.add_argument(
+        "--format",
+        action="append",
+        choices=["png", "pdf", "svg"],
+        dest="formats",
+        help="may be given more than once; default: png",
+    )
+
+    robots = _command(commands, "robots", "list what can be loaded, or describe one")
+    robots.add_argument("name", nargs="?", metavar="ROBOT", help="a name or a URDF")
+
+    _command(commands, "schema", "print the JSON Schema of a configuration")
+    return parser
+
+
+def _command(
+    commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
+    name: str,
+    text: str,
+) -> argparse.ArgumentParser:
+    return commands.add_parser(name, help=text, description=text.capitalize() + ".")
+
+
+def _add_configuration(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "config",
+        metavar="CONFIG",
+        help="a bundled name such as paper/4_moving_obstacle, a YAML file, or a log",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="overrides",
+        metavar="KEY=VALUE",
+        help="override a value, such as simulation.duration=2; may be repeated",
+    )

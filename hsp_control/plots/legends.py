@@ -1,0 +1,63 @@
+"""Legends under the axes, where they hide nothing, and remarks in them."""
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.transforms import ScaledTranslation
+
+_HANDLE, _GAP, _LETTER = 2.2, 1.3, 0.58
+"""Widths in a legend in units of its font size: handle, gap of columns, mean letter."""
+
+
+def legend_below(axes: Axes, columns: int | None = None) -> None:
+    """Put a legend of all that has a label under the axes.
+
+    Args:
+        axes: The axes; nothing happens where nothing has a label.
+        columns: Entries beside each other; None: as many as fit.
+    """
+    handles, labels = axes.get_legend_handles_labels()
+    if not handles:
+        return
+    figure = axes.get_figure(root=False)
+    drop = 32.0 if axes.axison and axes.name != "3d" else 5.0  # ticks and x label [pt]
+    below = ScaledTranslation(0.0, -drop / 72.0, figure.dpi_scale_trans)  # type: ignore[union-attr]
+    axes.legend(
+        handles,
+        labels,
+        loc="upper left",
+        bbox_to_anchor=(0.0, 0.0),
+        bbox_transform=axes.transAxes + below,
+        ncols=_fitting(axes, labels) if columns is None else columns,
+    )
+
+
+def note(axes: Axes, text: str) -> None:
+    """Add a remark to the legend to be."""
+    axes.plot([], [], linestyle="none", label=text)
+
+
+def plain(name: str) -> str:
+    """Return a name from the log such that matplotlib shows it as it is.
+
+    It would read dollar signs as formulas, and leave names that begin with an underscore
+    out of legends.
+    """
+    shown = name.replace("$", r"\$")
+    return f" {shown}" if shown.startswith("_") else shown
+
+
+def _fitting(axes: Axes, labels: Sequence[str]) -> int:
+    """Return how many columns fit under the axes; entries run down the columns."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    width = axes.get_window_extent().width / figure.dpi * 72.0 / 8.0
+    for columns in range(len(labels), 1, -1):
+        rows = -(-len(labels) // columns)
+        wide = sum(
+            max(map(len, labels[start : start + rows])) * _LETTER + _HANDLE + _GAP
+            for start in range(0, len(labels), rows)
+        )
+        if wide - _GAP <= width:
+            return columns
+    return 1

@@ -1,0 +1,120 @@
+"""Where things are in a log: the skeleton, obstacles, and the paths that tasks follow."""
+
+from itertools import permutations
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.plots.readings import task_names, task_type
+from hsp_control.robot import Array
+from hsp_control.simulation import Rollout
+
+
+class TaskPath(NamedTuple):
+    """The path of a point that a task leads.
+
+    Attributes:
+        name: The task's name.
+        desired: Where it shall be [m], shape (N, 3); along world axes that the task
+            leaves free, where it is.
+        actual: Where it is [m], shape (N, 3).
+        axes: The world axes that the task tracks, such as ``"xy"``.
+    """
+
+    name: str
+    desired: Array
+    actual: Array
+    axes: str
+
+
+class ObstaclePath(NamedTuple):
+    """A ball and where it goes.
+
+    Attributes:
+        name: Its name.
+        center: Its centre [m], shape (N, 3).
+        radius: Its radius [m].
+    """
+
+    name: str
+    center: Array
+    radius: float
+
+
+def obstacles(rollout: Rollout) -> list[ObstaclePath]:
+    """Return the obstacles of the scene."""
+    found = rollout.meta.get("obstacles", {}).items()
+    return [
+        ObstaclePath(name, rollout[f"obstacle.{name}"], float(about["radius"]))
+        for name, about in found
+    ]
+
+
+def parents(rollout: Rollout) -> list[int]:
+    """Return the index of every skeleton point's parent, -1 for none."""
+    return [int(parent) for parent in rollout.meta["robot"]["skeleton_parents"]]
+
+
+def task_paths(rollout: Rollout) -> list[TaskPath]:
+    """Return the paths of all tasks that lead a point."""
+    paths = (_task_path(rollout, name) for name in task_names(rollout))
+    return [path for path in paths if path is not None]
+
+
+def end_points(rollout: Rollout) -> Array:
+    """Return the paths of the skeleton's ends, shape (N, ends, 3) [m]."""
+    inner = set(parents(rollout))
+    ends = [k for k in range(rollout["skeleton"].shape[1]) if k not in inner]
+    return rollout["skeleton"][:, ends]
+
+
+def everything(rollout: Rollout, *, balls: bool = True) -> Array:
+    """Return points that enclose all that is ever to be seen, shape (K, 3) [m].
+
+    Args:
+        rollout: The log.
+        balls: Enclose obstacles to their surface, not only their centres.
+    """
+    points = [rollout["skeleton"].reshape(-1, 3)]
+    for path in task_paths(rollout):
+        points.append(path.desired)
+    for obstacle in obstacles(rollout):
+        points += ball(obstacle.center, obstacle.radius) if balls else [obstacle.center]
+    return np.concatenate(points)
+
+
+def ball(center: Array, radius: float) -> list[Array]:
+    """Return the corners of the boxes around balls, each of the shape of ``center``."""
+    return [center - radius, center + radius]
+
+
+def _task_path(rollout: Rollout, name: str) -> TaskPath | None:
+    reference = rollout[f"task.{name}.reference"]
+    actual = rollout[f"task.{name}.actual"]
+    if task_type(rollout, name) == "FramePose":
+        return TaskPath(name, reference[:, :3], actual[:, :3], "xyz")
+    if task_type(rollout, name) != "FramePosition":
+        return None
+    axes, path = _located(rollout, name, actual)
+    desired = path.copy()
+    desired[:, ["xyz".index(axis) for axis in axes]] = reference
+    return TaskPath(name, desired, path, axes)
+
+
+def _located(rollout: Rollout, name: str, actual: Array) -> tuple[str, Array]:
+    """Return the axes along which a position was measured, and the point's path.
+
+    The point is one of the skeleton's: the one, and the axes, whose numbers these are.
+    """
+    told = rollout.meta["tasks"][name].get("axes")
+    skeleton = rollout["skeleton"]
+    rows = actual.shape[1]
+    for axes in [told] if told else ["".join(p) for p in permutations("xyz", rows)]:
+        columns = ["xyz".index(axis) for axis in axes]
+        for point in reversed(range(skeleton.shape[1])):
+            if np.array_equal(skeleton[:, point, columns], actual):
+                return axes, skeleton[:, point]
+    axes = told or "xyz"[:rows]
+    path = np.zeros((len(actual), 3))
+    path[:, ["xyz".index(axis) for axis in axes]] = actual
+    return axes, path
