@@ -88,3 +88,7 @@ class LogError(HspControlError, ValueError):
 
 class ConfigError(HspControlError, ValueError):
     """A configuration file that does not follow the schema."""
+
+
+class ViewerError(HspControlError, RuntimeError):
+    """A 3-D view that cannot be opened, or that is gone."""

@@ -39,6 +39,9 @@ CARRIED = np.array([[3.0, 2.0, 1.0], [2.0, 2.0, 1.0], [1.0, 1.0, 1.0]])
 # r3 - r2 = θ1 - 2 θ2 + θ3 for the relative angles r2 = θ2 - θ1 and r3 = θ3 - θ2.
 SPREAD = np.array([1.0, -2.0, 1.0])
 
+# Which angles move joint two (row 1: the first) and joint three (row 2: the first two).
+MOVERS = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
+
 IDENTITY = np.eye(3)
 
 
@@ -86,20 +89,17 @@ def pseudo_inverse_rate(J: Array, J_dot: Array) -> Array:
 def gram_determinant(J: Array) -> float:
     """Return det(JJᵀ) = sin²(θ2-θ1) + sin²(θ3-θ1) + sin²(θ3-θ2), from 0 to 9/4.
 
-    The right side is Cauchy and Binet's; it loses no digits near a singularity.
+    The sum of the squared 2 × 2 minors (Cauchy and Binet) loses no digits near a
+    singularity.
     """
-    c1, c2, c3 = J.T
-    return float(cross(c1, c2) ** 2 + cross(c1, c3) ** 2 + cross(c2, c3) ** 2)
-
-
-def cross(a: Array, b: Array) -> float:
-    """Return a × b of two vectors in the plane."""
-    return float(a[0] * b[1] - a[1] * b[0])
+    (x1, x2, x3), (y1, y2, y3) = J.tolist()
+    areas = x1 * y2 - x2 * y1, x1 * y3 - x3 * y1, x2 * y3 - x3 * y2
+    return float(sum(area**2 for area in areas))
 
 
 def inverse_2x2(G: Array) -> Array:
     """Return G⁻¹ by Cramer's rule."""
-    (a, b), (c, d) = G
+    (a, b), (c, d) = G.tolist()
     return np.array([[d, -b], [-c, a]]) / (a * d - b * c)
 
 
@@ -180,13 +180,12 @@ def disk_cost_gradient(t: float, theta: Array) -> Array:
     """Return ∇f = Σ -2 J_kᵀ r_k / d_k⁴ with r_k from the centre to the joint.
 
     J_k, the Jacobian of the end of link k, is J without the columns of the links
-    beyond, so that J_kᵀ r_k fills the first k rows only.
+    beyond. Rows are links below: row k of r J is Jᵀ r_k.
     """
     J = jacobian(theta)
-    gradient = np.zeros(3)
-    for k, r in enumerate(joint_positions(theta)[:2] - disk_center(t)[0], start=1):
-        gradient[:k] -= 2.0 * (r @ J[:, :k]) / (r @ r) ** 2
-    return gradient
+    r = joint_positions(theta)[:2] - disk_center(t)[0]
+    square = (r**2).sum(axis=1, keepdims=True)
+    return -2.0 * (MOVERS * (r @ J) / square**2).sum(axis=0)
 
 
 def disk_cost_gradient_rate(t: float, theta: Array, theta_dot: Array) -> Array:
@@ -197,14 +196,13 @@ def disk_cost_gradient_rate(t: float, theta: Array, theta_dot: Array) -> Array:
     """
     c, c_dot = disk_center(t)
     J, J_dot = jacobian(theta), jacobian_rate(theta, theta_dot)
-    rate = np.zeros(3)
-    for k, r in enumerate(joint_positions(theta)[:2] - c, start=1):
-        J_k, J_k_dot = J[:, :k], J_dot[:, :k]
-        r_dot = J_k @ theta_dot[:k] - c_dot
-        square = r @ r
-        rate[:k] -= 2.0 * (r @ J_k_dot + r_dot @ J_k) / square**2
-        rate[:k] += 8.0 * (r @ r_dot) * (r @ J_k) / square**3
-    return rate
+    r = joint_positions(theta)[:2] - c
+    r_dot = (MOVERS * theta_dot) @ J.T - c_dot
+    square = (r**2).sum(axis=1, keepdims=True)
+    half_square_dot = (r * r_dot).sum(axis=1, keepdims=True)
+    turning = -2.0 * MOVERS * (r @ J_dot + r_dot @ J) / square**2
+    receding = 8.0 * MOVERS * half_square_dot * (r @ J) / square**3
+    return (turning + receding).sum(axis=0)
 
 
 def cost(number: int, t: float, theta: Array) -> float:

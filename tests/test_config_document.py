@@ -1,6 +1,9 @@
 """Configuration errors are part of the interface: every message is matched exactly."""
 
 import pickle
+from collections.abc import Callable
+from datetime import date
+from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -8,7 +11,16 @@ import pytest
 import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from pydantic import BaseModel, ConfigDict, Field, RootModel, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    RootModel,
+    Tag,
+    model_validator,
+)
+from typing_extensions import TypeAliasType
 
 from hsp_control.config.document import Document
 from hsp_control.config.reading import MAX_SIZE, MAX_VALUES
@@ -245,7 +257,15 @@ UNREADABLE = [
     ),
     ('a: "\\ud800"', r"1: a: '\ud800' cannot be read as text"),
     ("a: 1\n\tb: 2", "2: not YAML: a tab; indent with spaces"),
-    ("a: b: c", "1: not YAML: mapping values are not allowed here"),
+    (
+        "a: b: c",
+        "1: not YAML: no key can stand here; check the indentation, "
+        "and quote texts that hold ': '",
+    ),
+    (
+        "a:\n  b: 1\n c: 2",
+        "3: not YAML: the indentation does not fit the lines above",
+    ),
     ("a: *b", "1: not YAML: found undefined alias 'b'"),
     (
         "a: @home",
@@ -386,12 +406,13 @@ INVALID = [
     ),
     (
         TASK + "    trajectory: {radius: 3}",
-        "5: tasks.hand.trajectory: missing key 'type' (allowed: circle, line, segment)",
+        "5: tasks.hand.trajectory: missing key 'type'; "
+        "type is one of: circle, line, segment",
     ),
     (
         TASK + "    trajectory:\n      radius: 3\n      tpye: circle",
         "7: tasks.hand.trajectory.tpye: unknown key 'tpye'; did you mean 'type'? "
-        "(allowed: type, radius, center, to, via)",
+        "(type is one of: circle, line, segment)",
     ),
     (
         "robot: a\nintegrator: RK45",
@@ -424,7 +445,7 @@ INVALID = [
     ("robot: a\nframes: 3", "2: frames: 3 is an integer; expected a mapping"),
     (
         "robot: a\nframes: {tip: 3}",
-        "2: frames.tip: 3 is an integer; expected a list of numbers",
+        "2: frames.tip: 3 is an integer; expected a list of 3 numbers",
     ),
     # numbers
     (
@@ -561,6 +582,23 @@ def test_what_does_not_follow_the_schema(text: str, expected: str) -> None:
     assert message(text) == f"panda.yaml:{expected}"
 
 
+class Colour(Enum):
+    RED = "red"
+    BLUE = "blue"
+
+
+class Point(Part):
+    type: Literal["point"]
+
+
+Alias = TypeAliasType("Alias", Positive | list[Positive])
+Nested = Annotated[Trajectory | Point, Field(discriminator="type")]
+Chosen = Annotated[
+    Annotated[Circle, Tag("round")] | Annotated[Line, Tag("straight")],
+    Discriminator(lambda value: "round" if "radius" in value else "straight"),
+]
+
+
 class Lenient(BaseModel):
     """Types that the scenario above does not use, converted where pydantic can."""
 
@@ -575,6 +613,15 @@ class Lenient(BaseModel):
     anything: Any = None
     choice: Literal[1, 2] = 1
     shapes: Circle | Line | None = None
+    colour: Colour = Colour.RED
+    alias: Alias = 0.0
+    nested: Nested | None = None
+    chosen: Chosen | None = None
+    modes: list[Literal["a", "b"] | bool] = []
+    several: list[list[list[float]]] = []
+    bare: list = []  # type: ignore[type-arg]
+    day: date | None = None
+    call: Callable[[], None] | None = None
     renamed: int = Field(default=0, alias="new-name", lt=10)
 
 
@@ -600,6 +647,36 @@ class Lenient(BaseModel):
         ("choice: 3", "choice: unknown value 3 (allowed: 1, 2)"),
         ("shapes: 1", "shapes: 1 is an integer; expected a mapping"),
         ("shapes: {type: line}", "shapes: missing key 'to'; required here: type, to"),
+        (
+            "colour: rad",
+            "colour: unknown value 'rad'; did you mean 'red'? (allowed: red, blue)",
+        ),
+        ("alias: x", "alias: 'x' is text; expected a number or a list of numbers"),
+        (
+            "nested: {type: pint}",
+            "nested.type: unknown type 'pint'; did you mean 'point'? "
+            "(allowed: circle, line, segment, point)",
+        ),
+        (
+            "nested: {type: circle, radios: 1}",
+            "nested.radios: unknown key 'radios'; did you mean 'radius'? "
+            "(allowed: type, radius, center)",
+        ),
+        (
+            "chosen: {type: circle, radius: x}",
+            "chosen.radius: 'x' should be a valid number",
+        ),
+        ("chosen: {type: line}", "chosen: missing key 'to'"),
+        ("chosen: {type: circle, radius: 1, x: 1}", "chosen.x: unknown key 'x'"),
+        ("modes: x", "modes: 'x' is text; expected a list of 'a', 'b' or booleans"),
+        ("modes: [c]", "modes.0: 'c' is text; expected 'a', 'b' or true or false"),
+        ("several: 1", "several: 1 is an integer; expected a list of matrices"),
+        ("bare: 1", "bare: 1 is an integer; expected a list of values"),
+        (
+            "day: tomorrow",
+            "day: 'tomorrow' should be a valid date or datetime, input is too short",
+        ),
+        ("call: 1", "call: 1 should be callable"),
         ("new-name: 10", "new-name: 10 is too large; must be less than 10"),
     ],
 )
@@ -702,7 +779,11 @@ def test_overrides_create_mappings_and_fill_empty_ones() -> None:
             "expected the node content, but found '<stream end>'",
         ),
         ("steps=!!x 1", "the tag '!!x' is not allowed: plain data only"),
-        ("steps=a\nb: 1", "not YAML: mapping values are not allowed here"),
+        (
+            "steps=a\nb: 1",
+            "not YAML: no key can stand here; check the indentation, "
+            "and quote texts that hold ': '",
+        ),
         ("steps=x", "steps: 'x' is text; expected an integer"),
         (
             "fields.0.wieght=1",

@@ -256,12 +256,12 @@ def test_null_space_error_vanishes_on_the_papers_start(number: int) -> None:
     simulation = simulate_paper(number)
     norm = np.linalg.norm(simulation.null_space_error, axis=1)
     expected = norm[0] * np.exp(-10.0 * simulation.t)
-    assert_allclose(norm, expected, rtol=0.0, atol=1e-9)
+    assert_allclose(norm, expected, rtol=0.0, atol=1e-10)
 
 
 def test_null_space_error_stays_zero_in_the_second() -> None:
     """At rest and with g = 0 it starts at zero: there is never any self-motion."""
-    assert_allclose(simulate_paper(2).null_space_error, 0.0, atol=1e-8)
+    assert_allclose(simulate_paper(2).null_space_error, 0.0, atol=1e-10)
 
 
 def test_first_simulation_winds_up_while_it_tracks() -> None:
@@ -281,7 +281,7 @@ def test_first_simulation_forgets_its_start() -> None:
     assert distance[-1] > 1.0
 
 
-@pytest.mark.parametrize(("number", "duration"), [(2, 5.0), (3, 3.0), (4, 3.0)])
+@pytest.mark.parametrize(("number", "duration"), [(2, 4.0), (3, 2.0), (4, 2.0)])
 def test_controlled_null_space_does_not_forget_its_start(
     number: int, duration: float
 ) -> None:
@@ -304,7 +304,7 @@ def test_second_simulation_grazes_a_singularity() -> None:
     row = int(simulation.gram_determinant.argmin())
     assert simulation.t[row] == pytest.approx(3.14)
     assert simulation.gram_determinant[row] == pytest.approx(0.01015, abs=1e-5)
-    fine = simulate_paper(2, duration=3.2, grid=0.0005)
+    fine = simulate_paper(2, duration=3.15, grid=0.0005)
     assert 0.0078 < fine.gram_determinant.min() < 0.0083
 
 
@@ -314,7 +314,7 @@ def test_third_simulation_keeps_away_from_singularities() -> None:
 
 def test_fourth_simulation_keeps_away_from_the_disk() -> None:
     simulation = simulate_paper(4)
-    assert simulation.disk_distance.min() > 0.41
+    assert simulation.disk_distance.min() == pytest.approx(0.41587, abs=1e-5)
     assert simulation.gram_determinant.min() > 1.67
 
 

@@ -28,6 +28,7 @@ def run(options: argparse.Namespace) -> int:
     """Simulate, save the log, say what it shows; keep what was computed."""
     experiment = load_experiment(options.config, *options.overrides)
     log = options.out / f"{experiment.name}.npz"
+    log.parent.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
     status = 0
     try:
         rollout = _run_with_progress(experiment)
@@ -137,6 +138,7 @@ def _run_with_progress(experiment: Experiment) -> Rollout:
         TimeRemainingColumn(),
         console=_errors,
         transient=True,
+        disable=not _errors.is_terminal,
     ) as progress:
         bar = progress.add_task(experiment.name, total=1.0)
         return experiment.run(lambda done: progress.update(bar, completed=done))

@@ -11,7 +11,8 @@ from hsp_control.config.keys import KeyPath, split_assignment
 from hsp_control.config.located import locate, located
 from hsp_control.config.overrides import assign
 from hsp_control.config.plain import shortened, shown
-from hsp_control.config.reading import MAX_SIZE, Mark, YamlError, read_yaml
+from hsp_control.config.reading import MAX_SIZE, Mark, read_yaml
+from hsp_control.config.syntax import YamlError
 from hsp_control.exceptions import ConfigError, HspControlError
 from hsp_control.suggest import nearest
 

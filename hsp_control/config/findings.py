@@ -26,7 +26,8 @@ class Finding(NamedTuple):
 
     Attributes:
         path: The key path that the user wrote; for a missing key, of what lacks it.
-        kind: ``mismatch`` for a wrong type, or else pydantic's name for the error.
+        kind: ``mismatch`` for a wrong type, ``misspelt_tag`` for a wrong key in the
+            place of a discriminator, or else pydantic's name for the error.
         value: The value or the key at fault; the list of missing keys.
         expected: What is allowed there; for keys, what holds them.
         error: Pydantic's own words and numbers.
@@ -80,13 +81,15 @@ def _here(path: KeyPath, expected: Shape, error: ErrorDetails) -> Finding:
     kind, value = error["type"], error["input"]
     if kind.endswith(("_type", "_parsing", "_from_float")):
         kind = "mismatch"
+    if kind in ("extra_forbidden", "missing"):  # of a key that we lost sight of
+        kind = "other"
     tag = expected.discriminator
     if tag is not None and isinstance(value, dict):
         unknown = [name for name in value if name not in keys(expected)]
         if kind == "union_tag_invalid":
             path, value = (*path, tag), value[tag]
         elif kind == "union_tag_not_found" and (misspelt := nearest(tag, unknown)):
-            path, kind, value = (*path, misspelt), "extra_forbidden", misspelt
+            path, kind, value = (*path, misspelt), "misspelt_tag", misspelt
     return Finding(path, kind, value, expected, error)
 
 

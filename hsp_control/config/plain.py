@@ -34,7 +34,7 @@ def kind(value: Any) -> str:
 
 def joined(words: list[str]) -> str:
     """Return ``a, b or c``."""
-    return " or ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
+    return " or ".join(part for part in (", ".join(words[:-1]), *words[-1:]) if part)
 
 
 def _flow(value: Any, levels: int) -> str:

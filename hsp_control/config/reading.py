@@ -5,13 +5,14 @@ twice, a key that is no text, a tag, an alias that grows without bound) is refus
 """
 
 import re
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import yaml
 
 from hsp_control.config.keys import KeyPath
 from hsp_control.config.plain import shown
 from hsp_control.config.scalars import SCALARS, TAG
+from hsp_control.config.syntax import YamlError, character_error, syntax_error
 
 MAX_SIZE = 1_000_000
 """Characters in a text; parsing that many takes seconds."""
@@ -26,23 +27,6 @@ class Mark(NamedTuple):
 
     line: int
     column: int
-
-
-class YamlError(Exception):
-    """A text that is not the YAML that we accept.
-
-    Attributes:
-        line: The line that the message speaks of.
-        message: What is wrong there.
-        path: The key path that it speaks of, if the text was understood that far.
-    """
-
-    def __init__(self, line: int, message: str, path: KeyPath = ()) -> None:
-        """Keep the three apart: the caller knows the name of the file."""
-        super().__init__(line, message, path)
-        self.line = line
-        self.message = message
-        self.path = path
 
 
 def read_yaml(text: str) -> tuple[Any, dict[KeyPath, Mark]]:
@@ -87,13 +71,11 @@ def _compose(text: str) -> yaml.Node | None:
     try:
         composer = _Composer(text)
     except yaml.reader.ReaderError as error:
-        line = text.count("\n", 0, error.position) + 1
-        character = f"U+{ord(text[error.position]):04X}"
-        raise YamlError(line, f"not YAML: the character {character}") from None
+        raise character_error(error, text) from None
     try:
         return composer.get_single_node()
     except yaml.MarkedYAMLError as error:
-        _refuse_syntax(error)
+        raise syntax_error(error) from None
     except (ValueError, OverflowError):  # raised by the scanner's own int() and chr()
         message = "not YAML: an escape or a version that is out of range"
         raise YamlError(composer.line + 1, message) from None
@@ -183,15 +165,3 @@ def _check_bounds(depth: int, count: int, line: int) -> None:
         raise YamlError(line, f"nested deeper than {MAX_DEPTH} levels")
     if count > MAX_VALUES:
         raise YamlError(line, f"more than {MAX_VALUES} values (aliases expanded)")
-
-
-def _refuse_syntax(error: yaml.MarkedYAMLError) -> NoReturn:
-    mark = error.problem_mark or error.context_mark
-    line = mark.line + 1 if mark is not None else 1
-    problem, context = error.problem or "", error.context or ""
-    if r"'\t'" in problem:
-        raise YamlError(line, "not YAML: a tab; indent with spaces") from None
-    if context and error.context_mark and error.context_mark.line + 1 != line:
-        context += f" from line {error.context_mark.line + 1}"
-    what = ", ".join(part for part in (context, problem) if part)
-    raise YamlError(line, f"not YAML: {what}") from None

@@ -87,8 +87,7 @@ def tagged(options: Iterable[Any], discriminator: str) -> dict[Any, Any]:
     for option in options:
         inner = shape(option)
         if len(inner.options) > 1:
-            nested = tagged(inner.options, discriminator)
-            choices |= dict.fromkeys(nested, option)
+            choices |= tagged(inner.options, discriminator)  # pydantic flattens them
         elif field := fields(inner.options[0]).get(discriminator):
             choices |= dict.fromkeys(literals(field_shape(field).options), option)
     return choices

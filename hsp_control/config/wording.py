@@ -31,20 +31,19 @@ def explained(finding: Finding) -> str:
     """Return the message for a finding, without its place."""
     value, expected = finding.value, finding.expected
     match finding.kind:
-        case "mismatch" if words := _expected(expected.options):
+        case "mismatch" if words := joined(_words(expected)):
             return _mismatch(value, words, literals(expected.options))
         case "extra_forbidden":
             return f"unknown key {_unknown(value, keys(expected))}"
         case "missing":
-            required = listing(keys(expected, required=True), _LONG_LIST)
-            plural = "s" if len(value) > 1 else ""
-            missing = ", ".join(map(repr, value))
-            return f"missing key{plural} {missing}; required here: {required}"
+            return _missing(value, keys(expected, required=True))
         case "union_tag_invalid" if key := expected.discriminator:
             return f"unknown {key} {_unknown(value, tagged(expected.options, key))}"
         case "union_tag_not_found" if key := expected.discriminator:
-            allowed = listing(map(str, tagged(expected.options, key)), _LONG_LIST)
-            return f"missing key {key!r} (allowed: {allowed})"
+            return f"missing key {key!r}; {_tags(expected, key)}"
+        case "misspelt_tag" if key := expected.discriminator:
+            hint = f"did you mean {key!r}? ({_tags(expected, key)})"
+            return f"unknown key {value!r}; {hint}"
         case "literal_error" | "enum" if choices := literals(expected.options):
             return f"unknown value {_unknown(value, choices)}"
         case "too_short" | "too_long" | "string_too_short" | "string_too_long":
@@ -63,7 +62,19 @@ def explained(finding: Finding) -> str:
 def _unknown(value: Any, options: Iterable[Any]) -> str:
     allowed = [str(option) for option in options]
     near = _near(value, allowed)
-    return f"{shown(value)}{near} (allowed: {listing(allowed, _LONG_LIST)})"
+    among = f" (allowed: {listing(allowed, _LONG_LIST)})" if allowed else ""
+    return f"{shown(value)}{near}{among}"
+
+
+def _missing(names: list[str], required: list[str]) -> str:
+    plural = "s" if len(names) > 1 else ""
+    among = f"; required here: {listing(required, _LONG_LIST)}" if required else ""
+    return f"missing key{plural} {listing(map(repr, names), _LONG_LIST)}{among}"
+
+
+def _tags(expected: Shape, key: str) -> str:
+    tags = map(str, tagged(expected.options, key))
+    return f"{key} is one of: {listing(tags, _LONG_LIST)}"
 
 
 def _near(value: Any, options: Iterable[Any]) -> str:
@@ -108,33 +119,36 @@ def _in_pydantics_words(finding: Finding) -> str:
     return sentence if sentence != message else f"{value}: {message}"
 
 
-def _expected(options: Iterable[Any], *, many: bool = False) -> str:
+def _words(expected: Shape, *, many: bool = False) -> list[str]:
     """Return the types in plain words, or nothing if one of them has none."""
-    words = [_word(option, many=many) for option in options]
-    return joined(list(dict.fromkeys(words))) if all(words) else ""
+    found: list[str] = []
+    for option in expected.options:
+        choices = [shown(choice) for choice in literals([option])]
+        words = choices or [_word(option, expected.bounds(), many=many)]
+        if not all(words):
+            return []
+        found += [word for word in words if word not in found]
+    return found
 
 
-def _word(option: Any, *, many: bool) -> str:
+def _word(option: Any, bounds: tuple[int, int | None], *, many: bool) -> str:
     if option in _SIMPLE:
         return _SIMPLE[option][many]
-    if choices := literals([option]):
-        return joined([shown(choice) for choice in choices])
     container = get_origin(option) or option
     if not isinstance(container, type):
         return ""
     if is_model(container) or issubclass(container, Mapping):
         return "mappings" if many else "a mapping"
     if issubclass(container, Collection):
-        return _list(option, many=many)
+        return _list(option, bounds, many=many)
     return ""
 
 
-def _list(option: Any, *, many: bool) -> str:
-    inner = [shape(item) for item in get_args(option) if item is not Ellipsis]
-    items = inner[0].options if inner else ()
-    words = _expected(items, many=True)
+def _list(option: Any, bounds: tuple[int, int | None], *, many: bool) -> str:
+    items = [shape(item) for item in get_args(option) if item is not Ellipsis]
+    words = joined(_words(items[0], many=True)) if items else ""
     if words in ("lists of numbers", "lists of integers"):
         return "matrices" if many else "a matrix"
-    fewest, most = Shape((option,)).bounds()
+    fewest, most = bounds
     number = f"{fewest} " if fewest == most else ""
     return f"{'lists' if many else 'a list'} of {number}{words or 'values'}"

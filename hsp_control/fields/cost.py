@@ -44,8 +44,8 @@ class Cost(NullSpaceField):
         Raises:
             FieldError: If the gradient or its rate is not nv finite numbers.
         """
-        out.g[:] = self.gradient(state)
-        out.g_dot[:] = self.gradient_rate(state)
+        out.g[:] = self._tangent(self.gradient(state), "gradient")
+        out.g_dot[:] = self._tangent(self.gradient_rate(state), "gradient rate")
         if not _descend(metric.L, metric.W_dot, form, out.g, out.g_dot):
             raise FieldError(
                 f"cost {self.name!r} has the gradient {self.gradient(state)!r} and the "
@@ -53,6 +53,20 @@ class Cost(NullSpaceField):
                 "needs finite numbers"
             )
         return out
+
+    def _tangent(self, value: Array, what: str) -> Array:
+        try:
+            array = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise FieldError(
+                f"cost {self.name!r} has the {what} {value!r}; needs numbers"
+            ) from None
+        if array.shape != (self.robot.nv,):
+            raise FieldError(
+                f"cost {self.name!r} has a {what} of shape {array.shape}; "
+                f"needs ({self.robot.nv},): the tangent space, not the configuration"
+            )
+        return array
 
 
 class FunctionCost(Cost):
@@ -100,20 +114,10 @@ class FunctionCost(Cost):
         return number
 
     def gradient(self, state: RobotState) -> Array:
-        """Return the given gradient, or differences.
-
-        Raises:
-            FieldError: If the given one has the wrong shape.
-        """
+        """Return the given gradient, or differences."""
         if self._gradient is None:
             return super().gradient(state)
-        value = np.asarray(self._gradient(state), dtype=float)
-        if value.shape != (self.robot.nv,):
-            raise FieldError(
-                f"cost {self.name!r} has a gradient of shape {value.shape}; "
-                f"needs ({self.robot.nv},): the tangent space, not the configuration"
-            )
-        return value
+        return self._gradient(state)
 
     def gradient_rate(self, state: RobotState) -> Array:
         """Return the given rate, or differences along the flow."""

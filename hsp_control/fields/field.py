@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
@@ -67,9 +68,13 @@ class NullSpaceField(ABC):
         """Return the number to plot: a cost's value f(q, t), or a field's norm."""
 
     def __add__(self, other: "NullSpaceField") -> "WeightedSum":
+        if not isinstance(other, NullSpaceField):
+            return NotImplemented
         return WeightedSum([(1.0, self), (1.0, other)])
 
     def __rmul__(self, weight: float) -> "WeightedSum":
+        if not isinstance(weight, Real):
+            return NotImplemented
         return WeightedSum([(weight, self)])
 
 

@@ -39,9 +39,11 @@ class JointCentering(Cost):
                 f"field {name!r}: no joint of {robot.name} has limits, so none has a "
                 "middle; use a target posture instead"
             )
-        self._middle = np.where(limited, 0.5 * (lower + upper), 0.0)
-        half = np.where(limited, 0.5 * (upper - lower), 1.0)
-        self._stiffness = np.where(limited, w / half**2, 0.0)
+        # Away from here the limits are infinite, and inf - inf is no number.
+        low, high = lower[limited], upper[limited]
+        self._middle, self._stiffness = np.zeros(robot.nv), np.zeros(robot.nv)
+        self._middle[limited] = 0.5 * (low + high)
+        self._stiffness[limited] = w[limited] / (0.5 * (high - low)) ** 2
 
     def value(self, state: RobotState) -> float:
         """Return f."""

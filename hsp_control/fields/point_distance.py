@@ -66,8 +66,7 @@ class PointDistance(Cost):
         c = self.obstacle.center.sample(state.t, self._center).position
         total = 0.0
         for frame in self.frames:
-            r = state.position(frame) - c
-            total += self.weight / float(r @ r)
+            total += self.weight / self._square(frame, state.position(frame) - c)
         return total
 
     def gradient(self, state: RobotState) -> Array:
@@ -77,7 +76,7 @@ class PointDistance(Cost):
         for name in self.frames:
             frame = state.frame(name)
             r = frame.position - c
-            result += frame.jacobian[:3].T @ r / float(r @ r) ** 2
+            result += frame.jacobian[:3].T @ r / self._square(name, r) ** 2
         return -2.0 * self.weight * result
 
     def gradient_rate(self, state: RobotState) -> Array:
@@ -89,7 +88,21 @@ class PointDistance(Cost):
             J, J_dot = frame.jacobian[:3], frame.jacobian_dot[:3]
             r = frame.position - c
             r_dot = frame.velocity[:3] - c_dot
-            square = float(r @ r)
+            square = self._square(name, r)
             bent = r_dot - 4.0 * float(r @ r_dot) / square * r
             result += (J_dot.T @ r + J.T @ bent) / square**2
         return -2.0 * self.weight * result
+
+    def _square(self, frame: str, r: Array) -> float:
+        """Return d².
+
+        Raises:
+            FieldError: If it is 0, where the cost is infinite.
+        """
+        square = float(r @ r)
+        if square < 1e-24:  # a distance of 1e-12 m
+            raise FieldError(
+                f"field {self.name!r}: frame {frame!r} is at the centre of obstacle "
+                f"{self.obstacle.name!r}, where the cost is infinite"
+            )
+        return square

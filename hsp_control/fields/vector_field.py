@@ -32,18 +32,22 @@ class VectorField(NullSpaceField):
         Raises:
             FieldError: If either is not an array of nv finite numbers.
         """
-        for value, where, what in (
-            (self.vector(state), out.g, "g"),
-            (self.rate(state), out.g_dot, "g'"),
-        ):
-            array = np.asarray(value, dtype=float)
-            if array.shape != where.shape or not np.isfinite(array).all():
-                raise FieldError(
-                    f"field {self.name!r} returned {what} = {value!r} at "
-                    f"t = {state.t:.6g} s; needs {where.shape[0]} finite numbers"
-                )
-            where[:] = array
+        out.g[:] = self._tangent(self.vector(state), "g", state.t)
+        out.g_dot[:] = self._tangent(self.rate(state), "g'", state.t)
         return out
+
+    def _tangent(self, value: Array, what: str, t: float) -> Array:
+        nv = self.robot.nv
+        try:
+            array = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            array = np.empty(0)
+        if array.shape != (nv,) or not np.isfinite(array).all():
+            raise FieldError(
+                f"field {self.name!r} returned {what} = {value!r} at t = {t:.6g} s; "
+                f"needs {nv} finite numbers"
+            )
+        return array
 
     def value(self, state: RobotState) -> float:
         """Return ‖g‖."""

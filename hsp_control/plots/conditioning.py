@@ -15,6 +15,8 @@ from hsp_control.plots.lines import (
 from hsp_control.plots.readings import column_unit
 from hsp_control.simulation import Rollout
 
+_SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
 
 def draw_manipulability(axes: Axes, rollout: Rollout) -> None:
     """Draw det(J W⁻¹ Jᵀ), the square of Yoshikawa's measure, and mark its minimum."""
@@ -45,13 +47,14 @@ def draw_manipulability(axes: Axes, rollout: Rollout) -> None:
 def draw_singular_values(axes: Axes, rollout: Rollout) -> None:
     """Draw the singular values of all tasks' Jacobian in the metric."""
     values = rollout["singular_values"]
-    names = [rf"$\sigma_{{{k + 1}}}$" for k in range(values.shape[1])]
-    for name, line in zip(names, values.T, strict=True):
-        pass
+    names = [f"σ{k + 1}".translate(_SUBSCRIPTS) for k in range(values.shape[1])]
     draw_lines(axes, rollout.t, values, names)
     mark_damped(axes, rollout)
-    log_scale(axes, values)
+    if float(values.min()) < 0.05 * float(values.max()):
+        log_scale(axes, values)
+    else:
+        axes.set_ylim(bottom=0.0)
     unit = column_unit(rollout, "singular_values")
-    axes.set_ylabel(f"singular values of J L⁻ᵀ, W = L Lᵀ [{unit}]")
+    axes.set_ylabel(rf"singular values of $J\,L^{{-\mathsf{{T}}}}$ [{unit}]")
     time_axis(axes, rollout.t)
     legend_below(axes)

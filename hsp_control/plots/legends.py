@@ -20,7 +20,7 @@ def legend_below(axes: Axes, columns: int | None = None) -> None:
     if not handles:
         return
     figure = axes.get_figure(root=False)
-    drop = 32.0 if axes.axison and axes.name != "3d" else 5.0  # ticks and x label [pt]
+    drop = 32.0 if axes.axison else 5.0  # ticks and x label [pt]
     below = ScaledTranslation(0.0, -drop / 72.0, figure.dpi_scale_trans)  # type: ignore[union-attr]
     axes.legend(
         handles,

@@ -10,8 +10,8 @@ from hsp_control.plots.legends import note, plain
 from hsp_control.robot import Array
 from hsp_control.simulation import Rollout
 
-NAMED = 14
-"""Lines that can be told apart; of more, those that vary most get a colour and a name."""
+MOST, NAMED = 14, 7
+"""Of more than 14 lines, only the 7 that vary most get a colour and a name."""
 _DASHES = ("-", "--")
 
 
@@ -25,7 +25,7 @@ def draw_lines(axes: Axes, t: Array, values: Array, names: Sequence[str]) -> Non
         names: The columns' names.
     """
     named = list(range(len(names)))
-    if len(names) > NAMED:
+    if len(names) > MOST:
         spread = np.ptp(np.nan_to_num(values, posinf=0.0, neginf=0.0), axis=0)
         named = sorted(np.argsort(-spread, kind="stable")[:NAMED].tolist())
         others = [k for k in range(len(names)) if k not in named]
@@ -69,7 +69,8 @@ def log_scale(
     """
     shown = values[np.isfinite(values) & (values > floor)]
     highest = max(float(shown.max(initial=floor)), top)
-    lowest = float(shown.min(initial=highest))
+    # A norm that crosses zero dips at single rows; the axis need not follow.
+    lowest = float(np.quantile(shown, 0.005)) if shown.size else highest
     axes.set_yscale("log")
     axes.set_ylim(max(0.4 * lowest, floor), 3.0 * max(highest, 10.0 * floor))
 

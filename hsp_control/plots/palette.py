@@ -35,6 +35,8 @@ PAPER = "#FFFFFF"
 
 EARLY, LATE = "#C9DCEA", "#0A3A5C"
 """The two ends of the scale of time, light to dark blue."""
+OBSTACLE_EARLY = "#F7DCCB"
+"""An obstacle at the early end of that scale."""
 
 SERIES = (
     "#0072B2",  # blue

@@ -89,5 +89,6 @@ class StyledFigure(Figure):
 def new_figure(width: float, height: float) -> StyledFigure:
     """Return an empty figure, width and height in inches; call it within `style`."""
     figure = StyledFigure(figsize=(width, height), layout="constrained")
+    figure.get_layout_engine().set(w_pad=0.06, h_pad=0.06)
     FigureCanvasAgg(figure)
     return figure

@@ -1,0 +1,240 @@
+"""Costs of a frame's Jacobian: exact gradients and rates from running sums.
+
+For joints i and j on the way to a frame, with world columns J_j = (l_j, w_j) at the
+frame's origin, moving joint i changes J_j by
+
+    w_i × (l_j, w_j)   if i carries j, or is of the same joint,
+    (w_j × l_i, 0)     if j carries i,
+
+for revolute and prismatic joints and floating roots alike. A function φ(J) with
+∂φ/∂J = B, columns (b_j, c_j), therefore has the gradient
+
+    ∂φ/∂q_i = w_i · Σ_{j from i on} (l_j × b_j + w_j × c_j) + l_i · Σ_{j before i} b_j × w_j
+
+in O(n), without the kinematic Hessian; and since J' is known exactly, so is the rate.
+"""
+
+from abc import abstractmethod
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from hsp_control.arrays import Array, Indices
+from hsp_control.exceptions import FieldError
+from hsp_control.fields.cost import Cost
+from hsp_control.kernels import kernel
+from hsp_control.robot import Robot, RobotState
+
+Rows = Literal["position", "orientation", "pose"]
+_ROWS = {"position": "xyz", "orientation": "rpq", "pose": "xyzrpq"}
+
+
+class JacobianTerms(NamedTuple):
+    """φ and its derivatives at one state, for the selected and scaled rows.
+
+    Attributes:
+        value: φ(J).
+        slope: B = ∂φ/∂J, shape (k, nv).
+        slope_rate: B', shape (k, nv).
+    """
+
+    value: float
+    slope: Array
+    slope_rate: Array
+
+
+class JacobianCost(Cost):
+    """f = φ(J) for rows of one frame's Jacobian; write `terms`.
+
+    Attributes:
+        frame: The frame's name.
+        rows: Which rows, ``position``, ``orientation`` or ``pose``.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        frame: str,
+        *,
+        rows: Rows = "position",
+        axes: str = "xyz",
+        length: float = 1.0,
+        name: str,
+    ) -> None:
+        """Select rows.
+
+        Args:
+            robot: The robot.
+            frame: Name of the frame.
+            rows: ``position``, ``orientation`` or ``pose``.
+            axes: World axes of the position rows: ``"xy"`` for a planar arm.
+            length: What one radian is worth [m], where rows mix metres and radians.
+            name: What the log calls it.
+
+        Raises:
+            FrameNotFoundError: If the robot has no such frame.
+            FieldError: If rows or axes are unknown, or too many for the frame's joints.
+        """
+        super().__init__(robot, name)
+        robot.frame_id(frame)
+        if rows not in _ROWS:
+            raise FieldError(
+                f"field {name!r}: rows {rows!r}; choose among {list(_ROWS)}"
+            )
+        if not axes or set(axes) - set("xyz") or len(set(axes)) < len(axes):
+            raise FieldError(f"field {name!r}: axes {axes!r}; name axes among x, y, z")
+        if not 0.0 < length < np.inf:
+            raise FieldError(f"field {name!r}: length {length} must be positive")
+        kept = [i for i, axis in enumerate("xyz") if axis in axes]
+        if rows != "position":
+            kept = (kept if rows == "pose" else []) + [3, 4, 5]
+        self.frame = frame
+        self.rows = rows
+        self._selected: Indices = np.array(kept, dtype=np.int64)
+        self._scale = np.where(self._selected < 3, 1.0, length if rows == "pose" else 1)
+        self._freedoms, self._first = _chain(robot, frame)
+        if len(kept) > len(self._freedoms):
+            raise FieldError(
+                f"field {name!r}: {len(kept)} rows of frame {frame!r}, which only "
+                f"{len(self._freedoms)} freedoms move; they are singular everywhere"
+            )
+        self._B, self._B_dot = np.zeros((6, robot.nv)), np.zeros((6, robot.nv))
+        self._sums = np.zeros((4, len(self._freedoms) + 1, 3))
+
+    @abstractmethod
+    def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
+        """Return φ, ∂φ/∂J and its rate for the selected rows, shape (k, nv)."""
+
+    def value(self, state: RobotState) -> float:
+        """Return f."""
+        return self._terms(state).value
+
+    def gradient(self, state: RobotState) -> Array:
+        """Return ∇f, exact."""
+        return self._gradient_and_rate(state)[0]
+
+    def gradient_rate(self, state: RobotState) -> Array:
+        """Return (∇f)', exact."""
+        return self._gradient_and_rate(state)[1]
+
+    def _terms(self, state: RobotState) -> JacobianTerms:
+        frame = state.frame(self.frame)
+        scale = self._scale[:, None]
+        return self.terms(
+            frame.jacobian[self._selected] * scale,
+            frame.jacobian_dot[self._selected] * scale,
+        )
+
+    def _gradient_and_rate(self, state: RobotState) -> tuple[Array, Array]:
+        frame = state.frame(self.frame)
+        _, slope, slope_rate = self._terms(state)
+        scale = self._scale[:, None]
+        self._B[self._selected] = slope * scale
+        self._B_dot[self._selected] = slope_rate * scale
+        gradient, rate = np.zeros(self.robot.nv), np.zeros(self.robot.nv)
+        chain_gradient(
+            frame.jacobian,
+            frame.jacobian_dot,
+            self._B,
+            self._B_dot,
+            self._freedoms,
+            self._first,
+            self._sums,
+            gradient,
+            rate,
+        )
+        return gradient, rate
+
+
+@kernel
+def chain_gradient(
+    J: Array,
+    J_dot: Array,
+    B: Array,
+    B_dot: Array,
+    freedoms: Indices,
+    first: Indices,
+    sums: Array,
+    gradient: Array,
+    rate: Array,
+) -> None:
+    """Write the gradient of φ(J) and its rate from B = ∂φ/∂J; see the module.
+
+    Args:
+        J: World-aligned Jacobian of the frame, shape (6, nv).
+        J_dot: Its rate, shape (6, nv).
+        B: ∂φ/∂J, shape (6, nv).
+        B_dot: Its rate, shape (6, nv).
+        freedoms: The k freedoms that move the frame, from the root on.
+        first: For each of them, where its joint begins in that list.
+        sums: Scratch, shape (4, k + 1, 3).
+        gradient: ∂φ/∂q, shape (nv,); entries of other freedoms are left alone.
+        rate: Its time derivative, shape (nv,).
+    """
+    k = freedoms.shape[0]
+    carried, carried_dot, before, before_dot = sums[0], sums[1], sums[2], sums[3]
+    for a in range(3):
+        carried[k, a] = carried_dot[k, a] = 0.0
+        before[0, a] = before_dot[0, a] = 0.0
+    for p in range(k):
+        j = freedoms[p]
+        for a in range(3):
+            y, z = (a + 1) % 3, (a + 2) % 3
+            before[p + 1, a] = (
+                before[p, a] + B[y, j] * J[3 + z, j] - B[z, j] * J[3 + y, j]
+            )
+            before_dot[p + 1, a] = (
+                before_dot[p, a]
+                + B_dot[y, j] * J[3 + z, j]
+                - B_dot[z, j] * J[3 + y, j]
+                + B[y, j] * J_dot[3 + z, j]
+                - B[z, j] * J_dot[3 + y, j]
+            )
+    for r in range(k):
+        p = k - 1 - r
+        j = freedoms[p]
+        for a in range(3):
+            y, z = (a + 1) % 3, (a + 2) % 3
+            total = total_dot = 0.0
+            for block in (0, 3):  # l × b, then w × c
+                total += J[block + y, j] * B[block + z, j]
+                total -= J[block + z, j] * B[block + y, j]
+                total_dot += J_dot[block + y, j] * B[block + z, j]
+                total_dot -= J_dot[block + z, j] * B[block + y, j]
+                total_dot += J[block + y, j] * B_dot[block + z, j]
+                total_dot -= J[block + z, j] * B_dot[block + y, j]
+            carried[p, a] = carried[p + 1, a] + total
+            carried_dot[p, a] = carried_dot[p + 1, a] + total_dot
+    for p in range(k):
+        i, f = freedoms[p], first[p]
+        gradient[i] = rate[i] = 0.0
+        for a in range(3):
+            gradient[i] += J[3 + a, i] * carried[f, a] + J[a, i] * before[f, a]
+            rate[i] += J_dot[3 + a, i] * carried[f, a] + J[3 + a, i] * carried_dot[f, a]
+            rate[i] += J_dot[a, i] * before[f, a] + J[a, i] * before_dot[f, a]
+
+
+def _chain(robot: Robot, frame: str) -> tuple[Indices, Indices]:
+    """Return the freedoms that move a frame, and where each one's joint begins.
+
+    Raises:
+        FieldError: If a joint on the way mimics another: its freedom stands twice on
+            the chain, which the running sums do not know.
+    """
+    model = robot.model
+    freedoms: list[int] = []
+    first: list[int] = []
+    for joint_id in list(
+        model.supports[model.frames[robot.frame_id(frame)].parentJoint]
+    ):
+        joint = model.joints[joint_id]
+        if joint_id == 0:
+            continue
+        if joint.nvExtended != joint.nv:
+            raise FieldError(
+                f"frame {frame!r} is moved by {model.names[joint_id]!r}, which mimics "
+                "another joint; choose a frame before it, or load with mimic: false"
+            )
+        first.extend([len(freedoms)] * joint.nv)
+        freedoms.extend(range(joint.idx_v, joint.idx_v + joint.nv))
+    return np.array(freedoms, dtype=np.int64), np.array(first, dtype=np.int64)

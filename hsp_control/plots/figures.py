@@ -1,0 +1,141 @@
+"""Whole figures: the paper's five panels, and what explains a run."""
+
+import textwrap
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.gridspec import SubplotSpec
+
+from hsp_control.plots import palette
+from hsp_control.plots.conditioning import draw_manipulability, draw_singular_values
+from hsp_control.plots.errors import PlotError
+from hsp_control.plots.frames import draw_frames, draw_superimposed, columns_for
+from hsp_control.plots.joints import draw_efforts, draw_joint_positions
+from hsp_control.plots.legends import plain
+from hsp_control.plots.null_space import draw_field_value, draw_null_space_error
+from hsp_control.plots.paths import draw_end_effector, path_planes
+from hsp_control.plots.readings import chosen_rows
+from hsp_control.plots.style import new_figure, style
+from hsp_control.plots.task_errors import draw_task_errors
+from hsp_control.simulation import Rollout
+
+
+def paper_figure(
+    rollout: Rollout,
+    *,
+    absolute: bool = True,
+    frames: int = 8,
+    times: list[float] | None = None,
+) -> Figure:
+    """Return the paper's five panels of one run.
+
+    (a) the end effector's path, (b) the joints, (c) manipulability, (d) selected frames
+    and (e) the frames together.
+
+    Args:
+        rollout: The log.
+        absolute: Draw absolute angles where the literature on the robot does.
+        frames: How many frames, evenly over the run.
+        times: When to take frames [s], instead.
+
+    Raises:
+        PlotError: If the log has no row, or no frame is asked for.
+    """
+    _check(rollout)
+    rows = chosen_rows(rollout, frames, times)
+    if not rows:
+        raise PlotError("no frames are asked for; needs at least 1")
+    with style():
+        figure = new_figure(11.0, 7.6)
+        _entitle(figure, rollout)
+        upper, lower = figure.subfigures(2, 1, height_ratios=(1.0, 1.05))
+        grid = upper.add_gridspec(1, 3, width_ratios=(0.85, 1.0, 1.0))
+        a = _draw_paths(upper, grid[0], rollout)
+        b, c = upper.add_subplot(grid[1]), upper.add_subplot(grid[2])
+        draw_joint_positions(b, rollout, absolute=absolute)
+        draw_manipulability(c, rollout)
+        strip, together = lower.subfigures(1, 2, width_ratios=(1.9, 1.0))
+        columns = columns_for(rollout, len(rows), 6.8, 3.0)
+        cells = strip.subplots(-(-len(rows) // columns), columns, squeeze=False)
+        draw_frames(cells.ravel().tolist(), rollout, rows)
+        for cell in cells.ravel():
+            cell.label_outer()
+        strip.suptitle("(d)  Selected frames", **_HEADING)
+        e = together.add_subplot()
+        draw_superimposed(e, rollout, rows)
+        e.set_anchor("N")
+        together.suptitle("(e)  Frames together", **_HEADING)
+        _letter([a, b, c], ["End effector", "Joints", "Manipulability"])
+    return figure
+
+
+def diagnostics_figure(rollout: Rollout) -> Figure:
+    """Return six panels that tell whether a run did what the law promises.
+
+    Task errors, null-space error, field, efforts, singular values, manipulability.
+
+    Raises:
+        PlotError: If the log has no row.
+    """
+    _check(rollout)
+    with style():
+        figure = new_figure(11.0, 6.8)
+        _entitle(figure, rollout)
+        axes = figure.subplots(2, 3)
+        panels = (
+            (draw_task_errors, "Task error"),
+            (draw_null_space_error, "Null-space error"),
+            (draw_field_value, "Null-space field"),
+            (draw_efforts, "Efforts"),
+            (draw_singular_values, "Singular values"),
+            (draw_manipulability, "Manipulability"),
+        )
+        for one, (draw, _) in zip(axes.ravel(), panels, strict=True):
+            draw(one, rollout)
+        _letter(axes.ravel().tolist(), [title for _, title in panels])
+    return figure
+
+
+_HEADING = {"x": 0.01, "ha": "left", "fontsize": 10.0, "fontweight": "bold"}
+
+
+def _draw_paths(figure: SubFigure, place: SubplotSpec, rollout: Rollout) -> Axes:
+    """Draw the path in one plane, or in two one above the other; return the top axes."""
+    planes = path_planes(rollout)
+    grid = place.subgridspec(len(planes), 1)
+    drawn = []
+    for k, names in enumerate(planes):
+        axes = figure.add_subplot(grid[k])
+        draw_end_effector(axes, rollout, names=names, legend=k == len(planes) - 1)
+        drawn.append(axes)
+    return drawn[0]
+
+
+def _letter(axes: list[Axes], titles: list[str]) -> None:
+    for letter, one, title in zip("abcdefgh", axes, titles, strict=False):
+        one.set_title(f"({letter})  {title}")
+
+
+def _entitle(figure: Figure, rollout: Rollout) -> None:
+    """Write the title, and what the run was, at the foot."""
+    meta, config = rollout.meta, rollout.config or {}
+    robot, field = meta["robot"]["name"], meta.get("field", "")
+    title = config.get("title") or config.get("name") or f"{robot}, field: {field}"
+    figure.suptitle(plain(textwrap.fill(str(title), 100)))
+    gain = meta.get("versions", {}).get("hsp_control", "")
+    parts = [f"robot {robot}", f"field {field}", f"metric {meta.get('metric', '')}"]
+    parts += [f"hsp_control {gain}"] if gain else []
+    if rollout.status != "completed":
+        parts.insert(0, f"{rollout.status}: {meta.get('message', '')}".upper())
+    figure.supxlabel(
+        plain(textwrap.fill("  ·  ".join(parts), 180)),
+        fontsize=7.5,
+        color=palette.MUTED if rollout.status == "completed" else palette.WARNING,
+        x=0.01,
+        ha="left",
+    )
+
+
+def _check(rollout: Rollout) -> None:
+    if len(rollout) == 0:
+        raise PlotError(f"the log has no rows to draw ({rollout.status})")

@@ -1,0 +1,157 @@
+"""The robot at selected times: one picture each, or all in one."""
+
+from collections.abc import Sequence
+from typing import NamedTuple, Self
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+from hsp_control.plots import palette
+from hsp_control.plots.things import draw_arm, draw_ball, draw_directions, draw_shadow
+from hsp_control.plots.views import View, fit, view_of
+from hsp_control.plots.world import everything, obstacles, parents, task_paths
+from hsp_control.robot import Array
+from hsp_control.simulation import Rollout
+
+
+def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> None:
+    """Draw the robot at one row, with obstacles there and the tasks' whole paths.
+
+    A robot in a plane is drawn in it, one in space from a slant, with its shadow.
+
+    Args:
+        axes: The axes.
+        rollout: The log.
+        row: The row.
+        key: From a slant, show which way the world's axes point, and a length.
+    """
+    scene = _Scene.of(rollout)
+    skeleton, tree = rollout["skeleton"][row], parents(rollout)
+    if not scene.view.names:
+        draw_shadow(axes, scene.view, skeleton, tree, scene.floor)
+    _draw_paths(axes, scene.view, rollout, 1.6)
+    for obstacle in obstacles(rollout):
+        draw_ball(axes, scene.view, obstacle.center[row], obstacle.radius)
+    draw_arm(axes, scene.view, skeleton, tree)
+    scene.finish(axes, shadows=True, key=key)
+    axes.set_title(
+        f"t = {rollout.t[row]:.2f} s", fontsize=8.5, fontweight="normal", pad=3.0
+    )
+
+
+def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> None:
+    """Draw a strip of frames; axes that are left over are switched off.
+
+    Args:
+        axes: One for each row, in reading order.
+        rollout: The log.
+        rows: The rows.
+    """
+    for place, one in enumerate(axes):
+        if place < len(rows):
+            draw_frame(one, rollout, rows[place], key=place == 0)
+        else:
+            one.set_axis_off()
+
+
+def draw_superimposed(axes: Axes, rollout: Rollout, rows: Sequence[int]) -> None:
+    """Draw the robot at all rows in one picture, the later the darker.
+
+    Args:
+        axes: The axes.
+        rollout: The log.
+        rows: The rows.
+    """
+    scene, tree = _Scene.of(rollout), parents(rollout)
+    _draw_paths(axes, scene.view, rollout, 2.2)
+    times = rollout.t[list(rows)]
+    start, end = float(times.min()), float(times.max())
+    for place, row in enumerate(rows):
+        age = float(rollout.t[row] - start) / (end - start) if end > start else 1.0
+        pale = palette.blend(palette.OBSTACLE_EARLY, palette.OBSTACLE, age)
+        for obstacle in obstacles(rollout):
+            center = obstacle.center[row]
+            draw_ball(axes, scene.view, center, obstacle.radius, color=pale, zorder=1.9)
+        link = palette.blend(palette.EARLY, palette.LATE, age)
+        joint = palette.blend(link, palette.INK, 0.4)
+        points = rollout["skeleton"][row]
+        zorder = 3.0 + 0.2 * place
+        draw_arm(axes, scene.view, points, tree, link=link, joint=joint, zorder=zorder)
+    scene.finish(axes, shadows=False, key=True)
+    if end > start:
+        _time_bar(axes, start, end, times.tolist())
+
+
+def columns_for(rollout: Rollout, count: int, width: float, height: float) -> int:
+    """Return how many frames to put beside each other so that they come out largest.
+
+    Args:
+        rollout: The log.
+        count: How many frames there are.
+        width: Width of the space for them, in any unit.
+        height: Its height, in the same unit.
+    """
+    scene = _Scene.of(rollout)
+    w, h = (float(np.ptp(page)) + 1e-9 for page in scene.view.project(scene.points))
+
+    def scale(columns: int) -> float:
+        rows = -(-count // columns)
+        filled = count / (rows * columns)
+        return filled * min(width / columns / w, height / rows / h)
+
+    return max(range(1, count + 1), key=scale)
+
+
+class _Scene(NamedTuple):
+    """What all frames of a log share.
+
+    Attributes:
+        view: The view.
+        points: Points that enclose all that is ever to be seen, shape (K, 3) [m].
+        floor: Height of the floor [m]: of the world's origin, or of what lies lower.
+    """
+
+    view: View
+    points: Array
+    floor: float
+
+    @classmethod
+    def of(cls, rollout: Rollout) -> Self:
+        points = everything(rollout)
+        view = view_of(everything(rollout, balls=False))
+        return cls(view, points, min(0.0, float(points[:, 2].min())))
+
+    def finish(self, axes: Axes, *, shadows: bool, key: bool) -> None:
+        """Set limits and labels, or show directions where there are none."""
+        points = self.points
+        if not self.view.names:
+            axes.set_axis_off()
+            if shadows:
+                fallen = points.copy()
+                fallen[:, 2] = self.floor
+                points = np.concatenate([points, fallen])
+            corner = points.min(axis=0)
+            size = 0.25 * float(np.ptp(points, axis=0).max())
+            if key:
+                draw_directions(axes, self.view, corner, size)
+            points = np.vstack([points, corner])
+        fit(axes, self.view, points, least=1e-3)
+
+
+def _draw_paths(axes: Axes, view: View, rollout: Rollout, width: float) -> None:
+    for path in task_paths(rollout):
+        page = view.project(path.desired)
+        axes.plot(*page, color=palette.DESIRED, linewidth=width, zorder=1.8)
+
+
+def _time_bar(axes: Axes, start: float, end: float, ticks: list[float]) -> None:
+    scale = LinearSegmentedColormap.from_list("time", [palette.EARLY, palette.LATE])
+    figure = axes.get_figure(root=False)
+    assert figure is not None
+    beside = axes.inset_axes((1.04, 0.0, 0.035, 1.0))
+    bar = figure.colorbar(ScalarMappable(Normalize(start, end), scale), cax=beside)
+    bar.set_label("time [s]")
+    bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
+    bar.outline.set_visible(False)  # type: ignore[operator]

@@ -1,0 +1,62 @@
+"""Write a log's figures to files."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from hsp_control.plots.errors import PlotError
+from hsp_control.plots.figures import diagnostics_figure, paper_figure
+from hsp_control.plots.style import style
+from hsp_control.simulation import Rollout
+from hsp_control.suggest import did_you_mean, listing
+
+_UNDATED = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+"""The same log gives the same file, whenever it is drawn."""
+
+
+def save_figures(
+    rollout: Rollout,
+    folder: str | Path,
+    stem: str,
+    formats: Sequence[str] = ("png",),
+) -> list[Path]:
+    """Write ``<stem>-paper`` and ``<stem>-diagnostics`` in every format.
+
+    Args:
+        rollout: The log.
+        folder: Where to; made if need be.
+        stem: What the files' names begin with.
+        formats: Such as ``png``, ``pdf`` or ``svg``.
+
+    Returns:
+        The files.
+
+    Raises:
+        PlotError: If a format is not known, or a file cannot be written.
+    """
+    figures = {"paper": paper_figure, "diagnostics": diagnostics_figure}
+    paths = []
+    for name, draw in figures.items():
+        figure = draw(rollout)
+        for suffix in formats:
+            path = Path(folder) / f"{stem}-{name}.{suffix}"
+            _save(figure, path, suffix)
+            paths.append(path)
+    return paths
+
+
+def _save(figure: Figure, path: Path, suffix: str) -> None:
+    known = figure.canvas.get_supported_filetypes()
+    if suffix not in known:
+        raise PlotError(
+            f"no picture format {suffix!r}{did_you_mean(suffix, known)} "
+            f"(there are {listing(known)})"
+        )
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with style():
+            figure.savefig(path, format=suffix, metadata=_UNDATED.get(suffix))
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise PlotError(f"{path}: cannot write the picture: {reason}") from error

@@ -1,0 +1,33 @@
+"""The tasks' errors over time."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from hsp_control.plots import palette
+from hsp_control.plots.legends import legend_below, plain
+from hsp_control.plots.lines import log_scale, mark_damped, single, time_axis
+from hsp_control.plots.readings import task_errors
+from hsp_control.simulation import Rollout
+
+_DASHES = {"rad": "--", "–": ":"}
+"""Errors of different units lie on one axis; the legend names the units."""
+
+
+def draw_task_errors(axes: Axes, rollout: Rollout) -> None:
+    """Draw the norm of every task's error, metres and radians apart, on a log scale."""
+    t, parts = rollout.t, task_errors(rollout)
+    for place, part in enumerate(parts):
+        axes.plot(
+            t,
+            part.norm,
+            color=palette.series(place + 2),
+            linestyle=_DASHES.get(part.unit, "-"),
+            marker=single(t),
+            label=plain(f"{part.label} [{part.unit}]"),
+        )
+    mark_damped(axes, rollout)
+    log_scale(axes, np.concatenate([part.norm for part in parts]), top=1e-6)
+    units = ", ".join(dict.fromkeys(part.unit for part in parts))
+    axes.set_ylabel(rf"task error $\Vert e \Vert$ [{units}]")
+    time_axis(axes, t)
+    legend_below(axes)

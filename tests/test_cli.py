@@ -1,0 +1,142 @@
+"""The command line as a person uses it: output, exit status, one message an error."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hsp_control.cli import main
+
+MOVING = "paper/4_moving_obstacle"
+SHORT = ["--set", "simulation.duration=0.1"]
+
+
+def test_run_leaves_a_log_that_numpy_alone_reads(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", MOVING, "--out", str(tmp_path), "--no-view", *SHORT]) == 0
+    log = tmp_path / "4_moving_obstacle.npz"
+    assert f"Log: {log}" in capsys.readouterr().out
+    with np.load(log, allow_pickle=False) as columns:
+        assert {"t", "q", "v", "tau"} <= set(columns.files)
+        assert columns["t"].shape == (11,)
+        meta = json.loads(str(columns["meta"]))
+    assert meta["config"]["simulation"]["duration"] == 0.1
+    assert meta["columns"]["tau"]["unit"] == "N·m or N"
+
+
+def test_plot_draws_beside_the_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["run", MOVING, "--out", str(tmp_path), *SHORT])
+    assert main(["plot", str(tmp_path / "4_moving_obstacle.npz")]) == 0
+    figures = list(tmp_path.glob("*.png"))
+    assert len(figures) >= 2
+    printed = capsys.readouterr().out
+    assert all(f"Figure: {figure}" in printed for figure in figures)
+    assert all(figure.stat().st_size > 10_000 for figure in figures)
+
+
+def test_check_says_what_it_found(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", MOVING]) == 0
+    text = capsys.readouterr().out
+    assert "planar3r: nq = 6, nv = 3" in text
+    assert f"{MOVING}: fine" in text
+
+
+def test_check_warns_of_a_singular_start(capsys: pytest.CaptureFixture[str]) -> None:
+    stretched = ["--set", "start.coordinates=[0, 0, 0]"]
+    assert main(["check", MOVING, *stretched]) == 0
+    assert "singular at the start" in capsys.readouterr().out
+
+
+def test_robots_lists_what_can_be_loaded(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["robots"]) == 0
+    rows = capsys.readouterr().out.splitlines()
+    (planar,) = [row for row in rows if row.startswith("planar3r ")]
+    assert planar.split()[:6] == ["planar3r", "bundled", "fixed", "6", "3", "10"]
+    (bravo,) = [row for row in rows if row.startswith("bravo7_gripper ")]
+    assert "moves no mass" in bravo
+    assert main(["robots", "iiwa14"]) == 0
+    assert "iiwa_joint_7" in capsys.readouterr().out
+
+
+def test_schema_is_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    assert "null_space" in json.loads(capsys.readouterr().out)["properties"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "paper/4_moving"], "did you mean 'paper/4_moving_obstacle'?"),
+        (["run", "nowhere.yaml"], "hsp: nowhere.yaml: no such file"),
+        (["check", MOVING, "--set", "tasks.tip.frame=tpi"], "did you mean 'tip'?"),
+        (["check", MOVING, "--set", "nonsense"], "--set nonsense"),
+        (["plot", "nowhere.npz"], "hsp: nowhere.npz: no such file"),
+        (["plot", __file__], "not a whole .npz log"),
+        (["robots", "pand"], "did you mean 'panda'?"),
+        (["run", MOVING, *SHORT, "--out", "/proc/nowhere"], "hsp: /proc/nowhere"),
+    ],
+)
+def test_each_mistake_gets_one_message_and_status_2(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert message in captured.err
+    assert captured.err.startswith("hsp: ")
+    assert "Traceback" not in captured.err
+
+
+def test_bad_usage_ends_with_status_2() -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["run"])
+    assert caught.value.code == 2
+
+
+def test_a_diverging_run_keeps_its_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wild = ["--set", "simulation.control_period=0.01", "--set", "null_space.gain=900"]
+    assert main(["run", MOVING, "--out", str(tmp_path), *wild]) == 2
+    assert "diverged" in capsys.readouterr().err
+    with np.load(tmp_path / "4_moving_obstacle.npz", allow_pickle=False) as columns:
+        assert len(columns["t"]) > 1
+        assert json.loads(str(columns["meta"]))["status"] == "diverged"
+
+
+def test_ctrl_c_keeps_what_was_computed(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "hsp_control", "run", MOVING, "--out"]
+    long = ["--set", "simulation.duration=10000", "--set", "simulation.log_period=0.1"]
+    process = subprocess.Popen(
+        [*command, str(tmp_path), *long], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    time.sleep(8.0)  # well into the run, compilation included
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 2, errors.decode()
+    assert b"stopped by the user" in errors
+    with np.load(tmp_path / "4_moving_obstacle.npz", allow_pickle=False) as columns:
+        assert json.loads(str(columns["meta"]))["status"] == "interrupted"
+        assert len(columns["t"]) > 1
+
+
+def test_the_module_is_the_command() -> None:
+    ran = subprocess.run(
+        [sys.executable, "-m", "hsp_control", "--version"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert ran.stdout.startswith("hsp ")
+
+
+def test_help_is_printed_without_a_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0
+    assert "COMMAND" in capsys.readouterr().out
