@@ -23,7 +23,7 @@ help: ## list the targets
 
 demo: $(STAMP) ## run the paper's moving obstacle, plot it, say where it is
 	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo --no-view
-	@$(BIN)/hsp plot out/demo/*.npz --out out/demo
+	@$(BIN)/hsp plot out/demo/4_moving_obstacle.npz --out out/demo
 	@echo "The log and the figures are in out/demo:" && ls out/demo
 
 ##@ Check
@@ -48,7 +48,7 @@ wheel-test: $(STAMP) ## build the wheel, install it elsewhere, use it from there
 	cd "$$dir/cwd"; export PATH="$$dir/venv/bin:$$PATH"; unset PYTHONPATH; \
 	hsp robots; \
 	hsp check paper/4_moving_obstacle; \
-	hsp run paper/4_moving_obstacle --out out --no-view; \
+	hsp run paper/4_moving_obstacle --set simulation.duration=1 --out out --no-view; \
 	echo "The wheel works."
 
 ##@ Keep

@@ -863,6 +863,11 @@ def test_errors_of_overridden_keys_name_the_override() -> None:
     assert str(caught.value) == f"{origin}: tasks.hand.gains.kp: needs 3 numbers"
 
 
+def test_long_keys_are_cut() -> None:
+    error = Document.parse("a: 1").error(("a " * 50,), "is bad")
+    assert str(error) == f"<string>:1: '{'a ' * 18}a...': is bad"
+
+
 def test_errors_can_be_made_for_a_place() -> None:
     error = Document.parse("a b: {'': 1}", "x.yaml").error(("a b", ""), "is bad")
     assert (str(error), error.location) == ("x.yaml:1: 'a b'.'': is bad", "x.yaml:1")

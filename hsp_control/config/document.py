@@ -17,7 +17,6 @@ from hsp_control.exceptions import ConfigError, HspControlError
 from hsp_control.suggest import nearest
 
 _TOO_LARGE = f"larger than {MAX_SIZE // 1_000_000} MB, too much for a configuration"
-
 _LONGEST_ORIGIN = 72
 
 
@@ -167,7 +166,6 @@ def _why_unreadable(name: str, error: OSError | ValueError) -> str:
     if isinstance(error, FileNotFoundError):
         files = {file.stem: file.name for file in Path(name).parent.glob("*.yaml")}
         near = nearest(Path(name).stem, files)
-        return (
-            f"no such file; did you mean {files[near]!r}?" if near else "no such file"
-        )
+        hint = f"; did you mean {files[near]!r}?" if near else ""
+        return f"no such file{hint}"
     return f"cannot be read: {getattr(error, 'strerror', None) or error}"

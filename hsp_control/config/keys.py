@@ -3,6 +3,8 @@
 import re
 from typing import TypeAlias
 
+from hsp_control.config.plain import shortened
+
 KeyPath: TypeAlias = tuple[str | int, ...]
 
 _QUOTED = r"'[^']*'|\"[^\"]*\""
@@ -14,7 +16,8 @@ _NEEDS_QUOTES = re.compile(r"[\s.=:'\"]")
 def written(path: KeyPath) -> str:
     """Return the path with dots between its parts: ``tasks.0.gains.kp``.
 
-    Parts that would be misread (with a dot or a blank inside, or empty) are quoted.
+    Parts that would be misread (with a dot or a blank inside, or empty) are quoted, and
+    cut if they are long.
     """
     return ".".join(_written_part(part) for part in path)
 
@@ -38,4 +41,4 @@ def _written_part(part: str | int) -> str:
         return str(part)
     if part and part.isprintable() and not _NEEDS_QUOTES.search(part):
         return part
-    return repr(part)
+    return repr(shortened(part))

@@ -41,8 +41,8 @@ def _summary(document: Document, found: list[Finding]) -> ConfigError:
     messages = list(dict.fromkeys(str(error) for error in errors))
     first, others = errors[0], messages[1:]
     if others:
-        lines = [messages[0], f"and {len(others)} more:", *others[:_OTHERS]]
+        lines = [f"{first}\nand {len(others)} more:", *others[:_OTHERS]]
         if len(others) > _OTHERS:
             lines.append(f"... ({len(others) - _OTHERS} not shown)")
-        first.args = ("\n  ".join(lines).replace("\n  and ", "\nand ", 1),)
+        first.args = ("\n  ".join(lines),)
     return first

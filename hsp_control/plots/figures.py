@@ -3,8 +3,7 @@
 import textwrap
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
-from matplotlib.gridspec import SubplotSpec
+from matplotlib.figure import Figure
 
 from hsp_control.plots import palette
 from hsp_control.plots.conditioning import draw_manipulability, draw_singular_values
@@ -13,7 +12,7 @@ from hsp_control.plots.frames import draw_frames, draw_superimposed, columns_for
 from hsp_control.plots.joints import draw_efforts, draw_joint_positions
 from hsp_control.plots.legends import plain
 from hsp_control.plots.null_space import draw_field_value, draw_null_space_error
-from hsp_control.plots.paths import draw_end_effector, path_planes
+from hsp_control.plots.paths import draw_end_effector
 from hsp_control.plots.readings import chosen_rows
 from hsp_control.plots.style import new_figure, style
 from hsp_control.plots.task_errors import draw_task_errors
@@ -50,8 +49,9 @@ def paper_figure(
         _entitle(figure, rollout)
         upper, lower = figure.subfigures(2, 1, height_ratios=(1.0, 1.05))
         grid = upper.add_gridspec(1, 3, width_ratios=(0.85, 1.0, 1.0))
-        a = _draw_paths(upper, grid[0], rollout)
-        b, c = upper.add_subplot(grid[1]), upper.add_subplot(grid[2])
+        a, b, c = (upper.add_subplot(place) for place in grid)
+        draw_end_effector(a, rollout)
+        a.set_anchor("NW")
         draw_joint_positions(b, rollout, absolute=absolute)
         draw_manipulability(c, rollout)
         strip, together = lower.subfigures(1, 2, width_ratios=(1.9, 1.0))
@@ -97,18 +97,6 @@ def diagnostics_figure(rollout: Rollout) -> Figure:
 
 
 _HEADING = {"x": 0.01, "ha": "left", "fontsize": 10.0, "fontweight": "bold"}
-
-
-def _draw_paths(figure: SubFigure, place: SubplotSpec, rollout: Rollout) -> Axes:
-    """Draw the path in one plane, or in two one above the other; return the top axes."""
-    planes = path_planes(rollout)
-    grid = place.subgridspec(len(planes), 1)
-    drawn = []
-    for k, names in enumerate(planes):
-        axes = figure.add_subplot(grid[k])
-        draw_end_effector(axes, rollout, names=names, legend=k == len(planes) - 1)
-        drawn.append(axes)
-    return drawn[0]
 
 
 def _letter(axes: list[Axes], titles: list[str]) -> None:

@@ -51,7 +51,7 @@ def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> 
     """
     for place, one in enumerate(axes):
         if place < len(rows):
-            draw_frame(one, rollout, rows[place], key=place == 0)
+            draw_frame(one, rollout, rows[place], key=False)
         else:
             one.set_axis_off()
 
@@ -132,12 +132,18 @@ class _Scene(NamedTuple):
                 fallen = points.copy()
                 fallen[:, 2] = self.floor
                 points = np.concatenate([points, fallen])
-            corner = points.min(axis=0)
-            size = 0.25 * float(np.ptp(points, axis=0).max())
             if key:
-                draw_directions(axes, self.view, corner, size)
-            points = np.vstack([points, corner])
+                points = np.concatenate([points, self._draw_key(axes, points)])
         fit(axes, self.view, points, least=1e-3)
+
+    def _draw_key(self, axes: Axes, points: Array) -> Array:
+        """Show directions under the points, at the left; return what they take up."""
+        x, y = self.view.project(points)
+        length = 0.2 * max(float(np.ptp(x)), float(np.ptp(y)))
+        corner = np.array([float(x.min()), float(y.min()) - 1.2 * length])
+        origin = self.view.rows.T @ corner
+        draw_directions(axes, self.view, origin, length)
+        return np.array([origin, origin - 0.3 * length * self.view.rows[1]])
 
 
 def _draw_paths(axes: Axes, view: View, rollout: Rollout, width: float) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.transforms import ScaledTranslation
 
-_HANDLE, _GAP, _LETTER = 2.2, 1.3, 0.58
+_HANDLE, _GAP, _LETTER = 2.2, 1.3, 0.55
 """Widths in a legend in units of its font size: handle, gap of columns, mean letter."""
 
 
@@ -51,7 +51,7 @@ def _fitting(axes: Axes, labels: Sequence[str]) -> int:
     """Return how many columns fit under the axes; entries run down the columns."""
     figure = axes.get_figure(root=True)
     assert figure is not None
-    width = axes.get_window_extent().width / figure.dpi * 72.0 / 8.0
+    width = axes.get_window_extent().width / figure.dpi * 72.0 / 8.0 * 1.1
     for columns in range(len(labels), 1, -1):
         rows = -(-len(labels) // columns)
         wide = sum(
@@ -59,5 +59,5 @@ def _fitting(axes: Axes, labels: Sequence[str]) -> int:
             for start in range(0, len(labels), rows)
         )
         if wide - _GAP <= width:
-            return columns
+            return -(-len(labels) // rows)
     return 1

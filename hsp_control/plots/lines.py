@@ -41,7 +41,7 @@ def draw_lines(axes: Axes, t: Array, values: Array, names: Sequence[str]) -> Non
             label=plain(names[k]),
         )
     if len(names) > len(named):
-        note(axes, f"and {len(names) - len(named)} that move less (grey)")
+        note(axes, f"{len(names) - len(named)} others (grey)")
 
 
 def single(t: Array) -> str:

@@ -96,9 +96,7 @@ def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
         note(axes, decay.why_not)
     mark_damped(axes, rollout)
     log_scale(axes, norm, top=1e-6)
-    unit = position_unit(rollout)
-    unit = f"({unit})/s" if " " in unit else f"{unit}/s"
-    axes.set_ylabel(rf"null-space error $\Vert e_N \Vert_W$ [{unit}]")
+    axes.set_ylabel(rf"$\Vert e_N \Vert_W$ [{_norm_unit(rollout)}]")
     time_axis(axes, t)
     legend_below(axes)
 
@@ -115,3 +113,11 @@ def draw_field_value(axes: Axes, rollout: Rollout) -> None:
     axes.set_ylabel(f"value of the field [{unit}]")
     time_axis(axes, t)
     legend_below(axes)
+
+
+def _norm_unit(rollout: Rollout) -> str:
+    """Return the unit of a velocity's norm; in the mass matrix, twice the energy's root."""
+    if rollout.meta.get("metric") == "MassMatrixMetric":
+        return "√J"
+    unit = position_unit(rollout)
+    return f"({unit})/s" if " " in unit else f"{unit}/s"

@@ -23,6 +23,8 @@ JOINT = "#2F363D"
 """A robot's joints (near black)."""
 SHADOW = "#E3E6E9"
 """What only helps the eye: a shadow on the floor (pale grey)."""
+WALL = "#F6F7F8"
+"""The walls behind a picture in space."""
 
 INK = "#22272B"
 """Text and axes."""
@@ -49,6 +51,9 @@ SERIES = (
 )
 """Lines of one kind, such as joints; Okabe and Ito's yellow is lost on white."""
 
+TASKS = (ACTUAL, TASK, "#CC79A7", "#56B4E9", INK)
+"""What was measured of one task, of a second and so on."""
+
 
 def blend(start: str, end: str, fraction: float) -> str:
     """Return the colour at a fraction of the way from ``start`` to ``end``."""
@@ -60,6 +65,11 @@ def blend(start: str, end: str, fraction: float) -> str:
 def series(index: int) -> str:
     """Return the colour of line ``index``; after the last comes the first again."""
     return SERIES[index % len(SERIES)]
+
+
+def task(index: int) -> str:
+    """Return the colour of task ``index``."""
+    return TASKS[index % len(TASKS)]
 
 
 def _channels(color: str) -> tuple[int, int, int]:

@@ -4,10 +4,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hsp_control.plots import palette
+from hsp_control.plots.box import corners, draw_box
 from hsp_control.plots.legends import legend_below, note, plain
 from hsp_control.plots.lines import single
 from hsp_control.plots.things import draw_ball
-from hsp_control.plots.views import View, best_plane, fit, is_flat, plane
+from hsp_control.plots.views import View, best_plane, fit, is_flat, plane, slant
 from hsp_control.plots.world import (
     ball,
     end_points,
@@ -20,34 +21,24 @@ from hsp_control.simulation import Rollout
 
 NEARLY_FLAT = 0.05
 """Depth over width below which one view of a path is enough."""
-_ACTUAL = (palette.ACTUAL, *palette.SERIES[2:5], palette.INK)
-"""Colours of several tasks' paths; the desired ones are all of the colour DESIRED."""
 
 
-def path_planes(rollout: Rollout) -> list[str]:
-    """Return the planes in which to draw the end effector's path: one, or two.
+def path_view(rollout: Rollout) -> View:
+    """Return the view in which the end effector's path reads best.
 
     The robot's plane if it moves in one; the plane that the tasks track if they track
-    two axes; else the plane of the two axes along which paths and obstacles spread most,
-    and if they are not flat, the plane of the widest axis and of the third as well.
+    two axes; the plane of paths and obstacles if they are nearly flat; else a slant.
     """
     whole, seen = everything(rollout, balls=False), _seen(rollout, balls=False)
     if is_flat(whole):
-        return [best_plane(whole)]
+        return plane(best_plane(whole))
     tracked = {"".join(sorted(path.axes)) for path in task_paths(rollout)}
     if len(tracked) == 1 and len(only := tracked.pop()) == 2:
-        return [only]
-    best = best_plane(seen)
-    if is_flat(seen, NEARLY_FLAT):
-        return [best]
-    widest = "xyz"[int(np.argmax(np.ptp(seen, axis=0)))]
-    third = next(name for name in "xyz" if name not in best)
-    return [best, "".join(sorted(widest + third))]
+        return plane(only)
+    return plane(best_plane(seen)) if is_flat(seen, NEARLY_FLAT) else slant()
 
 
-def draw_end_effector(
-    axes: Axes, rollout: Rollout, *, names: str | None = None, legend: bool = True
-) -> None:
+def draw_end_effector(axes: Axes, rollout: Rollout, *, names: str = "") -> None:
     """Draw desired and actual path of every point that a task leads, and obstacles.
 
     Obstacles are drawn where they are at the end, and dashed where they were at the
@@ -56,16 +47,15 @@ def draw_end_effector(
     Args:
         axes: The axes.
         rollout: The log.
-        names: The world axes to draw, such as ``"xz"``; None: the best of
-            `path_planes`.
-        legend: Put a legend under the axes.
+        names: Two world axes to draw, such as ``"xz"``; empty: see `path_view`.
     """
-    view = plane(names or path_planes(rollout)[0])
+    view = plane(names) if names else path_view(rollout)
     paths = task_paths(rollout)
     for place, path in enumerate(paths):
-        still = float(np.ptp(path.desired, axis=0).max()) < 1e-9
+        page = view.project(path.desired)
+        still = max(float(np.ptp(coordinate)) for coordinate in page) < 1e-9
         axes.plot(
-            *view.project(path.desired),
+            *page,
             color=palette.DESIRED,
             linewidth=3.6,
             marker="o" if still else "",
@@ -82,16 +72,22 @@ def draw_end_effector(
             _draw_track(axes, view, ends[:, k], k, "end of the robot" if k == 0 else None)
         note(axes, "no task leads a point")
     _draw_obstacles(axes, view, rollout)
-    size = float(np.ptp(everything(rollout), axis=0).max())
-    fit(axes, view, _seen(rollout), least=0.02 * size)
-    if legend:
-        legend_below(axes)
+    least = 0.02 * float(np.ptp(everything(rollout), axis=0).max())
+    seen = _seen(rollout)
+    if view.names:
+        fit(axes, view, seen, least)
+    else:
+        middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+        half = np.maximum(0.53 * np.ptp(seen, axis=0), 0.5 * least)
+        draw_box(axes, view, middle - half, middle + half)
+        fit(axes, view, corners(middle - half, middle + half), margin=0.01)
+    legend_below(axes)
 
 
 def _draw_track(
     axes: Axes, view: View, points: Array, place: int, label: str | None
 ) -> None:
-    color = _ACTUAL[place % len(_ACTUAL)]
+    color = palette.task(place)
     axes.plot(*view.project(points), color=color, zorder=2.4, label=label)
     for row, face, name in ((0, palette.PAPER, "start"), (-1, color, "end")):
         axes.plot(
@@ -127,7 +123,7 @@ def _draw_obstacles(axes: Axes, view: View, rollout: Rollout) -> None:
 
 def _desired_label(axes: str, view: View) -> str:
     """Return the label; with the tracked axes if some in the view are not tracked."""
-    return f"desired ({axes})" if set(view.names) - set(axes) else "desired"
+    return f"desired ({axes})" if set(view.names or 'xyz') - set(axes) else "desired"
 
 
 def _seen(rollout: Rollout, *, balls: bool = True) -> Array:

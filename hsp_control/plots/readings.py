@@ -14,11 +14,13 @@ class ErrorPart(NamedTuple):
     Attributes:
         label: The task's name, and what of it, if it has several parts.
         unit: The components' unit.
+        task: The task's place among the tasks.
         norm: Their Euclidean norm at every row, shape (N,).
     """
 
     label: str
     unit: str
+    task: int
     norm: Array
 
 
@@ -45,14 +47,14 @@ def task_type(rollout: Rollout, name: str) -> str:
 def task_errors(rollout: Rollout) -> list[ErrorPart]:
     """Return the norms of all tasks' errors, metres and radians apart."""
     parts = []
-    for name in task_names(rollout):
+    for place, name in enumerate(task_names(rollout)):
         error = rollout[f"task.{name}.error"]
         unit_in_log = column_unit(rollout, f"task.{name}.error")
         whole = (("", unit_in_log, slice(None)),)
         for what, unit, rows in _PARTS.get(task_type(rollout, name), whole):
             norm = np.linalg.norm(error[:, rows], axis=1)
             label = f"{name} {what}".strip()
-            parts.append(ErrorPart(label, unit or position_unit(rollout), norm))
+            parts.append(ErrorPart(label, unit or position_unit(rollout), place, norm))
     return parts
 
 

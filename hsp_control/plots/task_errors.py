@@ -16,11 +16,11 @@ _DASHES = {"rad": "--", "–": ":"}
 def draw_task_errors(axes: Axes, rollout: Rollout) -> None:
     """Draw the norm of every task's error, metres and radians apart, on a log scale."""
     t, parts = rollout.t, task_errors(rollout)
-    for place, part in enumerate(parts):
+    for part in parts:
         axes.plot(
             t,
             part.norm,
-            color=palette.series(place + 2),
+            color=palette.task(part.task),
             linestyle=_DASHES.get(part.unit, "-"),
             marker=single(t),
             label=plain(f"{part.label} [{part.unit}]"),

@@ -75,7 +75,9 @@ def view_of(points: Array) -> View:
     return plane(best_plane(points)) if is_flat(points) else slant()
 
 
-def fit(axes: Axes, view: View, points: Array, least: float = 0.0) -> None:
+def fit(
+    axes: Axes, view: View, points: Array, least: float = 0.0, margin: float = 0.06
+) -> None:
     """Set limits around points, equal scales, and labels if there are world axes.
 
     Args:
@@ -83,14 +85,16 @@ def fit(axes: Axes, view: View, points: Array, least: float = 0.0) -> None:
         view: The view.
         points: What is to be seen, shape (K, 3).
         least: Width that is shown at least [m], so as not to magnify rounding.
+        margin: Room around them, relative to the greater width.
     """
     x, y = view.project(points)
     widest = max(float(np.ptp(x)), float(np.ptp(y)), least, 1e-6)
     for set_limits, coordinate in ((axes.set_xlim, x), (axes.set_ylim, y)):
         middle = 0.5 * float(coordinate.min() + coordinate.max())
-        half = 0.5 * max(float(np.ptp(coordinate)), least) + 0.06 * widest
+        half = 0.5 * max(float(np.ptp(coordinate)), least) + margin * widest
         set_limits(middle - half, middle + half)
     axes.set_aspect("equal")
+    axes.locator_params(nbins=6)
     if view.names:
         axes.set_xlabel(f"{view.names[0]} [m]")
         axes.set_ylabel(f"{view.names[1]} [m]")

@@ -1,0 +1,111 @@
+"""What the page is told: Meshcat's commands and a few of our own, in MessagePack."""
+
+import struct
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import umsgpack  # type: ignore[import-untyped]
+
+from hsp_control.arrays import Array
+from hsp_control.viewer.kept import key_of
+
+Json = dict[str, Any]
+
+CAMERA, CAPTION = "/camera", "/caption"
+
+
+class Command(NamedTuple):
+    """One word to the page.
+
+    Attributes:
+        path: The node of the scene tree that it is about.
+        key: What it sets; the next command with the same key replaces it.
+        packed: The command itself, a map in MessagePack.
+        deletes: Whether it takes the node and all below it away.
+    """
+
+    path: str
+    key: str
+    packed: bytes
+    deletes: bool = False
+
+
+def set_object(path: str, thing: Json) -> Command:
+    """Put a thing (see `shapes`) at a path, in place of what was there."""
+    return _command("set_object", path, "object", object=thing)
+
+
+def set_transform(path: str, transform: Array) -> Command:
+    """Move a node: its pose in its parent, a homogeneous matrix of shape (4, 4)."""
+    matrix = np.ascontiguousarray(transform.T, dtype="<f8")
+    return Command(
+        path, key_of(path, "transform"), _transform_head(path) + matrix.tobytes()
+    )
+
+
+def set_property(path: str, name: str, value: Any) -> Command:
+    """Set a property of a node: ``visible``, ``scale`` and what else Meshcat knows."""
+    return _command("set_property", path, name, property=name, value=value)
+
+
+def set_length(path: str, fraction: float) -> Command:
+    """Show only the first part of a path's tube, a fraction from 0 to 1."""
+    return _command("length", path, "length", fraction=float(fraction))
+
+
+def delete(path: str) -> Command:
+    """Take away a node and all below it."""
+    return _command("delete", path, "delete")._replace(deletes=True)
+
+
+def set_camera(**view: Any) -> Command:
+    """Look from elsewhere: see `Camera`."""
+    return _command("camera", CAMERA, "camera", **view)
+
+
+def set_caption(title: str, legend: list[tuple[str, str]]) -> Command:
+    """Set the words beside the scene: a title, and names with their colours."""
+    entries = [{"name": name, "color": color} for name, color in legend]
+    return _command("caption", CAPTION, "caption", title=title, legend=entries)
+
+
+def set_time(text: str) -> Command:
+    """Set the clock under the title; empty for none."""
+    return _command("time", CAPTION, "time", text=text)
+
+
+def typed_array(values: Any, dtype: type[np.generic]) -> umsgpack.Ext:
+    """Return numbers as one of JavaScript's typed arrays."""
+    kinds: dict[Any, int] = {np.uint8: 0x12, np.uint32: 0x16, np.float32: 0x17}
+    return umsgpack.Ext(kinds[dtype], np.ascontiguousarray(values, dtype).tobytes())
+
+
+def unpack(packed: bytes) -> Json:
+    """Return a command as plain data, its typed arrays as arrays; for tests."""
+    kinds = {
+        0x12: np.dtype("u1"),
+        0x16: np.dtype("<u4"),
+        0x17: np.dtype("<f4"),
+        0x18: np.dtype("<f8"),
+    }
+    handlers = {
+        kind: lambda ext, dtype=dtype: np.frombuffer(ext.data, dtype)
+        for kind, dtype in kinds.items()
+    }
+    return dict(umsgpack.unpackb(packed, ext_handlers=handlers))
+
+
+def _command(kind: str, path: str, what: str, **fields: Any) -> Command:
+    packed = umsgpack.packb({"type": kind, "path": path, **fields})
+    return Command(path, key_of(path, what), packed)
+
+
+@lru_cache(maxsize=4096)
+def _transform_head(path: str) -> bytes:
+    """Return the bytes before the matrix: packing them anew would cost the most."""
+    head = b"".join(
+        umsgpack.packb(word) for word in ("type", "set_transform", "path", path, "matrix")
+    )
+    ext8_of_16_doubles = struct.pack("BBB", 0xC7, 16 * 8, 0x18)
+    return b"\x83" + head + ext8_of_16_doubles

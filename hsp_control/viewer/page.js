@@ -1,0 +1,91 @@
+// Meshcat's viewer, told a few more words than it knows: see hsp_control/viewer/commands.py.
+"use strict";
+
+const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+const meshcat = viewer.handle_command.bind(viewer);
+
+// Our own lights, floor and grid come with the scene; they fit the robot.
+for (const name of ["Lights", "Grid", "Axes"]) viewer.delete_path([name]);
+
+const words = {camera, caption, time, length, ask};
+viewer.handle_command = (command) => {
+  if (Array.isArray(command)) command.forEach(viewer.handle_command);
+  else (words[command.type] ?? meshcat)(command);
+  viewer.set_dirty();
+};
+
+// Pinocchio's z is up, three.js's y.
+function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
+
+// Look at a target, from an eye or, along a direction, from where all the points are seen.
+function camera({target, eye, direction, up, points, field_of_view, margin}) {
+  const center = vector(target);
+  const toEye = vector(eye ?? direction);
+  if (eye) toEye.sub(center);
+  const distance = eye ? toEye.length() : 0;
+  toEye.normalize();
+  const tall = Math.tan(field_of_view * Math.PI / 360);
+  const wide = tall * (window.innerWidth / window.innerHeight || 1.5);
+  const right = vector(up).cross(toEye).normalize();
+  const above = toEye.clone().cross(right);
+  const needed = (point) => {
+    const offset = vector(point).sub(center);
+    const across = Math.max(Math.abs(offset.dot(right)) / wide, Math.abs(offset.dot(above)) / tall);
+    return offset.dot(toEye) + margin * across;
+  };
+  const away = distance || Math.max(...points.map(needed));
+  const lens = viewer.camera;
+  lens.fov = field_of_view;
+  lens.near = away / 100;
+  lens.far = away * 100;
+  lens.up.copy(vector(up));
+  lens.position.copy(center).addScaledVector(toEye, away);
+  viewer.controls.dispose();
+  viewer.set_camera(lens);  // new controls, that orbit about the new up
+  viewer.controls.target.copy(center);
+}
+
+function caption({title, legend}) {
+  document.title = title;
+  document.querySelector("#caption h1").textContent = title;
+  document.querySelector("#caption ul").replaceChildren(...legend.map(({name, color}) => {
+    const entry = document.createElement("li");
+    entry.textContent = name;
+    entry.style.setProperty("--color", color);
+    return entry;
+  }));
+}
+
+function time({text}) { document.querySelector("#caption .time").textContent = text; }
+
+// Draw a tube up to a fraction of its rings.
+function length({path, fraction}) {
+  const names = path.split("/").filter((name) => name.length > 0);
+  viewer.scene_tree.find(names).object.traverse(({geometry}) => {
+    const size = geometry?.userData.segment;
+    if (!size) return;
+    const segments = geometry.index.count / size;
+    geometry.setDrawRange(0, size * Math.round(fraction * segments));
+  });
+}
+
+// Answer once all that came before is drawn.
+function ask({number}) {
+  viewer.render();
+  viewer.connection.send(String(number));
+}
+
+// Follow the server; when it ends, wait for the next one at the same address.
+function connect(again = false) {
+  const address = new URL("scene", location.href);
+  address.protocol = address.protocol.replace("http", "ws");
+  const socket = new WebSocket(address);
+  socket.binaryType = "arraybuffer";
+  viewer.connection = socket;
+  socket.onopen = () => { if (again) location.reload(); };
+  socket.onmessage = ({data}) => viewer.handle_command_bytearray(new Uint8Array(data));
+  socket.onclose = () => {
+    document.getElementById("lost").hidden = false;
+    setTimeout(connect, 1000, true);
+  };
+}
