@@ -15,6 +15,7 @@ from hsp_control.exceptions import (
     ConfigurationError,
     FrameNotFoundError,
     JointNotFoundError,
+    ModelError,
     NonFiniteError,
     ShapeError,
 )
@@ -111,7 +112,17 @@ class Robot:
         return f"Robot({self.name!r}, nq={self.nq}, nv={self.nv})"
 
     def __reduce__(self) -> tuple[Any, ...]:
+        if self.mimics:
+            # A restored model would end the process: Pinocchio's archives leave out
+            # what its mimic joints refer to (seen with 4.1).
+            raise ModelError(
+                f"{self.name}: a robot with mimic joints cannot be pickled; "
+                "load it in each process, or with mimic=False"
+            )
         return (type(self), (self.model, self.source))
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return type(self)(self.model.copy(), self.source)
 
     @property
     def name(self) -> str:
@@ -224,6 +235,9 @@ class Robot:
             if joint.nq == 1 and joint.nv == 1:
                 lower[joint.idx_v] = self.model.lowerPositionLimit[joint.idx_q]
                 upper[joint.idx_v] = self.model.upperPositionLimit[joint.idx_q]
+        largest = np.finfo(float).max  # Pinocchio's word for unlimited
+        lower[lower <= -largest] = -np.inf
+        upper[upper >= largest] = np.inf
         return lower, upper
 
     def check_configuration(self, q: Any) -> Array:
@@ -316,7 +330,9 @@ class FrameKinematics:
         self.drift: Array = np.zeros(6)
         self._id = index
         self._stamp = -1
-        self._columns, self._freedoms = _support(robot.model, index)
+        self._columns, self._freedoms = joint_support(
+            robot.model, robot.model.frames[index].parentJoint
+        )
 
 
 class RobotState:
@@ -445,6 +461,16 @@ class RobotState:
             self.robot.model, self.data, self.q, self.v, acceleration
         )
 
+    @property
+    def stamp(self) -> int:
+        """A number that changes with every `update`: what is computed may be kept."""
+        return self._stamp
+
+    @property
+    def world_jacobian(self) -> Array:
+        """Pinocchio's joint Jacobian at the world's origin, see `joint_support`."""
+        return self._J
+
     def displaced(self, dt: float, displacement: Array) -> "RobotState":
         """Return the state at (t + dt, q ⊕ displacement) with the same velocity.
 
@@ -553,19 +579,19 @@ def _mass_matrix_difference(model: pin.Model, q: Array, v: Array) -> Array:
     return (8.0 * (M(h) - M(-h)) - (M(2.0 * h) - M(-2.0 * h))) / (12.0 * h)
 
 
-def _support(model: pin.Model, frame: int) -> tuple[Indices, Indices]:
-    """Return the columns of Pinocchio's J that move a frame, and their freedoms.
+def joint_support(model: pin.Model, joint: int) -> tuple[Indices, Indices]:
+    """Return the columns of Pinocchio's J that move a joint, and their freedoms.
 
     The two differ where joints mimic others: such a joint has a column of its own,
     already scaled, and its leader's freedom.
     """
     columns: list[int] = []
     freedoms: list[int] = []
-    for joint_id in model.supports[model.frames[frame].parentJoint]:
-        joint = model.joints[joint_id]
-        width = joint.nvExtended if joint_id > 0 else 0
-        columns.extend(range(joint.idx_vExtended, joint.idx_vExtended + width))
-        freedoms.extend(range(joint.idx_v, joint.idx_v + width))
+    for index in list(model.supports[joint])[1:]:  # not the universe
+        part = model.joints[index]
+        width = part.nvExtended
+        columns.extend(range(part.idx_vExtended, part.idx_vExtended + width))
+        freedoms.extend(range(part.idx_v, part.idx_v + width))
     return np.array(columns, dtype=np.int64), np.array(freedoms, dtype=np.int64)
 
 

@@ -2,36 +2,55 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 
+import numpy as np
+import pinocchio as pin
+
 from hsp_control.exceptions import SceneError
+from hsp_control.shapes import Shape
 from hsp_control.suggest import did_you_mean, listing
-from hsp_control.trajectories import Trajectory
+from hsp_control.trajectories import (
+    HoldOrientation,
+    OrientationTrajectory,
+    Trajectory,
+)
 
 
 class Obstacle:
-    """A ball (in the plane: a disk) whose centre follows a trajectory.
+    """A shape that stands or moves along trajectories.
 
     Attributes:
         name: What fields and the log call it.
-        center: Its centre in the world [m], of dimension 3.
-        radius: Its radius [m].
+        shape: Its form, centred on its own frame.
+        center: Where its frame's origin is in the world [m], of dimension 3.
+        orientation: How its frame is turned in the world.
     """
 
-    def __init__(self, name: str, center: Trajectory, radius: float) -> None:
-        """Set the obstacle.
+    def __init__(
+        self,
+        name: str,
+        shape: Shape,
+        center: Trajectory,
+        orientation: OrientationTrajectory | None = None,
+    ) -> None:
+        """Set the obstacle; without an orientation it stands along the world's axes.
 
         Raises:
-            SceneError: If the centre is not a point in space or the radius negative.
+            SceneError: If the centre is not a point in space.
         """
         if center.dimension != 3:
             raise SceneError(
                 f"obstacle {name!r}: its centre has dimension {center.dimension}; "
                 "needs 3 (x, y, z)"
             )
-        if not 0.0 <= radius < float("inf"):
-            raise SceneError(f"obstacle {name!r}: radius {radius} must be at least 0")
         self.name = name
+        self.shape = shape
         self.center = center
-        self.radius = float(radius)
+        self.orientation = orientation or HoldOrientation(np.eye(3))
+
+    def placement(self, t: float) -> pin.SE3:
+        """Return its placement in the world at time t [s]."""
+        rotation = self.orientation.sample(t).rotation
+        return pin.SE3(rotation, self.center.sample(t).position)
 
 
 class Scene(Mapping[str, Obstacle]):

@@ -48,6 +48,7 @@ from hsp_control.exceptions import (
 )
 from hsp_control.fields import FieldSample
 from hsp_control.metrics import MetricSample
+from hsp_control.shapes import Sphere
 from hsp_control.trajectories import Hold, Lissajous
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -74,7 +75,7 @@ JOINTS = {
     "ur5": ("shoulder_pan_joint", "elbow_joint"),
 }
 OBSTACLE = Obstacle(
-    "ball", Lissajous([1.4, 1.2, 0.9], [0.2, 0.3, 0.1], [1.3, 2.1, 0.7]), 0.1
+    "ball", Sphere(0.1), Lissajous([1.4, 1.2, 0.9], [0.2, 0.3, 0.1], [1.3, 2.1, 0.7])
 )
 
 
@@ -847,7 +848,7 @@ class Wrong(ValueOnly):
 
 def at_the_centre() -> PointDistance:
     tip = arm().state(0.0, arm().neutral(), np.zeros(3)).position("tip").copy()
-    ball = Obstacle("ball", Hold(tip), 0.1)
+    ball = Obstacle("ball", Sphere(0.1), Hold(tip))
     return PointDistance(arm(), ["link2", "tip"], ball, name="away")
 
 

@@ -164,7 +164,7 @@ def test_facts_of_the_third(runs: dict[int, Rollout]) -> None:
     assert 1.02 < run["manipulability"].min() < 1.03
     assert np.abs(absolute(run)).max() < 4.0
     bent = [arm.equal_angles(theta) for theta in absolute(runs[2])]
-    assert run["field.value"].max() < 0.1 * max(bent)  # what (2) makes of it
+    assert run["field.value"].max() < 0.2 * max(bent)  # what (2) makes of it
 
 
 def test_facts_of_the_fourth(runs: dict[int, Rollout]) -> None:

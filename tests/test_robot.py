@@ -20,12 +20,14 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 from oracles import gradient, slope
+from test_loading import REFUSED
 
 from hsp_control import HspControlError, Robot, RobotState
 from hsp_control.exceptions import (
     ConfigurationError,
     FrameNotFoundError,
     JointNotFoundError,
+    ModelError,
     NonFiniteError,
     ShapeError,
 )
@@ -75,7 +77,7 @@ def frames(robot: Robot, rng: np.random.Generator) -> list[str]:
 def step_of(v: Array) -> float:
     """Return a step [s] in which the joints together turn by 0.01 rad.
 
-    The differences of `oracles.slope` then err by 1e-14 in theory and 1e-13 by rounding.
+    The differences of `oracles.slope` then err by 1e-14 in theory, 1e-13 by rounding.
     """
     return 0.01 / max(1.0, float(np.abs(v).sum()))
 
@@ -107,7 +109,11 @@ def assert_equal_terms(
 
 @pytest.mark.parametrize("case", ROBOTS)
 def test_frames_equal_pinocchios(case: str) -> None:
-    """Placement, J, velocity and classical acceleration; J' too where it knows it."""
+    """Placement, J, J', velocity and classical acceleration (of v' = 0).
+
+    But for J' where joints mimic others, which Pinocchio gets wrong (by 3.6 on
+    tiago_pro); there the differences of the next tests decide.
+    """
     robot, q, v, rng = draw(case, seed=1)
     model, data = robot.model, robot.model.createData()
     state = robot.state(0.3, q, v)
@@ -125,6 +131,8 @@ def test_frames_equal_pinocchios(case: str) -> None:
             "velocity": pin.getFrameVelocity(model, data, index, LWA).vector,
             "drift": pin.getFrameClassicalAcceleration(model, data, index, LWA).vector,
         }
+        if robot.mimics:
+            del expected["jacobian_dot"]
         for what, value in expected.items():
             np.testing.assert_allclose(
                 getattr(frame, what), value, rtol=1e-13, atol=1e-13, err_msg=what
@@ -235,16 +243,25 @@ def test_nonlinear_effects_are_the_effort_of_no_acceleration(case: str) -> None:
     np.testing.assert_allclose(effects, expected, rtol=1e-13, atol=1e-12)
 
 
+def potential_energy(state: RobotState) -> float:
+    """Return -Σ m gᵀc, from the frames' placements."""
+    model, total = state.robot.model, 0.0
+    for name, inertia in zip(model.names, model.inertias, strict=True):
+        frame = state.frame(name)
+        center = frame.position + frame.rotation @ inertia.lever
+        total -= inertia.mass * model.gravity.linear @ center
+    return total
+
+
 @pytest.mark.parametrize("case", FLAT)
 def test_nonlinear_effects_are_lagranges(case: str) -> None:
     """N = M'v - ½ ∇(vᵀMv) + ∇U, all by differences of M and U (flat spaces only)."""
     robot, q, v, _ = draw(case, seed=8)
-    state, data = robot.state(0.0, q, v), robot.model.createData()
+    state = robot.state(0.0, q, v)
 
     def lagrangian(displacement: Array) -> float:
         there = state.displaced(0.0, displacement)
-        kinetic = 0.5 * v @ there.mass_matrix @ v
-        return float(kinetic - pin.computePotentialEnergy(robot.model, data, there.q))
+        return float(0.5 * v @ there.mass_matrix @ v) - potential_energy(there)
 
     M_dot = slope(lambda s: state.ahead(s).mass_matrix, step_of(v))
     expected = M_dot @ v - gradient(lagrangian, robot.nv, 0.01)
@@ -344,8 +361,9 @@ def test_dynamics_equal_mujocos(name: str, seed: int) -> None:
 
     # MuJoCo lifts the point masses' inertia to 1e-12 kg m²; the rest is rounding.
     M = np.zeros((robot.nv, robot.nv))
-    mujoco.mj_fullM(model, M, data.qM) if hasattr(data, "qM") else None
-    if not M.any():  # MuJoCo 4 keeps M in another sparse form
+    if hasattr(data, "qM"):  # MuJoCo 3
+        mujoco.mj_fullM(model, M, data.qM)
+    else:
         mujoco.mj_fullM(model, data, M)
     np.testing.assert_allclose(state.mass_matrix, M, rtol=0, atol=1e-11)
     np.testing.assert_allclose(
@@ -752,7 +770,7 @@ def test_unit_blocks() -> None:
         pin.JointModelPlanar(),  # x y, (cos, sin)
         pin.JointModelSpherical(),  # quaternion
         pin.JointModelPY(),
-        pin.JointModelRevoluteUnboundedUnaligned(np.array([0.6, 0.0, 0.8])),
+        pin.JointModelRUBX(),
     )
     assert robot.nq == 7 + 1 + 2 + 4 + 4 + 1 + 2
     assert robot.unit_blocks == ((3, 4), (8, 2), (12, 2), (14, 4), (19, 2))
@@ -773,8 +791,13 @@ def test_unit_blocks() -> None:
             ConfigurationError, match=re.escape(f"is a {kind} of norm 1.5")
         ):
             robot.state(0.0, spoilt, np.zeros(robot.nv))
+    # Joints added in Python have no limits unless they are given some.
+    lower, upper = robot.position_limits()
+    np.testing.assert_array_equal(lower, np.full(robot.nv, -np.inf))
+    np.testing.assert_array_equal(upper, np.full(robot.nv, np.inf))
     rng = np.random.default_rng(0)
     robot.check_configuration(robot.random_configuration(rng))
+    np.testing.assert_array_equal(robot.home(), robot.neutral())
 
 
 @pytest.mark.parametrize(
@@ -850,7 +873,7 @@ def test_position_limits(case: str) -> None:
 
 
 def test_planar_arm_has_no_limits() -> None:
-    """The last joint, too: the universe's number in Pinocchio's table is not its own."""
+    """The last joint, too: Pinocchio's universe claims its place in the tables."""
     lower, upper = load("planar3r").position_limits()
     np.testing.assert_array_equal(lower, [-np.inf] * 3)
     np.testing.assert_array_equal(upper, [np.inf] * 3)
@@ -880,13 +903,10 @@ def test_home_is_the_sources_or_neutral_or_the_middle_of_the_range() -> None:
     np.testing.assert_array_equal(load("solo12").home()[:7], [0, 0, 0, 0, 0, 0, 1])
 
 
-@pytest.mark.parametrize("name", [*BUNDLED, *sorted(example_robots())])
+@pytest.mark.parametrize("name", sorted({*BUNDLED, *example_robots()} - set(REFUSED)))
 def test_random_and_home_configurations_are_within_limits(name: str) -> None:
     """For every robot that there is, with a floating root and without."""
-    try:
-        robot = Robot.load(name)
-    except HspControlError:
-        pytest.skip("refused, see test_loading.py")
+    robot = Robot.load(name)
     lower, upper = robot.position_limits()
     rng = np.random.default_rng(25)
     drawn = [robot.random_configuration(rng) for _ in range(5)]
@@ -896,7 +916,9 @@ def test_random_and_home_configurations_are_within_limits(name: str) -> None:
         positions = robot.joint_positions(q)
         assert (positions >= lower - 1e-12).all()
         assert (positions <= upper + 1e-12).all()
-    assert np.abs(robot.difference(drawn[0], drawn[1])).max() > 0.0
+    # They differ, unless the URDF's limits are 0 and 0 (the double pendulums').
+    if (upper > lower).any():
+        assert np.abs(robot.difference(drawn[0], drawn[1])).max() > 0.0
     # The generator decides: the same seed draws the same.
     again = robot.random_configuration(np.random.default_rng(25))
     np.testing.assert_array_equal(again, drawn[0])
@@ -939,17 +961,27 @@ def test_neutral_is_every_joint_at_zero() -> None:
 # --- persistence ---------------------------------------------------------------------
 
 
+def by_pickle(robot: Robot) -> Robot:
+    return pickle.loads(pickle.dumps(robot))
+
+
 @pytest.mark.parametrize("case", ROBOTS)
-@pytest.mark.parametrize(
-    "duplicate", [lambda r: pickle.loads(pickle.dumps(r)), copy.deepcopy]
-)
+@pytest.mark.parametrize("duplicate", [by_pickle, copy.deepcopy])
 def test_pickle_and_deep_copy_round_trip(
     case: str, duplicate: Callable[[Robot], Robot]
 ) -> None:
     """The other robot is another object that says the same, to the last bit."""
     robot, q, v, _ = draw(case, seed=28)
+    if robot.mimics and duplicate is by_pickle:
+        # Pinocchio would restore a model that ends the process when it is used.
+        with pytest.raises(
+            ModelError, match=r"mimic joints cannot be pickled; .*False"
+        ):
+            pickle.dumps(robot)
+        return
     other = duplicate(robot)
     assert other is not robot
+    assert other.model is not robot.model
     assert other.source == robot.source
     assert repr(other) == repr(robot)
     for name in ("joint_names", "freedom_names", "frame_names", "unit_blocks"):

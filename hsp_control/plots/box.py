@@ -1,24 +1,39 @@
-"""Three axes with numbers, in space: a box around what is drawn, seen from a slant."""
+"""Three axes with numbers: a box around what is drawn in space, seen from a slant."""
 
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
+from hsp_control.arrays import Array
 from hsp_control.plots import palette
 from hsp_control.plots.views import View
-from hsp_control.robot import Array
 
-# For each axis: the edge that bears its numbers, as sides of the others (0 low, 1 high),
-# where its numbers stand off the edge, and where its name does [pt]. The eye stands at
-# high x, low y and above; these edges lie in front and at the left.
-_EDGES: tuple[tuple[tuple[int, int], tuple[int, int], str, tuple[int, int]], ...] = (
-    ((0, 0), (-3, -4), "right", (-18, -19)),
-    ((1, 0), (4, -4), "left", (24, -17)),
-    ((0, 0), (-5, 0), "right", (-36, 0)),
+
+class _Edge(NamedTuple):
+    """Where the numbers of an axis stand; the eye is at high x, low y and above.
+
+    Attributes:
+        sides: The edge, as sides of the two other axes: 0 low, 1 high.
+        shift: Where numbers stand off the edge [pt].
+        align: What of a number stands there.
+    """
+
+    sides: tuple[int, int]
+    shift: tuple[float, float]
+    align: str
+
+
+_EDGES = (
+    _Edge((0, 0), (-3.0, -4.0), "right"),
+    _Edge((1, 0), (4.0, -4.0), "left"),
+    _Edge((0, 0), (-5.0, 0.0), "right"),
 )
+_LETTER = 4.8
+"""Width of a letter in numbers [pt]."""
 _WALLS = ((0, 0), (1, 1), (2, 0))
 """The sides behind everything: low x, high y and the floor."""
 
@@ -44,10 +59,18 @@ def draw_box(axes: Axes, view: View, lower: Array, upper: Array) -> None:
 def _ticks(view: View, ends: Array, axis: int) -> Array:
     """Return round numbers along an edge, the fewer the shorter it is on the page."""
     lengths = np.ptp(ends, axis=0) * np.linalg.norm(view.rows, axis=0)
-    count = max(1, round(4.0 * float(lengths[axis] / lengths.max())))
+    count = max(2, round(4.0 * float(lengths[axis] / lengths.max())))
     low, high = ends[:, axis]
-    ticks = np.asarray(MaxNLocator(count, steps=[1, 2, 5, 10]).tick_values(low, high))
-    return np.round(ticks[(ticks >= low) & (ticks <= high)], 9)
+    near = 0.07 * (high - low)  # where numbers of x and y would meet
+    first, last = low + near * (axis == 1), high - near * (axis == 0)
+    inside = np.zeros(0)
+    while len(inside) < 2 and count < 10:  # one number alone gives no scale
+        ticks = np.asarray(
+            MaxNLocator(count, steps=[1, 2, 5, 10]).tick_values(low, high)
+        )
+        inside = ticks[(ticks >= first) & (ticks <= last)]
+        count += 1
+    return np.asarray(np.round(inside, 9))
 
 
 def _draw_wall(
@@ -68,36 +91,41 @@ def _draw_wall(
             axes.plot(*page_line, color=palette.GRID, linewidth=0.6, zorder=0.6)
 
 
-def _draw_numbers(
-    axes: Axes, view: View, ends: Array, ticks: Array, axis: int
-) -> None:
-    sides, offset, side, name_offset = _EDGES[axis]
+def _draw_numbers(axes: Axes, view: View, ends: Array, ticks: Array, axis: int) -> None:
+    sides, shift, align = _EDGES[axis]
     others = [other for other in range(3) if other != axis]
     edge = ends.copy()
-    for other, chosen in zip(others, sides, strict=True):
-        edge[:, other] = ends[chosen, other]
+    for other, side in zip(others, sides, strict=True):
+        edge[:, other] = ends[side, other]
     axes.plot(*view.project(edge), color=palette.MUTED, linewidth=0.7, zorder=0.7)
-    labels = [(tick, f"{tick:g}", offset, side, 8.0) for tick in ticks]
-    name = f"{'xyz'[axis]} [m]"
-    labels.append((float(ends[:, axis].mean()), name, name_offset, "center", 9.0))
-    for where, text, shift, align, size in labels:
+    numbers = [f"{tick:g}".replace("-", "−") for tick in ticks]
+    upright = axis == 2
+    for tick, number in zip(ticks, numbers, strict=True):
         point = edge[0].copy()
-        point[axis] = where
+        point[axis] = tick
         x, y = view.project(point)
         axes.annotate(
-            text,
+            number,
             (float(x), float(y)),
             xytext=shift,
             textcoords="offset points",
             ha=align,
-            va="center" if axis == 2 else "top",
-            rotation=90.0 if axis == 2 and size > 8.0 else 0.0,
-            fontsize=size,
-            annotation_clip=False,
+            va="center" if upright else "top",
+            fontsize=8.0,
         )
+    wide = _LETTER * max(map(len, numbers), default=0)
+    x, y = view.project(edge.mean(axis=0))
+    axes.annotate(
+        f"{'xyz'[axis]} [m]",
+        (float(x), float(y)),
+        xytext=((-16.0, -18.0), (16.0, -16.0), (-9.0 - wide, 0.0))[axis],
+        textcoords="offset points",
+        ha=("right", "left", "right")[axis],
+        va="center" if upright else "top",
+        rotation=90.0 if upright else 0.0,
+    )
 
 
 def corners(lower: Array, upper: Array) -> Array:
     """Return a box's corners, shape (8, 3)."""
-    ends = np.stack([lower, upper])
-    return np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i, j, k in product((0, 1), repeat=3)])
+    return np.array(list(product(*np.stack([lower, upper]).T)))

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from hsp_control.plots import palette
 from hsp_control.plots.conditioning import draw_manipulability, draw_singular_values
 from hsp_control.plots.errors import PlotError
-from hsp_control.plots.frames import draw_frames, draw_superimposed, columns_for
+from hsp_control.plots.frames import columns_for, draw_frames, draw_superimposed
 from hsp_control.plots.joints import draw_efforts, draw_joint_positions
 from hsp_control.plots.legends import plain
 from hsp_control.plots.null_space import draw_field_value, draw_null_space_error
@@ -47,15 +47,16 @@ def paper_figure(
     with style():
         figure = new_figure(11.0, 7.6)
         _entitle(figure, rollout)
-        upper, lower = figure.subfigures(2, 1, height_ratios=(1.0, 1.05))
+        halves = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.05))
+        upper, lower = halves.ravel()
         grid = upper.add_gridspec(1, 3, width_ratios=(0.85, 1.0, 1.0))
-        a, b, c = (upper.add_subplot(place) for place in grid)
+        a, b, c = (upper.add_subplot(grid[k]) for k in range(3))
         draw_end_effector(a, rollout)
         a.set_anchor("NW")
         draw_joint_positions(b, rollout, absolute=absolute)
         draw_manipulability(c, rollout)
         strip, together = lower.subfigures(1, 2, width_ratios=(1.9, 1.0))
-        columns = columns_for(rollout, len(rows), 6.8, 3.0)
+        columns = columns_for(rollout, len(rows), 6.8, 2.7)
         cells = strip.subplots(-(-len(rows) // columns), columns, squeeze=False)
         draw_frames(cells.ravel().tolist(), rollout, rows)
         for cell in cells.ravel():
@@ -108,13 +109,14 @@ def _entitle(figure: Figure, rollout: Rollout) -> None:
     """Write the title, and what the run was, at the foot."""
     meta, config = rollout.meta, rollout.config or {}
     robot, field = meta["robot"]["name"], meta.get("field", "")
-    title = config.get("title") or config.get("name") or f"{robot}, field: {field}"
+    named = (config.get("title"), meta.get("title"), meta.get("name"))
+    title = next(filter(None, named), f"{robot}, field: {field}")
     figure.suptitle(plain(textwrap.fill(str(title), 100)))
-    gain = meta.get("versions", {}).get("hsp_control", "")
+    version = meta.get("versions", {}).get("hsp_control", "")
     parts = [f"robot {robot}", f"field {field}", f"metric {meta.get('metric', '')}"]
-    parts += [f"hsp_control {gain}"] if gain else []
+    parts += [f"hsp_control {version}"] if version else []
     if rollout.status != "completed":
-        parts.insert(0, f"{rollout.status}: {meta.get('message', '')}".upper())
+        parts.insert(0, f"{rollout.status}: {meta.get('message', '')}")
     figure.supxlabel(
         plain(textwrap.fill("  ·  ".join(parts), 180)),
         fontsize=7.5,

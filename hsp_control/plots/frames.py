@@ -8,11 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
+from hsp_control.arrays import Array
 from hsp_control.plots import palette
 from hsp_control.plots.things import draw_arm, draw_ball, draw_directions, draw_shadow
 from hsp_control.plots.views import View, fit, view_of
 from hsp_control.plots.world import everything, obstacles, parents, task_paths
-from hsp_control.robot import Array
 from hsp_control.simulation import Rollout
 
 
@@ -94,7 +94,8 @@ def columns_for(rollout: Rollout, count: int, width: float, height: float) -> in
         height: Its height, in the same unit.
     """
     scene = _Scene.of(rollout)
-    w, h = (float(np.ptp(page)) + 1e-9 for page in scene.view.project(scene.points))
+    page = scene.view.project(scene.shown(shadows=True))
+    w, h = (float(np.ptp(coordinate)) + 1e-9 for coordinate in page)
 
     def scale(columns: int) -> float:
         rows = -(-count // columns)
@@ -102,6 +103,10 @@ def columns_for(rollout: Rollout, count: int, width: float, height: float) -> in
         return filled * min(width / columns / w, height / rows / h)
 
     return max(range(1, count + 1), key=scale)
+
+
+MOST_TICKS = 10
+"""More frames than that are not all named at the scale of time."""
 
 
 class _Scene(NamedTuple):
@@ -123,15 +128,19 @@ class _Scene(NamedTuple):
         view = view_of(everything(rollout, balls=False))
         return cls(view, points, min(0.0, float(points[:, 2].min())))
 
+    def shown(self, *, shadows: bool) -> Array:
+        """Return the points, and where they fall on the floor, shape (K, 3) [m]."""
+        if self.view.names or not shadows:
+            return self.points
+        fallen = self.points.copy()
+        fallen[:, 2] = self.floor
+        return np.concatenate([self.points, fallen])
+
     def finish(self, axes: Axes, *, shadows: bool, key: bool) -> None:
         """Set limits and labels, or show directions where there are none."""
-        points = self.points
+        points = self.shown(shadows=shadows)
         if not self.view.names:
             axes.set_axis_off()
-            if shadows:
-                fallen = points.copy()
-                fallen[:, 2] = self.floor
-                points = np.concatenate([points, fallen])
             if key:
                 points = np.concatenate([points, self._draw_key(axes, points)])
         fit(axes, self.view, points, least=1e-3)
@@ -140,7 +149,7 @@ class _Scene(NamedTuple):
         """Show directions under the points, at the left; return what they take up."""
         x, y = self.view.project(points)
         length = 0.2 * max(float(np.ptp(x)), float(np.ptp(y)))
-        corner = np.array([float(x.min()), float(y.min()) - 1.2 * length])
+        corner = np.array([float(x.min()), float(y.min()) - 1.5 * length])
         origin = self.view.rows.T @ corner
         draw_directions(axes, self.view, origin, length)
         return np.array([origin, origin - 0.3 * length * self.view.rows[1]])
@@ -159,5 +168,6 @@ def _time_bar(axes: Axes, start: float, end: float, ticks: list[float]) -> None:
     beside = axes.inset_axes((1.04, 0.0, 0.035, 1.0))
     bar = figure.colorbar(ScalarMappable(Normalize(start, end), scale), cax=beside)
     bar.set_label("time [s]")
-    bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    if len(ticks) <= MOST_TICKS:
+        bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
+    bar.outline.set_visible(False)

@@ -20,7 +20,7 @@ def legend_below(axes: Axes, columns: int | None = None) -> None:
     if not handles:
         return
     figure = axes.get_figure(root=False)
-    drop = 32.0 if axes.axison else 5.0  # ticks and x label [pt]
+    drop = 32.0 if axes.axison else 22.0  # what stands under the axes [pt]
     below = ScaledTranslation(0.0, -drop / 72.0, figure.dpi_scale_trans)  # type: ignore[union-attr]
     axes.legend(
         handles,
@@ -40,8 +40,8 @@ def note(axes: Axes, text: str) -> None:
 def plain(name: str) -> str:
     """Return a name from the log such that matplotlib shows it as it is.
 
-    It would read dollar signs as formulas, and leave names that begin with an underscore
-    out of legends.
+    It would read dollar signs as formulas, and leave names that begin with an
+    underscore out of legends.
     """
     shown = name.replace("$", r"\$")
     return f" {shown}" if shown.startswith("_") else shown

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
+from hsp_control.arrays import Array
 from hsp_control.plots import palette
 from hsp_control.plots.legends import note, plain
-from hsp_control.robot import Array
 from hsp_control.simulation import Rollout
 
 MOST, NAMED = 14, 7

@@ -3,13 +3,14 @@
 from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg
 from matplotlib.axes import Axes
 
+from hsp_control.arrays import Array
 from hsp_control.plots import palette
 from hsp_control.plots.legends import legend_below, note, plain
 from hsp_control.plots.lines import log_scale, mark_damped, single, time_axis
-from hsp_control.plots.readings import column_unit, position_unit
-from hsp_control.robot import Array
+from hsp_control.plots.readings import column_unit, constant_metric, position_unit
 from hsp_control.simulation import Rollout
 
 ROUNDING = 1e-12
@@ -35,19 +36,21 @@ class Decay(NamedTuple):
 def predicted_decay(rollout: Rollout) -> Decay:
     """Return ‖e_N(0)‖_W exp(-K_N t), law.md §2, or bounds for a matrix K_N.
 
-    V' = -e_NᵀW K_N e_N lies between the least and the greatest eigenvalue of the
-    symmetric part of W K_N relative to W. The log holds no W, so that for a matrix
-    there are bounds in the identity metric alone.
+    V' = -e_NᵀW K_N e_N lies between -2V times the greatest and the least eigenvalue of
+    the symmetric part of W K_N relative to W.
     """
     if not rollout.meta.get("controls_null_space", True):
-        return Decay(None, None, (0.0, 0.0), "no prediction: self-motion is not controlled")
+        why = "no prediction: self-motion is not controlled"
+        return Decay(None, None, (0.0, 0.0), why)
     K_N = np.asarray(rollout.meta["null_space_gain"], dtype=float)
-    rates = np.linalg.eigvalsh(0.5 * (K_N + K_N.T))
+    scalar = bool(np.all(K_N == K_N[0, 0] * np.eye(len(K_N))))
+    W = np.eye(len(K_N)) if scalar else constant_metric(rollout)
+    if W is None:
+        why = "no prediction: $K_N$ is a matrix, $W$ not in the log"
+        return Decay(None, None, (0.0, 0.0), why)
+    power = 0.5 * (W @ K_N + (W @ K_N).T)
+    rates = scipy.linalg.eigh(power, W, eigvals_only=True)
     slowest, fastest = float(rates[0]), float(rates[-1])
-    scalar = np.allclose(K_N, slowest * np.eye(len(K_N)), rtol=1e-9, atol=0.0)
-    if not scalar and rollout.meta.get("metric") != "IdentityMetric":
-        why = "no prediction: $K_N$ is a matrix, W unknown"
-        return Decay(None, None, (slowest, fastest), why)
     norm, elapsed = rollout["null_space_norm"], rollout.t - rollout.t[0]
     speeds = np.linalg.norm(rollout["field.g"], axis=1)
     speeds = speeds + np.linalg.norm(rollout.v, axis=1)
@@ -116,7 +119,7 @@ def draw_field_value(axes: Axes, rollout: Rollout) -> None:
 
 
 def _norm_unit(rollout: Rollout) -> str:
-    """Return the unit of a velocity's norm; in the mass matrix, twice the energy's root."""
+    """Return the norm's unit; in the mass matrix it is the root of twice an energy."""
     if rollout.meta.get("metric") == "MassMatrixMetric":
         return "√J"
     unit = position_unit(rollout)

@@ -3,10 +3,10 @@
 import numpy as np
 from matplotlib.axes import Axes
 
+from hsp_control.arrays import Array
 from hsp_control.plots import palette
 from hsp_control.plots.box import corners, draw_box
 from hsp_control.plots.legends import legend_below, note, plain
-from hsp_control.plots.lines import single
 from hsp_control.plots.things import draw_ball
 from hsp_control.plots.views import View, best_plane, fit, is_flat, plane, slant
 from hsp_control.plots.world import (
@@ -16,7 +16,6 @@ from hsp_control.plots.world import (
     obstacles,
     task_paths,
 )
-from hsp_control.robot import Array
 from hsp_control.simulation import Rollout
 
 NEARLY_FLAT = 0.05
@@ -69,7 +68,8 @@ def draw_end_effector(axes: Axes, rollout: Rollout, *, names: str = "") -> None:
     if not paths:
         ends = end_points(rollout)
         for k in range(ends.shape[1]):
-            _draw_track(axes, view, ends[:, k], k, "end of the robot" if k == 0 else None)
+            label = "end of the robot" if k == 0 else None
+            _draw_track(axes, view, ends[:, k], k, label)
         note(axes, "no task leads a point")
     _draw_obstacles(axes, view, rollout)
     least = 0.02 * float(np.ptp(everything(rollout), axis=0).max())
@@ -104,6 +104,7 @@ def _draw_track(
 
 def _draw_obstacles(axes: Axes, view: View, rollout: Rollout) -> None:
     found = obstacles(rollout)
+    label = "obstacle" if len(found) == 1 else "obstacles"
     for place, obstacle in enumerate(found):
         center, radius = obstacle.center, obstacle.radius
         moves = float(np.ptp(center, axis=0).max()) > 1e-9
@@ -117,13 +118,13 @@ def _draw_obstacles(axes: Axes, view: View, rollout: Rollout) -> None:
             linestyle=":",
             marker="" if moves else "+",
             zorder=2.1,
-            label=("obstacle" if len(found) == 1 else "obstacles") if place == 0 else None,
+            label=label if place == 0 else None,
         )
 
 
 def _desired_label(axes: str, view: View) -> str:
     """Return the label; with the tracked axes if some in the view are not tracked."""
-    return f"desired ({axes})" if set(view.names or 'xyz') - set(axes) else "desired"
+    return f"desired ({axes})" if set(view.names or "xyz") - set(axes) else "desired"
 
 
 def _seen(rollout: Rollout, *, balls: bool = True) -> Array:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.robot import Array
+from hsp_control.arrays import Array
 from hsp_control.simulation import Rollout
 
 
@@ -105,6 +105,26 @@ def effort_unit(rollout: Rollout) -> str:
     """Return the unit of the efforts that goes with the joints' positions."""
     efforts = {"rad": "N·m", "m": "N"}
     return efforts.get(position_unit(rollout), column_unit(rollout, "tau"))
+
+
+def constant_metric(rollout: Rollout) -> Array | None:
+    """Return the metric W, shape (nv, nv), if it is constant and the log tells it.
+
+    A log of a run from a configuration does; one of a run from Python tells the identity.
+    """
+    robot, told = rollout.meta["robot"], rollout.config or {}
+    nv = int(robot["nv"])
+    if rollout.meta.get("metric") == "IdentityMetric":
+        return np.eye(nv)
+    metric = told.get("null_space", {}).get("metric", {})
+    matrix = np.asarray(metric.get("matrix") or np.zeros(0), dtype=float)
+    if metric.get("type") == "constant":
+        return np.diag(matrix) if matrix.ndim == 1 else matrix
+    if metric.get("type") != "coordinates":
+        return None
+    if not matrix.size and robot.get("joint_coordinates") == "absolute":
+        matrix = np.tril(np.ones((nv, nv)))
+    return matrix.T @ matrix if matrix.size else None
 
 
 def column_unit(rollout: Rollout, name: str) -> str:

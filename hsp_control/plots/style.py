@@ -12,6 +12,7 @@ from cycler import cycler
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from hsp_control.plots import palette
 
@@ -70,14 +71,14 @@ STYLE: dict[str, Any] = {
 @contextmanager
 def style() -> Iterator[None]:
     """Hold matplotlib's parameters at `STYLE` within the context, and only there."""
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # any str may be a key
         yield
 
 
 class StyledFigure(Figure):
     """A figure that is drawn in `style`, wherever it is saved or shown.
 
-    Matplotlib makes ticks when they are first drawn, with the parameters of that moment.
+    Matplotlib makes ticks when they are first drawn, with the parameters of then.
     """
 
     def draw(self, renderer: RendererBase) -> None:
@@ -88,7 +89,7 @@ class StyledFigure(Figure):
 
 def new_figure(width: float, height: float) -> StyledFigure:
     """Return an empty figure, width and height in inches; call it within `style`."""
-    figure = StyledFigure(figsize=(width, height), layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.06, h_pad=0.06)
+    layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.06)
+    figure = StyledFigure(figsize=(width, height), layout=layout)
     FigureCanvasAgg(figure)
     return figure

@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
+from hsp_control.arrays import Array
 from hsp_control.plots import palette
 from hsp_control.plots.views import View
-from hsp_control.robot import Array
 
 
 def draw_arm(
@@ -157,5 +157,9 @@ def draw_directions(axes: Axes, view: View, origin: Array, length: float) -> Non
 def bones(points: Array, parents: Sequence[int]) -> Array:
     """Return all links as one line that NaN breaks between them, shape (3 links, 3)."""
     gap = np.full(3, np.nan)
-    links = [(points[parent], points[k]) for k, parent in enumerate(parents) if parent >= 0]
-    return np.array([point for link in links for point in (*link, gap)]).reshape(-1, 3)
+    lines = [
+        (points[parent], points[k], gap)
+        for k, parent in enumerate(parents)
+        if parent >= 0
+    ]
+    return np.array(lines).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""From which side points in the world are drawn: along a world axis, or from a slant."""
+"""From which side the world is drawn: along one of its axes, or from a slant."""
 
 from math import cos, radians, sin
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
-from hsp_control.robot import Array
+from hsp_control.arrays import Array
 
 FLAT = 1e-6
 """Depth over width below which motion is said to lie in a plane."""

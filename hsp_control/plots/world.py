@@ -1,12 +1,12 @@
-"""Where things are in a log: the skeleton, obstacles, and the paths that tasks follow."""
+"""Where things are in a log: the skeleton, obstacles, and the paths of tasks."""
 
 from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.plots.readings import task_names, task_type
-from hsp_control.robot import Array
 from hsp_control.simulation import Rollout
 
 

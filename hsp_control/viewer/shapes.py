@@ -34,7 +34,7 @@ def material(
     """
     number = color_number(color)
     surface: Json = {
-        "uuid": _uuid(),
+        "uuid": unique_name(),
         "type": "MeshStandardMaterial",
         "color": number,
         "roughness": roughness,
@@ -125,7 +125,7 @@ def mesh(geometry: Json, surface: Json, pose: Array | None = None, *,
         "geometries": [geometry],
         "materials": [surface],
         "object": {
-            "uuid": _uuid(),
+            "uuid": unique_name(),
             "type": "Mesh",
             "geometry": geometry["uuid"],
             "material": surface["uuid"],
@@ -143,7 +143,7 @@ def group(things: Sequence[Json]) -> Json:
         "geometries": [g for thing in things for g in thing.get("geometries", [])],
         "materials": [m for thing in things for m in thing.get("materials", [])],
         "object": {
-            "uuid": _uuid(),
+            "uuid": unique_name(),
             "type": "Group",
             "children": [thing["object"] for thing in things],
         },
@@ -184,7 +184,7 @@ def segments(points: Array, colors: Array) -> Json:
     """Return lines of one pixel, a pair of points (2n, 3) [m] each, in RGBA (2n, 4)."""
     geometry = buffer({"position": points, "color": colors})
     surface = {
-        "uuid": _uuid(),
+        "uuid": unique_name(),
         "type": "LineBasicMaterial",
         "vertexColors": True,
         "transparent": True,
@@ -198,7 +198,7 @@ def segments(points: Array, colors: Array) -> Json:
 def shadow_catcher(size: float, opacity: float) -> Json:
     """Return a square [m] in x and y that shows nothing but the shadows on it."""
     surface = {
-        "uuid": _uuid(),
+        "uuid": unique_name(),
         "type": "ShadowMaterial",
         "color": 0x000000,
         "transparent": True,
@@ -213,7 +213,7 @@ def shadow_catcher(size: float, opacity: float) -> Json:
 def light(kind: str, intensity: float, **properties: Any) -> Json:
     """Return one of three.js's lights."""
     thing = {
-        "uuid": _uuid(),
+        "uuid": unique_name(),
         "type": kind,
         "color": 0xFFFFFF,
         "intensity": intensity,
@@ -228,9 +228,9 @@ def matrix(transform: Array) -> list[float]:
 
 
 def _geometry(kind: str, **fields: Any) -> Json:
-    return {"uuid": _uuid(), "type": kind, **fields}
+    return {"uuid": unique_name(), "type": kind, **fields}
 
 
-def _uuid() -> str:
-    """Return a name that no other thing in this process has; Meshcat asks no more."""
+def unique_name() -> str:
+    """Return a name that no other thing of this process has: three.js asks no more."""
     return f"hsp-{next(_serial)}"

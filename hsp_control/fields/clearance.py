@@ -1,0 +1,172 @@
+"""Keep clear: of obstacles that may move, and of the robot's own links."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hsp_control.arrays import Array
+from hsp_control.differences import rate_along_flow
+from hsp_control.exceptions import FieldError
+from hsp_control.fields.barrier import barrier
+from hsp_control.fields.cost import Cost
+from hsp_control.geometry import Proximity, Proxy, link_shapes, self_pairs
+from hsp_control.robot import Robot, RobotState
+from hsp_control.scene import Obstacle
+from hsp_control.suggest import did_you_mean, listing
+
+
+class Clearance(Cost):
+    """f = Σ b(d_k) over pairs of shapes, b a barrier that is zero beyond its influence.
+
+    The gradient comes from the witness points. Its rate is a central difference of that
+    exact gradient along the flow, so that it holds the obstacles' own velocity and the
+    sliding of the witness points: freezing them would cost up to half of it.
+
+    Where the nearest features are flat and slide over each other, the gradient of a
+    distance jumps. Here it does not: capsules meet only rounded shapes, balls along
+    them meet all others, and the distance of a ball to a convex shape has a Lipschitz
+    gradient. The exponential law then holds across the rate's jumps.
+
+    Attributes:
+        influence: Distance at which the cost begins [m].
+        proximity: The distances.
+    """
+
+    def __init__(self, proximity: Proximity, influence: float, name: str) -> None:
+        """Set the cost.
+
+        Raises:
+            FieldError: If the influence is not a positive length.
+        """
+        super().__init__(proximity.robot, name)
+        if not 0.0 < influence < np.inf:
+            raise FieldError(f"field {name!r}: influence {influence} must be positive")
+        self.proximity = proximity
+        self.influence = float(influence)
+        self._slopes = np.zeros(len(proximity.pairs))
+
+    def value(self, state: RobotState) -> float:
+        """Return f."""
+        distances = self.proximity.measure(state)
+        return float(barrier(distances, self.influence, self._slopes))
+
+    def gradient(self, state: RobotState) -> Array:
+        """Return Σ b'(d_k) ∇d_k."""
+        barrier(self.proximity.measure(state), self.influence, self._slopes)
+        return self.proximity.gradient(state, self._slopes)
+
+    def gradient_rate(self, state: RobotState) -> Array:
+        """Return the gradient's rate along the flow; exactly zero out of influence."""
+        margin = self.proximity.measure(state).min() - self.influence
+        if margin > FAR:
+            return np.zeros(self.robot.nv)
+        return rate_along_flow(self.gradient, state)
+
+    def least_distance(self, state: RobotState) -> float:
+        """Return the least distance of all pairs [m]."""
+        return self.proximity.nearest(state)[0]
+
+
+FAR = 0.05
+"""Beyond the influence by this [m], no difference step reaches back into it."""
+
+
+class ObstacleClearance(Clearance):
+    """The robot's links keep clear of obstacles."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        obstacles: Sequence[Obstacle],
+        *,
+        influence: float = 0.2,
+        links: Sequence[str] | None = None,
+        proxy: Proxy = "capsules",
+        name: str = "obstacle_clearance",
+    ) -> None:
+        """Set the cost.
+
+        Args:
+            robot: The robot.
+            obstacles: What to keep clear of.
+            influence: Distance at which the cost begins [m].
+            links: Names of the links that keep clear; None: all that can move.
+            proxy: What stands for the links. ``capsules`` become balls along them
+                where an obstacle is not rounded.
+            name: What the log calls it.
+
+        Raises:
+            FieldError: If there is no obstacle or no link, or the influence is none.
+            SceneError: If an obstacle's mesh cannot be read.
+        """
+        if not obstacles:
+            raise FieldError(f"field {name!r}: there is no obstacle to keep clear of")
+        rounded = [o for o in obstacles if o.shape.rounded]
+        flat = [o for o in obstacles if not o.shape.rounded]
+        beads: Proxy = "spheres" if proxy == "capsules" else proxy
+        shapes = []
+        pairs = []
+        ordered = [*rounded, *flat]
+        chosen = [(proxy, rounded), (beads, flat)]
+        blocks = [(link_shapes(robot, kind), some) for kind, some in chosen if some]
+        total = sum(len(block) for block, _ in blocks)
+        for block, some in blocks:
+            moving = _moving(robot, block, links, name)
+            for i in moving:
+                pairs += [
+                    (len(shapes) + i, total + ordered.index(obstacle))
+                    for obstacle in some
+                ]
+            shapes += block
+        super().__init__(Proximity(robot, shapes, ordered, pairs), influence, name)
+
+
+class SelfClearance(Clearance):
+    """The robot's links keep clear of each other."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        influence: float = 0.1,
+        proxy: Proxy = "capsules",
+        name: str = "self_clearance",
+    ) -> None:
+        """Set the cost.
+
+        Pairs of neighbours and those that the SRDF disables are left out, and so are
+        pairs that overlap at the robot's home: proxies are fatter than the links.
+
+        Args:
+            robot: The robot.
+            influence: Distance at which the cost begins [m].
+            proxy: What stands for the links.
+            name: What the log calls it.
+
+        Raises:
+            FieldError: If no pair is left, or the influence is none.
+        """
+        shapes = link_shapes(robot, proxy)
+        pairs = self_pairs(robot, shapes)
+        proximity = Proximity(robot, shapes, (), pairs)
+        home = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+        apart = proximity.measure(home) > 0.0
+        kept = [pair for pair, ok in zip(pairs, apart, strict=True) if ok]
+        super().__init__(Proximity(robot, shapes, (), kept), influence, name)
+
+
+def _moving(
+    robot: Robot, shapes: Sequence, links: Sequence[str] | None, name: str
+) -> list[int]:
+    known = {shape.link for shape in shapes}
+    for link in links or ():
+        if link not in known:
+            raise FieldError(
+                f"field {name!r}: link {link!r} has no geometry"
+                f"{did_you_mean(link, known)} (those that have: {listing(known)})"
+            )
+    return [
+        i
+        for i, shape in enumerate(shapes)
+        if shape.joint > 0 and (links is None or shape.link in links)
+    ]

@@ -1,0 +1,66 @@
+"""The smallest capsule that holds a set of points."""
+
+import numpy as np
+from scipy.optimize import minimize
+
+from hsp_control.arrays import Array
+
+
+def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
+    """Return the ends and the radius of a small capsule that holds the points.
+
+    Its axis is found by a local search over direction and offset from each of the
+    three principal axes; for a given axis the shortest segment is exact.
+
+    Args:
+        points: Shape (k, 3) [m].
+
+    Returns:
+        (first end, second end, radius); the ends are equal for a ball.
+    """
+    center = points.mean(axis=0)
+    axes = np.linalg.svd(points - center, full_matrices=False)[2]
+    best: tuple[float, Array] | None = None
+    for k in range(len(axes)):
+        frame = np.roll(axes, -k, axis=0)  # its first row is the axis tried
+        scale = float(np.ptp(points, axis=0).max()) or 1.0
+        found = minimize(
+            lambda x, frame=frame, scale=scale: _volume(
+                points, *_axis(center, frame, scale, x)
+            ),
+            np.zeros(4),
+            method="Nelder-Mead",
+            options={"xatol": 1e-5, "fatol": 1e-12, "maxiter": 600},
+        )
+        if best is None or found.fun < best[0]:
+            best = (float(found.fun), np.concatenate(_axis(center, frame, scale, found.x)))
+    assert best is not None  # three axes were tried
+    anchor, direction = best[1][:3], best[1][3:]
+    low, high, radius = _segment(points, anchor, direction)
+    return anchor + low * direction, anchor + high * direction, radius
+
+
+def _axis(center: Array, frame: Array, scale: float, x: Array) -> tuple[Array, Array]:
+    direction = frame[0] + x[0] * frame[1] + x[1] * frame[2]
+    anchor = center + scale * (x[2] * frame[1] + x[3] * frame[2])
+    return anchor, direction / np.linalg.norm(direction)
+
+
+def _volume(points: Array, anchor: Array, direction: Array) -> float:
+    low, high, radius = _segment(points, anchor, direction)
+    return float(np.pi * radius**2 * (high - low + 4.0 / 3.0 * radius))
+
+
+def _segment(
+    points: Array, anchor: Array, direction: Array
+) -> tuple[float, float, float]:
+    """Return the shortest segment on an axis whose capsule holds the points."""
+    along = (points - anchor) @ direction
+    across = np.linalg.norm(points - anchor - np.outer(along, direction), axis=1)
+    radius = float(across.max())
+    cap = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+    low, high = float((along + cap).min()), float((along - cap).max())
+    if low > high:
+        low = high = 0.5 * (low + high)
+        radius = float(np.hypot(across, along - low).max())
+    return low, high, radius

@@ -1,0 +1,300 @@
+"""Shapes of obstacles and links, as Coal computes distances between them.
+
+A capsule's distance to another *rounded* shape (sphere, capsule, half-space) has a
+continuous gradient. Against a shape with flat faces it jumps where parallel features
+slide, a sphere's does not: `hsp_control.geometry` chooses accordingly.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import coal
+import numpy as np
+
+from hsp_control.arrays import Array
+from hsp_control.exceptions import SceneError
+
+
+class Shape(ABC):
+    """A body's form, centred on its own frame.
+
+    Attributes:
+        rounded: Whether a capsule's distance to it has a continuous gradient.
+    """
+
+    rounded: ClassVar[bool] = False
+
+    @abstractmethod
+    def geometry(self) -> Any:
+        """Return Coal's collision geometry.
+
+        Raises:
+            SceneError: If the shape is degenerate or its file cannot be read.
+        """
+
+    @property
+    @abstractmethod
+    def reach(self) -> float:
+        """The radius of a ball about its origin that holds it [m]; inf for a plane."""
+
+
+@dataclass(frozen=True)
+class Sphere(Shape):
+    """A ball; in the plane, a disk.
+
+    Attributes:
+        radius: Its radius [m]; 0 is a point.
+    """
+
+    radius: float
+    rounded: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        """Refuse what is no length."""
+        _lengths(self, zero=True, radius=self.radius)
+
+    def geometry(self) -> Any:
+        """Return Coal's sphere."""
+        return coal.Sphere(self.radius)
+
+    @property
+    def reach(self) -> float:
+        """Its radius."""
+        return self.radius
+
+
+@dataclass(frozen=True)
+class Capsule(Shape):
+    """A cylinder with round ends, along its z axis.
+
+    Attributes:
+        radius: Its radius [m].
+        length: Between the centres of its ends [m].
+    """
+
+    radius: float
+    length: float
+    rounded: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        """Refuse what is no length."""
+        _lengths(self, radius=self.radius)
+        _lengths(self, zero=True, length=self.length)
+
+    def geometry(self) -> Any:
+        """Return Coal's capsule."""
+        return coal.Capsule(self.radius, self.length)
+
+    @property
+    def reach(self) -> float:
+        """Half its overall length."""
+        return self.radius + 0.5 * self.length
+
+
+@dataclass(frozen=True)
+class HalfSpace(Shape):
+    """All below its own x-y plane: a floor, or a wall when it is turned."""
+
+    rounded: ClassVar[bool] = True
+
+    def geometry(self) -> Any:
+        """Return Coal's half-space."""
+        return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+
+    @property
+    def reach(self) -> float:
+        """Infinite."""
+        return float("inf")
+
+
+@dataclass(frozen=True)
+class Box(Shape):
+    """A box.
+
+    Attributes:
+        size: Its edges along x, y and z [m].
+    """
+
+    size: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        """Refuse what is no length."""
+        if len(self.size) != 3:
+            raise SceneError(f"box: size {list(self.size)} needs 3 edges")
+        _lengths(self, **dict(zip("xyz", self.size, strict=True)))
+
+    def geometry(self) -> Any:
+        """Return Coal's box."""
+        return coal.Box(*self.size)
+
+    @property
+    def reach(self) -> float:
+        """Half its diagonal."""
+        return 0.5 * float(np.linalg.norm(self.size))
+
+
+@dataclass(frozen=True)
+class Cylinder(Shape):
+    """A cylinder along its z axis.
+
+    Attributes:
+        radius: Its radius [m].
+        length: Its height [m].
+    """
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        """Refuse what is no length."""
+        _lengths(self, radius=self.radius, length=self.length)
+
+    def geometry(self) -> Any:
+        """Return Coal's cylinder."""
+        return coal.Cylinder(self.radius, self.length)
+
+    @property
+    def reach(self) -> float:
+        """Half its diagonal."""
+        return float(np.hypot(self.radius, 0.5 * self.length))
+
+
+@dataclass(frozen=True)
+class Mesh(Shape):
+    """A triangle mesh from a file, or its convex hull.
+
+    Attributes:
+        file: An STL, OBJ or DAE file.
+        scale: What its numbers are worth [m].
+        convex: Whether its convex hull stands for it.
+    """
+
+    file: Path
+    scale: float = 1.0
+    convex: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what is no length."""
+        _lengths(self, scale=self.scale)
+
+    def geometry(self) -> Any:
+        """Return Coal's mesh."""
+        return self._load()[0]
+
+    @property
+    def reach(self) -> float:
+        """The distance of its farthest vertex."""
+        return float(np.linalg.norm(self._load()[1], axis=1).max())
+
+    def _load(self) -> tuple[Any, Array]:
+        if not Path(self.file).is_file():
+            raise SceneError(f"mesh: no file {self.file}")
+        try:
+            mesh = coal.MeshLoader().load(str(self.file), np.full(3, self.scale))
+        except (RuntimeError, ValueError) as error:
+            reason = str(error).strip().splitlines()[-1]
+            raise SceneError(f"mesh: cannot read {self.file}: {reason}") from error
+        vertices = np.array(mesh.vertices())
+        if len(vertices) == 0:
+            raise SceneError(f"mesh: {self.file} holds no triangle")
+        if self.convex:
+            mesh.buildConvexHull(True, "Qt")
+            return mesh.convex, vertices
+        return mesh, vertices
+
+
+@dataclass(frozen=True)
+class PointCloud(Shape):
+    """Measured points, each grown to a cube of the resolution (Coal's octree).
+
+    Attributes:
+        points: The points, shape (k, 3) [m].
+        resolution: Edge of the cubes [m].
+    """
+
+    points: Sequence[Sequence[float]]
+    resolution: float = 0.02
+
+    def __post_init__(self) -> None:
+        """Refuse what is no cloud."""
+        _lengths(self, resolution=self.resolution)
+        array = np.asarray(self.points, dtype=float)
+        if array.ndim != 2 or array.shape[1:] != (3,) or not np.isfinite(array).all():
+            raise SceneError("point cloud: needs one or more points of 3 numbers")
+
+    def geometry(self) -> Any:
+        """Return Coal's octree."""
+        return coal.makeOctree(np.asarray(self.points, dtype=float), self.resolution)
+
+    @property
+    def reach(self) -> float:
+        """The distance of its farthest point, and a cube."""
+        far = float(np.linalg.norm(self.points, axis=1).max())
+        return far + 2.0 * self.resolution
+
+
+@dataclass(frozen=True)
+class HeightField(Shape):
+    """A terrain: heights on a regular grid about the origin, as a triangle mesh.
+
+    Coal measures no distance to its own height fields.
+
+    Attributes:
+        size: Extent along x and y [m].
+        heights: Heights [m], one row for each y, shape (≥ 2, ≥ 2).
+    """
+
+    size: tuple[float, float]
+    heights: Sequence[Sequence[float]]
+
+    def __post_init__(self) -> None:
+        """Refuse what is no grid."""
+        _lengths(self, **dict(zip("xy", self.size, strict=True)))
+        grid = self._grid()
+        if grid.ndim != 2 or min(grid.shape) < 2 or not np.isfinite(grid).all():
+            raise SceneError("height field: heights need 2 rows of 2 numbers or more")
+
+    def geometry(self) -> Any:
+        """Return Coal's mesh of two triangles a cell."""
+        rows, columns = self._grid().shape
+        vertices = self._vertices()
+        mesh = coal.BVHModelOBBRSS()
+        mesh.beginModel(2 * (rows - 1) * (columns - 1), len(vertices))
+        for i in range(rows - 1):
+            for j in range(columns - 1):
+                a = i * columns + j
+                b, c, d = a + 1, a + columns, a + columns + 1
+                mesh.addTriangle(vertices[a], vertices[b], vertices[d])
+                mesh.addTriangle(vertices[a], vertices[d], vertices[c])
+        mesh.endModel()
+        return mesh
+
+    @property
+    def reach(self) -> float:
+        """The distance of its farthest vertex."""
+        return float(np.linalg.norm(self._vertices(), axis=1).max())
+
+    def _grid(self) -> Array:
+        try:
+            return np.asarray(self.heights, dtype=float)
+        except ValueError:
+            raise SceneError("height field: its rows differ in length") from None
+
+    def _vertices(self) -> Array:
+        grid = self._grid()
+        x = np.linspace(-0.5, 0.5, grid.shape[1]) * self.size[0]
+        y = np.linspace(-0.5, 0.5, grid.shape[0]) * self.size[1]
+        X, Y = np.meshgrid(x, y)
+        return np.column_stack([X.ravel(), Y.ravel(), grid.ravel()])
+
+
+def _lengths(shape: Shape, *, zero: bool = False, **values: float) -> None:
+    for name, value in values.items():
+        if not (0.0 <= value if zero else 0.0 < value) or not value < np.inf:
+            least = "at least 0" if zero else "greater than 0"
+            raise SceneError(
+                f"{type(shape).__name__.lower()}: {name} is {value}; must be {least}"
+            )

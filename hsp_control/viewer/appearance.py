@@ -1,0 +1,19 @@
+"""How the view looks: what each thing is coloured, and how thick things are."""
+
+from hsp_control.plots import palette
+
+ACTUAL, DESIRED = palette.ACTUAL, palette.DESIRED
+OBSTACLE = palette.OBSTACLE
+LINK, JOINT = palette.LINK, palette.JOINT
+AXES = (palette.OBSTACLE, palette.TASK, palette.ACTUAL)
+"""x, y and z of a target: as near to red, green and blue as all eyes tell apart."""
+
+SKY, HORIZON = "#FFFFFF", "#E4E9EE"
+GRID = "#8794A1"
+
+PATH_RADIUS = 0.0035
+"""Of the actual path, over the size of the scene."""
+DESIRED_WIDENING = 2.4
+"""How much thicker the desired path is: both show where one lies in the other."""
+DESIRED_OPACITY = 0.45
+OBSTACLE_OPACITY = 0.55

@@ -1,0 +1,75 @@
+"""From where the scene is seen: as told, or so that all of it is in sight."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.arrays import Array
+from hsp_control.robot import Robot
+from hsp_control.viewer.commands import Command, set_camera
+
+FIELD_OF_VIEW = 32.0
+"""Height of the picture [deg]: a narrow one, in which straight arms look straight."""
+_MARGIN = 1.18
+_SLANT = np.array([1.0, -1.35, 0.62])
+_STEEP = np.cos(np.radians(30.0))
+_MOST_POINTS = 300
+
+
+def look_at(
+    robot: Robot,
+    points: Array,
+    eye: Sequence[float] | None = None,
+    target: Sequence[float] | None = None,
+) -> Command:
+    """Return the command that places the camera.
+
+    A planar arm is seen along its axes, any other robot from above its front. Where one
+    looks down or up steeply, y is up in the picture, else z.
+
+    Args:
+        robot: The robot.
+        points: What is to be in sight [m], shape (K, 3).
+        eye: Where one looks from [m]; None: far enough to see all points.
+        target: Where one looks at [m]; None: the points' middle.
+    """
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    center = middle if target is None else np.asarray(target, float)
+    view: dict[str, object] = {}
+    if eye is not None:
+        direction = np.asarray(eye, float) - center
+        view["eye"] = [float(x) for x in eye]
+    else:
+        normal = plane_normal(robot)
+        direction = _SLANT if normal is None else normal
+        stride = max(1, len(points) // _MOST_POINTS)
+        view["direction"] = direction.tolist()
+        view["points"] = points[::stride].tolist()
+    steep = abs(direction[2]) > _STEEP * np.linalg.norm(direction)
+    return set_camera(
+        **view,
+        target=center.tolist(),
+        up=[0.0, 1.0, 0.0] if steep else [0.0, 0.0, 1.0],
+        field_of_view=FIELD_OF_VIEW,
+        margin=_MARGIN,
+    )
+
+
+def plane_normal(robot: Robot) -> Array | None:
+    """Return the side from which a planar arm is seen, a unit vector, else None."""
+    if any(joint.nv != 1 for joint in list(robot.model.joints)[1:]):
+        return None
+    data = robot.model.createData()
+    J = pin.computeJointJacobians(robot.model, data, robot.neutral())
+    turns = np.linalg.norm(J[3:], axis=0) > 0.5
+    if not turns.any():
+        return None
+    normal = J[3:, turns][:, 0]
+    parallel = np.abs(np.abs(normal @ J[3:, turns]) - 1.0) < 1e-9
+    across = np.abs(normal @ J[:3, ~turns]) < 1e-9
+    if not (parallel.all() and across.all()):
+        return None
+    # From above; of upright planes: so that x or y goes to the right.
+    towards = normal @ np.array([0.1, -1.0, 10.0])
+    return np.asarray(normal if towards > 0.0 else -normal)

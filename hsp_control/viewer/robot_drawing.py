@@ -1,0 +1,124 @@
+"""The robot in the scene: drawn once, then moved joint by joint."""
+
+import logging
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.arrays import Array
+from hsp_control.robot import Robot
+from hsp_control.viewer import shapes
+from hsp_control.viewer.commands import Command, Json, set_object, set_transform
+from hsp_control.viewer.mesh_files import collada_object, mesh_geometry
+from hsp_control.viewer.stand_ins import stand_in
+from hsp_control.viewer.visuals import Visual, read_visuals
+
+ROOT = "/robot"
+
+_log = logging.getLogger(__name__)
+
+
+class RobotDrawing:
+    """A robot's nodes: one a joint, with the links that it carries below.
+
+    Where a link's mesh is missing, or the robot has nothing to show at all, capsules
+    and drums stand in for it.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        """Find out what there is to show."""
+        self.robot = robot
+        self._visuals = read_visuals(robot)
+        self._nodes = _node_names(robot)
+        missing = [v for v in self._visuals if v.kind == "mesh" and v.file is None]
+        self._stand_ins = {visual.joint for visual in missing}
+        if not self._visuals:
+            self._stand_ins = set(range(robot.model.njoints))
+        if missing:
+            _log.warning(
+                "%s: %d of %d meshes are not found (the first belongs to link %r)%s; "
+                "capsules are drawn for them",
+                robot.name,
+                len(missing),
+                sum(visual.kind == "mesh" for visual in self._visuals),
+                missing[0].name,
+                _hint(robot),
+            )
+
+    def draw(self) -> Iterable[Command]:
+        """Yield what puts the robot into the scene."""
+        for joint in sorted(self._stand_ins):
+            body = stand_in(self.robot, joint)
+            if body is not None:
+                yield set_object(f"{self._nodes[joint]}/stand-in", body)
+        links: dict[tuple[int, str], list[Json]] = {}
+        for visual in self._visuals:
+            thing = _thing(visual)
+            if thing is not None:
+                links.setdefault((visual.joint, visual.name), []).append(thing)
+        for (joint, link), things in links.items():
+            path = f"{self._nodes[joint]}/{_element(link)}"
+            yield set_object(path, shapes.group(things))
+
+    def move(self, placements: Sequence[pin.SE3]) -> list[Command]:
+        """Return what moves the joints to their placements in the world."""
+        return [
+            set_transform(node, placements[joint].homogeneous)
+            for joint, node in enumerate(self._nodes)
+            if joint > 0
+        ]
+
+    def points(self, placements: Sequence[pin.SE3]) -> Array:
+        """Return points of the robot in the world [m]: joints, frames, shape (K, 3)."""
+        frames = [
+            placements[frame.parentJoint].act(frame.placement).translation
+            for frame in self.robot.model.frames
+        ]
+        return np.array(frames)
+
+
+def _thing(visual: Visual) -> Json | None:
+    """Return one piece of a link, or None if it cannot be shown."""
+    surface = shapes.material(visual.color, opacity=visual.color[3])
+    size, pose = visual.size, visual.pose
+    match visual.kind:
+        case "box":
+            return shapes.mesh(shapes.box(size), surface, pose)
+        case "sphere":
+            return shapes.mesh(shapes.sphere(size[0]), surface, pose)
+        case "cylinder":
+            return shapes.mesh(shapes.cylinder(*size), surface, pose)
+        case "capsule":
+            half = np.eye(4)
+            half[2, 3] = -size[1] / 2.0
+            body = shapes.capsule(size[1], size[0], size[0])
+            return shapes.mesh(body, surface, pose @ half)
+    if visual.file is None:
+        return None
+    pose = pose @ np.diag([*visual.size, 1.0])
+    if visual.file.suffix.lower() != ".dae":
+        return shapes.mesh(mesh_geometry(visual.file), surface, pose)
+    thing = collada_object(visual.file)
+    thing["object"] |= {
+        "matrix": shapes.matrix(pose),
+        "castShadow": True,
+        "receiveShadow": True,
+    }
+    return thing
+
+
+def _node_names(robot: Robot) -> list[str]:
+    names = [_element(name) for name in robot.model.names]
+    return [f"{ROOT}/{name}" for name in names]
+
+
+def _element(name: str) -> str:
+    """Return a name as one element of a path."""
+    return name.replace("/", "_") or "_"
+
+
+def _hint(robot: Robot) -> str:
+    if "package://example-robot-data" in robot.source.urdf.read_text(errors="replace"):
+        return "; they come with: pip install example-robot-data-loaders"
+    return ""

@@ -1,0 +1,109 @@
+"""Bodies for a robot that has none to show: a capsule a link, a drum a joint."""
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.arrays import Array
+from hsp_control.robot import Robot
+from hsp_control.viewer import shapes
+from hsp_control.viewer.appearance import JOINT, LINK
+from hsp_control.viewer.commands import Json
+
+_THICKNESS = 0.028
+"""A link's radius at the base, over the robot's reach."""
+_TAPER = 0.55
+"""What is left of it at the hand."""
+
+
+def stand_in(robot: Robot, joint: int) -> Json | None:
+    """Return the body of a joint: its drum, and capsules to the joints it carries.
+
+    Args:
+        robot: The robot.
+        joint: The joint's index; 0 is what stands still.
+    """
+    radius = _radius(robot, joint)
+    surface = shapes.material(LINK)
+    things = [] if joint == 0 else [_drum(robot, joint, radius)]
+    ends = _ends(robot, joint)
+    for end, end_radius in ends:
+        length = float(np.linalg.norm(end))
+        if length > radius:
+            body = shapes.capsule(length, 0.8 * radius, 0.8 * end_radius)
+            things.append(shapes.mesh(body, surface, _along(end)))
+    return shapes.group(things) if things else None
+
+
+def _ends(robot: Robot, joint: int) -> list[tuple[Array, float]]:
+    """Return where a body goes in the joint's frame, and how thick it is there."""
+    model = robot.model
+    children = [
+        child for child in range(1, model.njoints) if model.parents[child] == joint
+    ]
+    if children:
+        return [
+            (model.jointPlacements[child].translation, _radius(robot, child))
+            for child in children
+        ]
+    tips = [
+        frame.placement.translation
+        for frame in model.frames
+        if frame.parentJoint == joint
+    ]
+    if joint == 0 or not tips:
+        return []
+    tip = max(tips, key=lambda point: float(np.linalg.norm(point)))
+    if not np.any(tip):
+        tip = model.inertias[joint].lever
+    return [(tip, _TAPER * _radius(robot, joint))]
+
+
+def _drum(robot: Robot, joint: int, radius: float) -> Json:
+    """Return what shows where a joint is, and which way it turns."""
+    surface = shapes.material(JOINT)
+    model = robot.model
+    if model.joints[joint].nv != 1:
+        return shapes.mesh(shapes.sphere(1.15 * radius), surface)
+    data = model.createData()
+    pin.computeJointJacobians(model, data, robot.neutral())
+    motion = np.asarray(data.joints[joint].S).reshape(6, -1)[:, 0]
+    turns = bool(np.any(motion[3:]))
+    pose = _along(motion[3:] if turns else motion[:3])
+    if turns:
+        drum = shapes.rounded_cylinder(1.15 * radius, 2.5 * radius, 0.25 * radius)
+        return shapes.mesh(drum, surface, pose)
+    return shapes.mesh(shapes.box([2.0 * radius, 2.0 * radius, 3.0 * radius]), surface, pose)
+
+
+def _radius(robot: Robot, joint: int) -> float:
+    """Return how thick a link is at its joint [m]: thinner towards the hand."""
+    model = robot.model
+    depth = [0] * model.njoints
+    for index in range(1, model.njoints):
+        depth[index] = depth[model.parents[index]] + 1
+    fraction = depth[joint] / max(depth)
+    return _THICKNESS * reach(robot) * (1.0 - (1.0 - _TAPER) * fraction)
+
+
+def reach(robot: Robot) -> float:
+    """Return the length of the longest chain of links [m]."""
+    model = robot.model
+    lengths = np.zeros(model.njoints)
+    for joint in range(2, model.njoints):
+        parent = model.parents[joint]
+        step = np.linalg.norm(model.jointPlacements[joint].translation)
+        lengths[joint] = lengths[parent] + step
+    for frame in model.frames:
+        tip = lengths[frame.parentJoint] + np.linalg.norm(frame.placement.translation)
+        if frame.parentJoint > 0:
+            lengths[0] = max(lengths[0], tip)
+    return float(lengths.max()) or 1.0
+
+
+def _along(direction: Array) -> Array:
+    """Return the pose that turns z along a direction, shape (4, 4)."""
+    pose = np.eye(4)
+    z = np.array([0.0, 0.0, 1.0])
+    turn = pin.Quaternion.FromTwoVectors(z, direction / np.linalg.norm(direction))
+    pose[:3, :3] = turn.toRotationMatrix()
+    return pose

@@ -1,0 +1,145 @@
+"""What a URDF says its links look like, read without loading a mesh."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.arrays import Array
+from hsp_control.robot import Robot
+
+_GREY = (0.72, 0.74, 0.76, 1.0)
+_MESHES = {".dae", ".obj", ".stl"}  # what the page can read
+_NO_NUMBERS: tuple[float, ...] = ()
+
+
+class Visual(NamedTuple):
+    """One piece of what a link looks like.
+
+    Attributes:
+        joint: The index of the joint that carries it; 0: it stands still.
+        name: Its link's name.
+        pose: Its pose in the joint's frame, shape (4, 4).
+        kind: ``box``, ``cylinder``, ``sphere``, ``capsule`` or ``mesh``.
+        size: Its lengths [m] as the URDF gives them; of a mesh: its scale.
+        color: Red, green, blue and opacity, from 0 to 1.
+        file: Of a mesh: the file, or None if there is none that can be shown.
+        painted: Whether the URDF gives the colour.
+    """
+
+    joint: int
+    name: str
+    pose: Array
+    kind: str
+    size: tuple[float, ...]
+    color: tuple[float, ...]
+    file: Path | None
+    painted: bool
+
+
+def read_visuals(robot: Robot) -> list[Visual]:
+    """Return what the robot's links look like; nothing if its URDF cannot be read."""
+    try:
+        tree = ElementTree.parse(robot.source.urdf).getroot()  # noqa: S314
+    except (OSError, ElementTree.ParseError):
+        return []
+    materials = dict(_materials(tree))
+    return [
+        visual
+        for link in tree.iter("link")
+        if robot.model.existBodyName(name := link.get("name", ""))
+        for element in link.iter("visual")
+        for visual in _visual(robot, name, element, materials)
+    ]
+
+
+def _visual(
+    robot: Robot,
+    link: str,
+    element: ElementTree.Element,
+    materials: dict[str, tuple[float, ...]],
+) -> Iterator[Visual]:
+    shape = next(iter(element.find("geometry") or ()), None)
+    if shape is None:
+        return
+    sizes = {
+        "box": ("size",),
+        "cylinder": ("radius", "length"),
+        "capsule": ("radius", "length"),
+        "sphere": ("radius",),
+        "mesh": ("scale",),
+    }.get(shape.tag)
+    if sizes is None:
+        return
+    size = sum((_numbers(shape.get(name)) for name in sizes), _NO_NUMBERS)
+    color = _color(element.find("material"), materials)
+    frame = robot.model.frames[robot.model.getBodyId(link)]
+    yield Visual(
+        joint=frame.parentJoint,
+        name=link,
+        pose=frame.placement.homogeneous @ _pose(element.find("origin")),
+        kind=shape.tag,
+        size=size or (1.0, 1.0, 1.0),
+        color=color or _GREY,
+        file=_mesh_file(robot, shape.get("filename", "")),
+        painted=color is not None,
+    )
+
+
+def _materials(
+    tree: ElementTree.Element,
+) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """Yield the named colours, wherever in the file they are given."""
+    for material in tree.iter("material"):
+        color = material.find("color")
+        if color is not None and material.get("name"):
+            yield material.get("name", ""), _numbers(color.get("rgba"))
+
+
+def _color(
+    material: ElementTree.Element | None, named: dict[str, tuple[float, ...]]
+) -> tuple[float, ...] | None:
+    if material is None:
+        return None
+    own = material.find("color")
+    if own is not None:
+        return _numbers(own.get("rgba"))
+    return named.get(material.get("name", ""))
+
+
+def _pose(origin: ElementTree.Element | None) -> Array:
+    if origin is None:
+        return np.eye(4)
+    rpy = np.array(_numbers(origin.get("rpy")) or (0.0, 0.0, 0.0))
+    xyz = np.array(_numbers(origin.get("xyz")) or (0.0, 0.0, 0.0))
+    pose: Array = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz).homogeneous
+    return pose
+
+
+def _mesh_file(robot: Robot, name: str) -> Path | None:
+    """Return the file that a mesh's name stands for, if it exists and can be shown."""
+    source = robot.source
+    scheme, _, rest = name.rpartition("://")
+    if scheme == "package":
+        package, _, inside = rest.partition("/")
+        candidates = [folder / rest for folder in source.package_dirs]
+        candidates += [
+            folder / inside for folder in source.package_dirs if folder.name == package
+        ]
+    else:
+        candidates = [source.urdf.parent / rest]  # an absolute path stays as it is
+    return next(
+        (
+            file
+            for file in candidates
+            if file.suffix.lower() in _MESHES and file.is_file()
+        ),
+        None,
+    )
+
+
+def _numbers(text: str | None) -> tuple[float, ...]:
+    return tuple(map(float, (text or "").split()))
