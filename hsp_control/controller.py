@@ -69,6 +69,8 @@ class Controller:
         field: The null-space field.
         metric: The joint-space metric.
         null_space_gain: K_N, shape (nv, nv) [1/s].
+        task_rows: Where each task's rows stand in the stack, by name.
+        field_sample: g and g' of the last `compute`.
     """
 
     def __init__(
@@ -124,7 +126,7 @@ class Controller:
             (task, self._stack.rows(where.start, where.stop))
             for task, where in zip(tasks, self.task_rows.values(), strict=True)
         )
-        self._field = FieldSample.allocate(robot.nv)
+        self.field_sample = FieldSample.allocate(robot.nv)
         self._resolution = Resolution(
             rows, robot.nv, metric.form, self.null_space_gain, singularity_threshold
         )
@@ -140,7 +142,7 @@ class Controller:
         for task, sample in self._samples:
             task.evaluate(state, sample)
         metric = self.metric.evaluate(state, self._metric)
-        field = self.field.evaluate(state, metric, form, self._field)
+        field = self.field.evaluate(state, metric, form, self.field_sample)
         a, e_N, damped = self._resolution.resolve(
             self._stack,
             state.v,
@@ -184,7 +186,7 @@ class Controller:
                     f"task {task.name!r} is not finite at t = {state.t:.6g} s; "
                     "does its trajectory return NaN or infinity there?"
                 )
-        if not all(np.isfinite(array).all() for array in self._field):
+        if not all(np.isfinite(array).all() for array in self.field_sample):
             raise NonFiniteError(
                 f"field {self.field.name!r} is not finite at t = {state.t:.6g} s"
             )

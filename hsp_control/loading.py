@@ -198,6 +198,7 @@ def _from_bundle(name: str, folder: Path) -> RobotSource:
     return RobotSource(
         name=name,
         urdf=folder / f"{name}.urdf",
+        srdf=srdf if (srdf := folder / f"{name}.srdf").is_file() else None,
         package_dirs=packages,
         origin="bundled",
         locked=dict(settings.get("locked") or {}),

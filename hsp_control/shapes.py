@@ -26,6 +26,8 @@ class Shape(ABC):
     """
 
     rounded: ClassVar[bool] = False
+    reversed: ClassVar[bool] = False
+    """Whether Coal gives its witness points, and the normal, the other way round."""
 
     @abstractmethod
     def geometry(self) -> Any:
@@ -54,7 +56,7 @@ class Sphere(Shape):
 
     def __post_init__(self) -> None:
         """Refuse what is no length."""
-        _lengths(self, zero=True, radius=self.radius)
+        _lengths(self, {"radius": self.radius}, zero=True)
 
     def geometry(self) -> Any:
         """Return Coal's sphere."""
@@ -81,8 +83,8 @@ class Capsule(Shape):
 
     def __post_init__(self) -> None:
         """Refuse what is no length."""
-        _lengths(self, radius=self.radius)
-        _lengths(self, zero=True, length=self.length)
+        _lengths(self, {"radius": self.radius})
+        _lengths(self, {"length": self.length}, zero=True)
 
     def geometry(self) -> Any:
         """Return Coal's capsule."""
@@ -124,7 +126,7 @@ class Box(Shape):
         """Refuse what is no length."""
         if len(self.size) != 3:
             raise SceneError(f"box: size {list(self.size)} needs 3 edges")
-        _lengths(self, **dict(zip("xyz", self.size, strict=True)))
+        _lengths(self, dict(zip("xyz", self.size, strict=True)))
 
     def geometry(self) -> Any:
         """Return Coal's box."""
@@ -150,7 +152,7 @@ class Cylinder(Shape):
 
     def __post_init__(self) -> None:
         """Refuse what is no length."""
-        _lengths(self, radius=self.radius, length=self.length)
+        _lengths(self, {"radius": self.radius, "length": self.length})
 
     def geometry(self) -> Any:
         """Return Coal's cylinder."""
@@ -178,7 +180,7 @@ class Mesh(Shape):
 
     def __post_init__(self) -> None:
         """Refuse what is no length."""
-        _lengths(self, scale=self.scale)
+        _lengths(self, {"scale": self.scale})
 
     def geometry(self) -> Any:
         """Return Coal's mesh."""
@@ -217,10 +219,11 @@ class PointCloud(Shape):
 
     points: Sequence[Sequence[float]]
     resolution: float = 0.02
+    reversed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         """Refuse what is no cloud."""
-        _lengths(self, resolution=self.resolution)
+        _lengths(self, {"resolution": self.resolution})
         array = np.asarray(self.points, dtype=float)
         if array.ndim != 2 or array.shape[1:] != (3,) or not np.isfinite(array).all():
             raise SceneError("point cloud: needs one or more points of 3 numbers")
@@ -252,7 +255,7 @@ class HeightField(Shape):
 
     def __post_init__(self) -> None:
         """Refuse what is no grid."""
-        _lengths(self, **dict(zip("xy", self.size, strict=True)))
+        _lengths(self, dict(zip("xy", self.size, strict=True)))
         grid = self._grid()
         if grid.ndim != 2 or min(grid.shape) < 2 or not np.isfinite(grid).all():
             raise SceneError("height field: heights need 2 rows of 2 numbers or more")
@@ -291,9 +294,9 @@ class HeightField(Shape):
         return np.column_stack([X.ravel(), Y.ravel(), grid.ravel()])
 
 
-def _lengths(shape: Shape, *, zero: bool = False, **values: float) -> None:
+def _lengths(shape: Shape, values: dict[str, float], *, zero: bool = False) -> None:
     for name, value in values.items():
-        if not (0.0 <= value if zero else 0.0 < value) or not value < np.inf:
+        if not (value >= 0.0 if zero else value > 0.0) or not value < np.inf:
             least = "at least 0" if zero else "greater than 0"
             raise SceneError(
                 f"{type(shape).__name__.lower()}: {name} is {value}; must be {least}"

@@ -428,13 +428,16 @@ def step_results() -> dict[str, list[float]]:
 
 
 def test_a_controller_step_is_the_same_without_the_compiler() -> None:
-    """NUMBA_DISABLE_JIT=1 runs the same functions as plain Python: one implementation."""
+    """NUMBA_DISABLE_JIT=1 runs the very same functions, as plain Python."""
     tests = Path(__file__).parent
     environment = os.environ | {
         "NUMBA_DISABLE_JIT": "1",
         "PYTHONPATH": os.pathsep.join([str(tests), str(tests.parent)]),
     }
-    code = "import json, test_linalg; print(json.dumps(test_linalg.step_results()))"
+    code = (
+        "import json, test_linalg as t; assert not hasattr(t.multiply, 'py_func'); "
+        "print(json.dumps(t.step_results()))"
+    )
     run = subprocess.run(
         [sys.executable, "-W", "error", "-c", code],
         env=environment,

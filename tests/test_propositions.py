@@ -278,7 +278,8 @@ TASKS: dict[str, TaskCase] = {
     ),
 }
 every_task = pytest.mark.parametrize("which", TASKS)
-LOG_PERIOD = 0.005
+LOG_PERIOD = 0.005  # [s]
+DURATION = 0.8  # of self-motion [s]
 
 
 @cache
@@ -313,7 +314,7 @@ def errors_of(which: str, rollout: Rollout) -> dict[str, Array]:
 
 @every_task
 def test_proposition_1_the_error_is_critically_damped(which: str) -> None:
-    """e(t) = (e0 + (e0' + ω e0) t) exp(-ω t), exactly: to 1e-10 of 1 over 1 s."""
+    """e(t) = (e0 + (e0' + ω e0) t) exp(-ω t), exactly: to 1e-12 of 1 over 1 s."""
     controller, rollout = tracked(which)
     w, t = TASKS[which].frequency, rollout.t[:, None]
     for name, e in errors_of(which, rollout).items():
@@ -322,10 +323,10 @@ def test_proposition_1_the_error_is_critically_damped(which: str) -> None:
         assert np.linalg.norm(e0) > 0.05
         assert np.linalg.norm(e0_dot) > 0.05
         expected = (e0 + (e0_dot + w * e0) * t) * np.exp(-w * t)
-        np.testing.assert_allclose(e, expected, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(e, expected, rtol=0, atol=1e-12)
         rate = (e0_dot - w * (e0_dot + w * e0) * t) * np.exp(-w * t)
         np.testing.assert_allclose(
-            rollout[f"task.{name}.error_rate"], rate, rtol=0, atol=1e-9
+            rollout[f"task.{name}.error_rate"], rate, rtol=0, atol=1e-11
         )
     assert controller.robot.name == TASKS[which].robot
 
@@ -363,10 +364,10 @@ def test_proposition_1_the_logged_acceleration(which: str) -> None:
                 found = C @ answer[3:]
             else:
                 found = answer[: task.rows]
-            np.testing.assert_allclose(found, wanted, rtol=0, atol=2e-10)
+            np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11)
         model, data = robot.model, robot.model.createData()
         answered = pin.aba(model, data, q, v, rollout.tau[i])
-        np.testing.assert_allclose(answered, a, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(answered, a, rtol=0, atol=1e-11)
 
 
 # -- the null space ----------------------------------------------------------------------
@@ -419,7 +420,7 @@ every_run = pytest.mark.parametrize("run", RUNS, ids=str)
 
 @cache
 def self_motion(run: Run) -> Rollout:
-    """Return 0.4 s of tracking off the path, with a field that moves in time."""
+    """Return 0.8 s of tracking off the path, with a field that moves in time."""
     robot, frame, q0 = load(run.robot), FRAMES[run.robot], home(run.robot)
     start = plain(run.robot).placement(q0, frame)
     gains = Gains.from_frequency(7.0)
@@ -441,7 +442,7 @@ def self_motion(run: Run) -> Rollout:
     )
     v0 = 0.5 * np.sin(1.0 + 2.0 * np.arange(robot.nv))
     rollout = simulate(
-        controller, q0, v0, duration=0.4, log_period=LOG_PERIOD, integrator=PRECISE
+        controller, q0, v0, duration=DURATION, log_period=LOG_PERIOD, integrator=PRECISE
     )
     assert not rollout["damped"].any()
     return rollout
@@ -464,25 +465,28 @@ def null_space_errors(run: Run, rollout: Rollout) -> tuple[Array, Array]:
 
 @every_run
 def test_proposition_2_the_null_space_error_decays_as_it_must(run: Run) -> None:
-    """Scalar K_N: ‖e_N‖_W = ‖e_N(0)‖_W exp(-K_N t) to 1e-8 of itself, all along.
+    """Scalar K_N: ‖e_N‖_W = ‖e_N(0)‖_W exp(-K_N t) to 1e-9 of itself, all along.
 
-    Any K_N: V' = -e_NᵀW K_N e_N with V = ½ e_NᵀW e_N, by differences of eighth order,
-    (2 K_N h)⁸/630 = 1e-12 of V' beside the rounding of V, 1e-15/h.
+    Any K_N: V' = -e_NᵀW K_N e_N with V = ½ e_NᵀW e_N, by differences of eighth order.
+    They are good to 1e-10 of V(0), to 1e-8 where M couples a matrix gain with the
+    wrists, so that V has fast parts.
     """
     rollout = self_motion(run)
     e_N, W = null_space_errors(run, rollout)
-    np.testing.assert_allclose(rollout["null_space_error"], e_N, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(rollout["null_space_error"], e_N, rtol=0, atol=2e-11)
     V = 0.5 * np.einsum("ti,tij,tj->t", e_N, W, e_N)
     np.testing.assert_allclose(
-        rollout["null_space_norm"], np.sqrt(2.0 * V), rtol=1e-9, atol=1e-10
+        rollout["null_space_norm"], np.sqrt(2.0 * V), rtol=1e-9, atol=1e-12
     )
     assert V[0] > 0.005
     if run.gain == "scalar":
         expected = np.sqrt(2.0 * V[0]) * np.exp(-6.0 * rollout.t)
-        np.testing.assert_allclose(np.sqrt(2.0 * V), expected, rtol=1e-8, atol=0)
+        np.testing.assert_allclose(np.sqrt(2.0 * V), expected, rtol=1e-9, atol=0)
     power = -np.einsum("ti,tij,tj->t", e_N, W @ run.K_N, e_N)
     found = differences(V, FIRST, LOG_PERIOD)
-    np.testing.assert_allclose(found, power[4:-4], rtol=0, atol=1e-9 * V[0] * 10.0)
+    fast = run.metric == "mass matrix" and run.gain == "matrix"
+    atol = (3e-8 if fast else 1e-9) * V[0]
+    np.testing.assert_allclose(found, power[4:-4], rtol=0, atol=atol)
 
 
 @pytest.mark.parametrize("run", [r for r in RUNS if r.gain == "scalar"], ids=str)
@@ -492,7 +496,7 @@ def test_proposition_2_there_was_something_to_prove(run: Run) -> None:
     g = rollout["field.g"]
     assert np.abs(g - g[0]).max() > 0.1
     e_N, W = null_space_errors(run, rollout)
-    moved = e_N[-1] - np.exp(-6.0 * 0.4) * e_N[0]  # a null space that did not turn
+    moved = e_N[-1] - np.exp(-6.0 * DURATION) * e_N[0]  # a null space that did not turn
     if run.robot != "planar3r" or run.metric == "mass matrix":
         assert np.abs(moved).max() > 1e-4 * np.abs(e_N[0]).max()
 
@@ -678,20 +682,20 @@ def test_proposition_3_q_converges_to_the_constrained_minimum(
 ) -> None:
     """In both metrics the same minimum, that of an optimiser that knows no robot.
 
-    SLSQP with differences is good to about 1e-7; the projected gradient at the end,
-    which is zero at the minimum alone, to what is left of the exponentials.
+    SLSQP with differences is good to 1e-8 here. The velocity that is left is Pg, the
+    projected gradient, which is zero at the minimum alone.
     """
     case, rollout = HELD[which], settled(which, metric)
     minimum = constrained_minimum(which)
     final = rollout["joint_positions"][-1]
     assert np.abs(rollout["joint_positions"][0] - minimum).max() > 0.05  # it had to move
-    np.testing.assert_allclose(final, minimum, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(final, minimum, rtol=0, atol=1e-7)
     assert case.cost(final) <= case.cost(minimum) + 1e-10
     np.testing.assert_allclose(
         case.constraint(final), case.constraint(rollout["joint_positions"][0]), atol=1e-9
     )
     # Nothing moves any more.
-    np.testing.assert_allclose(rollout.v[-1], 0.0, atol=1e-7)
+    np.testing.assert_allclose(rollout.v[-1], 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("which", "metric"), HELD_RUNS)
@@ -718,6 +722,6 @@ def test_proposition_3_the_cost_falls(which: str, metric: str) -> None:
     size = np.abs(predicted).max()
     late = slice(20, -4)  # the first rows move fast for differences of 10 ms
     np.testing.assert_allclose(
-        found[late.start - 4 :], predicted[late], rtol=0, atol=1e-5 * size
+        found[late.start - 4 :], predicted[late], rtol=0, atol=1e-7 * size
     )
     assert np.diff(f[100:]).max() < 1e-12

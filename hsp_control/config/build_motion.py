@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.arrays import Array
-from hsp_control.config import scenario as s
+from hsp_control.config.models import motion as s
 from hsp_control.exceptions import TrajectoryError
 from hsp_control.trajectories import (
     Circle,

@@ -6,23 +6,22 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hsp_control.arrays import Array
-from hsp_control.config.build_motion import position_trajectory
-from hsp_control.config.build_parts import (
-    build_fields,
-    build_metric,
-    build_robot,
-    build_start,
-    build_task,
-)
+from hsp_control.config.build_null_space import build_fields, build_metric
+from hsp_control.config.build_robot import build_robot, build_start
+from hsp_control.config.build_scene import build_scene
+from hsp_control.config.build_tasks import build_task
 from hsp_control.config.document import Document
-from hsp_control.config.scenario import Dop853Model, Rk4Model, Scenario
+from hsp_control.config.models.simulation import Dop853Model, Rk4Model
+from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
 from hsp_control.controller import Controller
 from hsp_control.exceptions import ConfigError, SimulationError
 from hsp_control.resources import bundled_configs
 from hsp_control.robot import Robot
-from hsp_control.scene import Obstacle, Scene
+from hsp_control.scene import Scene
 from hsp_control.simulation import (
     Dop853,
     Integrator,
@@ -134,15 +133,9 @@ def build(document: Document) -> Experiment:
     folder = Path(document.name).resolve().parent
     robot, scenario = build_robot(document, scenario, folder)
     q0 = build_start(document, scenario.start, robot)
-    start = robot.state(0.0, q0, 0.0 * robot.model.createData().tau)
+    start = robot.state(0.0, q0, np.zeros(robot.nv))
 
-    obstacles = []
-    for name, obstacle in scenario.scene.obstacles.items():
-        with document.at("scene", "obstacles", name):
-            center = position_trajectory(obstacle.center, None)
-            obstacles.append(Obstacle(name, center, obstacle.radius))
-    scene = Scene(obstacles)
-
+    scene = build_scene(document, scenario.scene, folder)
     tasks = [
         build_task(document, name, task, start) for name, task in scenario.tasks.items()
     ]

@@ -11,6 +11,7 @@ from .field import FieldSample as FieldSample
 from .field import NullSpaceField as NullSpaceField
 from .field import WeightedSum as WeightedSum
 from .joint_centering import JointCentering as JointCentering
+from .limit_barrier import LimitBarrier as LimitBarrier
 from .manipulability import Manipulability as Manipulability
 from .point_distance import PointDistance as PointDistance
 from .rest import Rest as Rest
@@ -19,3 +20,7 @@ from .target_posture import TargetPosture as TargetPosture
 from .transmission import Transmission as Transmission
 from .vector_field import FunctionField as FunctionField
 from .vector_field import VectorField as VectorField
+from .weight import ConstantWeight as ConstantWeight
+from .weight import Ramp as Ramp
+from .weight import StateWeight as StateWeight
+from .weight import Weight as Weight

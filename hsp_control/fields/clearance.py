@@ -9,7 +9,7 @@ from hsp_control.differences import rate_along_flow
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.barrier import barrier
 from hsp_control.fields.cost import Cost
-from hsp_control.geometry import Proximity, Proxy, link_shapes, self_pairs
+from hsp_control.geometry import LinkShape, Proximity, Proxy, link_shapes, self_pairs
 from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle
 from hsp_control.suggest import did_you_mean, listing
@@ -44,15 +44,16 @@ class Clearance(Cost):
         self.proximity = proximity
         self.influence = float(influence)
         self._slopes = np.zeros(len(proximity.pairs))
+        self._bends = np.zeros(len(proximity.pairs))
 
     def value(self, state: RobotState) -> float:
         """Return f."""
         distances = self.proximity.measure(state)
-        return float(barrier(distances, self.influence, self._slopes))
+        return float(barrier(distances, self.influence, self._slopes, self._bends))
 
     def gradient(self, state: RobotState) -> Array:
         """Return Σ b'(d_k) ∇d_k."""
-        barrier(self.proximity.measure(state), self.influence, self._slopes)
+        self.value(state)
         return self.proximity.gradient(state, self._slopes)
 
     def gradient_rate(self, state: RobotState) -> Array:
@@ -104,8 +105,8 @@ class ObstacleClearance(Clearance):
         rounded = [o for o in obstacles if o.shape.rounded]
         flat = [o for o in obstacles if not o.shape.rounded]
         beads: Proxy = "spheres" if proxy == "capsules" else proxy
-        shapes = []
-        pairs = []
+        shapes: list[LinkShape] = []
+        pairs: list[tuple[int, int]] = []
         ordered = [*rounded, *flat]
         chosen = [(proxy, rounded), (beads, flat)]
         blocks = [(link_shapes(robot, kind), some) for kind, some in chosen if some]
@@ -156,7 +157,7 @@ class SelfClearance(Clearance):
 
 
 def _moving(
-    robot: Robot, shapes: Sequence, links: Sequence[str] | None, name: str
+    robot: Robot, shapes: Sequence[LinkShape], links: Sequence[str] | None, name: str
 ) -> list[int]:
     known = {shape.link for shape in shapes}
     for link in links or ():

@@ -9,6 +9,7 @@ import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import FieldError
+from hsp_control.fields.weight import Product, Weight, as_weight
 from hsp_control.metrics import MetricSample
 from hsp_control.robot import Robot, RobotState
 
@@ -67,25 +68,32 @@ class NullSpaceField(ABC):
     def value(self, state: RobotState) -> float:
         """Return the number to plot: a cost's value f(q, t), or a field's norm."""
 
+    def least_distance(self, state: RobotState) -> float | None:
+        """Return the least distance that the field watches [m], if it watches any."""
+        return None
+
     def __add__(self, other: "NullSpaceField") -> "WeightedSum":
         if not isinstance(other, NullSpaceField):
             return NotImplemented
         return WeightedSum([(1.0, self), (1.0, other)])
 
-    def __rmul__(self, weight: float) -> "WeightedSum":
+    def __rmul__(self, weight: Weight | float) -> "WeightedSum":
         if not isinstance(weight, Real):
             return NotImplemented
         return WeightedSum([(weight, self)])
 
 
 class WeightedSum(NullSpaceField):
-    """g = Σ w_k g_k; a sum of sums is flattened.
+    """g = Σ w_k g_k, g' = Σ (w_k g_k' + w_k' g_k); a sum of sums is flattened.
 
     Attributes:
         terms: The (weight, field) pairs.
+        samples: What each term contributed at the last `evaluate`, weighted.
     """
 
-    def __init__(self, terms: Sequence[tuple[float, NullSpaceField]]) -> None:
+    def __init__(
+        self, terms: Sequence[tuple[Weight | float, NullSpaceField]]
+    ) -> None:
         """Add fields of one robot.
 
         Raises:
@@ -94,24 +102,20 @@ class WeightedSum(NullSpaceField):
         """
         if not terms:
             raise FieldError("a sum of fields needs at least one term")
-        flat: list[tuple[float, NullSpaceField]] = []
+        flat: list[tuple[Weight, NullSpaceField]] = []
         for weight, field in terms:
-            if not 0.0 <= weight < np.inf:
-                raise FieldError(
-                    f"weight of field {field.name!r} is {weight}; must be at least 0"
-                )
-            if isinstance(field, WeightedSum):
-                flat.extend((weight * inner, term) for inner, term in field.terms)
-            else:
-                flat.append((float(weight), field))
+            try:
+                flat.extend(_flattened(as_weight(weight), field))
+            except FieldError as error:
+                raise FieldError(f"field {field.name!r}: {error}") from error
         robot = flat[0][1].robot
         if not all(field.controls for _, field in flat):
             raise FieldError("an uncontrolled null space cannot be part of a sum")
         if any(field.robot is not robot for _, field in flat):
             raise FieldError("the fields of a sum belong to different robots")
         super().__init__(robot, " + ".join(field.name for _, field in flat))
-        self.terms: tuple[tuple[float, NullSpaceField], ...] = tuple(flat)
-        self._term = FieldSample.allocate(robot.nv)
+        self.terms: tuple[tuple[Weight, NullSpaceField], ...] = tuple(flat)
+        self.samples = tuple(FieldSample.allocate(robot.nv) for _ in flat)
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -119,12 +123,26 @@ class WeightedSum(NullSpaceField):
         """Write the weighted sums of g and g'."""
         out.g[:] = 0.0
         out.g_dot[:] = 0.0
-        for weight, field in self.terms:
-            g, g_dot = field.evaluate(state, metric, form, self._term)
-            out.g[:] += weight * g
-            out.g_dot[:] += weight * g_dot
+        for (weight, field), sample in zip(self.terms, self.samples, strict=True):
+            w, w_dot = weight.sample(state)
+            field.evaluate(state, metric, form, sample)
+            sample.g_dot[:] *= w
+            sample.g_dot[:] += w_dot * sample.g
+            sample.g[:] *= w
+            out.g[:] += sample.g
+            out.g_dot[:] += sample.g_dot
         return out
 
     def value(self, state: RobotState) -> float:
         """Return the weighted sum of the terms' values."""
-        return sum(weight * field.value(state) for weight, field in self.terms)
+        return sum(
+            weight.sample(state)[0] * field.value(state) for weight, field in self.terms
+        )
+
+
+def _flattened(
+    weight: Weight, field: NullSpaceField
+) -> list[tuple[Weight, NullSpaceField]]:
+    if not isinstance(field, WeightedSum):
+        return [(weight, field)]
+    return [(Product(weight, inner), term) for inner, term in field.terms]

@@ -53,13 +53,12 @@ class PointDistance(Cost):
         self.weight = float(weight)
         self._center = TrajectorySample.allocate(3)
 
-    def distance(self, state: RobotState) -> float:
-        """Return the least distance from a frame to the obstacle's surface [m]."""
+    def least_distance(self, state: RobotState) -> float:
+        """Return the least distance from a frame to the obstacle's centre [m]."""
         c = self.obstacle.center.sample(state.t, self._center).position
-        nearest = min(
+        return min(
             float(np.linalg.norm(state.position(frame) - c)) for frame in self.frames
         )
-        return nearest - self.obstacle.radius
 
     def value(self, state: RobotState) -> float:
         """Return f."""

@@ -67,8 +67,8 @@ class Transmission(JacobianCost):
             G = J @ J.T + FLOOR**2 * np.eye(len(J))
             G_dot = J_dot @ J.T
             G_dot += G_dot.T
-            y = np.linalg.solve(G, u)
-            y_dot = -np.linalg.solve(G, G_dot @ y)
+            y = np.asarray(np.linalg.solve(G, u))
+            y_dot = np.asarray(-np.linalg.solve(G, G_dot @ y))
             sign = -1.0
         z, z_dot = J.T @ y, J_dot.T @ y + J.T @ y_dot
         s = float(u @ y) if sign < 0.0 else float(z @ z) + FLOOR**2

@@ -1,5 +1,8 @@
 """The smallest capsule that holds a set of points."""
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from scipy.optimize import minimize
 
@@ -20,22 +23,19 @@ def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
     """
     center = points.mean(axis=0)
     axes = np.linalg.svd(points - center, full_matrices=False)[2]
-    best: tuple[float, Array] | None = None
+    candidates = []
     for k in range(len(axes)):
         frame = np.roll(axes, -k, axis=0)  # its first row is the axis tried
         scale = float(np.ptp(points, axis=0).max()) or 1.0
+        search = partial(_axis, center, frame, scale)
         found = minimize(
-            lambda x, frame=frame, scale=scale: _volume(
-                points, *_axis(center, frame, scale, x)
-            ),
+            partial(_volume_along, points, search),
             np.zeros(4),
             method="Nelder-Mead",
             options={"xatol": 1e-5, "fatol": 1e-12, "maxiter": 600},
         )
-        if best is None or found.fun < best[0]:
-            best = (float(found.fun), np.concatenate(_axis(center, frame, scale, found.x)))
-    assert best is not None  # three axes were tried
-    anchor, direction = best[1][:3], best[1][3:]
+        candidates.append((float(found.fun), k, search(found.x)))
+    _, _, (anchor, direction) = min(candidates, key=lambda candidate: candidate[:2])
     low, high, radius = _segment(points, anchor, direction)
     return anchor + low * direction, anchor + high * direction, radius
 
@@ -46,8 +46,10 @@ def _axis(center: Array, frame: Array, scale: float, x: Array) -> tuple[Array, A
     return anchor, direction / np.linalg.norm(direction)
 
 
-def _volume(points: Array, anchor: Array, direction: Array) -> float:
-    low, high, radius = _segment(points, anchor, direction)
+def _volume_along(
+    points: Array, search: Callable[[Array], tuple[Array, Array]], x: Array
+) -> float:
+    low, high, radius = _segment(points, *search(x))
     return float(np.pi * radius**2 * (high - low + 4.0 / 3.0 * radius))
 
 

@@ -10,6 +10,7 @@ import pinocchio as pin
 from scipy.spatial import ConvexHull
 
 from hsp_control.arrays import Array
+from hsp_control.combining import Part
 from hsp_control.exceptions import ModelError
 from hsp_control.geometry.capsule_fit import enclosing_capsule
 from hsp_control.robot import Robot
@@ -76,7 +77,11 @@ def _collision_shapes(robot: Robot) -> list[LinkShape]:
     The robot may have locked joints that the URDF has not: a shape is found again by
     the name of the frame that it is fixed to.
     """
-    source = robot.source
+    return [shape for part in robot.parts for shape in _shapes_of_part(robot, part)]
+
+
+def _shapes_of_part(robot: Robot, part: Part) -> list[LinkShape]:
+    source = part.source
     full = pin.buildModelFromUrdf(str(source.urdf), mimic=False)
     try:
         geometry = pin.buildGeomFromUrdf(
@@ -91,10 +96,12 @@ def _collision_shapes(robot: Robot) -> list[LinkShape]:
     shapes = []
     for item in geometry.geometryObjects:
         frame = full.frames[item.parentFrame]
-        own = robot.model.frames[robot.frame_id(frame.name)]
+        name = part.prefix + frame.name
+        # What is fixed to a combined robot's root hangs on its universe's namesake.
+        own = robot.model.frames[robot.frame_id(name)]
         shapes.append(
             LinkShape(
-                link=frame.name,
+                link=name,
                 joint=own.parentJoint,
                 placement=own.placement * frame.placement.actInv(item.placement),
                 geometry=item.geometry,

@@ -10,7 +10,8 @@ from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import FieldError
 from hsp_control.geometry.links import LinkShape
 from hsp_control.kernels import kernel
-from hsp_control.robot import Robot, RobotState, joint_support
+from hsp_control.kinematics import joint_support
+from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle
 
 GJK_TOLERANCE = 1e-10
@@ -70,6 +71,11 @@ class Proximity:
         self.first: Array = np.zeros((count, 3))
         self.second: Array = np.zeros((count, 3))
         self._normals: Array = np.zeros((count, 3))
+        self._reversed = [
+            k
+            for k, (_, second) in enumerate(pairs)
+            if second >= len(links) and obstacles[second - len(links)].shape.reversed
+        ]
         self._measured: tuple[int, int] | None = None
         joints = [link.joint for link in links] + [0] * len(obstacles)
         support = {joint: joint_support(robot.model, joint) for joint in set(joints)}
@@ -79,7 +85,7 @@ class Proximity:
         ]
 
     def measure(self, state: RobotState) -> Array:
-        """Compute all distances at a state, if that has not been done, and return them."""
+        """Return all distances at a state, computing them once."""
         if self._measured == (id(state), state.stamp):
             return self.distances
         items = self._geometry.geometryObjects
@@ -94,6 +100,9 @@ class Proximity:
             self.first[k] = result.getNearestPoint1()
             self.second[k] = result.getNearestPoint2()
             self._normals[k] = result.normal  # from the first shape to the second
+        for k in self._reversed:
+            self.first[k], self.second[k] = self.second[k].copy(), self.first[k].copy()
+            self._normals[k] *= -1.0
         self._measured = (id(state), state.stamp)
         return self.distances
 

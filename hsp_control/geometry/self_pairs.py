@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
-import pinocchio as pin
-
 from hsp_control.geometry.links import LinkShape
 from hsp_control.robot import Robot
 
@@ -22,26 +20,38 @@ def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]
         for j in range(i + 1, len(links)):
             second = links[j]
             a, b = first.joint, second.joint
-            if a == b or parents[a] == b and a > 0 or parents[b] == a and b > 0:
+            if a == b or _neighbours(robot, first, second, parents):
                 continue
             if frozenset((first.link, second.link)) in disabled:
-                continue
-            # Both on bodies that never move against each other: nothing to gain.
-            if _rigid(robot.model, a, b):
                 continue
             pairs.append((i, j))
     return pairs
 
 
-def _rigid(model: pin.Model, a: int, b: int) -> bool:
-    return a == 0 and b == 0
+def _neighbours(
+    robot: Robot, first: LinkShape, second: LinkShape, parents: Sequence[int]
+) -> bool:
+    """Return whether one joint carries the other's link, on the same robot.
+
+    The world is a neighbour of each robot's own first joint only.
+    """
+    a, b = first.joint, second.joint
+    if parents[a] != b and parents[b] != a:
+        return False
+    return min(a, b) > 0 or _part(robot, first) == _part(robot, second)
+
+
+def _part(robot: Robot, shape: LinkShape) -> str:
+    prefixes = [p.prefix for p in robot.parts if shape.link.startswith(p.prefix)]
+    return max(prefixes, key=len)
 
 
 def _disabled(robot: Robot) -> set[frozenset[str]]:
-    if robot.source.srdf is None:
-        return set()
-    root = ElementTree.parse(robot.source.srdf).getroot()
-    return {
-        frozenset((pair.get("link1", ""), pair.get("link2", "")))
-        for pair in root.iter("disable_collisions")
-    }
+    disabled = set()
+    for part in robot.parts:
+        if part.source.srdf is None:
+            continue
+        for pair in ElementTree.parse(part.source.srdf).iter("disable_collisions"):
+            links = (pair.get("link1", ""), pair.get("link2", ""))
+            disabled.add(frozenset(part.prefix + link for link in links))
+    return disabled

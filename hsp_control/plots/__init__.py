@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from hsp_control.plots.frames import draw_superimposed as draw_superimposed
     from hsp_control.plots.joints import draw_efforts as draw_efforts
     from hsp_control.plots.joints import draw_joint_positions as draw_joint_positions
+    from hsp_control.plots.null_space import draw_distances as draw_distances
+    from hsp_control.plots.null_space import draw_field_terms as draw_field_terms
     from hsp_control.plots.null_space import draw_field_value as draw_field_value
     from hsp_control.plots.null_space import (
         draw_null_space_error as draw_null_space_error,
@@ -30,15 +32,17 @@ if TYPE_CHECKING:
     from hsp_control.plots.readings import chosen_rows as chosen_rows
     from hsp_control.plots.saving import save_figures as save_figures
     from hsp_control.plots.style import new_figure as new_figure
-    from hsp_control.plots.style import style as style
+    from hsp_control.plots.style import styled as styled
     from hsp_control.plots.task_errors import draw_task_errors as draw_task_errors
 
 _HOMES = {
     "PlotError": "errors",
     "chosen_rows": "readings",
     "diagnostics_figure": "figures",
+    "draw_distances": "null_space",
     "draw_efforts": "joints",
     "draw_end_effector": "paths",
+    "draw_field_terms": "null_space",
     "draw_field_value": "null_space",
     "draw_frame": "frames",
     "draw_frames": "frames",
@@ -51,7 +55,7 @@ _HOMES = {
     "new_figure": "style",
     "paper_figure": "figures",
     "save_figures": "saving",
-    "style": "style",
+    "styled": "style",
 }
 __all__ = list(_HOMES)
 

@@ -11,10 +11,15 @@ from hsp_control.plots.errors import PlotError
 from hsp_control.plots.frames import columns_for, draw_frames, draw_superimposed
 from hsp_control.plots.joints import draw_efforts, draw_joint_positions
 from hsp_control.plots.legends import plain
-from hsp_control.plots.null_space import draw_field_value, draw_null_space_error
+from hsp_control.plots.null_space import (
+    draw_distances,
+    draw_field_terms,
+    draw_field_value,
+    draw_null_space_error,
+)
 from hsp_control.plots.paths import draw_end_effector
-from hsp_control.plots.readings import chosen_rows
-from hsp_control.plots.style import new_figure, style
+from hsp_control.plots.readings import chosen_rows, distances, field_terms
+from hsp_control.plots.style import new_figure, styled
 from hsp_control.plots.task_errors import draw_task_errors
 from hsp_control.simulation import Rollout
 
@@ -44,7 +49,7 @@ def paper_figure(
     rows = chosen_rows(rollout, frames, times)
     if not rows:
         raise PlotError("no frames are asked for; needs at least 1")
-    with style():
+    with styled():
         figure = new_figure(11.0, 7.6)
         _entitle(figure, rollout)
         halves = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.05))
@@ -71,29 +76,37 @@ def paper_figure(
 
 
 def diagnostics_figure(rollout: Rollout) -> Figure:
-    """Return six panels that tell whether a run did what the law promises.
+    """Return panels that tell whether a run did what the law promises.
 
-    Task errors, null-space error, field, efforts, singular values, manipulability.
+    Task errors, null-space error, field, efforts, singular values, manipulability; and
+    where the log has them, distances to obstacles and the shares of the field's terms.
 
     Raises:
         PlotError: If the log has no row.
     """
     _check(rollout)
-    with style():
-        figure = new_figure(11.0, 6.8)
-        _entitle(figure, rollout)
-        axes = figure.subplots(2, 3)
-        panels = (
+    with styled():
+        panels = [
             (draw_task_errors, "Task error"),
             (draw_null_space_error, "Null-space error"),
             (draw_field_value, "Null-space field"),
             (draw_efforts, "Efforts"),
             (draw_singular_values, "Singular values"),
             (draw_manipulability, "Manipulability"),
-        )
-        for one, (draw, _) in zip(axes.ravel(), panels, strict=True):
+        ]
+        if distances(rollout):
+            panels.append((draw_distances, "Distances"))
+        if len(field_terms(rollout)) > 1:
+            panels.append((draw_field_terms, "The field's terms"))
+        columns = -(-len(panels) // 2)
+        figure = new_figure(3.6 * columns, 6.8)
+        _entitle(figure, rollout)
+        axes = figure.subplots(2, columns).ravel().tolist()
+        for one, (draw, _) in zip(axes, panels, strict=False):
             draw(one, rollout)
-        _letter(axes.ravel().tolist(), [title for _, title in panels])
+        for left_over in axes[len(panels) :]:
+            left_over.set_axis_off()
+        _letter(axes, [title for _, title in panels])
     return figure
 
 

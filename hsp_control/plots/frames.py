@@ -10,9 +10,10 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 
 from hsp_control.arrays import Array
 from hsp_control.plots import palette
-from hsp_control.plots.things import draw_arm, draw_ball, draw_directions, draw_shadow
+from hsp_control.plots.bodies import bodies
+from hsp_control.plots.things import draw_arm, draw_body, draw_directions, draw_shadow
 from hsp_control.plots.views import View, fit, view_of
-from hsp_control.plots.world import everything, obstacles, parents, task_paths
+from hsp_control.plots.world import centers, everything, parents, task_paths
 from hsp_control.simulation import Rollout
 
 
@@ -32,8 +33,8 @@ def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> N
     if not scene.view.names:
         draw_shadow(axes, scene.view, skeleton, tree, scene.floor)
     _draw_paths(axes, scene.view, rollout, 1.6)
-    for obstacle in obstacles(rollout):
-        draw_ball(axes, scene.view, obstacle.center[row], obstacle.radius)
+    for body in bodies(rollout):
+        draw_body(axes, scene.view, body, row)
     draw_arm(axes, scene.view, skeleton, tree)
     scene.finish(axes, shadows=True, key=key)
     axes.set_title(
@@ -71,9 +72,8 @@ def draw_superimposed(axes: Axes, rollout: Rollout, rows: Sequence[int]) -> None
     for place, row in enumerate(rows):
         age = float(rollout.t[row] - start) / (end - start) if end > start else 1.0
         pale = palette.blend(palette.OBSTACLE_EARLY, palette.OBSTACLE, age)
-        for obstacle in obstacles(rollout):
-            center = obstacle.center[row]
-            draw_ball(axes, scene.view, center, obstacle.radius, color=pale, zorder=1.9)
+        for body in bodies(rollout):
+            draw_body(axes, scene.view, body, row, color=pale, zorder=1.9)
         link = palette.blend(palette.EARLY, palette.LATE, age)
         joint = palette.blend(link, palette.INK, 0.4)
         points = rollout["skeleton"][row]
@@ -125,7 +125,7 @@ class _Scene(NamedTuple):
     @classmethod
     def of(cls, rollout: Rollout) -> Self:
         points = everything(rollout)
-        view = view_of(everything(rollout, balls=False))
+        view = view_of(centers(rollout))
         return cls(view, points, min(0.0, float(points[:, 2].min())))
 
     def shown(self, *, shadows: bool) -> Array:

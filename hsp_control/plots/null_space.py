@@ -9,8 +9,20 @@ from matplotlib.axes import Axes
 from hsp_control.arrays import Array
 from hsp_control.plots import palette
 from hsp_control.plots.legends import legend_below, note, plain
-from hsp_control.plots.lines import log_scale, mark_damped, single, time_axis
-from hsp_control.plots.readings import column_unit, constant_metric, position_unit
+from hsp_control.plots.lines import (
+    draw_lines,
+    log_scale,
+    mark_damped,
+    single,
+    time_axis,
+)
+from hsp_control.plots.readings import (
+    column_unit,
+    constant_metric,
+    distances,
+    field_terms,
+    position_unit,
+)
 from hsp_control.simulation import Rollout
 
 ROUNDING = 1e-12
@@ -43,7 +55,8 @@ def predicted_decay(rollout: Rollout) -> Decay:
         why = "no prediction: self-motion is not controlled"
         return Decay(None, None, (0.0, 0.0), why)
     K_N = np.asarray(rollout.meta["null_space_gain"], dtype=float)
-    scalar = bool(np.all(K_N == K_N[0, 0] * np.eye(len(K_N))))
+    multiple = K_N[0, 0] * np.eye(len(K_N))
+    scalar = np.array_equal(K_N, multiple)
     W = np.eye(len(K_N)) if scalar else constant_metric(rollout)
     if W is None:
         why = "no prediction: $K_N$ is a matrix, $W$ not in the log"
@@ -118,9 +131,35 @@ def draw_field_value(axes: Axes, rollout: Rollout) -> None:
     legend_below(axes)
 
 
+def draw_field_terms(axes: Axes, rollout: Rollout) -> None:
+    """Draw the norm of every term's share of g, which shows what rules when."""
+    names = field_terms(rollout)
+    shares = [np.linalg.norm(rollout[f"field.{name}.g"], axis=1) for name in names]
+    draw_lines(axes, rollout.t, np.column_stack(shares), names)
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel(rf"share $\Vert g_k \Vert$ [{_rate_unit(rollout)}]")
+    time_axis(axes, rollout.t)
+    legend_below(axes)
+
+
+def draw_distances(axes: Axes, rollout: Rollout) -> None:
+    """Draw the least distance that each field watches; below zero is contact."""
+    names = distances(rollout)
+    values = np.column_stack([rollout[f"distance.{name}"] for name in names])
+    draw_lines(axes, rollout.t, values, names)
+    axes.axhline(0.0, color=palette.OBSTACLE, linewidth=1.0, zorder=1.0)
+    axes.set_ylabel("least distance [m]")
+    time_axis(axes, rollout.t)
+    legend_below(axes)
+
+
 def _norm_unit(rollout: Rollout) -> str:
     """Return the norm's unit; in the mass matrix it is the root of twice an energy."""
     if rollout.meta.get("metric") == "MassMatrixMetric":
         return "√J"
+    return _rate_unit(rollout)
+
+
+def _rate_unit(rollout: Rollout) -> str:
     unit = position_unit(rollout)
     return f"({unit})/s" if " " in unit else f"{unit}/s"

@@ -5,15 +5,16 @@ from matplotlib.axes import Axes
 
 from hsp_control.arrays import Array
 from hsp_control.plots import palette
+from hsp_control.plots.bodies import bodies
 from hsp_control.plots.box import corners, draw_box
 from hsp_control.plots.legends import legend_below, note, plain
-from hsp_control.plots.things import draw_ball
+from hsp_control.plots.things import draw_body
 from hsp_control.plots.views import View, best_plane, fit, is_flat, plane, slant
 from hsp_control.plots.world import (
-    ball,
+    centers,
     end_points,
     everything,
-    obstacles,
+    obstacle_points,
     task_paths,
 )
 from hsp_control.simulation import Rollout
@@ -28,12 +29,13 @@ def path_view(rollout: Rollout) -> View:
     The robot's plane if it moves in one; the plane that the tasks track if they track
     two axes; the plane of paths and obstacles if they are nearly flat; else a slant.
     """
-    whole, seen = everything(rollout, balls=False), _seen(rollout, balls=False)
-    if is_flat(whole):
+    if is_flat(whole := centers(rollout)):
         return plane(best_plane(whole))
     tracked = {"".join(sorted(path.axes)) for path in task_paths(rollout)}
     if len(tracked) == 1 and len(only := tracked.pop()) == 2:
         return plane(only)
+    middles = [body.center for body in bodies(rollout) if len(body.points)]
+    seen = np.concatenate([_led(rollout), *middles])
     return plane(best_plane(seen)) if is_flat(seen, NEARLY_FLAT) else slant()
 
 
@@ -72,8 +74,9 @@ def draw_end_effector(axes: Axes, rollout: Rollout, *, names: str = "") -> None:
             _draw_track(axes, view, ends[:, k], k, label)
         note(axes, "no task leads a point")
     _draw_obstacles(axes, view, rollout)
-    least = 0.02 * float(np.ptp(everything(rollout), axis=0).max())
-    seen = _seen(rollout)
+    everywhere = everything(rollout)
+    least = 0.02 * float(np.ptp(everywhere, axis=0).max())
+    seen = np.concatenate([_led(rollout), *obstacle_points(rollout, everywhere)])
     if view.names:
         fit(axes, view, seen, least)
     else:
@@ -103,20 +106,18 @@ def _draw_track(
 
 
 def _draw_obstacles(axes: Axes, view: View, rollout: Rollout) -> None:
-    found = obstacles(rollout)
+    found = bodies(rollout)
     label = "obstacle" if len(found) == 1 else "obstacles"
-    for place, obstacle in enumerate(found):
-        center, radius = obstacle.center, obstacle.radius
-        moves = float(np.ptp(center, axis=0).max()) > 1e-9
-        if moves:
-            draw_ball(axes, view, center[0], radius, filled=False)
-        draw_ball(axes, view, center[-1], radius)
+    for place, body in enumerate(found):
+        if body.moves:
+            draw_body(axes, view, body, 0, filled=False)
+        draw_body(axes, view, body, -1)
         axes.plot(
-            *view.project(center),
+            *view.project(body.center),
             color=palette.OBSTACLE,
             linewidth=1.1,
             linestyle=":",
-            marker="" if moves else "+",
+            marker="" if body.moves else "+",
             zorder=2.1,
             label=label if place == 0 else None,
         )
@@ -127,14 +128,11 @@ def _desired_label(axes: str, view: View) -> str:
     return f"desired ({axes})" if set(view.names or "xyz") - set(axes) else "desired"
 
 
-def _seen(rollout: Rollout, *, balls: bool = True) -> Array:
-    """Return points that enclose paths and obstacles, shape (K, 3) [m]."""
-    points: list[Array] = []
-    for path in task_paths(rollout):
-        points += [path.desired, path.actual]
-    if not points:
-        points.append(end_points(rollout).reshape(-1, 3))
-    for obstacle in obstacles(rollout):
-        corners = ball(obstacle.center, obstacle.radius)
-        points += corners if balls else [obstacle.center]
-    return np.concatenate(points)
+def _led(rollout: Rollout) -> Array:
+    """Return the points of all paths, or those of the robot's ends, (K, 3) [m]."""
+    paths = task_paths(rollout)
+    if not paths:
+        return end_points(rollout).reshape(-1, 3)
+    return np.concatenate(
+        [path for each in paths for path in (each.desired, each.actual)]
+    )

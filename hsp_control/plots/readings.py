@@ -110,7 +110,7 @@ def effort_unit(rollout: Rollout) -> str:
 def constant_metric(rollout: Rollout) -> Array | None:
     """Return the metric W, shape (nv, nv), if it is constant and the log tells it.
 
-    A log of a run from a configuration does; one of a run from Python tells the identity.
+    A log of a run from a configuration does; else one can tell the identity alone.
     """
     robot, told = rollout.meta["robot"], rollout.config or {}
     nv = int(robot["nv"])
@@ -125,6 +125,20 @@ def constant_metric(rollout: Rollout) -> Array | None:
     if not matrix.size and robot.get("joint_coordinates") == "absolute":
         matrix = np.tril(np.ones((nv, nv)))
     return matrix.T @ matrix if matrix.size else None
+
+
+def field_terms(rollout: Rollout) -> list[str]:
+    """Return the names of a sum's terms whose share of g the log has."""
+    inner = (
+        name.removeprefix("field.") for name in rollout.columns if name != "field.g"
+    )
+    return [name.removesuffix(".g") for name in inner if name.endswith(".g")]
+
+
+def distances(rollout: Rollout) -> list[str]:
+    """Return the names of the fields that watch a distance."""
+    names = (name for name in rollout.columns if name.startswith("distance."))
+    return [name.removeprefix("distance.") for name in names]
 
 
 def column_unit(rollout: Rollout, name: str) -> str:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from hsp_control.plots.errors import PlotError
 from hsp_control.plots.figures import diagnostics_figure, paper_figure
-from hsp_control.plots.style import style
+from hsp_control.plots.style import styled
 from hsp_control.simulation import Rollout
 from hsp_control.suggest import did_you_mean, listing
 
@@ -55,7 +55,7 @@ def _save(figure: Figure, path: Path, suffix: str) -> None:
         )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with style():
+        with styled():
             figure.savefig(path, format=suffix, metadata=_UNDATED.get(suffix))
     except OSError as error:
         reason = error.strerror or str(error)

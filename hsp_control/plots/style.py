@@ -69,26 +69,26 @@ STYLE: dict[str, Any] = {
 
 
 @contextmanager
-def style() -> Iterator[None]:
+def styled() -> Iterator[None]:
     """Hold matplotlib's parameters at `STYLE` within the context, and only there."""
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # any str may be a key
         yield
 
 
 class StyledFigure(Figure):
-    """A figure that is drawn in `style`, wherever it is saved or shown.
+    """A figure that is drawn in the style, wherever it is saved or shown.
 
     Matplotlib makes ticks when they are first drawn, with the parameters of then.
     """
 
     def draw(self, renderer: RendererBase) -> None:
         """Draw in the style."""
-        with style():
+        with styled():
             super().draw(renderer)
 
 
 def new_figure(width: float, height: float) -> StyledFigure:
-    """Return an empty figure, width and height in inches; call it within `style`."""
+    """Return an empty figure, width and height in inches; call it within `styled`."""
     layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.06)
     figure = StyledFigure(figsize=(width, height), layout=layout)
     FigureCanvasAgg(figure)

@@ -1,13 +1,15 @@
-"""Things in the world: an arm, its shadow, a ball, the directions of the axes."""
+"""Things in the world: an arm, its shadow, an obstacle, the directions of the axes."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Polygon
 
 from hsp_control.arrays import Array
 from hsp_control.plots import palette
+from hsp_control.plots.bodies import Body
 from hsp_control.plots.views import View
 
 
@@ -91,38 +93,56 @@ def draw_shadow(
             )
 
 
-def draw_ball(
+def draw_body(
     axes: Axes,
     view: View,
-    center: Array,
-    radius: float,
+    body: Body,
+    row: int,
     *,
     color: str = palette.OBSTACLE,
     filled: bool = True,
     zorder: float = 2.0,
 ) -> None:
-    """Draw a ball: a disk, which is what a parallel projection makes of it.
+    """Draw an obstacle's outline; a half-space only where it is seen edge-on.
 
     Args:
         axes: The axes.
         view: The view.
-        center: Its centre, shape (3,) [m].
-        radius: Its radius [m].
+        body: The obstacle.
+        row: The row.
         color: Its colour.
-        filled: False: a dashed outline.
+        filled: False: a dashed outline, as for a ball that only holds a body.
         zorder: Where it lies above other things.
     """
-    x, y = view.project(center)
-    disk = Circle(
-        (float(x), float(y)),
-        radius,
-        facecolor=f"{color}73" if filled else "none",
-        edgecolor=color,
-        linewidth=1.0,
-        linestyle="-" if filled else (0, (3, 2)),
-        zorder=zorder,
-    )
-    axes.add_patch(disk)
+    filled = filled and body.exact
+    looks: dict[str, Any] = {
+        "facecolor": f"{color}73" if filled else "none",
+        "edgecolor": color,
+        "linewidth": 1.0,
+        "linestyle": "-" if filled else (0, (3, 2)),
+        "zorder": zorder,
+    }
+    if len(body.points) == 1:
+        x, y = view.project(body.placed(row)[0])
+        axes.add_patch(Circle((float(x), float(y)), body.radius, **looks))
+    elif len(body.points):
+        axes.add_patch(Polygon(body.outline(view, row), **looks))
+    else:
+        _draw_half_space(axes, view, body, row, looks)
+
+
+def _draw_half_space(
+    axes: Axes, view: View, body: Body, row: int, looks: dict[str, Any]
+) -> None:
+    normal = view.rows @ body.rotation[row, :, 2]
+    if float(np.linalg.norm(normal)) < 1.0 - 1e-6:
+        return
+    far = 1e3  # beyond every picture [m]
+    point = view.rows @ body.center[row]
+    along = far * np.array([-normal[1], normal[0]])
+    edge = np.stack([point - along, point + along])
+    corners = np.concatenate([edge, edge[::-1] - far * normal])
+    axes.add_patch(Polygon(corners, **looks))
 
 
 def draw_directions(axes: Axes, view: View, origin: Array, length: float) -> None:

@@ -1,4 +1,4 @@
-"""Where things are in a log: the skeleton, obstacles, and the paths of tasks."""
+"""Where things are in a log: the skeleton, the paths of tasks, and all together."""
 
 from itertools import permutations
 from typing import NamedTuple
@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.arrays import Array
+from hsp_control.plots.bodies import bodies
 from hsp_control.plots.readings import task_names, task_type
 from hsp_control.simulation import Rollout
 
@@ -27,29 +28,6 @@ class TaskPath(NamedTuple):
     axes: str
 
 
-class ObstaclePath(NamedTuple):
-    """A ball and where it goes.
-
-    Attributes:
-        name: Its name.
-        center: Its centre [m], shape (N, 3).
-        radius: Its radius [m].
-    """
-
-    name: str
-    center: Array
-    radius: float
-
-
-def obstacles(rollout: Rollout) -> list[ObstaclePath]:
-    """Return the obstacles of the scene."""
-    found = rollout.meta.get("obstacles", {}).items()
-    return [
-        ObstaclePath(name, rollout[f"obstacle.{name}"], float(about["radius"]))
-        for name, about in found
-    ]
-
-
 def parents(rollout: Rollout) -> list[int]:
     """Return the index of every skeleton point's parent, -1 for none."""
     return [int(parent) for parent in rollout.meta["robot"]["skeleton_parents"]]
@@ -68,24 +46,38 @@ def end_points(rollout: Rollout) -> Array:
     return rollout["skeleton"][:, ends]
 
 
-def everything(rollout: Rollout, *, balls: bool = True) -> Array:
-    """Return points that enclose all that is ever to be seen, shape (K, 3) [m].
+def everything(rollout: Rollout) -> Array:
+    """Return points that enclose robot, paths and obstacles, shape (K, 3) [m].
 
-    Args:
-        rollout: The log.
-        balls: Enclose obstacles to their surface, not only their centres.
+    Of obstacles larger than all else, such as a floor, only what is beside the robot is
+    worth showing: they do not count.
     """
     points = [rollout["skeleton"].reshape(-1, 3)]
-    for path in task_paths(rollout):
-        points.append(path.desired)
-    for obstacle in obstacles(rollout):
-        points += ball(obstacle.center, obstacle.radius) if balls else [obstacle.center]
+    points += [path.desired for path in task_paths(rollout)]
+    return np.concatenate([*points, *obstacle_points(rollout, np.concatenate(points))])
+
+
+def centers(rollout: Rollout) -> Array:
+    """Return robot, paths and the obstacles' mere centres, shape (K, 3) [m].
+
+    They lie in a plane if all moves in one; a disk's thickness says nothing.
+    """
+    points = [rollout["skeleton"].reshape(-1, 3)]
+    points += [path.desired for path in task_paths(rollout)]
+    points += [body.center for body in bodies(rollout) if len(body.points)]
     return np.concatenate(points)
 
 
-def ball(center: Array, radius: float) -> list[Array]:
-    """Return the corners of the boxes around balls, each of the shape of ``center``."""
-    return [center - radius, center + radius]
+def obstacle_points(rollout: Rollout, others: Array) -> list[Array]:
+    """Return points that enclose obstacles, but those larger than all else.
+
+    Args:
+        rollout: The log.
+        others: All else, shape (K, 3) [m].
+    """
+    size = float(np.ptp(others, axis=0).max())
+    found = [body.enclosed() for body in bodies(rollout) if len(body.points)]
+    return [points for points in found if np.ptp(points, axis=0).max() <= 1.5 * size]
 
 
 def _task_path(rollout: Rollout, name: str) -> TaskPath | None:

@@ -70,8 +70,12 @@ class Rk4:
     """The classical fourth-order Runge-Kutta step, in the chart at its start."""
 
     def __init__(self, step: float) -> None:
-        """Set the largest step [s]; each interval is cut into equal ones."""
-        self.step = step
+        """Set the largest step [s]; each interval is cut into equal ones.
+
+        Raises:
+            SimulationError: If it is not positive.
+        """
+        self.step = _positive(step, "step")
 
     def advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
@@ -100,8 +104,12 @@ class SemiImplicitEuler:
     """v ← v + h v', then q ← q ⊕ h v: first order, cheap, well-behaved."""
 
     def __init__(self, step: float) -> None:
-        """Set the largest step [s]; each interval is cut into equal ones."""
-        self.step = step
+        """Set the largest step [s]; each interval is cut into equal ones.
+
+        Raises:
+            SimulationError: If it is not positive.
+        """
+        self.step = _positive(step, "step")
 
     def advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
@@ -122,8 +130,12 @@ class Dop853:
     """
 
     def __init__(self, rtol: float = 1e-9, atol: float = 1e-9) -> None:
-        """Set the relative and absolute tolerance of a step."""
-        self.rtol, self.atol = rtol, atol
+        """Set the relative and absolute tolerance of a step.
+
+        Raises:
+            SimulationError: If one is not positive.
+        """
+        self.rtol, self.atol = _positive(rtol, "rtol"), _positive(atol, "atol")
 
     def advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
@@ -155,6 +167,12 @@ class Dop853:
             t = float(solver.t)
             q, v = chart.point(solver.y)
         return q, v
+
+
+def _positive(value: float, name: str) -> float:
+    if not 0.0 < value < np.inf:
+        raise SimulationError(f"integrator: {name} is {value}; must be positive")
+    return value
 
 
 def number_of_steps(duration: float, step: float) -> int:

@@ -1,17 +1,19 @@
 """Fills a rollout's columns, one row at a time, into memory that is there already."""
 
 import platform
+from pathlib import Path
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller, ControlOutput
+from hsp_control.fields import FieldSample, NullSpaceField, WeightedSum
 from hsp_control.robot import Robot, RobotState
-from hsp_control.scene import Scene
+from hsp_control.scene import Obstacle, Scene
 from hsp_control.simulation.rollout import FORMAT, Rollout
-from hsp_control.trajectories import TrajectorySample
 from hsp_control.version import __version__
 
 
@@ -56,9 +58,15 @@ class Recorder:
         column("damped", (), "-", "1 where a singularity made the law bounded")
         self._joints, self._edges = _skeleton(robot, controller)
         column("skeleton", (len(self._edges), 3), "m", "joints and task frames")
+        self._terms = _terms(controller)
+        for name, (_, field) in self._terms.items():
+            column(f"field.{name}.g", (nv,), f"{joint_unit}/s", "weighted contribution")
+            column(f"field.{name}.value", (), "-", "unweighted cost or norm")
+            if field.least_distance(_probe(robot)) is not None:
+                column(f"distance.{name}", (), "m", "least distance it watches")
         for obstacle in scene.values():
             column(f"obstacle.{obstacle.name}", (3,), "m", "its centre")
-        self._center = TrajectorySample.allocate(3)
+            column(f"obstacle.{obstacle.name}.quaternion", (4,), "-", "x, y, z, w")
 
     def record(self, state: RobotState, output: ControlOutput) -> None:
         """Append the row of a state and of what the controller made of it."""
@@ -89,9 +97,15 @@ class Recorder:
             columns["skeleton"][i, k] = (
                 state.position(frame) if frame else state.data.oMi[joint].translation
             )
+        for name, (sample, field) in self._terms.items():
+            columns[f"field.{name}.g"][i] = sample.g
+            columns[f"field.{name}.value"][i] = field.value(state)
+            if f"distance.{name}" in columns:
+                columns[f"distance.{name}"][i] = field.least_distance(state)
         for obstacle in self._scene.values():
-            center = obstacle.center.sample(state.t, self._center).position
-            columns[f"obstacle.{obstacle.name}"][i] = center
+            placement = pin.SE3ToXYZQUAT(obstacle.placement(state.t))
+            columns[f"obstacle.{obstacle.name}"][i] = placement[:3]
+            columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
         self._rows += 1
 
     def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
@@ -124,9 +138,7 @@ class Recorder:
                 "controls_null_space": controller.field.controls,
                 "null_space_gain": controller.null_space_gain.tolist(),
                 "metric": type(controller.metric).__name__,
-                "obstacles": {
-                    o.name: {"radius": o.radius} for o in self._scene.values()
-                },
+                "obstacles": {o.name: _described(o) for o in self._scene.values()},
                 "versions": versions(),
                 **meta,
             },
@@ -141,6 +153,29 @@ def versions() -> dict[str, str]:
         "python": platform.python_version(),
         **{package: version(package) for package in packages},
     }
+
+
+def _terms(controller: Controller) -> dict[str, tuple[FieldSample, NullSpaceField]]:
+    """Return each term of the controller's field and where its share of g stands."""
+    field = controller.field
+    if not isinstance(field, WeightedSum):
+        return {field.name: (controller.field_sample, field)}
+    terms = zip(field.samples, (term for _, term in field.terms), strict=True)
+    names = [term.name for _, term in field.terms]
+    return {
+        name if names.count(name) == 1 else f"{name}_{k}": pair
+        for k, (name, pair) in enumerate(zip(names, terms, strict=True))
+    }
+
+
+def _described(obstacle: Obstacle) -> dict[str, Any]:
+    reach = obstacle.shape.reach
+    return {
+        "shape": type(obstacle.shape).__name__,
+        "parameters": {k: str(v) if isinstance(v, Path) else v
+                       for k, v in vars(obstacle.shape).items()},
+        "radius": reach if np.isfinite(reach) else None,
+    }  # fmt: skip
 
 
 def _probe(robot: Robot) -> RobotState:

@@ -3,6 +3,7 @@
 import json
 import zipfile
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -96,7 +97,8 @@ class Rollout:
                 np.savez_compressed(file, allow_pickle=False, meta=meta, **self.columns)
             part.replace(path)
         except OSError as error:
-            part.unlink(missing_ok=True)
+            with suppress(OSError):  # its folder may be no folder
+                part.unlink(missing_ok=True)
             reason = error.strerror or str(error)
             raise LogError(f"{path}: cannot write the log: {reason}") from error
         return path

@@ -32,7 +32,7 @@ class Command(NamedTuple):
 
 
 def set_object(path: str, thing: Json) -> Command:
-    """Put a thing (see `shapes`) at a path, in place of what was there."""
+    """Put a thing (see `threejs`) at a path, in place of what was there."""
     return _command("set_object", path, "object", object=thing)
 
 
@@ -105,7 +105,8 @@ def _command(kind: str, path: str, what: str, **fields: Any) -> Command:
 def _transform_head(path: str) -> bytes:
     """Return the bytes before the matrix: packing them anew would cost the most."""
     head = b"".join(
-        umsgpack.packb(word) for word in ("type", "set_transform", "path", path, "matrix")
+        umsgpack.packb(word)
+        for word in ("type", "set_transform", "path", path, "matrix")
     )
     ext8_of_16_doubles = struct.pack("BBB", 0xC7, 16 * 8, 0x18)
     return b"\x83" + head + ext8_of_16_doubles

@@ -43,9 +43,7 @@ class Kept:
 
     def items(self) -> list[tuple[str, str, bytes]]:
         """Return (path, what, packed command) of everything, oldest first."""
-        return [
-            (*_split(key), packed) for key, packed in self._packed.items()
-        ]
+        return [(*_split(key), packed) for key, packed in self._packed.items()]
 
     def get(self, key: str) -> bytes | None:
         """Return the command with a key, if there is one."""

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from hsp_control.viewer.commands import Json, typed_array
-from hsp_control.viewer.shapes import unique_name
+from hsp_control.viewer.threejs import unique_name
 
 
 def mesh_geometry(file: Path) -> Json:
@@ -50,7 +50,7 @@ def _textures(file: Path, text: str) -> dict[str, str]:
         return {}
     names = {
         (element.text or "").strip()
-        for images in ElementTree.fromstring(text).iter()  # noqa: S314
+        for images in ElementTree.fromstring(text).iter()
         if images.tag.endswith("library_images")
         for element in images.iter()
         if element.tag.endswith("init_from")

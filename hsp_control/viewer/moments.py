@@ -3,8 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.arrays import Array
+from hsp_control.robot import Robot
 
 
 class Moment(NamedTuple):
@@ -33,4 +35,35 @@ def between(column: Array, now: Moment) -> Array:
     here: Array = column[row]
     if fraction == 0.0:
         return here
-    return (1.0 - fraction) * here + fraction * column[row + 1]
+    there: Array = column[row + 1]
+    return (1.0 - fraction) * here + fraction * there
+
+
+def orientation_between(quaternions: Array, now: Moment) -> pin.Quaternion:
+    """Return the orientation at a moment, the short way from row to row.
+
+    Args:
+        quaternions: One a row, (x, y, z, w), shape (N, 4).
+        now: The moment.
+    """
+    row, fraction = now
+    start, end = (
+        pin.Quaternion(*quaternions[k, [3, 0, 1, 2]]).normalized()
+        for k in (row, min(row + 1, len(quaternions) - 1))
+    )
+    return start.slerp(fraction, end)
+
+
+def configuration_between(robot: Robot, q: Array, now: Moment) -> Array:
+    """Return the configuration at a moment, on the shortest way from row to row.
+
+    Args:
+        robot: The robot.
+        q: One configuration a row, shape (N, nq).
+        now: The moment.
+    """
+    row, fraction = now
+    here: Array = q[row]
+    if fraction == 0.0:
+        return here
+    return robot.integrate(here, fraction * robot.difference(here, q[row + 1]))

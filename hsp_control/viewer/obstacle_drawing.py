@@ -1,60 +1,67 @@
-"""Obstacles in the scene: translucent balls that move."""
+"""Obstacles in the scene: translucent, each where its trajectory leads it."""
 
 from collections.abc import Iterator
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.arrays import Array
 from hsp_control.scene import Scene
-from hsp_control.trajectories import TrajectorySample
-from hsp_control.viewer import shapes
-from hsp_control.viewer.appearance import OBSTACLE, OBSTACLE_OPACITY
+from hsp_control.shapes import Shape
+from hsp_control.viewer.appearance import OBSTACLE
 from hsp_control.viewer.commands import Command, set_object, set_transform
+from hsp_control.viewer.obstacle_shapes import obstacle
 
 ROOT = "/obstacles"
 
 
-def draw_obstacle(name: str, radius: float) -> Command:
-    """Return what puts a ball into the scene; `move_obstacle` gives it its place."""
-    surface = shapes.material(OBSTACLE, opacity=OBSTACLE_OPACITY, glow=0.15)
-    ball = shapes.mesh(shapes.sphere(radius), surface)
-    return set_object(_path(name), shapes.group([ball]))
+def draw_obstacle(name: str, shape: Shape, extent: float) -> Command:
+    """Return what puts an obstacle into the scene; see `obstacle`."""
+    return set_object(_path(name), obstacle(shape, extent))
 
 
-def move_obstacle(name: str, center: Array) -> Command:
-    """Return what moves a ball's centre [m], shape (3,)."""
-    pose = np.eye(4)
-    pose[:3, 3] = center
-    return set_transform(_path(name), pose)
+def move_obstacle(name: str, placement: pin.SE3) -> Command:
+    """Return what moves an obstacle to its placement in the world."""
+    return set_transform(_path(name), placement.homogeneous)
+
+
+def enclosing(shape: Shape, center: Array) -> list[Array]:
+    """Return corners of boxes about balls that hold a shape at its centres [m]."""
+    reach = shape.reach
+    if not np.isfinite(reach):
+        return []
+    return [center - reach, center + reach]
 
 
 class ObstacleDrawing:
-    """The obstacles of a scene, each on its trajectory."""
+    """The obstacles of a scene."""
 
     def __init__(self, scene: Scene) -> None:
         """Draw this scene."""
         self._scene = scene
-        self._sample = TrajectorySample.allocate(3)
 
-    def draw(self) -> Iterator[Command]:
-        """Yield what puts the obstacles into the scene."""
-        for obstacle in self._scene.values():
-            yield draw_obstacle(obstacle.name, obstacle.radius)
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield what puts the obstacles into a scene of some size [m]."""
+        for each in self._scene.values():
+            yield draw_obstacle(each.name, each.shape, 4.0 * size)
 
     def move(self, time: float) -> Iterator[Command]:
         """Yield what moves them to where they are at a time [s]."""
-        for obstacle in self._scene.values():
-            center = obstacle.center.sample(time, self._sample).position
-            yield move_obstacle(obstacle.name, center)
+        for each in self._scene.values():
+            yield move_obstacle(each.name, each.placement(time))
 
     def points(self) -> Array:
-        """Return points that enclose them at the start [m], shape (K, 3)."""
+        """Return no point: the robot is where the viewer shows it."""
+        return np.zeros((0, 3))
+
+    def obstacle_points(self) -> Array:
+        """Return points that enclose the obstacles at the start [m], shape (K, 3)."""
         corners = [
-            obstacle.center.sample(0.0, self._sample).position + sign * obstacle.radius
-            for obstacle in self._scene.values()
-            for sign in (-1.0, 1.0)
+            corner
+            for each in self._scene.values()
+            for corner in enclosing(each.shape, each.placement(0.0).translation)
         ]
-        return np.array(corners).reshape(-1, 3)
+        return np.reshape(corners, (-1, 3))
 
     def legend(self) -> list[tuple[str, str]]:
         """Return names and colours."""

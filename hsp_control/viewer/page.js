@@ -7,12 +7,24 @@ const meshcat = viewer.handle_command.bind(viewer);
 // Our own lights, floor and grid come with the scene; they fit the robot.
 for (const name of ["Lights", "Grid", "Axes"]) viewer.delete_path([name]);
 
-const words = {camera, caption, time, length, ask};
+const words = {camera, caption, time, length, ask, set_object};
 viewer.handle_command = (command) => {
   if (Array.isArray(command)) command.forEach(viewer.handle_command);
   else (words[command.type] ?? meshcat)(command);
   viewer.set_dirty();
 };
+
+function node(path) {
+  return viewer.scene_tree.find(path.split("/").filter((name) => name.length > 0)).object;
+}
+
+// Some mesh files have no normals and would be black.
+function set_object(command) {
+  meshcat(command);
+  node(command.path).traverse(({geometry}) => {
+    if (geometry?.isBufferGeometry && !geometry.attributes.normal) geometry.computeVertexNormals();
+  });
+}
 
 // Pinocchio's z is up, three.js's y.
 function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
@@ -60,8 +72,7 @@ function time({text}) { document.querySelector("#caption .time").textContent = t
 
 // Draw a tube up to a fraction of its rings.
 function length({path, fraction}) {
-  const names = path.split("/").filter((name) => name.length > 0);
-  viewer.scene_tree.find(names).object.traverse(({geometry}) => {
+  node(path).traverse(({geometry}) => {
     const size = geometry?.userData.segment;
     if (!size) return;
     const segments = geometry.index.count / size;

@@ -8,9 +8,10 @@ import pinocchio as pin
 
 from hsp_control.arrays import Array
 from hsp_control.robot import Robot
-from hsp_control.viewer import shapes
+from hsp_control.viewer import threejs
 from hsp_control.viewer.commands import Command, Json, set_object, set_transform
 from hsp_control.viewer.mesh_files import collada_object, mesh_geometry
+from hsp_control.viewer.poses import moved_to
 from hsp_control.viewer.stand_ins import stand_in
 from hsp_control.viewer.visuals import Visual, read_visuals
 
@@ -59,7 +60,7 @@ class RobotDrawing:
                 links.setdefault((visual.joint, visual.name), []).append(thing)
         for (joint, link), things in links.items():
             path = f"{self._nodes[joint]}/{_element(link)}"
-            yield set_object(path, shapes.group(things))
+            yield set_object(path, threejs.group(things))
 
     def move(self, placements: Sequence[pin.SE3]) -> list[Command]:
         """Return what moves the joints to their placements in the world."""
@@ -77,31 +78,50 @@ class RobotDrawing:
         ]
         return np.array(frames)
 
+    def stand(self) -> Array:
+        """Return points of what stands still [m], shape (K, 3)."""
+        points = [np.zeros(3)]
+        for visual in self._visuals:
+            if visual.joint == 0 and visual.kind in {"box", "cylinder", "sphere"}:
+                lowest = visual.pose[2, 3] - _half_height(visual)
+                points.append(np.array([*visual.pose[:2, 3], lowest]))
+        return np.array(points)
+
+
+def _half_height(visual: Visual) -> float:
+    """Return half the height of a shape in the world [m]."""
+    z = np.abs(visual.pose[2, :3])
+    if visual.kind == "sphere":
+        return visual.size[0]
+    if visual.kind == "box":
+        return float(z @ np.array(visual.size)) / 2.0
+    radius, length = visual.size
+    return float(z[2] * length / 2.0 + np.hypot(z[0], z[1]) * radius)
+
 
 def _thing(visual: Visual) -> Json | None:
     """Return one piece of a link, or None if it cannot be shown."""
-    surface = shapes.material(visual.color, opacity=visual.color[3])
+    surface = threejs.material(visual.color, opacity=visual.color[3])
     size, pose = visual.size, visual.pose
     match visual.kind:
         case "box":
-            return shapes.mesh(shapes.box(size), surface, pose)
+            return threejs.mesh(threejs.box(size), surface, pose)
         case "sphere":
-            return shapes.mesh(shapes.sphere(size[0]), surface, pose)
+            return threejs.mesh(threejs.sphere(size[0]), surface, pose)
         case "cylinder":
-            return shapes.mesh(shapes.cylinder(*size), surface, pose)
+            return threejs.mesh(threejs.cylinder(*size), surface, pose)
         case "capsule":
-            half = np.eye(4)
-            half[2, 3] = -size[1] / 2.0
-            body = shapes.capsule(size[1], size[0], size[0])
-            return shapes.mesh(body, surface, pose @ half)
+            half = moved_to([0.0, 0.0, -size[1] / 2.0])
+            body = threejs.capsule(size[1], size[0], size[0])
+            return threejs.mesh(body, surface, pose @ half)
     if visual.file is None:
         return None
     pose = pose @ np.diag([*visual.size, 1.0])
     if visual.file.suffix.lower() != ".dae":
-        return shapes.mesh(mesh_geometry(visual.file), surface, pose)
+        return threejs.mesh(mesh_geometry(visual.file), surface, pose)
     thing = collada_object(visual.file)
     thing["object"] |= {
-        "matrix": shapes.matrix(pose),
+        "matrix": threejs.matrix(pose),
         "castShadow": True,
         "receiveShadow": True,
     }

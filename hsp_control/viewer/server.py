@@ -181,7 +181,9 @@ def _meshcat_page() -> Path:
     """Return the folder of Meshcat's page, without importing Meshcat."""
     spec = importlib.util.find_spec("meshcat")
     if spec is None or spec.origin is None:
-        raise ViewerError("the view needs meshcat; install it with: pip install meshcat")
+        raise ViewerError(
+            "the view needs meshcat; install it with: pip install meshcat"
+        )
     folder = Path(spec.origin).parent / "viewer" / "dist"
     if not (folder / "main.min.js").is_file():
         raise ViewerError(

@@ -5,9 +5,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from hsp_control.arrays import Array
-from hsp_control.viewer import shapes
+from hsp_control.viewer import threejs
 from hsp_control.viewer.appearance import GRID, HORIZON, SKY
-from hsp_control.viewer.commands import Command, set_object, set_property, set_transform
+from hsp_control.viewer.commands import (
+    Command,
+    Json,
+    set_object,
+    set_property,
+    set_transform,
+)
+from hsp_control.viewer.poses import moved_to
 
 _LIGHT_FROM = np.array([0.5, -0.45, 1.6])
 _FINE = 1e-3
@@ -28,6 +35,21 @@ def draw_stage(points: Array, floor: float) -> Iterator[Command]:
     yield from _floor(center, size, floor)
 
 
+def in_sight(subject: Array, others: Array) -> Array:
+    """Return the points to be seen: the subject's, and others near it.
+
+    What lies far off, or is much larger, counts only up to the subject's own size from
+    it.
+
+    Args:
+        subject: Points of the robot and its paths [m], shape (K, 3).
+        others: Points of obstacles [m], shape (L, 3).
+    """
+    size = scene_size(subject)
+    low, high = subject.min(axis=0) - size, subject.max(axis=0) + size
+    return np.vstack([subject, np.clip(others, low, high)])
+
+
 def scene_size(points: Array) -> float:
     """Return the distance of the farthest of the points from their middle [m]."""
     center = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -35,16 +57,16 @@ def scene_size(points: Array) -> float:
 
 
 def _lights(center: Array, size: float) -> Iterator[Command]:
-    sky = shapes.light("HemisphereLight", 0.62, groundColor=0xC9D2DA)
-    fill = shapes.light("DirectionalLight", 0.22)
+    sky = threejs.light("HemisphereLight", 0.62, groundColor=0xC9D2DA)
+    fill = threejs.light("DirectionalLight", 0.22)
     back = np.array([-_LIGHT_FROM[0], 1.2 * abs(_LIGHT_FROM[1]), 0.6])
-    yield set_object("/lights/sky", shapes.group([sky]))
-    yield set_object("/lights/fill", shapes.group([fill]))
-    yield set_transform("/lights/fill", _moved_to(back * 4.0 * size))
+    yield set_object("/lights/sky", threejs.group([sky]))
+    yield set_object("/lights/fill", threejs.group([fill]))
+    yield set_transform("/lights/fill", moved_to(back * 4.0 * size))
     # The light looks at the origin; what casts shadows must lie in its view.
     around = float(np.linalg.norm(center)) + 1.3 * size
     distance = 4.0 * around
-    key = shapes.light(
+    key = threejs.light(
         "DirectionalLight",
         0.5,
         castShadow=True,
@@ -54,7 +76,7 @@ def _lights(center: Array, size: float) -> Iterator[Command]:
             "normalBias": 4e-3 * around,
             "mapSize": [2048, 2048],
             "camera": {
-                "uuid": shapes.unique_name(),
+                "uuid": threejs.unique_name(),
                 "type": "OrthographicCamera",
                 "left": -around,
                 "right": around,
@@ -66,25 +88,25 @@ def _lights(center: Array, size: float) -> Iterator[Command]:
         },
     )
     towards = _LIGHT_FROM / np.linalg.norm(_LIGHT_FROM)
-    yield set_object("/lights/key", shapes.group([key]))
-    yield set_transform("/lights/key", _moved_to(towards * distance))
+    yield set_object("/lights/key", threejs.group([key]))
+    yield set_transform("/lights/key", moved_to(towards * distance))
 
 
 def _floor(center: Array, size: float, height: float) -> Iterator[Command]:
-    pose = _moved_to([center[0], center[1], height])
-    yield set_object("/floor/shadow", shapes.group([_shadow(size)]))
+    pose = moved_to([center[0], center[1], height])
+    yield set_object("/floor/shadow", threejs.group([_shadow(size)]))
     yield set_transform("/floor/shadow", pose)
     step = _round_step(size / 4.0)
     middle = np.round(center[:2] / step) * step
-    yield set_object("/floor/grid", shapes.group([_grid(size, step)]))
-    yield set_transform("/floor/grid", _moved_to([*middle, height]))
+    yield set_object("/floor/grid", threejs.group([_grid(size, step)]))
+    yield set_transform("/floor/grid", moved_to([*middle, height]))
 
 
-def _shadow(size: float) -> shapes.Json:
-    return shapes.shadow_catcher(12.0 * size, 0.16)
+def _shadow(size: float) -> Json:
+    return threejs.shadow_catcher(12.0 * size, 0.16)
 
 
-def _grid(size: float, step: float) -> shapes.Json:
+def _grid(size: float, step: float) -> Json:
     """Return lines in x and y that fade with the distance from the middle."""
     reach = 2.6 * size
     ticks = np.arange(-np.floor(reach / step), np.floor(reach / step) + 1.0) * step
@@ -96,19 +118,13 @@ def _grid(size: float, step: float) -> shapes.Json:
     colors[:, :3] = _channels(GRID)
     distance = np.linalg.norm(points, axis=1) / reach
     colors[:, 3] = 0.55 * np.clip(1.0 - distance, 0.0, 1.0) ** 1.5
-    return shapes.segments(points, colors)
+    return threejs.segments(points, colors)
 
 
 def _round_step(length: float) -> float:
     """Return the largest of 1, 2 or 5 times a power of ten that is not above."""
     power = 10.0 ** np.floor(np.log10(length))
     return float(power * max(n for n in (1.0, 2.0, 5.0) if n * power <= length * 1.001))
-
-
-def _moved_to(position: Array | list[float]) -> Array:
-    pose = np.eye(4)
-    pose[:3, 3] = position
-    return pose
 
 
 def _channels(color: str) -> list[float]:

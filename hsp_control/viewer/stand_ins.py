@@ -5,9 +5,10 @@ import pinocchio as pin
 
 from hsp_control.arrays import Array
 from hsp_control.robot import Robot
-from hsp_control.viewer import shapes
+from hsp_control.viewer import threejs
 from hsp_control.viewer.appearance import JOINT, LINK
 from hsp_control.viewer.commands import Json
+from hsp_control.viewer.poses import along
 
 _THICKNESS = 0.028
 """A link's radius at the base, over the robot's reach."""
@@ -23,15 +24,15 @@ def stand_in(robot: Robot, joint: int) -> Json | None:
         joint: The joint's index; 0 is what stands still.
     """
     radius = _radius(robot, joint)
-    surface = shapes.material(LINK)
+    surface = threejs.material(LINK)
     things = [] if joint == 0 else [_drum(robot, joint, radius)]
     ends = _ends(robot, joint)
     for end, end_radius in ends:
         length = float(np.linalg.norm(end))
         if length > radius:
-            body = shapes.capsule(length, 0.8 * radius, 0.8 * end_radius)
-            things.append(shapes.mesh(body, surface, _along(end)))
-    return shapes.group(things) if things else None
+            body = threejs.capsule(length, 0.8 * radius, 0.8 * end_radius)
+            things.append(threejs.mesh(body, surface, along(end)))
+    return threejs.group(things) if things else None
 
 
 def _ends(robot: Robot, joint: int) -> list[tuple[Array, float]]:
@@ -60,19 +61,21 @@ def _ends(robot: Robot, joint: int) -> list[tuple[Array, float]]:
 
 def _drum(robot: Robot, joint: int, radius: float) -> Json:
     """Return what shows where a joint is, and which way it turns."""
-    surface = shapes.material(JOINT)
+    surface = threejs.material(JOINT)
     model = robot.model
     if model.joints[joint].nv != 1:
-        return shapes.mesh(shapes.sphere(1.15 * radius), surface)
+        return threejs.mesh(threejs.sphere(1.15 * radius), surface)
     data = model.createData()
     pin.computeJointJacobians(model, data, robot.neutral())
     motion = np.asarray(data.joints[joint].S).reshape(6, -1)[:, 0]
     turns = bool(np.any(motion[3:]))
-    pose = _along(motion[3:] if turns else motion[:3])
+    pose = along(motion[3:] if turns else motion[:3])
     if turns:
-        drum = shapes.rounded_cylinder(1.15 * radius, 2.5 * radius, 0.25 * radius)
-        return shapes.mesh(drum, surface, pose)
-    return shapes.mesh(shapes.box([2.0 * radius, 2.0 * radius, 3.0 * radius]), surface, pose)
+        drum = threejs.rounded_cylinder(1.15 * radius, 2.5 * radius, 0.25 * radius)
+        return threejs.mesh(drum, surface, pose)
+    return threejs.mesh(
+        threejs.box([2.0 * radius, 2.0 * radius, 3.0 * radius]), surface, pose
+    )
 
 
 def _radius(robot: Robot, joint: int) -> float:
@@ -98,12 +101,3 @@ def reach(robot: Robot) -> float:
         if frame.parentJoint > 0:
             lengths[0] = max(lengths[0], tip)
     return float(lengths.max()) or 1.0
-
-
-def _along(direction: Array) -> Array:
-    """Return the pose that turns z along a direction, shape (4, 4)."""
-    pose = np.eye(4)
-    z = np.array([0.0, 0.0, 1.0])
-    turn = pin.Quaternion.FromTwoVectors(z, direction / np.linalg.norm(direction))
-    pose[:3, :3] = turn.toRotationMatrix()
-    return pose

@@ -4,7 +4,7 @@ import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.viewer.commands import Json
-from hsp_control.viewer.shapes import buffer
+from hsp_control.viewer.threejs import buffer
 
 _SIDES = 8
 

@@ -43,7 +43,7 @@ class Visual(NamedTuple):
 def read_visuals(robot: Robot) -> list[Visual]:
     """Return what the robot's links look like; nothing if its URDF cannot be read."""
     try:
-        tree = ElementTree.parse(robot.source.urdf).getroot()  # noqa: S314
+        tree = ElementTree.parse(robot.source.urdf).getroot()
     except (OSError, ElementTree.ParseError):
         return []
     materials = dict(_materials(tree))

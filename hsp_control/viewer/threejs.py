@@ -6,15 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array
+from hsp_control.arrays import Array, Indices
 from hsp_control.viewer.commands import Json, typed_array
 
 _serial = count(1)
 
 # three.js turns its solids about y, a URDF and we about z.
-_Y_TO_Z = np.array(
-    [[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]]
-)
+_Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
 
 
 def material(
@@ -84,14 +82,14 @@ def capsule(length: float, start_radius: float, end_radius: float) -> Json:
     quarter = np.linspace(0.0, np.pi / 2.0, 9)
     below = np.column_stack([np.sin(quarter), -np.cos(quarter)]) * start_radius
     above = np.column_stack([np.cos(quarter), np.sin(quarter)]) * end_radius
-    return turned(np.vstack([below, above + [0.0, length]]))
+    return turned(np.vstack([below, above + np.array([0.0, length])]))
 
 
 def rounded_cylinder(radius: float, length: float, rounding: float) -> Json:
     """Return a cylinder [m] about z with rounded rims, its middle at the origin."""
     quarter = np.linspace(0.0, np.pi / 2.0, 5)
     rim = np.column_stack([np.cos(quarter), np.sin(quarter)]) * rounding
-    upper = rim + [radius - rounding, length / 2.0 - rounding]
+    upper = rim + np.array([radius - rounding, length / 2.0 - rounding])
     lower = upper[::-1] * [1.0, -1.0]
     axis = [0.0, length / 2.0]
     return turned(np.vstack([[0.0, -axis[1]], lower, upper, axis]))
@@ -115,8 +113,9 @@ def plane(size: float) -> Json:
     return _geometry("PlaneGeometry", width=size, height=size)
 
 
-def mesh(geometry: Json, surface: Json, pose: Array | None = None, *,
-         shadow: bool = True) -> Json:
+def mesh(
+    geometry: Json, surface: Json, pose: Array | None = None, *, shadow: bool = True
+) -> Json:
     """Return a solid with a surface, at a pose (4, 4) in its node."""
     total = np.eye(4) if pose is None else pose
     if geometry["type"] in {"CylinderGeometry", "LatheGeometry"}:
@@ -151,7 +150,7 @@ def group(things: Sequence[Json]) -> Json:
 
 
 def buffer(
-    attributes: dict[str, Array], triangles: Array | None = None, segment: int = 0
+    attributes: dict[str, Array], triangles: Indices | None = None, segment: int = 0
 ) -> Json:
     """Return a geometry of vertices.
 

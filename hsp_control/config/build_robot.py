@@ -1,0 +1,149 @@
+"""The robot and its start out of a configuration, each error located."""
+
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from hsp_control.arrays import Array
+from hsp_control.combining import placement
+from hsp_control.config.document import Document
+from hsp_control.config.keys import KeyPath
+from hsp_control.config.models import robot as s
+from hsp_control.config.scenario import Scenario
+from hsp_control.exceptions import ConfigError, ConfigurationError
+from hsp_control.loading import ToolFrame
+from hsp_control.robot import Robot, RobotState
+
+Loaded = TypeVar("Loaded", bound=s.LoadModel)
+
+
+def build_robot(
+    document: Document, scenario: Scenario, folder: Path
+) -> tuple[Robot, Scenario]:
+    """Return the robot, and the scenario with its paths made absolute.
+
+    A relative path is looked up beside the configuration first, so that a folder with
+    both can be moved; the log then names the file that was found.
+    """
+    model = scenario.robot
+    if (model.name is None) == (model.parts is None):
+        raise document.error(("robot",), "give either name or parts")
+    gravity = model.gravity
+    if model.parts is None:
+        found = _located(model, folder)
+        robot = _load(document, ("robot",), found, gravity)
+    else:
+        parts = {name: _located(part, folder) for name, part in model.parts.items()}
+        found = model.model_copy(update={"parts": parts})
+        robots = {
+            name: (
+                _load(document, ("robot", "parts", name), part, gravity),
+                placement(part.position, part.rpy),
+            )
+            for name, part in parts.items()
+        }
+        with document.at("robot", "parts"):
+            robot = Robot.combine(robots)
+    return robot, scenario.model_copy(update={"robot": found})
+
+
+def _located(model: Loaded, folder: Path) -> Loaded:
+    """Return the model with the path of a URDF beside the configuration."""
+    name = model.name or ""
+    if name.endswith((".urdf", ".xml")) and (folder / name).is_file():
+        return model.model_copy(update={"name": str(folder / name)})
+    return model
+
+
+def _load(
+    document: Document, at: KeyPath, model: s.LoadModel, gravity: list[float] | None
+) -> Robot:
+    if model.name is None:
+        raise document.error(at, "missing key 'name'")
+    tools = {
+        tool: ToolFrame(frame.parent, frame.translation, frame.rpy)
+        for tool, frame in model.tool_frames.items()
+    }
+    with document.at(*at, "name"):
+        return Robot.load(
+            model.name,
+            root=model.root,
+            locked=model.locked,
+            tool_frames=tools,
+            gravity=gravity,
+            mimic=model.mimic,
+        )
+
+
+def build_start(document: Document, model: s.StartModel, robot: Robot) -> Array:
+    """Return the start configuration, shape (nq,)."""
+    given = [
+        key
+        for key in ("joints", "coordinates", "configuration")
+        if getattr(model, key) is not None
+    ]
+    if len(given) > 1:
+        raise document.error(
+            ("start", given[1]), f"the start is said twice: by {given[0]} already"
+        )
+    with document.at("start", *given):
+        if model.configuration is not None:
+            return robot.check_configuration(model.configuration)
+        if model.coordinates is not None:
+            A = robot.joint_coordinates
+            if A is None:
+                raise ConfigurationError(
+                    f"{robot.name} has no joint coordinates of its own; use joints"
+                )
+            theta = robot.check_tangent(model.coordinates, "coordinates")
+            joints = np.asarray(np.linalg.solve(A, theta))
+            return robot.integrate(robot.neutral(), joints)
+        if isinstance(model.joints, dict):
+            return _moved_joints(document, robot, model.joints)
+        if model.joints is not None:
+            return joint_configuration(robot, model.joints, "joints")
+    return robot.home()
+
+
+def joint_configuration(robot: Robot, joints: Any, what: str) -> Array:
+    """Return the configuration of given joint positions, shape (nv,)."""
+    return robot.integrate(robot.neutral(), robot.check_tangent(joints, what))
+
+
+def _moved_joints(document: Document, robot: Robot, joints: dict[str, float]) -> Array:
+    positions = robot.joint_positions(robot.home())
+    for joint, value in joints.items():
+        with document.at("start", "joints", joint):
+            where = robot.velocity_index(joint)
+            if where.stop - where.start != 1:
+                raise ConfigurationError(
+                    f"joint {joint!r} has {where.stop - where.start} freedoms; "
+                    "use start.configuration"
+                )
+        positions[where] = value
+    return robot.integrate(robot.neutral(), positions)
+
+
+def end_effector(
+    document: Document, at: KeyPath, frame: str | None, robot: Robot
+) -> str:
+    """Return the named frame, or the robot's end effector; it exists."""
+    with document.at(*at, "frame"):
+        name = frame or robot.source.end_effector
+        if name is None:
+            raise ConfigError(
+                f"name the frame: {robot.name} says of none that it is its end "
+                f"effector (its last is {robot.frame_names[-1]!r})"
+            )
+        robot.frame_id(name)
+    return name
+
+
+def posture(value: Any, start: RobotState) -> Array:
+    """Return the configuration of ``start``, ``home`` or given joint positions."""
+    if value == "start":
+        return start.q
+    if value == "home":
+        return start.robot.home()
+    return joint_configuration(start.robot, value, "posture")

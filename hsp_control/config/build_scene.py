@@ -1,0 +1,64 @@
+"""Obstacles out of a configuration."""
+
+from pathlib import Path
+
+import numpy as np
+
+from hsp_control.config.build_motion import orientation_trajectory, position_trajectory
+from hsp_control.config.document import Document
+from hsp_control.config.models import scene as s
+from hsp_control.scene import Obstacle, Scene
+from hsp_control.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    HeightField,
+    Mesh,
+    PointCloud,
+    Shape,
+    Sphere,
+)
+
+
+def build_scene(document: Document, model: s.SceneModel, folder: Path) -> Scene:
+    """Return the scene; files are looked up beside the configuration."""
+    obstacles = []
+    for name, obstacle in model.obstacles.items():
+        where = ("scene", "obstacles", name)
+        with document.at(*where):
+            with document.at(*where, "shape"):
+                shape = _shape(obstacle.shape, folder)
+                shape.geometry()  # fails here, where it can be located
+            with document.at(*where, "center"):
+                center = position_trajectory(obstacle.center, None)
+            orientation = None
+            if obstacle.orientation is not None:
+                with document.at(*where, "orientation"):
+                    orientation = orientation_trajectory(
+                        obstacle.orientation, np.eye(3)
+                    )
+            obstacles.append(Obstacle(name, shape, center, orientation))
+    return Scene(obstacles)
+
+
+def _shape(model: s.AnyShape, folder: Path) -> Shape:
+    match model:
+        case s.SphereModel():
+            return Sphere(model.radius)
+        case s.CapsuleModel():
+            return Capsule(model.radius, model.length)
+        case s.CylinderModel():
+            return Cylinder(model.radius, model.length)
+        case s.BoxModel():
+            x, y, z = model.size
+            return Box((x, y, z))
+        case s.PlaneModel():
+            return HalfSpace()
+        case s.MeshModel():
+            return Mesh(folder / model.file, model.scale, model.convex)
+        case s.PointCloudModel():
+            return PointCloud(model.points, model.resolution)
+        case s.HeightFieldModel():
+            width, depth = model.size
+            return HeightField((width, depth), model.heights)

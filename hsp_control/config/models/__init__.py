@@ -1,0 +1,1 @@
+"""The schema, a file for each part of a configuration."""

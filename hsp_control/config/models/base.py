@@ -1,0 +1,21 @@
+"""What all parts of a configuration share: checked numbers and a strict model."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Vector = list[Number]
+Vector3 = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Gain = Positive | Annotated[list[Positive], Field(min_length=1)] | list[Vector]
+Weights = NonNegative | list[NonNegative]
+
+
+class Model(BaseModel):
+    """A part of the tree: unknown keys are refused, values never change."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True
+    )

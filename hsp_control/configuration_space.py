@@ -1,0 +1,189 @@
+"""The space that configurations live in: a manifold, with tangent vectors (nv,)."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.arrays import Array
+from hsp_control.exceptions import ConfigurationError, NonFiniteError, ShapeError
+from hsp_control.loading import moving_joints
+
+
+class ConfigurationSpace:
+    """Configurations q, shape (nq,), and what may be done with them.
+
+    Attributes:
+        name: What messages call the robot.
+        model: The Pinocchio model.
+        nq: Numbers in a configuration.
+        nv: Freedoms.
+        joints: The joints that have freedoms, by name, in the order of velocities.
+        joint_names: Their names.
+        freedom_names: A name for each freedom, ``root_joint.x`` where a joint has many.
+        unit_blocks: (start, size) of every quaternion and (cos, sin) pair in q.
+        flat: Whether every joint has one freedom, so that δ' = v holds globally.
+        mimics: Whether some joints follow others.
+    """
+
+    def __init__(
+        self, model: pin.Model, name: str, home: Sequence[float] | None = None
+    ) -> None:
+        """Describe a model's configurations; ``home`` has shape (nv,)."""
+        self.model = model
+        self.name = name
+        self.nq: int = model.nq
+        self.nv: int = model.nv
+        self.joints = moving_joints(model)
+        self.joint_names: tuple[str, ...] = tuple(self.joints)
+        self.freedom_names: tuple[str, ...] = _freedom_names(self.joints)
+        self.unit_blocks: tuple[tuple[int, int], ...] = _unit_blocks(self.joints)
+        self.flat: bool = all(joint.nv == 1 for joint in self.joints.values())
+        self.mimics: bool = model.nvExtended != model.nv
+        fits = home is not None and len(home) == self.nv
+        self._home = np.array(home) if fits else None
+
+    def neutral(self) -> Array:
+        """Return the configuration with every joint at zero, shape (nq,)."""
+        return np.asarray(pin.neutral(self.model))
+
+    def home(self) -> Array:
+        """Return the posture that the robot's source recommends, or the neutral one.
+
+        Where neutral lies outside the limits, the joint is put in their middle.
+        """
+        if self._home is not None:
+            return self.integrate(self.neutral(), self._home)
+        lower, upper = self.position_limits()
+        bounded = np.isfinite(lower) & np.isfinite(upper)
+        middle = np.zeros(self.nv)
+        middle[bounded] = 0.5 * (lower[bounded] + upper[bounded])
+        inside = (lower < 0.0) & (upper > 0.0)
+        middle[inside] = 0.0
+        return self.integrate(self.neutral(), middle)
+
+    def random_configuration(self, rng: np.random.Generator) -> Array:
+        """Draw a configuration: uniform within limits, any angle where there are none.
+
+        A floating root is drawn within a unit box, with a uniform orientation.
+        """
+        lower, upper = self.position_limits()
+        bounded = np.isfinite(lower) & np.isfinite(upper)
+        low = np.where(bounded, lower, -np.pi)
+        high = np.where(bounded, upper, np.pi)
+        q = self.integrate(self.neutral(), rng.uniform(low, high))
+        for joint in self.joints.values():
+            if joint.shortname() == "JointModelFreeFlyer":
+                quaternion = rng.standard_normal(4)
+                q[joint.idx_q : joint.idx_q + 3] = rng.uniform(-1.0, 1.0, 3)
+                q[joint.idx_q + 3 : joint.idx_q + 7] = quaternion / np.linalg.norm(
+                    quaternion
+                )
+        return q
+
+    def integrate(self, q: Array, displacement: Array) -> Array:
+        """Return q ⊕ displacement, shape (nq,)."""
+        return np.asarray(pin.integrate(self.model, q, displacement))
+
+    def difference(self, start: Array, end: Array) -> Array:
+        """Return end ⊖ start: the displacement that leads from start to end, (nv,)."""
+        return np.asarray(pin.difference(self.model, start, end))
+
+    def joint_positions(self, q: Array) -> Array:
+        """Return every joint's position [rad or m], shape (nv,): the log from neutral.
+
+        Continuous joints come as angles in (-pi, pi].
+        """
+        return self.difference(self.neutral(), q)
+
+    def position_limits(self) -> tuple[Array, Array]:
+        """Return lower and upper joint positions, shape (nv,); ±inf where unlimited.
+
+        Continuous joints and the root have no limits, whatever the model's numbers.
+        """
+        lower = np.full(self.nv, -np.inf)
+        upper = np.full(self.nv, np.inf)
+        for joint in self.joints.values():
+            if joint.nq == 1 and joint.nv == 1:
+                lower[joint.idx_v] = self.model.lowerPositionLimit[joint.idx_q]
+                upper[joint.idx_v] = self.model.upperPositionLimit[joint.idx_q]
+        largest = np.finfo(float).max  # Pinocchio's word for unlimited
+        lower[lower <= -largest] = -np.inf
+        upper[upper >= largest] = np.inf
+        return lower, upper
+
+    def check_configuration(self, q: Any) -> Array:
+        """Return q as a float array of shape (nq,) that is a configuration.
+
+        Raises:
+            ShapeError: If its shape is not (nq,).
+            NonFiniteError: If it holds a NaN or an infinity.
+            ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
+        """
+        configuration = _check_vector(q, self.nq, "configuration q", self)
+        for start, size in self.unit_blocks:
+            block = configuration[start : start + size]
+            norm = float(np.linalg.norm(block))
+            if abs(norm - 1.0) > 1e-6:
+                kind = "(cos, sin) pair" if size == 2 else "quaternion"
+                raise ConfigurationError(
+                    f"q[{start}:{start + size}] = {block.tolist()} is a {kind} "
+                    f"of norm {norm:.6g}; needs norm 1"
+                )
+        return configuration
+
+    def check_tangent(self, vector: Any, what: str) -> Array:
+        """Return a velocity, acceleration or effort as a float array of shape (nv,).
+
+        Raises:
+            ShapeError: If its shape is not (nv,).
+            NonFiniteError: If it holds a NaN or an infinity.
+        """
+        return _check_vector(vector, self.nv, what, self)
+
+
+def _unit_blocks(joints: Mapping[str, Any]) -> tuple[tuple[int, int], ...]:
+    blocks = []
+    for joint in joints.values():
+        if joint.nq == joint.nv + 1:
+            size = 2 if joint.nv in {1, 3} else 4
+            if joint.shortname() == "JointModelSpherical":
+                size = 4
+            blocks.append((joint.idx_q + joint.nq - size, size))
+    return tuple(blocks)
+
+
+def _freedom_names(joints: Mapping[str, Any]) -> tuple[str, ...]:
+    suffixes = {
+        3: ("x", "y", "yaw"),
+        6: ("x", "y", "z", "roll", "pitch", "yaw"),
+    }
+    names: list[str] = []
+    for name, joint in joints.items():
+        if joint.nv == 1:
+            names.append(name)
+        else:
+            labels = suffixes.get(joint.nv, tuple(str(k) for k in range(joint.nv)))
+            names.extend(f"{name}.{label}" for label in labels)
+    return tuple(names)
+
+
+def _check_vector(
+    vector: Any, size: int, what: str, space: ConfigurationSpace
+) -> Array:
+    try:
+        array = np.asarray(vector, dtype=float)
+    except (TypeError, ValueError):
+        raise ShapeError(f"{what} is not an array of {size} numbers") from None
+    if array.shape != (size,):
+        raise ShapeError(
+            f"{what} has shape {array.shape}; {space.name} needs ({size},)"
+            + (f" (nq = {space.nq}, nv = {space.nv})" if space.nq != space.nv else "")
+        )
+    bad = np.flatnonzero(~np.isfinite(array))
+    if bad.size:
+        raise NonFiniteError(
+            f"{what}[{bad[0]}] is {array[bad[0]]}; needs finite numbers"
+        )
+    return array

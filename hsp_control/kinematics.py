@@ -1,0 +1,132 @@
+"""Where a frame is and how it moves: its Jacobian, exact rate and drift."""
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.arrays import Array, Indices
+from hsp_control.kernels import kernel
+
+
+class FrameKinematics:
+    """Where a frame is and how it moves, in world axes, linear before angular.
+
+    Attributes:
+        rotation: World ← frame, shape (3, 3).
+        position: Its origin in the world [m], shape (3,).
+        jacobian: J with (velocity of the origin, angular velocity) = J v, (6, nv).
+        jacobian_dot: J' = dJ/dt along v, exact, shape (6, nv).
+        velocity: J v, shape (6,) [m/s, rad/s].
+        drift: J' v, shape (6,): the classical acceleration when v' = 0.
+    """
+
+    __slots__ = (
+        "_columns",
+        "_freedoms",
+        "_id",
+        "_stamp",
+        "drift",
+        "jacobian",
+        "jacobian_dot",
+        "position",
+        "rotation",
+        "velocity",
+    )
+
+    def __init__(self, model: pin.Model, data: pin.Data, index: int) -> None:
+        """Allocate; `RobotState.frame` fills it."""
+        nv = model.nv
+        self.rotation: Array = data.oMf[index].rotation  # views: they follow the data
+        self.position: Array = data.oMf[index].translation
+        self.jacobian: Array = np.zeros((6, nv))
+        self.jacobian_dot: Array = np.zeros((6, nv))
+        self.velocity: Array = np.zeros(6)
+        self.drift: Array = np.zeros(6)
+        self._id = index
+        self._stamp = -1
+        self._columns, self._freedoms = joint_support(
+            model, model.frames[index].parentJoint
+        )
+
+
+@kernel
+def frame_kinematics(
+    J_world: Array,
+    J_world_dot: Array,
+    p: Array,
+    v: Array,
+    columns: Indices,
+    freedoms: Indices,
+    J: Array,
+    J_dot: Array,
+    velocity: Array,
+    drift: Array,
+) -> None:
+    """Move the joints' Jacobian and its rate from the world's origin to a point.
+
+    A column (l, w) at the origin reads (l + w × p, w) at the point p, and its rate
+    (l' + w' × p + w × p', w'). Only joints that carry the frame have columns; those of
+    joints that mimic add to their leader's.
+    """
+    for k in range(columns.shape[0]):
+        j = freedoms[k]
+        for i in range(6):
+            J[i, j] = 0.0
+            J_dot[i, j] = 0.0
+    for i in range(6):
+        velocity[i] = 0.0
+        drift[i] = 0.0
+    for k in range(columns.shape[0]):
+        c, j = columns[k], freedoms[k]
+        wx, wy, wz = J_world[3, c], J_world[4, c], J_world[5, c]
+        J[0, j] += J_world[0, c] + wy * p[2] - wz * p[1]
+        J[1, j] += J_world[1, c] + wz * p[0] - wx * p[2]
+        J[2, j] += J_world[2, c] + wx * p[1] - wy * p[0]
+        J[3, j] += wx
+        J[4, j] += wy
+        J[5, j] += wz
+    for j in range(v.shape[0]):
+        for i in range(6):
+            velocity[i] += J[i, j] * v[j]
+    ux, uy, uz = velocity[0], velocity[1], velocity[2]
+    for k in range(columns.shape[0]):
+        c, j = columns[k], freedoms[k]
+        wx, wy, wz = J_world[3, c], J_world[4, c], J_world[5, c]
+        ax, ay, az = J_world_dot[3, c], J_world_dot[4, c], J_world_dot[5, c]
+        J_dot[0, j] += J_world_dot[0, c] + ay * p[2] - az * p[1] + wy * uz - wz * uy
+        J_dot[1, j] += J_world_dot[1, c] + az * p[0] - ax * p[2] + wz * ux - wx * uz
+        J_dot[2, j] += J_world_dot[2, c] + ax * p[1] - ay * p[0] + wx * uy - wy * ux
+        J_dot[3, j] += ax
+        J_dot[4, j] += ay
+        J_dot[5, j] += az
+    for j in range(v.shape[0]):
+        for i in range(6):
+            drift[i] += J_dot[i, j] * v[j]
+
+
+def mass_matrix_difference(model: pin.Model, q: Array, v: Array) -> Array:
+    """Return M' by fourth-order differences along v, good to 1e-11 of M.
+
+    For robots with mimic joints, which Pinocchio's Coriolis matrix does not know.
+    """
+    data, h = model.createData(), 1e-3 / max(1.0, float(np.abs(v).max()))
+
+    def M(s: float) -> Array:
+        return np.array(pin.crba(model, data, pin.integrate(model, q, s * v)))
+
+    return (8.0 * (M(h) - M(-h)) - (M(2.0 * h) - M(-2.0 * h))) / (12.0 * h)
+
+
+def joint_support(model: pin.Model, joint: int) -> tuple[Indices, Indices]:
+    """Return the columns of Pinocchio's J that move a joint, and their freedoms.
+
+    The two differ where joints mimic others: such a joint has a column of its own,
+    already scaled, and its leader's freedom.
+    """
+    columns: list[int] = []
+    freedoms: list[int] = []
+    for index in list(model.supports[joint])[1:]:  # not the universe
+        part = model.joints[index]
+        width = part.nvExtended
+        columns.extend(range(part.idx_vExtended, part.idx_vExtended + width))
+        freedoms.extend(range(part.idx_v, part.idx_v + width))
+    return np.array(columns, dtype=np.int64), np.array(freedoms, dtype=np.int64)

@@ -1,0 +1,709 @@
+"""Figures: what is drawn is what the log says, and it can be read."""
+
+import itertools
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pinocchio as pin
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from matplotlib.text import Text
+
+import hsp_control.plots as plots
+from hsp_control import (
+    ConstantMetric,
+    Controller,
+    FrameOrientation,
+    FramePose,
+    FramePosition,
+    Gains,
+    Hold,
+    JointPosture,
+    MassMatrixMetric,
+    Obstacle,
+    Pointing,
+    Rest,
+    Robot,
+    Rollout,
+    Scene,
+    TargetPosture,
+    Task,
+    load_experiment,
+    simulate,
+)
+from hsp_control.plots import (
+    PlotError,
+    box,
+    figures,
+    palette,
+    paths,
+    readings,
+    views,
+    world,
+)
+from hsp_control.plots.null_space import predicted_decay
+from hsp_control.trajectories import (
+    Circle as Round,
+)
+from hsp_control.trajectories import (
+    ComposedPose,
+    HoldOrientation,
+    Lissajous,
+    Spin,
+)
+
+pytestmark = pytest.mark.filterwarnings("error")
+A = np.tril(np.ones((3, 3)))
+GAINS = Gains(100.0, 20.0)
+NAMES = ("uncontrolled", "rest", "obstacle", "space", "pose", "several", "posture")
+PAPER = {"uncontrolled": 1, "rest": 2, "obstacle": 4}
+
+
+def planar(number: int) -> Rollout:
+    name = {1: "1_uncontrolled", 2: "2_rest", 4: "4_moving_obstacle"}[number]
+    return load_experiment(f"paper/{name}", "simulation.duration=1.0").run()
+
+
+@dataclass
+class Arm:
+    """A Panda at home, and what it can be asked to do."""
+
+    robot: Robot = field(default_factory=lambda: Robot.load("panda"))
+    tcp: str = "panda_tcp"
+
+    def __post_init__(self) -> None:
+        self.q0 = self.robot.home()
+        frame = self.robot.state(0.0, self.q0, np.zeros(7)).frame(self.tcp)
+        self.position, self.rotation = frame.position.copy(), frame.rotation.copy()
+
+    def circle(self, normal: list[float]) -> Round:
+        return Round(self.position, 0.1, 2.0, normal=normal)
+
+    def run(self, *tasks: Task, scene: Scene | None = None, **settings: Any) -> Rollout:
+        posture = TargetPosture(self.robot, self.q0 + 0.1)
+        controller = Controller(self.robot, tasks, posture, **settings)
+        return simulate(controller, self.q0, duration=0.5, scene=scene)
+
+
+def spatial() -> dict[str, Rollout]:
+    arm = Arm()
+    robot, tcp = arm.robot, arm.tcp
+    tilted = FramePosition(robot, tcp, arm.circle([1.0, 0.0, 1.0]), GAINS)
+    center = Lissajous([0.3, -0.3, 0.5], [0.0, 0.1, 0.1], [0, 2, 3], [0, 0, 0])
+    spin = Spin(arm.rotation, [0.0, 0.0, 1.0], 0.3)
+    pose = FramePose(robot, tcp, ComposedPose(arm.circle([1.0, 0.0, 0.0]), spin), GAINS)
+    aside = Spin(arm.rotation @ pin.utils.rotate("x", 0.4), [0, 0, 1], 1.0)
+    xz = FramePosition(
+        robot, tcp, Hold(arm.position[[0, 2]]), GAINS, axes="xz", name="xz"
+    )
+    pointing = Pointing(robot, tcp, [0, 0, 1], aside, GAINS)
+    joints = ["panda_joint1", "panda_joint2"]
+    posture = JointPosture(robot, arm.q0 + 0.1, GAINS, joints=joints)
+    turned = FrameOrientation(
+        robot, "panda_link5", HoldOrientation(np.eye(3)), GAINS, name="turn"
+    )
+    return {
+        "space": arm.run(
+            tilted,
+            scene=Scene([Obstacle("ball", center, 0.07)]),
+            null_space_gain=np.linspace(5.0, 15.0, 7),
+        ),
+        "pose": arm.run(pose, metric=MassMatrixMetric()),
+        "several": arm.run(xz, pointing),
+        "posture": arm.run(posture, turned),
+    }
+
+
+@pytest.fixture(scope="module")
+def logs() -> dict[str, Rollout]:
+    return {name: planar(number) for name, number in PAPER.items()} | spatial()
+
+
+@pytest.fixture(params=NAMES)
+def log(logs: dict[str, Rollout], request: pytest.FixtureRequest) -> Rollout:
+    return logs[request.param]
+
+
+def changed(
+    log: Rollout, rows: slice = slice(None), columns: Any = None, **meta: Any
+) -> Rollout:
+    """Return a copy of a log of some rows, with some columns and meta replaced."""
+    kept = {name: column[rows].copy() for name, column in log.columns.items()}
+    return Rollout(kept | (columns or {}), log.meta | meta)
+
+
+def drawn(draw: Callable[..., None], *arguments: Any, **options: Any) -> Axes:
+    """Return axes that something has been drawn on."""
+    with plots.styled():
+        axes = plots.new_figure(4.0, 3.0).add_subplot()
+        draw(axes, *arguments, **options)
+    return axes
+
+
+def lines(axes: Axes) -> list[tuple[np.ndarray, np.ndarray]]:
+    return [(line.get_xdata(), line.get_ydata()) for line in axes.lines]
+
+
+def named(axes: Axes, label: str) -> np.ndarray:
+    """Return x and y of the one line whose label begins so, shape (N, 2)."""
+    found = [line for line in axes.lines if str(line.get_label()).startswith(label)]
+    assert len(found) == 1, (label, [line.get_label() for line in axes.lines])
+    return np.column_stack(found[0].get_data())
+
+
+def legend_texts(axes: Axes) -> list[str]:
+    legend = axes.get_legend()
+    return [] if legend is None else [text.get_text() for text in legend.get_texts()]
+
+
+def both(log: Rollout) -> list[Figure]:
+    return [plots.paper_figure(log), plots.diagnostics_figure(log)]
+
+
+def visible(figure: Figure) -> list[Axes]:
+    return [axes for axes in figure.findobj(Axes) if axes.get_visible()]
+
+
+# -- what is drawn is what the log says -----------------------------------------------
+
+
+def test_joints_are_absolute_angles_of_the_planar_arm(logs: dict[str, Rollout]) -> None:
+    log = logs["uncontrolled"]
+    expected = log["joint_positions"] @ A.T
+    for k, (t, y) in enumerate(lines(drawn(plots.draw_joint_positions, log))):
+        np.testing.assert_array_equal(t, log.t)
+        np.testing.assert_allclose(y, expected[:, k], rtol=1e-14)
+    own = lines(drawn(plots.draw_joint_positions, log, absolute=False))
+    for k, (_, y) in enumerate(own):
+        np.testing.assert_array_equal(y, log["joint_positions"][:, k])
+    assert len(own) == 3
+
+
+def test_curves_over_time_are_columns(log: Rollout) -> None:
+    efforts = lines(drawn(plots.draw_efforts, log))
+    values = lines(drawn(plots.draw_singular_values, log))
+    for found, column in ((efforts, log.tau), (values, log["singular_values"])):
+        assert len(found) == column.shape[1]
+        for k, (t, y) in enumerate(found):
+            np.testing.assert_array_equal(t, log.t)
+            np.testing.assert_array_equal(y, column[:, k])
+    axes = drawn(plots.draw_field_value, log)
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), log["field.value"])
+    axes = drawn(plots.draw_null_space_error, log)
+    np.testing.assert_array_equal(named(axes, "actual")[:, 1], log["null_space_norm"])
+
+
+def test_the_minimum_of_manipulability_is_marked(log: Rollout) -> None:
+    axes = drawn(plots.draw_manipulability, log)
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), log["manipulability"])
+    t, least = named(axes, "minimum")[0]
+    assert least == log["manipulability"].min()
+    assert log["manipulability"][log.t == t] == least
+    assert axes.get_ylim()[0] == 0.0
+
+
+def test_metres_and_radians_of_a_pose_are_apart(logs: dict[str, Rollout]) -> None:
+    log = logs["pose"]
+    axes = drawn(plots.draw_task_errors, log)
+    error = log["task.panda_tcp.error"]
+    for label, rows in (
+        ("panda_tcp position [m]", slice(3)),
+        ("panda_tcp orientation [rad]", slice(3, 6)),
+    ):
+        norm = np.linalg.norm(error[:, rows], axis=1)
+        np.testing.assert_allclose(named(axes, label)[:, 1], norm, rtol=1e-14)
+    assert axes.get_ylabel().endswith("[m, rad]")
+    assert axes.get_yscale() == "log"
+
+
+def test_each_type_of_task_has_its_unit(logs: dict[str, Rollout]) -> None:
+    units = {
+        part.label: part.unit
+        for name in ("several", "posture")
+        for part in readings.task_errors(logs[name])
+    }
+    assert units == {
+        "xz": "m",
+        "panda_tcp_pointing tan of half the angle": "–",
+        "posture": "rad or m",
+        "turn": "rad",
+    }
+    robot = logs["posture"].meta["robot"] | {"units": ["rad"] * 7}
+    told = changed(logs["posture"], robot=robot)
+    assert readings.task_errors(told)[0].unit == "rad"
+    assert readings.effort_unit(told) == "N·m"
+
+
+def test_paths_are_the_logs_in_the_plane_of_the_robot(logs: dict[str, Rollout]) -> None:
+    log = logs["obstacle"]
+    axes = drawn(plots.draw_end_effector, log)
+    for label, column in (
+        ("desired", "task.tip.reference"),
+        ("actual", "task.tip.actual"),
+    ):
+        np.testing.assert_array_equal(named(axes, label), log[column])
+    centers = log["obstacle.disk"][:, :2]
+    np.testing.assert_array_equal(named(axes, "obstacle"), centers)
+    disks = [patch for patch in axes.patches if isinstance(patch, Circle)]
+    assert [disk.center for disk in disks] == [tuple(centers[0]), tuple(centers[-1])]
+    assert {disk.radius for disk in disks} == {0.2}
+    assert axes.get_aspect() == 1.0
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")
+
+
+def test_a_path_in_space_is_seen_from_a_slant(logs: dict[str, Rollout]) -> None:
+    log = logs["space"]
+    axes = drawn(plots.draw_end_effector, log)
+    view = views.slant()
+    np.testing.assert_allclose(view.rows @ view.rows.T, np.eye(2), atol=1e-15)
+    for label in ("desired", "actual"):
+        column = "reference" if label == "desired" else "actual"
+        page = np.column_stack(view.project(log[f"task.panda_tcp.{column}"]))
+        np.testing.assert_array_equal(named(axes, label), page)
+    texts = {text.get_text() for text in axes.texts}
+    assert {"x [m]", "y [m]", "z [m]"} <= texts
+    front = drawn(plots.draw_end_effector, log, names="yz")
+    reference = log["task.panda_tcp.reference"]
+    np.testing.assert_array_equal(named(front, "desired"), reference[:, 1:])
+
+
+def test_tracked_axes_are_found_without_being_told(logs: dict[str, Rollout]) -> None:
+    (path,) = world.task_paths(logs["several"])
+    assert path.axes == "xz"
+    desired = path.desired[:, [0, 2]]
+    np.testing.assert_array_equal(desired, logs["several"]["task.xz.reference"])
+    np.testing.assert_array_equal(path.desired[:, 1], path.actual[:, 1])
+    assert paths.path_view(logs["several"]).names == "xz"
+    hidden = changed(logs["several"], columns={"skeleton": np.ones((51, 8, 3))})
+    (path,) = world.task_paths(hidden)
+    assert path.axes == "xy"  # nothing in the log tells: the first axes
+
+
+def test_frames_show_the_skeleton_at_their_time(logs: dict[str, Rollout]) -> None:
+    log = logs["obstacle"]
+    axes = drawn(plots.draw_frame, log, 70)
+    skeleton = log["skeleton"][70, :, :2]
+    assert axes.get_title(loc="left") == "t = 0.70 s"
+    (disk,) = (patch for patch in axes.patches if isinstance(patch, Circle))
+    assert disk.center == tuple(log["obstacle.disk"][70, :2])
+    points = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
+    np.testing.assert_array_equal(np.concatenate(points), skeleton)
+    links = np.array([skeleton[[k - 1, k]] for k in (1, 2, 3)])
+    found = next(line for line in axes.lines if line.get_color() == palette.LINK)
+    np.testing.assert_array_equal(found.get_xydata().reshape(3, 3, 2)[:, :2], links)
+
+
+def test_frames_are_even_in_time_or_where_they_are_asked_for(
+    logs: dict[str, Rollout],
+) -> None:
+    log = logs["rest"]
+    rows = readings.chosen_rows(log)
+    assert len(rows) == 8
+    assert (rows[0], rows[-1]) == (0, 100)
+    assert np.ptp(np.diff(rows)) <= 1
+    assert readings.chosen_rows(log, times=[0.25, -3.0, 99.0, 0.251]) == [0, 25, 100]
+    together = drawn(plots.draw_superimposed, log, rows)
+    arms = [line for line in together.lines if len(line.get_xdata()) == 9]
+    np.testing.assert_array_equal(
+        [arm.get_xydata()[-2] for arm in arms], log["skeleton"][rows, -1, :2]
+    )
+    brightness = [sum(mpl.colors.to_rgb(arm.get_color())) for arm in arms]
+    assert sorted(brightness, reverse=True) == brightness
+
+
+# -- the prediction of e_N ------------------------------------------------------------
+
+
+def test_a_scalar_gain_predicts_a_line_and_the_log_lies_on_it(
+    logs: dict[str, Rollout],
+) -> None:
+    log = logs["obstacle"]
+    norm = log["null_space_norm"]
+    predicted = named(drawn(plots.draw_null_space_error, log), "predicted")
+    np.testing.assert_allclose(predicted[:, 1], norm[0] * np.exp(-10.0 * log.t))
+    np.testing.assert_allclose(predicted[:, 1], norm, rtol=1e-3)
+    late = changed(log, columns={"t": log.t + 5.0})  # the clock need not start at 0
+    np.testing.assert_allclose(predicted_decay(late).slow, predicted[:, 1])
+
+
+def test_a_matrix_gain_predicts_a_band_and_the_log_lies_in_it(
+    logs: dict[str, Rollout],
+) -> None:
+    robot = Robot.load("planar3r", gravity=(0, 0, 0))
+    task = FramePosition(robot, "tip", Round([1, 1], 1, 3), GAINS, axes="xy")
+    q0 = robot.integrate(robot.neutral(), np.array([-0.44, 0.9, 0.9]))
+    controller = Controller(
+        robot,
+        [task],
+        Rest(robot),
+        null_space_gain=[5.0, 10.0, 15.0],
+        metric=ConstantMetric.from_coordinates(A),
+    )
+    config = {"null_space": {"metric": {"type": "coordinates", "matrix": None}}}
+    run = simulate(controller, q0, [1.0, 0.0, -1.0], duration=1.0)
+    for log in (changed(run, config=config), logs["space"]):
+        decay, norm = predicted_decay(log), log["null_space_norm"]
+        assert decay.gains[0] < decay.gains[1]
+        assert np.all(norm <= decay.slow * (1.0 + 1e-6))
+        assert np.all(norm >= decay.fast * (1.0 - 1e-6))
+        texts = legend_texts(drawn(plots.draw_null_space_error, log))
+        assert texts[0].startswith("predicted: between exp(−")
+    assert predicted_decay(logs["space"]).gains == pytest.approx((5.0, 15.0))
+    (unknown, *_) = legend_texts(drawn(plots.draw_null_space_error, run))[::-1]
+    assert unknown == "no prediction: $K_N$ is a matrix, $W$ not in the log"
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("uncontrolled", "no prediction: self-motion is not controlled"),
+        ("rest", "no prediction: starts with $e_N$ = 0"),
+    ],
+)
+def test_no_prediction_where_there_is_none(
+    logs: dict[str, Rollout], name: str, why: str
+) -> None:
+    axes = drawn(plots.draw_null_space_error, logs[name])
+    assert legend_texts(axes) == [r"actual $\Vert e_N \Vert_W$", why]
+    assert axes.get_ylim()[1] >= 1e-6  # rounding does not fill the axis
+
+
+@pytest.mark.parametrize(
+    ("metric", "expected"),
+    [
+        ({"type": "constant", "matrix": [1.0, 2.0, 3.0]}, np.diag([1.0, 2.0, 3.0])),
+        ({"type": "constant", "matrix": np.eye(3).tolist()}, np.eye(3)),
+        ({"type": "coordinates", "matrix": None}, A.T @ A),
+        ({"type": "coordinates", "matrix": (2 * A).tolist()}, 4.0 * A.T @ A),
+        ({"type": "mass_matrix"}, None),
+    ],
+)
+def test_the_metric_is_read_from_the_configuration(
+    logs: dict[str, Rollout], metric: dict[str, Any], expected: np.ndarray | None
+) -> None:
+    log = changed(logs["rest"], config={"null_space": {"metric": metric}})
+    found = readings.constant_metric(log)
+    assert (found is None) == (expected is None)
+    if found is not None:
+        np.testing.assert_array_equal(found, expected)
+
+
+# -- it can be read -------------------------------------------------------------------
+
+
+def test_axes_have_labels_with_units(log: Rollout) -> None:
+    for figure in both(log):
+        for axes in visible(figure):
+            if not axes.axison or axes.get_label() == "<colorbar>":
+                continue
+            for axis in (axes.xaxis, axes.yaxis):
+                shown = any(
+                    tick.label1.get_visible() for tick in axis.get_major_ticks()
+                )
+                text = axis.label.get_text()
+                assert not shown or ("[" in text and text.endswith("]")), text
+
+
+def test_several_lines_have_a_legend(log: Rollout) -> None:
+    for figure in both(log):
+        for axes in visible(figure):
+            handles, labels = axes.get_legend_handles_labels()
+            assert len(handles) < 2 or legend_texts(axes) == labels
+            assert len(set(labels)) == len(labels)
+
+
+def test_nothing_is_clipped_and_nothing_overlaps(log: Rollout) -> None:
+    for figure in both(log):
+        figure.canvas.draw()
+        renderer = figure.canvas.get_renderer()
+        paper = figure.bbox.padded(1.0)
+        for text in figure.findobj(Text):
+            if text.get_visible() and text.get_text().strip():
+                box = text.get_window_extent(renderer)
+                assert box.width == 0.0 or (
+                    paper.contains(box.x0, box.y0) and paper.contains(box.x1, box.y1)
+                ), text
+        panels = [
+            axes.get_tightbbox(renderer)
+            for axes in visible(figure)
+            if axes.get_subplotspec() is not None and (axes.axison or axes.lines)
+        ]
+        for one, other in itertools.combinations(panels, 2):
+            overlap = one.intersection(one, other)
+            assert overlap is None or min(overlap.width, overlap.height) < 3.0
+
+
+def test_of_many_joints_the_busiest_are_named(logs: dict[str, Rollout]) -> None:
+    n = 30
+    names = [f"leg_{k}_joint" for k in range(n)]
+    waves = np.sin(logs["rest"].t)[:, None] * np.arange(n)
+    robot = logs["rest"].meta["robot"] | {"freedoms": names, "nq": n, "nv": n}
+    log = changed(logs["rest"], columns={"tau": waves}, robot=robot)
+    axes = drawn(plots.draw_efforts, log)
+    busiest = [f"{k}_joint" for k in range(23, 30)]
+    shown = [text.removeprefix("leg_") for text in legend_texts(axes)]
+    assert shown == [*busiest, "23 others (grey)"]
+    found = {tuple(y) for _, y in lines(axes) if len(y)}
+    assert found == {tuple(waves[:, k]) for k in range(n)}
+
+
+def test_a_bounded_law_is_marked(logs: dict[str, Rollout]) -> None:
+    damped = np.zeros(101)
+    damped[20:31] = damped[90:] = 1.0
+    log = changed(logs["rest"], columns={"damped": damped})
+    for draw in (
+        plots.draw_manipulability,
+        plots.draw_singular_values,
+        plots.draw_task_errors,
+        plots.draw_null_space_error,
+    ):
+        axes = drawn(draw, log)
+        spans = [(patch.get_x(), patch.get_width()) for patch in axes.patches]
+        np.testing.assert_allclose(spans, [(0.2, 0.1), (0.9, 0.1)], atol=1e-12)
+        assert "law bounded near a singularity" in legend_texts(axes)
+
+
+def test_names_are_shown_as_they_are(logs: dict[str, Rollout]) -> None:
+    robot = logs["rest"].meta["robot"] | {"freedoms": ["_a", "b$x$", "$c_"]}
+    log = changed(logs["rest"], robot=robot, field="$g$", title="costs $5 and $6")
+    assert legend_texts(drawn(plots.draw_efforts, log)) == [" _a", r"b\$x\$", r"\$c_"]
+    for figure in both(log):
+        assert figure.get_suptitle() == r"costs \$5 and \$6"
+        figure.canvas.draw()
+
+
+def test_joints_lose_what_all_names_begin_with(logs: dict[str, Rollout]) -> None:
+    assert readings.joint_names(logs["pose"]) == [f"joint{k}" for k in range(1, 8)]
+    for names, short in (
+        (["lbr_a_1", "lbr_a_2"], ["a_1", "a_2"]),
+        (["j1", "j2"], ["j1", "j2"]),
+        (["only_one"], ["one"]),
+    ):
+        robot = {"freedoms": names}
+        found = readings.joint_names(changed(logs["rest"], robot=robot))
+        assert found in (short, names)
+        assert all(name[0].isalpha() for name in found)
+
+
+def test_the_title_is_the_configurations(logs: dict[str, Rollout]) -> None:
+    title = "Simulation 2: rest, and its drift"
+    log = logs["rest"]
+    for figure in both(changed(log, config={"title": title})):
+        assert figure.get_suptitle() == title
+    bare = changed(log, config=None, title="", name=None)
+    assert plots.paper_figure(bare).get_suptitle() == "planar3r, field: rest"
+
+
+# -- the palette ----------------------------------------------------------------------
+
+# Machado, Oliveira, Fernandes (2009), severity 1, on linear RGB.
+BLINDNESS = {
+    "none": np.eye(3),
+    "protan": [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    "deutan": [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ],
+    "tritan": [
+        [1.255528, -0.076749, -0.178779],
+        [-0.078411, 0.930809, 0.147602],
+        [0.004733, 0.691367, 0.303900],
+    ],
+}
+
+
+def lab(color: str, blindness: str) -> np.ndarray:
+    """Return CIE L*a*b* of a colour as an eye sees it."""
+    srgb = np.array(mpl.colors.to_rgb(color))
+    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(np.asarray(BLINDNESS[blindness]) @ linear, 0.0, 1.0)
+    xyz = (
+        np.array(
+            [
+                [0.4124564, 0.3575761, 0.1804375],
+                [0.2126729, 0.7151522, 0.0721750],
+                [0.0193339, 0.1191920, 0.9503041],
+            ]
+        )
+        @ seen
+        / [0.95047, 1.0, 1.08883]
+    )
+    f = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+@pytest.mark.parametrize("blindness", BLINDNESS)
+@pytest.mark.parametrize(
+    "colors",
+    [
+        palette.SERIES,
+        palette.TASKS,
+        (
+            palette.ACTUAL,
+            palette.DESIRED,
+            palette.OBSTACLE,
+            palette.LINK,
+            palette.JOINT,
+        ),
+        (palette.TASK, palette.WARNING, palette.PAPER),
+        (palette.FIELD, palette.INK, palette.WARNING, palette.PAPER),
+        (palette.EARLY, palette.LATE, palette.OBSTACLE, palette.DESIRED),
+    ],
+)
+def test_colours_stay_apart_for_all_eyes(
+    colors: tuple[str, ...], blindness: str
+) -> None:
+    for one, other in itertools.combinations(colors, 2):
+        assert np.linalg.norm(lab(one, blindness) - lab(other, blindness)) > 12.0
+
+
+def test_colours_blend_and_come_again() -> None:
+    assert palette.blend("#000000", "#FF8000", 0.0) == "#000000"
+    assert palette.blend("#000000", "#FF8000", 1.0) == "#FF8000"
+    assert palette.blend("#000000", "#FF8000", 0.5) == "#808040"
+    assert palette.series(0) == palette.series(len(palette.SERIES))
+    assert palette.task(0) == palette.ACTUAL
+
+
+# -- logs at the edge -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rows", [1, 2, 5])
+def test_short_logs_are_drawn(log: Rollout, rows: int) -> None:
+    short = changed(log, slice(rows), status="interrupted", message="by the user")
+    for figure in both(short):
+        figure.canvas.draw()
+        assert figure.get_supxlabel().startswith("interrupted: by the user")
+
+
+def test_a_log_without_rows_says_so(logs: dict[str, Rollout]) -> None:
+    empty = changed(logs["rest"], slice(0), status="diverged")
+    for draw in (plots.paper_figure, plots.diagnostics_figure):
+        with pytest.raises(PlotError, match=r"no rows to draw \(diverged\)"):
+            draw(empty)
+    with pytest.raises(PlotError, match="needs at least 1"):
+        plots.paper_figure(logs["rest"], times=[])
+
+
+def test_a_robot_that_stands_still_is_drawn(logs: dict[str, Rollout]) -> None:
+    for name in ("rest", "space", "posture"):
+        rows = np.zeros(30, dtype=int)
+        still = {
+            k: column[rows] for k, column in logs[name].columns.items() if k != "t"
+        }
+        log = changed(logs[name], slice(30), still)
+        for figure in both(log):
+            figure.canvas.draw()
+        axes = drawn(plots.draw_end_effector, log)
+        assert np.ptp(axes.get_xlim()) > 0.01  # rounding is not magnified
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7, 8, 13])
+def test_any_number_of_frames_fits(logs: dict[str, Rollout], count: int) -> None:
+    figure = plots.paper_figure(logs["obstacle"], frames=count)
+    titles = [axes.get_title(loc="left") for axes in visible(figure)]
+    assert sum(title.startswith("t = ") for title in titles) == count
+
+
+def test_a_box_has_two_numbers_on_every_edge() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        lower = rng.uniform(-1.0, 1.0, 3)
+        upper = lower + rng.uniform(0.05, 1.0, 3)
+        axes = drawn(box.draw_box, views.slant(), lower, upper)
+        numbers = [text for text in axes.texts if "[" not in text.get_text()]
+        assert len(numbers) >= 6
+        assert box.corners(lower, upper).shape == (8, 3)
+
+
+# -- files, and what drawing leaves behind --------------------------------------------
+
+
+def test_figures_are_written_in_every_format(
+    logs: dict[str, Rollout], tmp_path: Path
+) -> None:
+    folder = tmp_path / "new" / "folder"
+    files = plots.save_figures(logs["space"], folder, "run", ("png", "pdf", "svg"))
+    kinds = itertools.product(("paper", "diagnostics"), ("png", "pdf", "svg"))
+    assert files == [folder / f"run-{name}.{suffix}" for name, suffix in kinds]
+    assert all(5_000 < file.stat().st_size < 600_000 for file in files)
+    again = plots.save_figures(logs["space"], tmp_path, "run", ("svg", "pdf"))
+    for file in again:  # the same log, the same bytes
+        assert file.read_bytes() == (folder / file.name).read_bytes()
+
+
+def test_what_cannot_be_written_says_why(
+    logs: dict[str, Rollout], tmp_path: Path
+) -> None:
+    with pytest.raises(PlotError, match="no picture format 'pgn'; did you mean 'png'"):
+        plots.save_figures(logs["rest"], tmp_path, "run", ("pgn",))
+    (tmp_path / "file").touch()
+    with pytest.raises(PlotError, match=r"run-paper\.png: cannot write the picture"):
+        plots.save_figures(logs["rest"], tmp_path / "file", "run")
+
+
+def test_parameters_of_matplotlib_are_left_alone(logs: dict[str, Rollout]) -> None:
+    before = dict(mpl.rcParams)
+    for figure in both(logs["space"]):
+        assert isinstance(figure.canvas, FigureCanvasAgg)
+        figure.canvas.draw()
+    assert dict(mpl.rcParams) == before
+
+
+def test_a_figure_keeps_its_style_wherever_it_is_saved(tmp_path: Path) -> None:
+    with plots.styled():
+        figure = plots.new_figure(2.0, 2.0)
+        axes = figure.add_subplot()
+        axes.plot([0.0, 1.0], [0.0, 1.0])
+    figure.savefig(tmp_path / "plain.png")  # outside the style
+    label = axes.xaxis.get_major_ticks()[0].label1
+    assert label.get_fontsize() == 8.0
+    assert label.get_color() == palette.INK
+
+
+def test_importing_draws_nothing_in(tmp_path: Path) -> None:
+    program = """
+import sys
+import hsp_control
+import hsp_control.plots.palette
+assert not [name for name in sys.modules if name.startswith("matplotlib")]
+import hsp_control.plots as plots
+for name in plots.__all__:
+    assert getattr(plots, name).__name__ == name
+assert "matplotlib" in sys.modules
+assert "matplotlib.pyplot" not in sys.modules
+"""
+    environment = {"MPLBACKEND": "TkAgg", "HOME": str(tmp_path), "PATH": ""}
+    subprocess.run([sys.executable, "-c", program], check=True, env=environment)
+    with pytest.raises(AttributeError, match="no attribute 'draw_nothing'"):
+        _ = plots.draw_nothing  # type: ignore[attr-defined]
+
+
+def test_letters_and_headings(logs: dict[str, Rollout]) -> None:
+    paper, diagnostics = both(logs["obstacle"])
+    texts = {text.get_text() for text in paper.findobj(Text)}
+    for heading in (
+        "(a)  End effector",
+        "(b)  Joints",
+        "(c)  Manipulability",
+        "(d)  Selected frames",
+        "(e)  Frames together",
+    ):
+        assert heading in texts
+    titles = [axes.get_title(loc="left")[:3] for axes in visible(diagnostics)]
+    assert titles == ["(a)", "(b)", "(c)", "(d)", "(e)", "(f)"]
+    assert figures.paper_figure is plots.paper_figure
