@@ -371,8 +371,8 @@ def test_law_does_not_depend_on_the_rows(form: int, seed: int, m: int) -> None:
         (phi_N(x, form), phi_N(y, form)),
     ):
         np.testing.assert_allclose(first, second, rtol=1e-10, atol=1e-10)
-    # Its own rate: with another's the law differs.
-    wrong = phi_N(y._replace(J_dot=B @ x.J_dot), form)
+    # With another's rate the law differs.
+    wrong = phi_N(y._replace(J_dot=x.J_dot), form)
     assert np.abs(wrong - phi_N(x, form)).max() > 1e-3
 
 
@@ -585,8 +585,12 @@ def controller(c: Case, metric: Metric, gain: Any) -> Controller:
 
 
 def step_of(v: Array) -> float:
-    """Return a step in which the joints together move by 0.01."""
-    return 0.01 / max(1.0, float(np.abs(v).sum()))
+    """Return a step in which the joints together move by 0.001.
+
+    Near a singularity J# bends within 0.01: the differences' error h⁶ f⁽⁷⁾/140 was then
+    4e-7 of it on panda_fingers, here 1e-12; rounding is 1e-15 over the step.
+    """
+    return 0.001 / max(1.0, float(np.abs(v).sum()))
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -601,14 +605,13 @@ def test_controller_applies_the_short_form(name: str, kind: str) -> None:
     out = controller(c, metric, 7.0).compute(state)
     assert not out.damped
     expected = oracles.law(x.J, x.J_dot, x.a_x, c.v, x.g, x.g_dot, K_N, x.W, x.W_dot)
-    # Rounding, grown by cond(M): up to 1e4 on solo12.
-    scale = 1e-15 * np.linalg.cond(x.W) + 1e-13
+    # Rounding, grown by J's condition; seen: 2e-14 of a, 1e-13 of e_N.
     size = np.abs(expected.acceleration).max()
     np.testing.assert_allclose(
-        out.acceleration, expected.acceleration, rtol=0, atol=100 * scale * size
+        out.acceleration, expected.acceleration, rtol=0, atol=1e-12 * size
     )
     np.testing.assert_allclose(
-        out.null_space_error, expected.null_space_error, rtol=0, atol=100 * scale
+        out.null_space_error, expected.null_space_error, rtol=0, atol=1e-12
     )
     # J a + J'v = a_x: to rounding, whatever the metric's condition.
     residual = x.J @ out.acceleration + x.J_dot @ c.v - x.a_x
@@ -706,10 +709,10 @@ def test_identity_behind_the_short_form(name: str, kind: str) -> None:
     P = np.eye(c.robot.nv) - J_sharp @ t.J
     bend = t.J_dot.T @ J_sharp.T @ t.W - t.W_dot @ J_sharp @ t.J
     right = P @ np.linalg.solve(t.W, bend @ x)
-    # Differences: 1e-12 of J#, grown by cond(M) up to 1e4.
-    scale = max(1.0, np.abs(left).max())
-    np.testing.assert_allclose(left, right, rtol=0, atol=1e-8 * scale)
-    assert np.abs(left).max() > 0.1  # there is something to see
+    # Rounding of the differences, 1e-11, and of W⁻¹: cond(M) is up to 5e6 (Tiago).
+    scale = max(1.0, np.abs(left).max()) * (1e-9 + 1e-14 * np.linalg.cond(t.W))
+    np.testing.assert_allclose(left, right, rtol=0, atol=scale)
+    assert np.abs(left).max() > 0.01  # there is something to see
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -766,9 +769,9 @@ def test_lyapunov_function_decays_as_proved(name: str, kind: str, gain: str) -> 
 
     step = min(step_of(c.v), 0.1 / np.abs(a).max())
     expected = -e_N @ W @ K_N @ e_N
-    assert abs(expected) > 1.0
-    # Six-point differences: 1e-15 of V over the step; V' is of V's order or more.
-    np.testing.assert_allclose(slope(V, step), expected, rtol=1e-7)
+    assert abs(expected) > 0.1  # there is something to see
+    # Rounding of the differences: 1e-15 of V over 1e-4 s; seen: 1e-12 of V'.
+    np.testing.assert_allclose(slope(V, step), expected, rtol=1e-10)
 
 
 @pytest.mark.parametrize("kind", METRICS)

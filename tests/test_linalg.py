@@ -28,6 +28,7 @@ from hsp_control import (
     Metric,
     Robot,
     TargetPosture,
+    kinematics,
     linalg,
     robot,
 )
@@ -349,7 +350,7 @@ def arguments(name: str) -> tuple[Any, ...]:
             *(J, J_dot, J_sharp, sample[0], J_sharp[0], sample[1]),
             *(np.zeros((5, n)), np.zeros(n)),
         ),
-        "_frame_kinematics": (
+        "frame_kinematics": (
             *(*world, normal(18, 3), normal(19, n - 1), index, shared),
             *(np.zeros((6, n - 1)), np.zeros((6, n - 1)), np.zeros(6), np.zeros(6)),
         ),
@@ -367,7 +368,7 @@ KERNELS: dict[str, Callable[..., Any]] = {
         if callable(function) and uncompiled(function).__module__ == linalg.__name__
     },
     "acceleration": law.acceleration,
-    "_frame_kinematics": robot._frame_kinematics,
+    "frame_kinematics": kinematics.frame_kinematics,
     "_take": robot._take,
 }
 

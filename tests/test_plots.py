@@ -51,6 +51,7 @@ from hsp_control.plots import (
     world,
 )
 from hsp_control.plots.null_space import predicted_decay
+from hsp_control.shapes import Sphere
 from hsp_control.trajectories import (
     Circle as Round,
 )
@@ -114,7 +115,7 @@ def spatial() -> dict[str, Rollout]:
     return {
         "space": arm.run(
             tilted,
-            scene=Scene([Obstacle("ball", center, 0.07)]),
+            scene=Scene([Obstacle("ball", Sphere(0.07), center)]),
             null_space_gain=np.linspace(5.0, 15.0, 7),
         ),
         "pose": arm.run(pose, metric=MassMatrixMetric()),
@@ -574,7 +575,7 @@ def test_colours_stay_apart_for_all_eyes(
 def test_colours_blend_and_come_again() -> None:
     assert palette.blend("#000000", "#FF8000", 0.0) == "#000000"
     assert palette.blend("#000000", "#FF8000", 1.0) == "#FF8000"
-    assert palette.blend("#000000", "#FF8000", 0.5) == "#808040"
+    assert palette.blend("#000000", "#FF8000", 0.5) == "#804000"
     assert palette.series(0) == palette.series(len(palette.SERIES))
     assert palette.task(0) == palette.ACTUAL
 

@@ -9,7 +9,7 @@ frame's origin, moving joint i changes J_j by
 for revolute and prismatic joints and floating roots alike. A function φ(J) with
 ∂φ/∂J = B, columns (b_j, c_j), therefore has the gradient
 
-    ∂φ/∂q_i = w_i · Σ_{j from i on} (l_j × b_j + w_j × c_j) + l_i · Σ_{j before i} b_j × w_j
+    w_i · Σ_{j from i on} (l_j × b_j + w_j × c_j) + l_i · Σ_{j before i} (b_j × w_j)
 
 in O(n), without the kinematic Hessian; and since J' is known exactly, so is the rate.
 """

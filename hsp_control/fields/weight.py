@@ -70,7 +70,8 @@ class Ramp(Weight):
         s = min(max((state.t - self.start) / self.duration, 0.0), 1.0)
         rise = self.final - self.initial
         slope = 30.0 * s * s * (1.0 - s) ** 2 / self.duration
-        return self.initial + rise * s**3 * (10.0 - 15.0 * s + 6.0 * s * s), rise * slope
+        value = self.initial + rise * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+        return value, rise * slope
 
 
 class StateWeight(Weight):

@@ -133,6 +133,4 @@ def _led(rollout: Rollout) -> Array:
     paths = task_paths(rollout)
     if not paths:
         return end_points(rollout).reshape(-1, 3)
-    return np.concatenate(
-        [path for each in paths for path in (each.desired, each.actual)]
-    )
+    return np.concatenate([points for path in paths for points in path[1:3]])

@@ -1,5 +1,6 @@
 """What a log says, in the form in which a person would plot it."""
 
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -129,10 +130,9 @@ def constant_metric(rollout: Rollout) -> Array | None:
 
 def field_terms(rollout: Rollout) -> list[str]:
     """Return the names of a sum's terms whose share of g the log has."""
-    inner = (
-        name.removeprefix("field.") for name in rollout.columns if name != "field.g"
-    )
-    return [name.removesuffix(".g") for name in inner if name.endswith(".g")]
+    inside = re.compile(r"field\.(.+)\.g")
+    found = (inside.fullmatch(name) for name in rollout.columns)
+    return [match[1] for match in found if match]
 
 
 def distances(rollout: Rollout) -> list[str]:

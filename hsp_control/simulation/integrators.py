@@ -18,6 +18,9 @@ from hsp_control.robot import Robot
 Dynamics = Callable[[float, Array, Array], Array]
 """(t, q, v) ↦ v'."""
 
+LONGEST_FIRST_STEP = 0.02
+"""The longest step that `Dop853` tries without knowing the motion [s]."""
+
 CHART_RADIUS = 1.0
 """How far a root may turn [rad] before its chart is laid anew (singular at 2π)."""
 
@@ -126,7 +129,8 @@ class SemiImplicitEuler:
 class Dop853:
     """Dormand and Prince's adaptive eighth-order method, SciPy's implementation.
 
-    It first tries to take an interval in one step, which the tolerance then judges.
+    It first tries to take an interval in one step, or 20 ms of it, which the tolerance
+    then judges: much longer trials can overflow before they are judged.
     """
 
     def __init__(self, rtol: float = 1e-9, atol: float = 1e-9) -> None:
@@ -152,7 +156,7 @@ class Dop853:
                 t,
                 np.concatenate([np.zeros(robot.nv), v]),
                 end,
-                first_step=end - t,
+                first_step=min(end - t, LONGEST_FIRST_STEP),
                 rtol=self.rtol,
                 atol=self.atol,
             )

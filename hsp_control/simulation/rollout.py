@@ -112,7 +112,8 @@ class Rollout:
         """
         path = Path(path)
         try:
-            with np.load(path, allow_pickle=False) as archive:
+            # Opened here, because NumPy leaves a broken archive open.
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
                 columns = {name: archive[name] for name in archive.files}
         except FileNotFoundError:
             near = [file.name for file in path.parent.glob("*.npz")]

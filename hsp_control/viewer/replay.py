@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from hsp_control.config.build_parts import build_robot
+from hsp_control.config.build_robot import build_robot
 from hsp_control.config.document import Document
-from hsp_control.config.scenario import Scenario, ViewModel
+from hsp_control.config.models.view import ViewModel
+from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
 from hsp_control.exceptions import HspControlError, ViewerError
 from hsp_control.robot import Robot

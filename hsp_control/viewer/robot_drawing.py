@@ -43,7 +43,7 @@ class RobotDrawing:
                 robot.name,
                 len(missing),
                 sum(visual.kind == "mesh" for visual in self._visuals),
-                missing[0].name,
+                missing[0].link,
                 _hint(robot),
             )
 
@@ -57,7 +57,7 @@ class RobotDrawing:
         for visual in self._visuals:
             thing = _thing(visual)
             if thing is not None:
-                links.setdefault((visual.joint, visual.name), []).append(thing)
+                links.setdefault((visual.joint, visual.link), []).append(thing)
         for (joint, link), things in links.items():
             path = f"{self._nodes[joint]}/{_element(link)}"
             yield set_object(path, threejs.group(things))
@@ -139,6 +139,7 @@ def _element(name: str) -> str:
 
 
 def _hint(robot: Robot) -> str:
-    if "package://example-robot-data" in robot.source.urdf.read_text(errors="replace"):
+    texts = [part.source.urdf.read_text(errors="replace") for part in robot.parts]
+    if any("package://example-robot-data" in text for text in texts):
         return "; they come with: pip install example-robot-data-loaders"
     return ""

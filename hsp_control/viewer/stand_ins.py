@@ -1,5 +1,7 @@
 """Bodies for a robot that has none to show: a capsule a link, a drum a joint."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pinocchio as pin
 
@@ -26,37 +28,39 @@ def stand_in(robot: Robot, joint: int) -> Json | None:
     radius = _radius(robot, joint)
     surface = threejs.material(LINK)
     things = [] if joint == 0 else [_drum(robot, joint, radius)]
-    ends = _ends(robot, joint)
-    for end, end_radius in ends:
-        length = float(np.linalg.norm(end))
+    for start, end, end_radius in _links(robot, joint):
+        length = float(np.linalg.norm(end - start))
         if length > radius:
             body = threejs.capsule(length, 0.8 * radius, 0.8 * end_radius)
-            things.append(threejs.mesh(body, surface, along(end)))
+            pose = along(end - start)
+            pose[:3, 3] = start
+            things.append(threejs.mesh(body, surface, pose))
     return threejs.group(things) if things else None
 
 
-def _ends(robot: Robot, joint: int) -> list[tuple[Array, float]]:
-    """Return where a body goes in the joint's frame, and how thick it is there."""
+def _links(robot: Robot, joint: int) -> Iterator[tuple[Array, Array, float]]:
+    """Yield from where to where a body goes in its joint's frame, and how thick then."""
     model = robot.model
     children = [
         child for child in range(1, model.njoints) if model.parents[child] == joint
     ]
-    if children:
-        return [
-            (model.jointPlacements[child].translation, _radius(robot, child))
-            for child in children
-        ]
-    tips = [
-        frame.placement.translation
-        for frame in model.frames
-        if frame.parentJoint == joint
-    ]
-    if joint == 0 or not tips:
-        return []
-    tip = max(tips, key=lambda point: float(np.linalg.norm(point)))
-    if not np.any(tip):
-        tip = model.inertias[joint].lever
-    return [(tip, _TAPER * _radius(robot, joint))]
+    for child in children:
+        start = np.zeros(3) if joint else _base(robot, model.names[child])
+        end = model.jointPlacements[child].translation
+        yield start, end, _radius(robot, child)
+    if joint and not children:
+        tips = [f.placement.translation for f in model.frames if f.parentJoint == joint]
+        tip = max(tips, key=lambda point: float(np.linalg.norm(point)))
+        if not np.any(tip):
+            tip = model.inertias[joint].lever
+        yield np.zeros(3), tip, _TAPER * _radius(robot, joint)
+
+
+def _base(robot: Robot, joint: str) -> Array:
+    """Return where the robot stands that a joint belongs to."""
+    part = next(part for part in robot.parts if joint.startswith(part.prefix))
+    place: Array = part.placement.translation
+    return place
 
 
 def _drum(robot: Robot, joint: int, radius: float) -> Json:

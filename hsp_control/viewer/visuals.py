@@ -9,11 +9,20 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.arrays import Array
+from hsp_control.combining import Part
+from hsp_control.loading import RobotSource
 from hsp_control.robot import Robot
 
 _GREY = (0.72, 0.74, 0.76, 1.0)
 _MESHES = {".dae", ".obj", ".stl"}  # what the page can read
 _NO_NUMBERS: tuple[float, ...] = ()
+_SIZES = {
+    "box": ("size",),
+    "cylinder": ("radius", "length"),
+    "capsule": ("radius", "length"),
+    "sphere": ("radius",),
+    "mesh": ("scale",),
+}
 
 
 class Visual(NamedTuple):
@@ -21,71 +30,63 @@ class Visual(NamedTuple):
 
     Attributes:
         joint: The index of the joint that carries it; 0: it stands still.
-        name: Its link's name.
+        link: Its link's name.
         pose: Its pose in the joint's frame, shape (4, 4).
         kind: ``box``, ``cylinder``, ``sphere``, ``capsule`` or ``mesh``.
         size: Its lengths [m] as the URDF gives them; of a mesh: its scale.
         color: Red, green, blue and opacity, from 0 to 1.
         file: Of a mesh: the file, or None if there is none that can be shown.
-        painted: Whether the URDF gives the colour.
     """
 
     joint: int
-    name: str
+    link: str
     pose: Array
     kind: str
     size: tuple[float, ...]
     color: tuple[float, ...]
     file: Path | None
-    painted: bool
 
 
 def read_visuals(robot: Robot) -> list[Visual]:
-    """Return what the robot's links look like; nothing if its URDF cannot be read."""
+    """Return what the robot's links look like; nothing of a URDF that is gone."""
+    return [visual for part in robot.parts for visual in _of_part(robot, part)]
+
+
+def _of_part(robot: Robot, part: Part) -> Iterator[Visual]:
     try:
-        tree = ElementTree.parse(robot.source.urdf).getroot()
+        tree = ElementTree.parse(part.source.urdf).getroot()
     except (OSError, ElementTree.ParseError):
-        return []
+        return
     materials = dict(_materials(tree))
-    return [
-        visual
-        for link in tree.iter("link")
-        if robot.model.existBodyName(name := link.get("name", ""))
-        for element in link.iter("visual")
-        for visual in _visual(robot, name, element, materials)
-    ]
+    for link in tree.iter("link"):
+        name = part.prefix + link.get("name", "")
+        if not robot.model.existBodyName(name):
+            continue
+        frame = robot.model.frames[robot.model.getBodyId(name)]
+        for element in link.iter("visual"):
+            visual = _visual(part.source, frame, element, materials)
+            if visual is not None:
+                yield visual
 
 
 def _visual(
-    robot: Robot,
-    link: str,
+    source: RobotSource,
+    frame: pin.Frame,
     element: ElementTree.Element,
     materials: dict[str, tuple[float, ...]],
-) -> Iterator[Visual]:
+) -> Visual | None:
     shape = next(iter(element.find("geometry") or ()), None)
-    if shape is None:
-        return
-    sizes = {
-        "box": ("size",),
-        "cylinder": ("radius", "length"),
-        "capsule": ("radius", "length"),
-        "sphere": ("radius",),
-        "mesh": ("scale",),
-    }.get(shape.tag)
-    if sizes is None:
-        return
-    size = sum((_numbers(shape.get(name)) for name in sizes), _NO_NUMBERS)
-    color = _color(element.find("material"), materials)
-    frame = robot.model.frames[robot.model.getBodyId(link)]
-    yield Visual(
+    if shape is None or shape.tag not in _SIZES:
+        return None
+    size = sum((_numbers(shape.get(name)) for name in _SIZES[shape.tag]), _NO_NUMBERS)
+    return Visual(
         joint=frame.parentJoint,
-        name=link,
+        link=frame.name,
         pose=frame.placement.homogeneous @ _pose(element.find("origin")),
         kind=shape.tag,
         size=size or (1.0, 1.0, 1.0),
-        color=color or _GREY,
-        file=_mesh_file(robot, shape.get("filename", "")),
-        painted=color is not None,
+        color=_color(element.find("material"), materials) or _GREY,
+        file=_mesh_file(source, shape.get("filename", "")),
     )
 
 
@@ -119,9 +120,8 @@ def _pose(origin: ElementTree.Element | None) -> Array:
     return pose
 
 
-def _mesh_file(robot: Robot, name: str) -> Path | None:
+def _mesh_file(source: RobotSource, name: str) -> Path | None:
     """Return the file that a mesh's name stands for, if it exists and can be shown."""
-    source = robot.source
     scheme, _, rest = name.rpartition("://")
     if scheme == "package":
         package, _, inside = rest.partition("/")
