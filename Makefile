@@ -52,6 +52,9 @@ wheel-test: $(STAMP) ## build the wheel, install it elsewhere, use it from there
 	echo "The wheel works."
 
 ##@ Keep
+figures: $(STAMP) ## draw the documents' figures anew, into docs/figures
+	@$(BIN)/python docs/make_figures.py
+
 format: $(STAMP) ## let ruff format the code and fix what it can
 	@$(BIN)/ruff check --fix --quiet || true
 	@$(BIN)/ruff format
@@ -71,7 +74,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help demo test lint coverage wheel-test format constraints clean
+.PHONY: help figures demo test lint coverage wheel-test format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

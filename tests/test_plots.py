@@ -38,18 +38,10 @@ from hsp_control import (
     TargetPosture,
     Task,
     load_experiment,
+    palette,
     simulate,
 )
-from hsp_control.plots import (
-    PlotError,
-    box,
-    figures,
-    palette,
-    paths,
-    readings,
-    views,
-    world,
-)
+from hsp_control.plots import PlotError, box, paths, readings, views, world
 from hsp_control.plots.null_space import predicted_decay
 from hsp_control.shapes import Sphere
 from hsp_control.trajectories import (
@@ -676,22 +668,18 @@ def test_a_figure_keeps_its_style_wherever_it_is_saved(tmp_path: Path) -> None:
     assert label.get_color() == palette.INK
 
 
-def test_importing_draws_nothing_in(tmp_path: Path) -> None:
+def test_matplotlib_comes_late_and_no_display_is_needed(tmp_path: Path) -> None:
     program = """
 import sys
 import hsp_control
-import hsp_control.plots.palette
 assert not [name for name in sys.modules if name.startswith("matplotlib")]
-import hsp_control.plots as plots
-for name in plots.__all__:
-    assert getattr(plots, name).__name__ == name
-assert "matplotlib" in sys.modules
+from hsp_control.plots import new_figure, styled
+with styled():
+    new_figure(1.0, 1.0).add_subplot()
 assert "matplotlib.pyplot" not in sys.modules
 """
     environment = {"MPLBACKEND": "TkAgg", "HOME": str(tmp_path), "PATH": ""}
     subprocess.run([sys.executable, "-c", program], check=True, env=environment)
-    with pytest.raises(AttributeError, match="no attribute 'draw_nothing'"):
-        _ = plots.draw_nothing  # type: ignore[attr-defined]
 
 
 def test_letters_and_headings(logs: dict[str, Rollout]) -> None:
@@ -706,5 +694,4 @@ def test_letters_and_headings(logs: dict[str, Rollout]) -> None:
     ):
         assert heading in texts
     titles = [axes.get_title(loc="left")[:3] for axes in visible(diagnostics)]
-    assert titles == ["(a)", "(b)", "(c)", "(d)", "(e)", "(f)"]
-    assert figures.paper_figure is plots.paper_figure
+    assert titles == [f"({letter})" for letter in "abcdefgh"]

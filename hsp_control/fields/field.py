@@ -78,7 +78,7 @@ class NullSpaceField(ABC):
         return WeightedSum([(1.0, self), (1.0, other)])
 
     def __rmul__(self, weight: Weight | float) -> "WeightedSum":
-        if not isinstance(weight, Real):
+        if not isinstance(weight, Real | Weight):
             return NotImplemented
         return WeightedSum([(weight, self)])
 

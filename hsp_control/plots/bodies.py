@@ -30,6 +30,8 @@ class Body(NamedTuple):
             its x-y plane.
         radius: The balls' radius [m].
         exact: False for a ball that only holds it.
+        vast: Whether it is larger than the robot, such as a floor; pictures need not
+            hold all of it.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Body(NamedTuple):
     points: Array
     radius: float
     exact: bool
+    vast: bool
 
     @property
     def moves(self) -> bool:
@@ -51,8 +54,6 @@ class Body(NamedTuple):
 
     def enclosed(self) -> Array:
         """Return points that enclose it at all rows, shape (M, 3) [m]."""
-        if not len(self.points):
-            return self.points
         low, high = self.points.min(axis=0), self.points.max(axis=0)
         corners = _corners(low, high) if len(self.points) > 8 else self.points
         turned = corners @ np.swapaxes(self.rotation, 1, 2)  # (N, K, 3)
@@ -87,7 +88,10 @@ def _body(rollout: Rollout, name: str, about: Mapping[str, Any]) -> Body:
         points, radius = np.zeros((1, 3)), float(about["radius"])
     else:
         points, radius = form(about.get("parameters", about))
-    return Body(name, center, rotation, points, radius, form is not None)
+    robot = float(np.ptp(rollout["skeleton"].reshape(-1, 3), axis=0).max())
+    size = 2.0 * radius + float(np.ptp(points, axis=0).max()) if len(points) else np.inf
+    vast = size > 1.2 * robot
+    return Body(name, center, rotation, points, radius, form is not None, vast)
 
 
 def _corners(low: Array, high: Array) -> Array:

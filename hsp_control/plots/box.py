@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
+from hsp_control import palette
 from hsp_control.arrays import Array
-from hsp_control.plots import palette
 from hsp_control.plots.views import View
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from hsp_control.plots import palette
+from hsp_control import palette
 from hsp_control.plots.legends import legend_below
 from hsp_control.plots.lines import (
     draw_lines,

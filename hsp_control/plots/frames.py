@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
+from hsp_control import palette
 from hsp_control.arrays import Array
-from hsp_control.plots import palette
 from hsp_control.plots.bodies import bodies
 from hsp_control.plots.things import draw_arm, draw_body, draw_directions, draw_shadow
 from hsp_control.plots.views import View, fit, view_of
@@ -73,7 +73,8 @@ def draw_superimposed(axes: Axes, rollout: Rollout, rows: Sequence[int]) -> None
         age = float(rollout.t[row] - start) / (end - start) if end > start else 1.0
         pale = palette.blend(palette.OBSTACLE_EARLY, palette.OBSTACLE, age)
         for body in bodies(rollout):
-            draw_body(axes, scene.view, body, row, color=pale, zorder=1.9)
+            if body.moves or place == len(rows) - 1:
+                draw_body(axes, scene.view, body, row, color=pale, zorder=1.9)
         link = palette.blend(palette.EARLY, palette.LATE, age)
         joint = palette.blend(link, palette.INK, 0.4)
         points = rollout["skeleton"][row]

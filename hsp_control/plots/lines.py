@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
+from hsp_control import palette
 from hsp_control.arrays import Array
-from hsp_control.plots import palette
 from hsp_control.plots.legends import note, plain
 from hsp_control.simulation import Rollout
 
@@ -71,8 +71,8 @@ def log_scale(
     highest = max(float(shown.max(initial=floor)), top)
     # A norm that crosses zero dips at single rows; the axis need not follow.
     lowest = float(np.quantile(shown, 0.005)) if shown.size else highest
-    axes.set_yscale("log")
     axes.set_ylim(max(0.4 * lowest, floor), 3.0 * max(highest, 10.0 * floor))
+    axes.set_yscale("log")  # after the limits: there may be nothing to find them by
 
 
 def mark_damped(axes: Axes, rollout: Rollout) -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import scipy.linalg
 from matplotlib.axes import Axes
 
+from hsp_control import palette
 from hsp_control.arrays import Array
-from hsp_control.plots import palette
 from hsp_control.plots.legends import legend_below, note, plain
 from hsp_control.plots.lines import (
     draw_lines,

@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.axes import Axes
 
+from hsp_control import palette
 from hsp_control.arrays import Array
-from hsp_control.plots import palette
 from hsp_control.plots.bodies import bodies
 from hsp_control.plots.box import corners, draw_box
 from hsp_control.plots.legends import legend_below, note, plain
@@ -14,7 +14,6 @@ from hsp_control.plots.world import (
     centers,
     end_points,
     everything,
-    obstacle_points,
     task_paths,
 )
 from hsp_control.simulation import Rollout
@@ -34,7 +33,7 @@ def path_view(rollout: Rollout) -> View:
     tracked = {"".join(sorted(path.axes)) for path in task_paths(rollout)}
     if len(tracked) == 1 and len(only := tracked.pop()) == 2:
         return plane(only)
-    middles = [body.center for body in bodies(rollout) if len(body.points)]
+    middles = [body.center for body in bodies(rollout) if not body.vast]
     seen = np.concatenate([_led(rollout), *middles])
     return plane(best_plane(seen)) if is_flat(seen, NEARLY_FLAT) else slant()
 
@@ -74,9 +73,9 @@ def draw_end_effector(axes: Axes, rollout: Rollout, *, names: str = "") -> None:
             _draw_track(axes, view, ends[:, k], k, label)
         note(axes, "no task leads a point")
     _draw_obstacles(axes, view, rollout)
-    everywhere = everything(rollout)
-    least = 0.02 * float(np.ptp(everywhere, axis=0).max())
-    seen = np.concatenate([_led(rollout), *obstacle_points(rollout, everywhere)])
+    least = 0.02 * float(np.ptp(everything(rollout), axis=0).max())
+    around = [body.enclosed() for body in bodies(rollout) if not body.vast]
+    seen = np.concatenate([_led(rollout), *around])
     if view.names:
         fit(axes, view, seen, least)
     else:
@@ -109,18 +108,11 @@ def _draw_obstacles(axes: Axes, view: View, rollout: Rollout) -> None:
     found = bodies(rollout)
     label = "obstacle" if len(found) == 1 else "obstacles"
     for place, body in enumerate(found):
+        draw_body(axes, view, body, -1, label=label if place == 0 else None)
         if body.moves:
             draw_body(axes, view, body, 0, filled=False)
-        draw_body(axes, view, body, -1)
-        axes.plot(
-            *view.project(body.center),
-            color=palette.OBSTACLE,
-            linewidth=1.1,
-            linestyle=":",
-            marker="" if body.moves else "+",
-            zorder=2.1,
-            label=label if place == 0 else None,
-        )
+            page = view.project(body.center)
+            axes.plot(*page, color=palette.OBSTACLE, linewidth=1.1, linestyle=":")
 
 
 def _desired_label(axes: str, view: View) -> str:

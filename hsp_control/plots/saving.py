@@ -39,11 +39,19 @@ def save_figures(
     paths = []
     for name, draw in figures.items():
         figure = draw(rollout)
+        _settle(figure)
         for suffix in formats:
             path = Path(folder) / f"{stem}-{name}.{suffix}"
             _save(figure, path, suffix)
             paths.append(path)
     return paths
+
+
+def _settle(figure: Figure) -> None:
+    """Lay the figure out once, for all formats alike."""
+    with styled():
+        figure.draw_without_rendering()
+    figure.set_layout_engine("none")
 
 
 def _save(figure: Figure, path: Path, suffix: str) -> None:

@@ -14,7 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from hsp_control.plots import palette
+from hsp_control import palette
 
 STYLE: dict[str, Any] = {
     "axes.axisbelow": True,

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
+from hsp_control import palette
 from hsp_control.arrays import Array
-from hsp_control.plots import palette
 from hsp_control.plots.bodies import Body
 from hsp_control.plots.views import View
 
@@ -102,8 +102,11 @@ def draw_body(
     color: str = palette.OBSTACLE,
     filled: bool = True,
     zorder: float = 2.0,
+    label: str | None = None,
 ) -> None:
     """Draw an obstacle's outline; a half-space only where it is seen edge-on.
+
+    What is larger than the robot is drawn as a mere line, behind all else.
 
     Args:
         axes: The axes.
@@ -113,14 +116,17 @@ def draw_body(
         color: Its colour.
         filled: False: a dashed outline, as for a ball that only holds a body.
         zorder: Where it lies above other things.
+        label: What the legend calls it.
     """
-    filled = filled and body.exact
     looks: dict[str, Any] = {
-        "facecolor": f"{color}73" if filled else "none",
-        "edgecolor": color,
+        "facecolor": "none"
+        if body.vast or not (filled and body.exact)
+        else f"{color}73",
+        "edgecolor": f"{color}73" if body.vast else color,
         "linewidth": 1.0,
-        "linestyle": "-" if filled else (0, (3, 2)),
-        "zorder": zorder,
+        "linestyle": "-" if filled and body.exact else (0, (3, 2)),
+        "zorder": 0.9 if body.vast else zorder,
+        "label": label,
     }
     if len(body.points) == 1:
         x, y = view.project(body.placed(row)[0])
@@ -142,6 +148,7 @@ def _draw_half_space(
     along = far * np.array([-normal[1], normal[0]])
     edge = np.stack([point - along, point + along])
     corners = np.concatenate([edge, edge[::-1] - far * normal])
+    looks["facecolor"] = palette.SHADOW
     axes.add_patch(Polygon(corners, **looks))
 
 

@@ -47,14 +47,9 @@ def end_points(rollout: Rollout) -> Array:
 
 
 def everything(rollout: Rollout) -> Array:
-    """Return points that enclose robot, paths and obstacles, shape (K, 3) [m].
-
-    Of obstacles larger than all else, such as a floor, only what is beside the robot is
-    worth showing: they do not count.
-    """
-    points = [rollout["skeleton"].reshape(-1, 3)]
-    points += [path.desired for path in task_paths(rollout)]
-    return np.concatenate([*points, *obstacle_points(rollout, np.concatenate(points))])
+    """Return points that enclose robot, paths and obstacles, shape (K, 3) [m]."""
+    around = [body.enclosed() for body in bodies(rollout) if not body.vast]
+    return np.concatenate([*_robot_and_paths(rollout), *around])
 
 
 def centers(rollout: Rollout) -> Array:
@@ -62,22 +57,13 @@ def centers(rollout: Rollout) -> Array:
 
     They lie in a plane if all moves in one; a disk's thickness says nothing.
     """
-    points = [rollout["skeleton"].reshape(-1, 3)]
-    points += [path.desired for path in task_paths(rollout)]
-    points += [body.center for body in bodies(rollout) if len(body.points)]
-    return np.concatenate(points)
+    middles = [body.center for body in bodies(rollout) if not body.vast]
+    return np.concatenate([*_robot_and_paths(rollout), *middles])
 
 
-def obstacle_points(rollout: Rollout, others: Array) -> list[Array]:
-    """Return points that enclose obstacles, but those larger than all else.
-
-    Args:
-        rollout: The log.
-        others: All else, shape (K, 3) [m].
-    """
-    size = float(np.ptp(others, axis=0).max())
-    found = [body.enclosed() for body in bodies(rollout) if len(body.points)]
-    return [points for points in found if np.ptp(points, axis=0).max() <= 1.5 * size]
+def _robot_and_paths(rollout: Rollout) -> list[Array]:
+    paths = task_paths(rollout)
+    return [rollout["skeleton"].reshape(-1, 3), *(path.desired for path in paths)]
 
 
 def _task_path(rollout: Rollout, name: str) -> TaskPath | None:

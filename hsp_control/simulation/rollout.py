@@ -149,7 +149,9 @@ def _checked(
         raise LogError(
             f"{path}: its format is {found!r}; this version reads {FORMAT!r}"
         )
-    missing = [name for name in _REQUIRED if name not in columns]
+    described = meta.get("columns")
+    wanted = [*_REQUIRED, *(described if isinstance(described, dict) else ())]
+    missing = [name for name in wanted if name not in columns]
     if missing:
         raise LogError(f"{path}: the log lacks the column {missing[0]!r}")
     rows = {name: np.shape(column)[:1] for name, column in columns.items()}

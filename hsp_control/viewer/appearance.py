@@ -1,6 +1,6 @@
 """How the view looks: what each thing is coloured, and how thick things are."""
 
-from hsp_control.plots import palette
+from hsp_control import palette
 
 ACTUAL, DESIRED = palette.ACTUAL, palette.DESIRED
 OBSTACLE = palette.OBSTACLE
@@ -11,9 +11,8 @@ AXES = (palette.OBSTACLE, palette.TASK, palette.ACTUAL)
 SKY, HORIZON = "#FFFFFF", "#E4E9EE"
 GRID = "#8794A1"
 
-PATH_RADIUS = 0.0035
+PATH_RADIUS = 0.0045
 """Of the actual path, over the size of the scene."""
-DESIRED_WIDENING = 2.4
-"""How much thicker the desired path is: both show where one lies in the other."""
-DESIRED_OPACITY = 0.45
-OBSTACLE_OPACITY = 0.55
+DESIRED_WIDENING = 2.0
+"""How much thicker the desired path is: a sleeve, in which the actual one lies."""
+OBSTACLE_OPACITY = 0.75

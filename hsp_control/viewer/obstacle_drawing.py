@@ -1,6 +1,6 @@
 """Obstacles in the scene: translucent, each where its trajectory leads it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pinocchio as pin
@@ -31,6 +31,12 @@ def enclosing(shape: Shape, center: Array) -> list[Array]:
     if not np.isfinite(reach):
         return []
     return [center - reach, center + reach]
+
+
+def obstacle_legend(names: Iterable[str]) -> list[tuple[str, str]]:
+    """Return the obstacles' names and colour: one entry, for all look the same."""
+    text = ", ".join(names)
+    return [(text, OBSTACLE)] if text else []
 
 
 class ObstacleDrawing:
@@ -65,7 +71,7 @@ class ObstacleDrawing:
 
     def legend(self) -> list[tuple[str, str]]:
         """Return names and colours."""
-        return [(name, OBSTACLE) for name in self._scene]
+        return obstacle_legend(self._scene)
 
 
 def _path(name: str) -> str:

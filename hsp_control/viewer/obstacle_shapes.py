@@ -50,7 +50,7 @@ def logged_shape(about: Mapping[str, Any]) -> Shape | None:
 
 def obstacle(shape: Shape, extent: float) -> Json:
     """Return an obstacle of a shape; a half-space as a square of an extent [m]."""
-    surface = threejs.material(OBSTACLE, opacity=OBSTACLE_OPACITY, glow=0.15)
+    surface = threejs.material(OBSTACLE, opacity=OBSTACLE_OPACITY, glow=0.3)
     pose = np.eye(4)
     match shape:
         case shapes.Sphere():
@@ -70,7 +70,9 @@ def obstacle(shape: Shape, extent: float) -> Json:
         case _:
             solid = _facets(*_triangles(shape.geometry()))
             surface |= {"side": 2}
-    return threejs.group([threejs.mesh(solid, surface, pose)])
+    thing = threejs.mesh(solid, surface, pose)
+    thing["object"]["receiveShadow"] = False  # nor its own, which would show through
+    return threejs.group([thing])
 
 
 def _facets(vertices: Array, triangles: Indices) -> Json:

@@ -12,9 +12,7 @@ from hsp_control.viewer.appearance import (
     ACTUAL,
     AXES,
     DESIRED,
-    DESIRED_OPACITY,
     DESIRED_WIDENING,
-    OBSTACLE,
     PATH_RADIUS,
 )
 from hsp_control.viewer.commands import (
@@ -29,6 +27,7 @@ from hsp_control.viewer.obstacle_drawing import (
     draw_obstacle,
     enclosing,
     move_obstacle,
+    obstacle_legend,
 )
 from hsp_control.viewer.obstacle_shapes import logged_shape
 from hsp_control.viewer.poses import along
@@ -94,8 +93,8 @@ class RolloutDrawing:
     def legend(self) -> list[tuple[str, str]]:
         """Return names and colours."""
         paths = any(target.desired is not None for target in self._targets)
-        named = [("desired", DESIRED), ("actual", ACTUAL)] if paths else []
-        return named + [(name, OBSTACLE) for name in self._obstacles]
+        named = [("desired path", DESIRED), ("actual path", ACTUAL)] if paths else []
+        return named + obstacle_legend(self._obstacles)
 
     def _placement(self, name: str, now: Moment) -> pin.SE3:
         center = between(self._rollout[f"obstacle.{name}"], now)
@@ -112,10 +111,10 @@ def _draw_path(
         return  # it stands still: the marker shows where
     rows = np.linspace(0, len(points) - 1, min(len(points), _MOST_RINGS)).round()
     if desired:
-        surface = threejs.material(DESIRED, opacity=DESIRED_OPACITY, glow=0.5)
+        surface = threejs.paint(DESIRED, inside=True)
         radius *= DESIRED_WIDENING
     else:
-        surface = threejs.material(ACTUAL, glow=0.35)
+        surface = threejs.paint(ACTUAL)
     line = threejs.mesh(tube(points[rows.astype(int)], radius), surface, shadow=False)
     yield set_object(path, threejs.group([line]))
 
@@ -123,18 +122,18 @@ def _draw_path(
 def _marker(target: Target, radius: float) -> Json:
     """Return what shows the target now: a ball, an arrow, or three axes."""
     if target.direction is not None:
-        surface = threejs.material(DESIRED, glow=0.3)
+        surface = threejs.material(DESIRED)
         return threejs.group(
             [threejs.mesh(threejs.arrow(60 * radius, 2 * radius), surface)]
         )
     if target.rotation is None:
-        surface = threejs.material(DESIRED, glow=0.3)
+        surface = threejs.material(DESIRED)
         return threejs.group([threejs.mesh(threejs.sphere(4.5 * radius), surface)])
     arrows = []
     for axis, color in zip(np.eye(3), AXES, strict=True):
         body = threejs.arrow(40.0 * radius, 1.5 * radius)
         arrows.append(
-            threejs.mesh(body, threejs.material(color, glow=0.3), along(axis))
+            threejs.mesh(body, threejs.material(color), along(axis))
         )
     return threejs.group(arrows)
 

@@ -39,7 +39,7 @@ def stand_in(robot: Robot, joint: int) -> Json | None:
 
 
 def _links(robot: Robot, joint: int) -> Iterator[tuple[Array, Array, float]]:
-    """Yield from where to where a body goes in its joint's frame, and how thick then."""
+    """Yield from where a body goes, to where, and how thick it is there."""
     model = robot.model
     children = [
         child for child in range(1, model.njoints) if model.parents[child] == joint

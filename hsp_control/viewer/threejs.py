@@ -16,18 +16,13 @@ _Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1
 
 
 def material(
-    color: str | Sequence[float],
-    *,
-    opacity: float = 1.0,
-    roughness: float = 0.55,
-    glow: float = 0.0,
+    color: str | Sequence[float], *, opacity: float = 1.0, glow: float = 0.0
 ) -> Json:
-    """Return a surface.
+    """Return a surface that light falls on.
 
     Args:
         color: ``#RRGGBB``, or red, green and blue from 0 to 1.
         opacity: 1 solid, 0 invisible.
-        roughness: 1 matt, 0 glossy.
         glow: Its share of its colour that needs no light, from 0 to 1.
     """
     number = color_number(color)
@@ -35,14 +30,30 @@ def material(
         "uuid": unique_name(),
         "type": "MeshStandardMaterial",
         "color": number,
-        "roughness": roughness,
+        "roughness": 0.55,
         "metalness": 0.0,
+        "emissive": number,
+        "emissiveIntensity": glow,
     }
-    if glow:
-        surface |= {"emissive": number, "emissiveIntensity": glow}
     if opacity < 1.0:
         surface |= {"transparent": True, "opacity": opacity, "depthWrite": False}
     return surface
+
+
+def paint(color: str, *, inside: bool = False) -> Json:
+    """Return a surface of the same colour in any light.
+
+    Args:
+        color: ``#RRGGBB``.
+        inside: Show only the far half, seen from within: a sleeve that never hides what
+            it holds.
+    """
+    return {
+        "uuid": unique_name(),
+        "type": "MeshBasicMaterial",
+        "color": color_number(color),
+        "side": 1 if inside else 0,
+    }
 
 
 def color_number(color: str | Sequence[float]) -> int:

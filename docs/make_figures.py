@@ -1,0 +1,121 @@
+"""Draw the figures of the documents: `make figures` (they are committed)."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+import hsp_control as hsp
+from hsp_control.palette import DESIRED, INK, SERIES
+from hsp_control.plots import new_figure, paper_figure, styled
+
+FOLDER = Path(__file__).parent / "figures"
+PAPER = ("1_uncontrolled", "2_rest", "3_equal_angles", "4_moving_obstacle")
+GAIN, FREQUENCY = 4.0, 6.0
+
+
+def main() -> None:
+    """Draw everything into docs/figures."""
+    FOLDER.mkdir(exist_ok=True)
+    for name in PAPER:
+        rollout = hsp.load_experiment(f"paper/{name}").run()
+        with styled():
+            paper_figure(rollout).savefig(FOLDER / f"paper_{name}.png", dpi=110)
+    with styled():
+        figure = new_figure(11.0, 3.6)
+        left, middle, right = figure.subplots(1, 3)
+        draw_propositions(left, middle)
+        draw_chaos(right)
+        figure.savefig(FOLDER / "propositions.png", dpi=130)
+    for file in sorted(FOLDER.glob("*.png")):
+        print(f"Figure: {file.relative_to(FOLDER.parents[1])}")
+
+
+def draw_propositions(left: Axes, middle: Axes) -> None:
+    """Draw e and e_N of an iiwa that starts off its path, in three metrics."""
+    robot = hsp.Robot.load("iiwa14")
+    metrics = {
+        "identity": hsp.IdentityMetric(),
+        "constant": hsp.ConstantMetric(np.linspace(1.0, 3.0, 7)),
+        "mass matrix": hsp.MassMatrixMetric(),
+    }
+    # Wide to narrow: the three lines lie on each other, that is the point.
+    for color, width, name in zip(SERIES, (7.0, 4.5, 2.0), metrics, strict=False):
+        rollout = moving_iiwa(robot, metrics[name])
+        error = np.linalg.norm(rollout["task.hand.error"], axis=1)
+        left.semilogy(rollout.t, error, color=color, lw=width, label=name)
+        norm = rollout["null_space_norm"]
+        middle.semilogy(rollout.t, norm / norm[0], color=color, lw=width, label=name)
+    e0, e0_dot = (rollout[f"task.hand.{part}"][0] for part in ("error", "error_rate"))
+    t = rollout.t[:, None]
+    exact = (e0 + (e0_dot + FREQUENCY * e0) * t) * np.exp(-FREQUENCY * t)
+    style = {"color": INK, "lw": 1.0, "ls": "--"}
+    left.semilogy(rollout.t, np.linalg.norm(exact, axis=1), **style, label="predicted")
+    middle.semilogy(rollout.t, np.exp(-GAIN * rollout.t), **style, label="predicted")
+    left.set(title="(a)  The task: pose of an iiwa", ylabel="pose error ‖e‖ [m, rad]")
+    middle.set(
+        title="(b)  Its null space, field moving",
+        ylabel="‖e_N‖_W relative to start [-]",
+    )
+    for axes in (left, middle):
+        axes.set(xlabel="time [s]", ylim=(1e-7, 3.0))
+        axes.legend()
+
+
+def moving_iiwa(robot: hsp.Robot, metric: hsp.Metric) -> hsp.Rollout:
+    """Return a run with a pose task on a circle and a posture that swings."""
+    state = robot.state(0.0, robot.home(), np.zeros(7))
+    hand = state.frame("iiwa_link_ee")
+    circle = hsp.Circle(
+        hand.position - [0.05, 0.0, 0.0], 0.1, 2.0, normal=[0.0, 0.0, 1.0]
+    )
+    pose = hsp.ComposedPose(circle, hsp.HoldOrientation(hand.rotation))
+    gains = hsp.Gains.from_frequency(FREQUENCY)
+    task = hsp.FramePose(robot, "iiwa_link_ee", pose, gains, name="hand")
+    swing = hsp.FunctionField(
+        robot,
+        lambda s: 0.8 * np.sin(1.5 * s.t + np.arange(7)) - robot.joint_positions(s.q),
+    )
+    controller = hsp.Controller(
+        robot, [task], swing, null_space_gain=GAIN, metric=metric
+    )
+    rng = np.random.default_rng(1)
+    start = robot.integrate(state.q, 0.1 * rng.standard_normal(7))
+    return hsp.simulate(
+        controller,
+        start,
+        0.3 * rng.standard_normal(7),
+        duration=3.0,
+        integrator=hsp.Dop853(1e-10, 1e-10),
+    )
+
+
+def draw_chaos(axes: Axes) -> None:
+    """Draw how far two starts 1e-9 rad apart get, with and without control."""
+    shown = (("1_uncontrolled", "φ_N = 0"), ("3_equal_angles", "g = -∇f"))
+    for color, (name, label) in zip((DESIRED, SERIES[0]), shown, strict=True):
+        runs = []
+        for nudge in (0.0, 1e-9):
+            experiment = hsp.load_experiment(f"paper/{name}")
+            robot = experiment.robot
+            q0 = robot.integrate(experiment.q0, np.array([nudge, 0.0, 0.0]))
+            runs.append(
+                hsp.simulate(
+                    experiment.controller,
+                    q0,
+                    duration=10.0,
+                    integrator=hsp.Dop853(1e-12, 1e-12),
+                )
+            )
+        apart = np.abs(runs[0]["joint_positions"] - runs[1]["joint_positions"])
+        axes.semilogy(runs[0].t, apart.max(axis=1) + 1e-17, color=color, label=label)
+    axes.set(
+        title="(c)  Two starts 1e-9 rad apart",
+        xlabel="time [s]",
+        ylabel="largest joint difference [rad]",
+    )
+    axes.legend()
+
+
+if __name__ == "__main__":
+    main()
