@@ -19,7 +19,7 @@ from hsp_control import (
     load_experiment,
 )
 from hsp_control.config import json_schema
-from hsp_control.resources import bundled_configs
+from hsp_control.resources import bundled, bundled_configs
 
 MOVING = "paper/4_moving_obstacle"
 
@@ -84,6 +84,18 @@ def test_every_bundled_configuration_follows_the_exported_schema() -> None:
         assert load_experiment(name).scenario.title, name
 
 
+def test_the_bundled_schema_is_the_exported_one() -> None:
+    """Editors find it by the first line of each bundled configuration."""
+    file = bundled("configs") / "hsp_control.schema.json"
+    assert json.loads(file.read_text(encoding="utf-8")) == json_schema(), (
+        "refresh it with: hsp schema > configs/hsp_control.schema.json"
+    )
+    for path in bundled_configs().values():
+        first = path.read_text(encoding="utf-8").splitlines()[0]
+        where = first.removeprefix("# yaml-language-server: $schema=")
+        assert (path.parent / where).samefile(file), path
+
+
 def test_a_configuration_becomes_the_objects_it_names() -> None:
     experiment = load_experiment(PANDA)
     (task,) = experiment.controller.tasks
@@ -93,7 +105,7 @@ def test_a_configuration_becomes_the_objects_it_names() -> None:
     np.testing.assert_allclose(np.diag(task.Kv), [14.4] * 3 + [9.0] * 3)
     assert isinstance(experiment.controller.metric, MassMatrixMetric)
     ((weight, field),) = experiment.controller.field.terms
-    assert weight == 2.0
+    assert weight.value == 2.0
     assert isinstance(field, JointCentering)
     assert isinstance(experiment.integrator, Rk4)
     positions = experiment.robot.joint_positions(experiment.q0)
@@ -205,6 +217,8 @@ def test_every_task(task: dict) -> None:
     assert np.isfinite(experiment.controller.compute(state).tau).all()
 
 
+BALL = {"type": "sphere", "radius": 1.0}
+
 # Each row: what is changed, the class of the error, and what its message says.
 MISTAKES = [
     ("robot.name", "pandda", "RobotNotFoundError",
@@ -274,9 +288,12 @@ MISTAKES = [
      "FieldError", "null_space.fields.0: field 'joint_centering': weights"),
     ("null_space.fields", [{"type": "rest"}, {"type": "uncontrolled"}],
      "ConfigError", "null_space.fields.1: an uncontrolled null space"),
-    ("scene", {"obstacles": {"b": {"radius": 1, "center": {"type": "hold"}}}},
-     "TrajectoryError", "scene.obstacles.b: give the point"),
-    ("scene", {"obstacles": {"b": {"radius": 1, "center":
+    ("scene", {"obstacles": {"b": {"shape": BALL, "center": {"type": "hold"}}}},
+     "TrajectoryError", "scene.obstacles.b.center: give the point"),
+    ("scene", {"obstacles": {"b": {"shape": {"type": "mesh", "file": "b.stl"},
+                                   "center": {"type": "hold", "point": [0, 0, 0]}}}},
+     "SceneError", "scene.obstacles.b.shape: mesh: no file"),
+    ("scene", {"obstacles": {"b": {"shape": BALL, "center":
                                    {"type": "hold", "point": [0, 0]}}}},
      "SceneError", "scene.obstacles.b: obstacle 'b': its centre has dimension 2"),
     ("simulation.integrator.step", 0.0007, "SimulationError",
