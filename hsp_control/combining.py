@@ -36,14 +36,21 @@ def combine(parts: Sequence[tuple[Part, pin.Model]]) -> pin.Model:
         parts: Each robot's part and its own model.
 
     Raises:
-        ModelError: If there are fewer than two, prefixes repeat, or a joint mimics
-            another (Pinocchio cannot append such a model).
+        ModelError: If there are fewer than two, prefixes repeat, one consists of
+            several already, or a joint mimics another (Pinocchio cannot append it).
     """
     prefixes = [part.prefix for part, _ in parts]
     if len(parts) < 2 or len(set(prefixes)) < len(prefixes):
-        raise ModelError(f"robots to combine need different names: {prefixes}")
+        raise ModelError(
+            f"robots to combine need different names, two or more: got {prefixes}"
+        )
     whole = pin.Model()
     for part, model in parts:
+        if part.source.origin == "combined":
+            raise ModelError(
+                f"{part.prefix}{part.source.name}: is combined already; "
+                "combine all robots at once"
+            )
         if model.nvExtended != model.nv:
             raise ModelError(
                 f"{part.prefix}{part.source.name}: joints that mimic others cannot be "

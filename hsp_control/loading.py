@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +28,17 @@ Root = Literal["fixed", "planar", "free_flyer"]
 _ROOT_JOINTS = {
     "planar": pin.JointModelPlanar,
     "free_flyer": pin.JointModelFreeFlyer,
+}
+# What example-robot-data does not say, and the tree alone does not show: a lone jaw
+# looks like one more joint of the arm, a sensor like a tool.
+_END_EFFECTORS = {
+    "b1_z1": "gripperStator",
+    "baxter": "right_gripper",
+    "talos": "gripper_right_base_link",
+    "talos_arm": "gripper_left_base_link",
+    "talos_box": "gripper_right_base_link",
+    "talos_legs": "gripper_right_base_link",
+    "z1": "gripperStator",
 }
 
 
@@ -93,6 +105,10 @@ def find_robot(name: str | Path) -> RobotSource:
     others = example_robots()
     if text in others:
         return others[text]
+    if text in examples_without_urdf():
+        raise RobotNotFoundError(
+            f"robot {text!r} of example-robot-data has no URDF; nothing else is read"
+        )
     known = sorted({*bundled, *others})
     hint = "" if others else "; more with: pip install example-robot-data-loaders"
     raise RobotNotFoundError(
@@ -103,13 +119,12 @@ def find_robot(name: str | Path) -> RobotSource:
 
 def example_robots() -> dict[str, RobotSource]:
     """Return the robots of example-robot-data by name; empty if it is not installed."""
-    if importlib.util.find_spec("example_robot_data") is None:
+    loaders = _example_loaders()
+    if not loaders:
         return {}
-    from example_robot_data.robots_loader import ROBOTS
-
     root = _example_robot_data_folder()
     sources = {}
-    for name, loader in ROBOTS.items():
+    for name, loader in loaders.items():
         folder = root / "robots" / loader.path
         urdf = folder / loader.urdf_subpath / getattr(loader, "urdf_filename", "")
         srdf = folder / loader.srdf_subpath / getattr(loader, "srdf_filename", "")
@@ -121,8 +136,15 @@ def example_robots() -> dict[str, RobotSource]:
                 root="free_flyer" if loader.free_flyer else "fixed",
                 package_dirs=(root.parent, root / "robots"),
                 origin="example-robot-data",
+                end_effector=_END_EFFECTORS.get(name),
             )
     return sources
+
+
+def examples_without_urdf() -> tuple[str, ...]:
+    """Return the names of example-robot-data that stand for no URDF."""
+    found = example_robots()
+    return tuple(name for name in _example_loaders() if name not in found)
 
 
 def load_model(
@@ -170,6 +192,32 @@ def moving_joints(model: pin.Model) -> dict[str, Any]:
     return {name: joint for name, joint in named if joint.nv > 0}
 
 
+def end_effector_frame(model: pin.Model) -> str:
+    """Return the frame that is most likely the hand, judged by the tree of joints.
+
+    It is the last link that moves with the end of the longest chain of joints, the last
+    chain of equals. Where that chain forks in its second half, what follows is taken
+    for fingers, and its end is the link that they spring from.
+    """
+    chains: list[list[int]] = [[]]
+    for joint in range(1, model.njoints):
+        chains.append([*chains[model.parents[joint]], joint])
+    longest = max(reversed(chains), key=len)
+    forks = [
+        joint
+        for depth, joint in enumerate(longest, start=1)
+        if 2 * depth >= len(longest) and len(model.children[joint]) > 1
+    ]
+    end = forks[0] if forks else longest[-1]
+    links = [
+        frame.name
+        for frame in model.frames
+        if frame.parentJoint == end and frame.type == pin.FrameType.BODY
+    ]
+    hands = [link for link in links if not re.search("finger|thumb", link.lower())]
+    return str((hands or links)[-1])
+
+
 def _from_path(path: Path) -> RobotSource:
     if path.is_dir():
         raise RobotNotFoundError(f"{path}: is a folder; name the .urdf file in it")
@@ -208,6 +256,14 @@ def _from_bundle(name: str, folder: Path) -> RobotSource:
     )
 
 
+def _example_loaders() -> dict[str, Any]:
+    if importlib.util.find_spec("example_robot_data") is None:
+        return {}
+    from example_robot_data.robots_loader import ROBOTS
+
+    return dict(ROBOTS)
+
+
 def _example_robot_data_folder() -> Path:
     """Return ``<prefix>/share/example-robot-data`` of the installed package.
 
@@ -240,9 +296,28 @@ def _parse(urdf: Path, root: Root, *, mimic: bool) -> pin.Model:
         return pin.buildModelFromUrdf(str(urdf), joint, "root_joint", mimic=mimic)
     except (ValueError, RuntimeError) as error:
         reason = str(error).strip().splitlines()[-1].removeprefix("hint: ")
-        if mimic and "mimic" in reason:  # Pinocchio wants the leader before it
+        if mimic and "mimic" in reason:
+            reason = _explain_mimic(urdf) or reason
             reason += "; load its mimic joints as free ones: mimic=False"
         raise ModelError(f"{urdf}: not a robot that can be built: {reason}") from error
+
+
+def _explain_mimic(urdf: Path) -> str:
+    """Name the joint that Pinocchio cannot let follow another, and say why."""
+    order = list(pin.buildModelFromUrdf(str(urdf), mimic=False).names)
+    for joint in ElementTree.parse(urdf).iter("joint"):
+        mimic, follower = joint.find("mimic"), joint.get("name")
+        if mimic is None or follower not in order:
+            continue
+        leader = mimic.get("joint")
+        if leader not in order:
+            return f"joint {follower!r} mimics {leader!r}, which is no moving joint"
+        if order.index(leader) > order.index(follower):
+            return (
+                f"joint {follower!r} mimics {leader!r}, which comes after it in the "
+                "tree, and Pinocchio wants the leader first"
+            )
+    return ""
 
 
 def _refuse_malformed_xml(urdf: Path) -> None:
@@ -345,10 +420,10 @@ def _add_frame(model: pin.Model, name: str, tool: ToolFrame) -> None:
 
 
 def _refuse_singular_mass_matrix(model: pin.Model, source: RobotSource) -> None:
-    """Refuse a model with a joint that moves no mass, and name the joint.
+    """Refuse a model with joints that move no mass, and name them.
 
-    Tried at a generic configuration, where only a joint (or a combination of joints)
-    that never moves any mass makes M singular.
+    Tried at a generic configuration, where only joints (or a combination of joints)
+    that never move any mass make M singular.
     """
     if model.nv == 0:
         raise ModelError(f"{source.urdf}: the robot has no moving joint")
@@ -358,17 +433,21 @@ def _refuse_singular_mass_matrix(model: pin.Model, source: RobotSource) -> None:
     values, vectors = np.linalg.eigh(mass_matrix)
     if values[0] > 1e-12 * values[-1]:
         return
-    weakest = int(np.argmax(np.abs(vectors[:, 0])))
-    culprit, freedoms = next(
-        (name, joint.nv)
+    idle = np.diag(mass_matrix) <= 1e-12 * values[-1]
+    if not idle.any():  # only together: name the one that moves most
+        idle[np.argmax(np.abs(vectors[:, 0]))] = True
+    culprits = {
+        name: joint.nv
         for name, joint in moving_joints(model).items()
-        if joint.idx_v <= weakest < joint.idx_v + joint.nv
-    )
-    cure = f"lock it: locked: {{{culprit}: 0.0}}" if freedoms == 1 else "root: fixed"
+        if idle[joint.idx_v : joint.idx_v + joint.nv].any()
+    }
+    single = set(culprits.values()) == {1}
+    locks = ", ".join(f"{name}: 0.0" for name in culprits)
     raise ModelError(
-        f"{source.urdf}: joint {culprit!r} moves no mass, so its acceleration is not "
-        f"defined (the mass matrix is singular: {values[0]:.1e} of {values[-1]:.1e}); "
-        f"give its links an inertia, or {cure}"
+        f"{source.urdf}: no mass moves with {listing(culprits)}, so that no "
+        f"acceleration is defined there (the mass matrix is singular: {values[0]:.1e} "
+        f"of {values[-1]:.1e}); give the links an inertia, or "
+        + (f"lock the joints: locked: {{{locks}}}" if single else "root: fixed")
     )
 
 

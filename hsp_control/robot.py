@@ -29,6 +29,7 @@ from hsp_control.loading import (
     RobotSource,
     Root,
     ToolFrame,
+    end_effector_frame,
     find_robot,
     load_model,
 )
@@ -56,7 +57,13 @@ class Robot(ConfigurationSpace):
         self.source = source
         self.parts = tuple(parts) or (Part("", source, pin.SE3.Identity()),)
         self.frame_names: tuple[str, ...] = tuple(f.name for f in model.frames)
-        self._frame_ids = {name: i for i, name in enumerate(self.frame_names)}
+        # Where a joint and a link have one name, the link's frame is meant.
+        links = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
+        self._frame_ids = {
+            frame.name: i
+            for i, frame in enumerate(model.frames)
+            if frame.type == pin.FrameType.BODY or frame.name not in links
+        }
         self._data = model.createData()
 
     @classmethod
@@ -137,7 +144,7 @@ class Robot(ConfigurationSpace):
         return (type(self), (self.model, self.source, self.parts))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        return type(self)(self.model.copy(), self.source)
+        return type(self)(self.model.copy(), self.source, self.parts)
 
     @property
     def joint_coordinates(self) -> Array | None:
@@ -148,6 +155,14 @@ class Robot(ConfigurationSpace):
         if self.source.joint_coordinates != "absolute":
             return None
         return np.tril(np.ones((self.nv, self.nv)))
+
+    @property
+    def end_effector(self) -> str:
+        """The frame of its hand: as its source says, or the likeliest by its joints."""
+        named = self.source.end_effector
+        if named is not None and named in self._frame_ids:
+            return named
+        return end_effector_frame(self.model)
 
     # -- names ------------------------------------------------------------------------
 

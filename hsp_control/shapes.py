@@ -224,8 +224,11 @@ class PointCloud(Shape):
     def __post_init__(self) -> None:
         """Refuse what is no cloud."""
         _lengths(self, {"resolution": self.resolution})
-        array = np.asarray(self.points, dtype=float)
-        if array.ndim != 2 or array.shape[1:] != (3,) or not np.isfinite(array).all():
+        try:
+            array = np.asarray(self.points, dtype=float)
+        except ValueError:  # points differ in length
+            array = np.zeros(0)
+        if array.shape != (max(len(array), 1), 3) or not np.isfinite(array).all():
             raise SceneError("point cloud: needs one or more points of 3 numbers")
 
     def geometry(self) -> Any:
@@ -255,6 +258,8 @@ class HeightField(Shape):
 
     def __post_init__(self) -> None:
         """Refuse what is no grid."""
+        if len(self.size) != 2:
+            raise SceneError(f"height field: size {list(self.size)} needs 2 extents")
         _lengths(self, dict(zip("xy", self.size, strict=True)))
         grid = self._grid()
         if grid.ndim != 2 or min(grid.shape) < 2 or not np.isfinite(grid).all():

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 
 from hsp_control import HspControlError, Robot, ToolFrame, loading, resources
 from hsp_control.exceptions import (
@@ -38,18 +39,19 @@ EXAMPLES = [
 
 # Robots of example-robot-data that are refused, and why. (cassie is not listed at all:
 # it is no URDF.)
-NO_MASS = "joint 'bravo_finger1_joint' moves no mass.*give its links an inertia"
-LATE_LEADER = "parent joint of the mimic joint is not in the kinematic tree; .*mimic=Fa"
+NO_MASS = "no mass moves with bravo_finger1_joint, bravo_finger2_joint, so that no acc"
+LATE_LEADER = "mimics '.*', which comes after it in the tree, .*; .*mimic=False"
+NO_LEADER = "'Left_index_q2' mimics 'index_q1', which is no moving joint; .*mimic=False"
 REFUSED = {
     "bravo7_gripper": NO_MASS,
     "falcon_bravo7_gripper": NO_MASS,
     "bluevolta_bravo7_gripper": NO_MASS,
-    "alex_psyonic_hands": LATE_LEADER,
+    "alex_psyonic_hands": NO_LEADER,
     "romeo": LATE_LEADER,
     "talos_full": LATE_LEADER,
     "talos_full_box": LATE_LEADER,
 }
-REFUSED_WITHOUT_MIMIC = {"romeo": "joint 'LFinger32' moves no mass"}
+REFUSED_WITHOUT_MIMIC = {"romeo": r"no mass moves with LFinger21, .*\(24 in all\)"}
 
 INERTIA = (
     '<inertial><origin xyz="0.2 0.1 0.3"/><mass value="2"/>'
@@ -178,7 +180,7 @@ def test_example_robot(name: str, root: str, nq: int, nv: int) -> None:
 def test_every_example_robot_loads_or_says_why_not(name: str, mimic: bool) -> None:
     """Nothing but ModelError, and of exactly the robots that are known for it."""
     reason = REFUSED.get(name)
-    if not mimic and reason == LATE_LEADER:
+    if not mimic and reason in {LATE_LEADER, NO_LEADER}:
         reason = REFUSED_WITHOUT_MIMIC.get(name)
     source = find_robot(name)
     if source.origin == "bundled":
@@ -203,6 +205,12 @@ def test_sdf_only_robot_is_not_listed() -> None:
     pytest.importorskip("example_robot_data")
     assert len(example_robots()) >= 70
     assert "cassie" not in example_robots()
+
+
+def test_sdf_only_robot_is_refused_by_name() -> None:
+    pytest.importorskip("example_robot_data")
+    with pytest.raises(RobotNotFoundError, match=r"'cassie' .* has no URDF"):
+        Robot.load("cassie")
 
 
 def test_without_example_robot_data(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -613,7 +621,7 @@ def test_file_that_may_not_be_read(
         ),
         (
             ARM.replace("</joint>", '<mimic joint="ghost"/></joint>', 1),
-            "mimic joint is not in the kinematic tree; load its mimic joints as free",
+            "joint 'shoulder' mimics 'ghost', which is no moving joint; load its mimic",
         ),
         (
             gripper().replace(
@@ -636,9 +644,31 @@ def test_hint_to_load_mimic_joints_as_free_ones_helps(
     write: Callable[..., Path],
 ) -> None:
     path = write(ARM.replace("</joint>", '<mimic joint="elbow"/></joint>', 1))
-    with pytest.raises(ModelError, match="mimic=False"):
+    message = "'shoulder' mimics 'elbow', which comes after it in the tree.*mimic=False"
+    with pytest.raises(ModelError, match=message):
         Robot.load(path)
     assert Robot.load(path, mimic=False).nv == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("bravo7_gripper", {}),
+        ("falcon_bravo7_gripper", {}),
+        ("bluevolta_bravo7_gripper", {}),
+        ("romeo", {"mimic": False}),
+    ],
+)
+def test_hint_to_lock_joints_that_move_no_mass_helps(
+    name: str, options: dict[str, Any]
+) -> None:
+    """The message's own words, read as YAML, are the cure."""
+    pytest.importorskip("example_robot_data")
+    with pytest.raises(ModelError, match="lock the joints: locked: ") as caught:
+        Robot.load(name, **options)
+    hint = yaml.safe_load(str(caught.value).split("lock the joints: ")[1])
+    robot = Robot.load(name, **hint, **options)
+    assert not set(hint["locked"]) & set(robot.joint_names)
 
 
 @pytest.mark.parametrize("last", ["wrist", "a_joint"])
@@ -655,7 +685,7 @@ def test_joint_that_moves_no_mass_is_named(
             joint(last, "upper", "hand"),
         )
     )
-    message = rf"joint '{last}' moves no mass, .* or lock it: locked: {{{last}: 0\.0}}"
+    message = rf"no mass moves with {last}, .*, or lock .*: locked: {{{last}: 0\.0}}"
     with pytest.raises(ModelError, match=message):
         Robot.load(path)
     assert Robot.load(path, locked={last: 0.0}).joint_names == ("shoulder",)
@@ -675,7 +705,7 @@ def test_root_that_moves_no_mass_of_its_own(write: Callable[..., Path]) -> None:
     path = write(text.replace(' rpy="0.3 0.2 0.1"', ""))
     assert Robot.load(path).nv == 1
     with pytest.raises(
-        ModelError, match=r"moves no mass, .*inertia, or (root|lock it)"
+        ModelError, match=r"no mass moves with .*inertia, or (root|lock the)"
     ):
         Robot.load(path, root="planar")
 

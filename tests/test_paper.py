@@ -38,13 +38,14 @@ ROWS = {1: 201, 2: 1001, 3: 1001, 4: 1001}  # (1) is chaos: its first 2 s
 PERTURBATION = 1e-9
 
 
-def experiment(number: int) -> Experiment:
+def experiment(number: int, log_period: float = 0.01) -> Experiment:
     """Return the bundled configuration, at a tolerance tenfold tighter than its own.
 
     (2) grazes a singularity at 3.14 s, where that much is lost again.
     """
     return load_experiment(
         CONFIGURATIONS[number],
+        f"simulation.log_period={log_period}",
         "simulation.integrator.rtol=1.0e-12",
         "simulation.integrator.atol=1.0e-12",
     )
@@ -58,10 +59,10 @@ def runs() -> dict[int, Rollout]:
 
 @pytest.fixture(scope="module")
 def perturbed() -> dict[int, Rollout]:
-    """Return them again, each from a start 1e-9 rad away."""
+    """Return them again, each from a start 1e-9 rad away, every second row."""
     found = {}
     for number in NUMBERS:
-        here = experiment(number)
+        here = experiment(number, log_period=0.02)
         q0 = here.robot.integrate(here.q0, PERTURBATION * np.array([1.0, -1.0, 1.0]))
         found[number] = replace(here, q0=q0).run()
     return found
@@ -106,7 +107,9 @@ def test_whole_trajectories(number: int, runs: dict[int, Rollout]) -> None:
     agree(arm.absolute_from_relative(run["acceleration"]), hand.theta_ddot, 1e-8)
     agree(arm.absolute_torque(run.tau), hand.tau, 1e-8)
     agree(run["task.tip.error"], hand.task_error, 1e-10)
-    agree(arm.absolute_from_relative(run["null_space_error"]), hand.null_space_error, 1e-9)
+    agree(
+        arm.absolute_from_relative(run["null_space_error"]), hand.null_space_error, 1e-9
+    )
     sigma = run["singular_values"][:, -1]
     agree(sigma, hand.sigma_min, 1e-7)  # √ of a difference: half the digits
     assert not run["damped"].any()
@@ -182,9 +185,9 @@ def test_the_first_forgets_its_start(
     runs: dict[int, Rollout], perturbed: dict[int, Rollout]
 ) -> None:
     """(1) Starts 1e-9 rad apart end radians apart: tenfold a second."""
-    apart = np.abs(absolute(perturbed[1]) - absolute(runs[1])).max(axis=1)
+    apart = np.abs(absolute(perturbed[1]) - absolute(runs[1])[::2]).max(axis=1)
     assert apart[0] == pytest.approx(PERTURBATION, rel=1e-6)
-    assert apart[:201].max() < 1e-7
+    assert apart[:101].max() < 1e-7
     assert apart.max() > 1.0
 
 
@@ -193,11 +196,12 @@ def test_the_others_do_not(
     number: int, runs: dict[int, Rollout], perturbed: dict[int, Rollout]
 ) -> None:
     """(2) stays as far away; in (3) and (4), which have a minimum, it is forgotten."""
-    apart = np.abs(absolute(perturbed[number]) - absolute(runs[number])).max(axis=1)
+    apart = absolute(perturbed[number]) - absolute(runs[number])[::2]
+    apart = np.abs(apart).max(axis=1)
     assert apart[0] == pytest.approx(PERTURBATION, rel=1e-6)
     assert apart.max() < 2.0 * PERTURBATION
     if number > 2:
-        assert apart[200:].max() < 1e-12
+        assert apart[100:].max() < 1e-12
 
 
 @pytest.mark.parametrize("number", NUMBERS)

@@ -140,7 +140,7 @@ def home(name: str) -> Array:
     return robot.integrate(q, 0.15 * np.cos(1.0 + np.arange(robot.nv)))
 
 
-# -- the tasks ---------------------------------------------------------------------------
+# --- the tasks -----------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -206,9 +206,11 @@ TASKS: dict[str, TaskCase] = {
             )
         ],
         lambda start: {
-            "tip": lambda t, here: np.array([1.0, 1.0])
-            + 0.9 * np.array([np.cos(2.0 * t + 0.4), np.sin(2.0 * t + 0.4)])
-            - here.translation[:2]
+            "tip": lambda t, here: (
+                np.array([1.0, 1.0])
+                + 0.9 * np.array([np.cos(2.0 * t + 0.4), np.sin(2.0 * t + 0.4)])
+                - here.translation[:2]
+            )
         },
         8.0,
         "constant",
@@ -224,8 +226,9 @@ TASKS: dict[str, TaskCase] = {
             )
         ],
         lambda start: {
-            "iiwa_link_ee": lambda t, here: swing(start.translation, OFF, t)
-            - here.translation
+            "iiwa_link_ee": lambda t, here: (
+                swing(start.translation, OFF, t) - here.translation
+            )
         },
         6.0,
         "mass matrix",
@@ -268,8 +271,9 @@ TASKS: dict[str, TaskCase] = {
             ),
         ],
         lambda start: {
-            "panda_tcp": lambda t, here: swing(start.translation, OFF, t)
-            - here.translation,
+            "panda_tcp": lambda t, here: (
+                swing(start.translation, OFF, t) - here.translation
+            ),
             "panda_tcp_pointing": lambda t, here: stereographic(
                 LEANT @ start.rotation, here.rotation[:, 2]
             ),
@@ -333,7 +337,7 @@ def test_proposition_1_the_error_is_critically_damped(which: str) -> None:
 
 @every_task
 def test_proposition_1_residual_of_the_error_equation(which: str) -> None:
-    """e'' + 2 ω e' + ω² e = 0 by differences of e, to their rounding, 1e-16/h² = 1e-10."""
+    """e'' + 2 ω e' + ω² e = 0 by differences of e, to rounding, 1e-16/h² = 1e-10."""
     _, rollout = tracked(which)
     w = TASKS[which].frequency
     for e in errors_of(which, rollout).values():
@@ -346,11 +350,16 @@ def test_proposition_1_residual_of_the_error_equation(which: str) -> None:
 
 @every_task
 def test_proposition_1_the_logged_acceleration(which: str) -> None:
-    """J a + J'v = a_x, with J and J' of plain Pinocchio, at every row; M a + N = tau."""
+    """J a + J'v = a_x, J and J' by plain Pinocchio, at every row; M a + N = tau."""
     controller, rollout = tracked(which)
     robot, case = controller.robot, TASKS[which]
     for i in range(0, len(rollout), 10):
-        t, q, v, a = rollout.t[i], rollout.q[i], rollout.v[i], rollout["acceleration"][i]
+        t, q, v, a = (
+            rollout.t[i],
+            rollout.q[i],
+            rollout.v[i],
+            rollout["acceleration"][i],
+        )
         state = robot.state(t, q, v)
         J, J_dot = plain(case.robot).jacobians(q, v, FRAMES[case.robot])
         answer = J @ a + J_dot @ v
@@ -370,7 +379,7 @@ def test_proposition_1_the_logged_acceleration(which: str) -> None:
         np.testing.assert_allclose(answered, a, rtol=0, atol=1e-11)
 
 
-# -- the null space ----------------------------------------------------------------------
+# --- the null space ------------------------------------------------------------------
 
 
 def moving(robot: Robot, name: str) -> NullSpaceField:
@@ -495,7 +504,7 @@ def test_proposition_2_there_was_something_to_prove(run: Run) -> None:
     rollout = self_motion(run)
     g = rollout["field.g"]
     assert np.abs(g - g[0]).max() > 0.1
-    e_N, W = null_space_errors(run, rollout)
+    e_N, _ = null_space_errors(run, rollout)
     moved = e_N[-1] - np.exp(-6.0 * DURATION) * e_N[0]  # a null space that did not turn
     if run.robot != "planar3r" or run.metric == "mass matrix":
         assert np.abs(moved).max() > 1e-4 * np.abs(e_N[0]).max()
@@ -512,7 +521,10 @@ def test_the_law_integrates_in_fourth_order(metric: str) -> None:
     robot, q0 = load("panda"), home("panda")
     start = plain("panda").placement(q0, "panda_tcp")
     task = FramePosition(
-        robot, "panda_tcp", circle_about(start.translation, OFF), Gains.from_frequency(7)
+        robot,
+        "panda_tcp",
+        circle_about(start.translation, OFF),
+        Gains.from_frequency(7),
     )
     field = moving(robot, "panda")
     controller = Controller(
@@ -541,7 +553,7 @@ def test_the_law_integrates_in_fourth_order(metric: str) -> None:
     assert order == pytest.approx(4.0, abs=0.2)
 
 
-# -- the minimum -------------------------------------------------------------------------
+# --- the minimum ---------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -564,9 +576,12 @@ def tip_by_hand(angles: Array) -> Array:
 
 def planar_cost(angles: Array) -> float:
     first = np.array([np.cos(angles[0]), np.sin(angles[0])])
-    second = first + [np.cos(angles[:2].sum()), np.sin(angles[:2].sum())]
+    absolute = angles[0] + angles[1]
+    second = first + np.array([np.cos(absolute), np.sin(absolute)])
     ball = np.array([0.3, 1.3])
-    away = 1.0 / ((first - ball) @ (first - ball)) + 1.0 / ((second - ball) @ (second - ball))
+    away = 1.0 / ((first - ball) @ (first - ball)) + 1.0 / (
+        (second - ball) @ (second - ball)
+    )
     return float(5.0 * (angles[2] - angles[1]) ** 2 + 0.5 * away)
 
 
@@ -589,14 +604,20 @@ HELD: dict[str, Held] = {
     "planar3r": Held(
         "planar3r",
         lambda robot, start: FramePosition(
-            robot, "tip", Hold(start.translation[:2]), Gains.from_frequency(10), axes="xy"
-        ),
-        lambda robot: EqualJointAngles(robot, ["joint2", "joint3"], weight=5.0)
-        + PointDistance(
             robot,
-            ["link2", "link3"],
-            Obstacle("ball", Sphere(0.1), Hold([0.3, 1.3, 0.0])),
-            weight=0.5,
+            "tip",
+            Hold(start.translation[:2]),
+            Gains.from_frequency(10),
+            axes="xy",
+        ),
+        lambda robot: (
+            EqualJointAngles(robot, ["joint2", "joint3"], weight=5.0)
+            + PointDistance(
+                robot,
+                ["link2", "link3"],
+                Obstacle("ball", Sphere(0.1), Hold([0.3, 1.3, 0.0])),
+                weight=0.5,
+            )
         ),
         planar_cost,
         tip_by_hand,
@@ -608,8 +629,9 @@ HELD: dict[str, Held] = {
         lambda robot, start: FramePosition(
             robot, "panda_tcp", Hold(start.translation), Gains.from_frequency(10)
         ),
-        lambda robot: 2.0 * JointCentering(robot)
-        + 3.0 * TargetPosture(robot, posture()),
+        lambda robot: (
+            2.0 * JointCentering(robot) + 3.0 * TargetPosture(robot, posture())
+        ),
         centering_and_posture,
         lambda q: plain("panda").placement(q, "panda_tcp").translation,
         1.0,
@@ -620,19 +642,24 @@ HELD: dict[str, Held] = {
         lambda robot, start: FramePose(
             robot, "panda_tcp", HoldPose(start), Gains.from_frequency(10)
         ),
-        lambda robot: 2.0 * JointCentering(robot)
-        + 3.0 * TargetPosture(robot, posture()),
+        lambda robot: (
+            2.0 * JointCentering(robot) + 3.0 * TargetPosture(robot, posture())
+        ),
         centering_and_posture,
-        lambda q: pin.log6(
-            plain("panda").placement(home("panda"), "panda_tcp").actInv(
-                plain("panda").placement(q, "panda_tcp")
-            )
-        ).vector,
+        lambda q: (
+            pin.log6(
+                plain("panda")
+                .placement(home("panda"), "panda_tcp")
+                .actInv(plain("panda").placement(q, "panda_tcp"))
+            ).vector
+        ),
         1.0,
         8.0,
     ),
 }
-HELD_RUNS = [(which, metric) for which in HELD for metric in ("identity", "mass matrix")]
+HELD_RUNS = [
+    (which, metric) for which in HELD for metric in ("identity", "mass matrix")
+]
 
 
 @cache
@@ -688,11 +715,15 @@ def test_proposition_3_q_converges_to_the_constrained_minimum(
     case, rollout = HELD[which], settled(which, metric)
     minimum = constrained_minimum(which)
     final = rollout["joint_positions"][-1]
-    assert np.abs(rollout["joint_positions"][0] - minimum).max() > 0.05  # it had to move
+    assert (
+        np.abs(rollout["joint_positions"][0] - minimum).max() > 0.05
+    )  # it had to move
     np.testing.assert_allclose(final, minimum, rtol=0, atol=1e-7)
     assert case.cost(final) <= case.cost(minimum) + 1e-10
     np.testing.assert_allclose(
-        case.constraint(final), case.constraint(rollout["joint_positions"][0]), atol=1e-9
+        case.constraint(final),
+        case.constraint(rollout["joint_positions"][0]),
+        atol=1e-9,
     )
     # Nothing moves any more.
     np.testing.assert_allclose(rollout.v[-1], 0.0, atol=1e-9)
@@ -712,7 +743,11 @@ def test_proposition_3_the_cost_falls(which: str, metric: str) -> None:
     np.testing.assert_allclose(rollout["field.value"], f, rtol=1e-12)
     predicted = []
     for q, v, g, e_N in zip(
-        rollout.q, rollout.v, rollout["field.g"], rollout["null_space_error"], strict=True
+        rollout.q,
+        rollout.v,
+        rollout["field.g"],
+        rollout["null_space_error"],
+        strict=True,
     ):
         W, J = W_of(case.robot, q), plain(case.robot).jacobians(q, v, frame)[0][:rows]
         across = np.linalg.solve(W, J.T)

@@ -70,7 +70,7 @@ def load(name: str, root: Any = None) -> Robot:
     return Robot.load(name, root=root)
 
 
-# -- what is known without the package ---------------------------------------------------
+# --- what is known without the package -----------------------------------------------
 
 # Eighth order, at -4 h ... 4 h.
 FIRST = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
@@ -162,7 +162,7 @@ def wobble(position: Array) -> Lissajous:
     return Lissajous(position - away, amplitudes, rates, phases)
 
 
-# -- the members -------------------------------------------------------------------------
+# --- the members ---------------------------------------------------------------------
 
 
 class Family:
@@ -286,7 +286,7 @@ class Pose(Orientation):
 
 @dataclass(frozen=True)
 class Direction(Family):
-    """Pointing; the reference stands still, tumbles, or spins about what it points at."""
+    """Pointing; the reference is still, tumbles, or spins about what it points at."""
 
     frame: str
     axis: tuple[float, float, float]
@@ -318,8 +318,8 @@ class Direction(Family):
         """Return the turn in the frame's own axes, along two fixed ones across."""
         R = motion.placement(0.0, self.frame).rotation
         across = rows_in_the_frame(task, motion)
-        return lambda s: across @ pin.log3(
-            R.T @ motion.placement(s, self.frame).rotation
+        return lambda s: (
+            across @ pin.log3(R.T @ motion.placement(s, self.frame).rotation)
         )
 
     def size(self, error: float) -> float:
@@ -554,7 +554,7 @@ def test_pointing_rows_are_fixed_in_the_frame(case: Case) -> None:
 
 
 def gains_of(kind: str, rows: int, seed: int) -> tuple[Gains, Array, Array]:
-    """Return gains and the matrices that they stand for; the matrix is not symmetric."""
+    """Return gains and what they stand for; the matrices are not symmetric."""
     rng = np.random.default_rng(seed)
     if kind == "scalar":
         return GAINS, 25.0 * np.eye(rows), 10.0 * np.eye(rows)
@@ -607,9 +607,7 @@ def test_the_law_of_the_error(case: Case, part: float, gains: str) -> None:
     e_ddot = motion.derivative(reported, SECOND)
     size = 1.0 + np.abs(e_dot).max() + np.abs(e).max()
     np.testing.assert_allclose(sample.error_rate, e_dot, rtol=0, atol=3e-10 * size)
-    np.testing.assert_allclose(
-        e_ddot, -Kv @ e_dot - Kp @ e, rtol=0, atol=5e-9 * size
-    )
+    np.testing.assert_allclose(e_ddot, -Kv @ e_dot - Kp @ e, rtol=0, atol=5e-9 * size)
 
 
 @every_task
@@ -667,7 +665,7 @@ def test_evaluate_writes_where_it_is_told_and_has_no_memory(case: Case) -> None:
         assert not np.shares_memory(kept, written)
 
 
-# -- near half a turn --------------------------------------------------------------------
+# --- near half a turn ----------------------------------------------------------------
 
 near_pi = st.one_of(
     st.floats(0.0, 2.0 * np.pi),
@@ -739,7 +737,7 @@ def test_pointing_through_the_antipode(angle: float, side: float, kind: str) -> 
     assert np.abs(sample.acceleration).max() < 1e4
 
 
-# -- errors ------------------------------------------------------------------------------
+# --- errors --------------------------------------------------------------------------
 
 
 def panda() -> Robot:
@@ -859,9 +857,7 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
         r"^configuration q has shape \(3,\); planar3r needs \(6,\) \(nq = 6, nv = 3\)$",
     ),
     "gains of another size": (
-        lambda: FramePosition(
-            panda(), "panda_tcp", Hold([0, 0, 0]), Gains([1, 2], 1)
-        ),
+        lambda: FramePosition(panda(), "panda_tcp", Hold([0, 0, 0]), Gains([1, 2], 1)),
         GainError,
         r"^kp has shape \(2,\); needs a number, 3 numbers or a 3 × 3 matrix$",
     ),
@@ -903,11 +899,15 @@ def test_arguments_are_copied() -> None:
     np.testing.assert_array_equal(task.Kp, np.diag([1.0, 2.0, 3.0]))
 
 
-# -- gains -------------------------------------------------------------------------------
+# --- gains ---------------------------------------------------------------------------
 
 
 def test_gains_in_three_forms() -> None:
-    for kp, kv in ((4.0, 5.0), ([4.0, 4.0], [5.0, 5.0]), (4 * np.eye(2), 5 * np.eye(2))):
+    for kp, kv in (
+        (4.0, 5.0),
+        ([4.0, 4.0], [5.0, 5.0]),
+        (4 * np.eye(2), 5 * np.eye(2)),
+    ):
         Kp, Kv = Gains(kp, kv).matrices(2)
         np.testing.assert_array_equal(Kp, 4.0 * np.eye(2))
         np.testing.assert_array_equal(Kv, 5.0 * np.eye(2))
@@ -961,7 +961,10 @@ GAIN_ERRORS: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: Gains(np.ones((2, 3)), 1.0),
         r"^kp has shape \(2, 3\); a matrix gain is square$",
     ),
-    "three axes": (lambda: Gains(np.ones((1, 1, 1)), 1.0), r"^kp has shape \(1, 1, 1\)"),
+    "three axes": (
+        lambda: Gains(np.ones((1, 1, 1)), 1.0),
+        r"^kp has shape \(1, 1, 1\)",
+    ),
     "empty": (lambda: Gains([], 1.0), r"^kp is empty; needs numbers$"),
     "words": (
         lambda: Gains("stiff", 1.0),

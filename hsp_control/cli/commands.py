@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from hsp_control.cli import robot_table
 from hsp_control.config import Experiment, json_schema, load_experiment
-from hsp_control.exceptions import ModelError, SimulationError
-from hsp_control.loading import example_robots, find_robot
-from hsp_control.resources import bundled_robots
+from hsp_control.exceptions import SimulationError
+from hsp_control.loading import example_robots
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 
@@ -99,24 +100,25 @@ def robots(options: argparse.Namespace) -> int:
     if options.name is not None:
         _describe(Robot.load(options.name))
         return 0
+    if options.markdown:
+        print(robot_table.markdown(), end="")
+        return 0
     table = Table(box=None, pad_edge=False)
     for heading in ("robot", "origin", "root"):
         table.add_column(heading)
     for heading in ("nq", "nv", "frames"):
         table.add_column(heading, justify="right")
-    table.add_column("end effector, or why not")
-    sources = {name: find_robot(name) for name in bundled_robots()}
-    sources |= {k: v for k, v in example_robots().items() if k not in sources}
-    for name, source in sources.items():
-        try:
-            robot = Robot.load(name)
-        except ModelError as error:
-            reason = str(error).removeprefix(f"{source.urdf}: ").split(",")[0]
-            table.add_row(name, source.origin, source.root, "-", "-", "-", reason)
-            continue
-        counts = (str(robot.nq), str(robot.nv), str(len(robot.frame_names)))
+    for heading in ("end effector", "position", "pose", "note"):
+        table.add_column(heading)
+    for row in robot_table.rows():
+        counts = (row.nq, row.nv, row.frames)
         table.add_row(
-            name, source.origin, source.root, *counts, source.end_effector or ""
+            *(row.name, row.origin, row.root),
+            *("-" if count is None else str(count) for count in counts),
+            row.end_effector or "-",
+            robot_table.task(row, row.position, 3),
+            robot_table.task(row, row.pose, 6),
+            escape(row.note.replace("`", "")),
         )
     _out.print(table)
     if not example_robots():

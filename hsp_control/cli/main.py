@@ -72,7 +72,9 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     robots = _command(commands, "robots", "list what can be loaded, or describe one")
-    robots.add_argument("name", nargs="?", metavar="ROBOT", help="a name or a URDF")
+    which = robots.add_mutually_exclusive_group()
+    which.add_argument("name", nargs="?", metavar="ROBOT", help="a name or a URDF")
+    which.add_argument("--markdown", action="store_true", help="print docs/robots.md")
 
     _command(commands, "schema", "print the JSON Schema of a configuration")
     return parser

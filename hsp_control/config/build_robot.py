@@ -11,7 +11,7 @@ from hsp_control.config.document import Document
 from hsp_control.config.keys import KeyPath
 from hsp_control.config.models import robot as s
 from hsp_control.config.scenario import Scenario
-from hsp_control.exceptions import ConfigError, ConfigurationError
+from hsp_control.exceptions import ConfigurationError
 from hsp_control.loading import ToolFrame
 from hsp_control.robot import Robot, RobotState
 
@@ -128,16 +128,12 @@ def _moved_joints(document: Document, robot: Robot, joints: dict[str, float]) ->
 def end_effector(
     document: Document, at: KeyPath, frame: str | None, robot: Robot
 ) -> str:
-    """Return the named frame, or the robot's end effector; it exists."""
+    """Return the named frame, which exists, or the robot's end effector."""
+    if frame is None:
+        return robot.end_effector
     with document.at(*at, "frame"):
-        name = frame or robot.source.end_effector
-        if name is None:
-            raise ConfigError(
-                f"name the frame: {robot.name} says of none that it is its end "
-                f"effector (its last is {robot.frame_names[-1]!r})"
-            )
-        robot.frame_id(name)
-    return name
+        robot.frame_id(frame)
+    return frame
 
 
 def posture(value: Any, start: RobotState) -> Array:

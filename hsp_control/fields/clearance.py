@@ -159,7 +159,7 @@ class SelfClearance(Clearance):
 def _moving(
     robot: Robot, shapes: Sequence[LinkShape], links: Sequence[str] | None, name: str
 ) -> list[int]:
-    known = {shape.link for shape in shapes}
+    known = tuple(dict.fromkeys(shape.link for shape in shapes))
     for link in links or ():
         if link not in known:
             raise FieldError(

@@ -57,11 +57,13 @@ class Manipulability(JacobianCost):
             )
         self.form = form
         self._W_inv = np.eye(robot.nv) if metric is None else _inverse(metric, robot.nv)
+        # More where the metric's numbers are small: it must stand above G's rounding.
+        self._floor = FLOOR**2 * max(1.0, 0.1 * float(np.trace(self._W_inv)) / robot.nv)
 
     def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
         """Return f, its slope and rate; for φ = ½ log det G the slope is G⁻¹JW⁻¹."""
         JW, JW_dot = J @ self._W_inv, J_dot @ self._W_inv
-        G = JW @ J.T + FLOOR**2 * np.eye(len(J))
+        G = JW @ J.T + self._floor * np.eye(len(J))
         G_dot = JW_dot @ J.T
         G_dot += G_dot.T
         G_inv = np.linalg.inv(G)

@@ -35,7 +35,8 @@ class Transmission(JacobianCost):
         Args:
             robot: The robot.
             frame: Name of the frame.
-            direction: u in the world, one number for each of the axes; normalised here.
+            direction: u in the world, one number for each of the axes in the order that
+                they are named in; normalised here.
             kind: ``velocity`` or ``force``.
             axes: World axes of the position rows.
             name: What the log calls it.
@@ -54,7 +55,7 @@ class Transmission(JacobianCost):
         if kind not in ("velocity", "force"):
             raise FieldError(f"field {name!r}: kind {kind!r}; choose velocity or force")
         self.kind = kind
-        self.direction: Array = u / np.linalg.norm(u)
+        self.direction: Array = u[np.argsort(list(axes))] / np.linalg.norm(u)
 
     def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
         """Return f, its slope and rate; both kinds are a power of one square s."""

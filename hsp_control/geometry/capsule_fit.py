@@ -22,7 +22,8 @@ def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
         (first end, second end, radius); the ends are equal for a ball.
     """
     center = points.mean(axis=0)
-    axes = np.linalg.svd(points - center, full_matrices=False)[2]
+    spread = points - center
+    axes = np.linalg.svd(spread.T @ spread)[2]  # three, however few the points
     candidates = []
     for k in range(len(axes)):
         frame = np.roll(axes, -k, axis=0)  # its first row is the axis tried

@@ -3,6 +3,7 @@
 import logging
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
+from weakref import WeakSet
 
 import coal
 import numpy as np
@@ -21,6 +22,7 @@ FALLBACK_RADIUS = 0.05
 """Radius of the capsules between joints where a robot has no geometry [m]."""
 
 _log = logging.getLogger(__name__)
+_warned: "WeakSet[Robot]" = WeakSet()
 
 
 @dataclass(frozen=True)
@@ -46,21 +48,25 @@ def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
     ``capsules``, the default, are 200 times faster than meshes and have exact, smooth
     gradients against rounded obstacles; ``spheres`` are beads along those capsules,
     smooth against everything convex; ``hulls`` and ``meshes`` are the robot's own
-    collision geometry. A robot without any gets capsules between its joints, and a
-    warning.
+    collision geometry. A robot without any gets capsules between its joints, and
+    one warning.
 
     Raises:
         ModelError: If a collision mesh cannot be read, or the proxy is unknown.
     """
     if proxy not in get_args(Proxy):
         raise ModelError(f"proxy {proxy!r}: choose among {', '.join(get_args(Proxy))}")
-    shapes = _collision_shapes(robot)
-    if not shapes:
+    own = {part.prefix: _collision_shapes(robot, part) for part in robot.parts}
+    bare = [part for part in robot.parts if not own[part.prefix]]
+    if bare and robot not in _warned:
+        _warned.add(robot)
         _log.warning(
             "%s has no collision geometry: using capsules of radius %g m between its "
-            "joints", robot.name, FALLBACK_RADIUS,
+            "joints", " and ".join(part.prefix + part.source.name for part in bare),
+            FALLBACK_RADIUS,
         )  # fmt: skip
-        shapes = _between_joints(robot)
+    own |= {part.prefix: _between_joints(robot, part) for part in bare}
+    shapes = [shape for of_part in own.values() for shape in of_part]
     if proxy == "meshes":
         return shapes
     if proxy == "hulls":
@@ -71,16 +77,18 @@ def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
     return [bead for capsule in capsules for bead in _beads(capsule)]
 
 
-def _collision_shapes(robot: Robot) -> list[LinkShape]:
+def part_of(robot: Robot, name: str) -> Part:
+    """Return which of a combined robot's parts a joint or a link belongs to."""
+    parts = [part for part in robot.parts if name.startswith(part.prefix)]
+    return max(parts, key=lambda part: len(part.prefix))
+
+
+def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
     """Read the URDF's collision geometry and hang it on the robot's own joints.
 
     The robot may have locked joints that the URDF has not: a shape is found again by
     the name of the frame that it is fixed to.
     """
-    return [shape for part in robot.parts for shape in _shapes_of_part(robot, part)]
-
-
-def _shapes_of_part(robot: Robot, part: Part) -> list[LinkShape]:
     source = part.source
     full = pin.buildModelFromUrdf(str(source.urdf), mimic=False)
     try:
@@ -110,16 +118,22 @@ def _shapes_of_part(robot: Robot, part: Part) -> list[LinkShape]:
     return shapes
 
 
-def _between_joints(robot: Robot) -> list[LinkShape]:
+def _between_joints(robot: Robot, part: Part) -> list[LinkShape]:
     model = robot.model
+    joints = [
+        i for i in range(1, model.njoints) if part_of(robot, model.names[i]) is part
+    ]
     shapes = []
-    for child in range(1, model.njoints):
+    for child in joints:
         parent, end = model.parents[child], model.jointPlacements[child].translation
-        if float(np.linalg.norm(end)) > 1e-6:
-            placement, length = _along(np.zeros(3), end)
+        # The world is no joint of the part's own: it goes by a name of the part's.
+        name = model.names[parent] if parent else f"{part.prefix}universe"
+        start = np.zeros(3) if parent else part.placement.translation
+        placement, length = _along(start, end)
+        if length > 1e-6:
             geometry = coal.Capsule(FALLBACK_RADIUS, length)
-            shapes.append(LinkShape(model.names[parent], parent, placement, geometry))
-    last = [i for i in range(1, model.njoints) if i not in list(model.parents)]
+            shapes.append(LinkShape(name, parent, placement, geometry))
+    last = [i for i in joints if i not in list(model.parents)]
     shapes.extend(
         LinkShape(model.names[i], i, pin.SE3.Identity(), coal.Sphere(FALLBACK_RADIUS))
         for i in last
@@ -190,7 +204,7 @@ def _beads(capsule: LinkShape) -> list[LinkShape]:
     if isinstance(capsule.geometry, coal.Sphere):
         return [capsule]
     radius, half = capsule.geometry.radius, capsule.geometry.halfLength
-    number = int(np.ceil(2.0 * half / radius)) + 1
+    number = max(int(np.ceil(2.0 * half / radius)), 1) + 1
     # Half-way between two balls the capsule's side stands out by this factor.
     gap = 2.0 * half / (number - 1)
     grown = float(np.hypot(radius, 0.5 * gap))

@@ -76,7 +76,7 @@ class Proximity:
             for k, (_, second) in enumerate(pairs)
             if second >= len(links) and obstacles[second - len(links)].shape.reversed
         ]
-        self._measured: tuple[int, int] | None = None
+        self._measured: tuple[RobotState, int] | None = None
         joints = [link.joint for link in links] + [0] * len(obstacles)
         support = {joint: joint_support(robot.model, joint) for joint in set(joints)}
         self._supports = [
@@ -86,7 +86,8 @@ class Proximity:
 
     def measure(self, state: RobotState) -> Array:
         """Return all distances at a state, computing them once."""
-        if self._measured == (id(state), state.stamp):
+        measured = self._measured  # the state itself: an id would be used again
+        if measured and measured[0] is state and measured[1] == state.stamp:
             return self.distances
         items = self._geometry.geometryObjects
         for index, obstacle in enumerate(self.obstacles, start=len(self.links)):
@@ -103,7 +104,7 @@ class Proximity:
         for k in self._reversed:
             self.first[k], self.second[k] = self.second[k].copy(), self.first[k].copy()
             self._normals[k] *= -1.0
-        self._measured = (id(state), state.stamp)
+        self._measured = (state, state.stamp)
         return self.distances
 
     def gradient(self, state: RobotState, slopes: Array) -> Array:

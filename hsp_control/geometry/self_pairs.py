@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
-from hsp_control.geometry.links import LinkShape
+from hsp_control.geometry.links import LinkShape, part_of
 from hsp_control.robot import Robot
 
 
@@ -38,12 +38,7 @@ def _neighbours(
     a, b = first.joint, second.joint
     if parents[a] != b and parents[b] != a:
         return False
-    return min(a, b) > 0 or _part(robot, first) == _part(robot, second)
-
-
-def _part(robot: Robot, shape: LinkShape) -> str:
-    prefixes = [p.prefix for p in robot.parts if shape.link.startswith(p.prefix)]
-    return max(prefixes, key=len)
+    return min(a, b) > 0 or part_of(robot, first.link) is part_of(robot, second.link)
 
 
 def _disabled(robot: Robot) -> set[frozenset[str]]:

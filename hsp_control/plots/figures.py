@@ -23,6 +23,8 @@ from hsp_control.plots.style import new_figure, styled
 from hsp_control.plots.task_errors import draw_task_errors
 from hsp_control.simulation import Rollout
 
+_HEADING = {"x": 0.01, "ha": "left", "fontsize": 10.0, "fontweight": "bold"}
+
 
 def paper_figure(
     rollout: Rollout,
@@ -108,9 +110,6 @@ def diagnostics_figure(rollout: Rollout) -> Figure:
             left_over.set_axis_off()
         _letter(axes, [title for _, title in panels])
     return figure
-
-
-_HEADING = {"x": 0.01, "ha": "left", "fontsize": 10.0, "fontweight": "bold"}
 
 
 def _letter(axes: list[Axes], titles: list[str]) -> None:

@@ -16,6 +16,9 @@ from hsp_control.plots.views import View, fit, view_of
 from hsp_control.plots.world import centers, everything, parents, task_paths
 from hsp_control.simulation import Rollout
 
+MOST_TICKS = 10
+"""More frames than that are not all named at the scale of time."""
+
 
 def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> None:
     """Draw the robot at one row, with obstacles there and the tasks' whole paths.
@@ -37,6 +40,7 @@ def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> N
         draw_body(axes, scene.view, body, row)
     draw_arm(axes, scene.view, skeleton, tree)
     scene.finish(axes, shadows=True, key=key)
+    axes.locator_params(nbins=3)  # a frame is small
     axes.set_title(
         f"t = {rollout.t[row]:.2f} s", fontsize=8.5, fontweight="normal", pad=3.0
     )
@@ -104,10 +108,6 @@ def columns_for(rollout: Rollout, count: int, width: float, height: float) -> in
         return filled * min(width / columns / w, height / rows / h)
 
     return max(range(1, count + 1), key=scale)
-
-
-MOST_TICKS = 10
-"""More frames than that are not all named at the scale of time."""
 
 
 class _Scene(NamedTuple):

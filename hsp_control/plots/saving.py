@@ -11,9 +11,6 @@ from hsp_control.plots.style import styled
 from hsp_control.simulation import Rollout
 from hsp_control.suggest import did_you_mean, listing
 
-_UNDATED = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
-"""The same log gives the same file, whenever it is drawn."""
-
 
 def save_figures(
     rollout: Rollout,
@@ -39,19 +36,11 @@ def save_figures(
     paths = []
     for name, draw in figures.items():
         figure = draw(rollout)
-        _settle(figure)
         for suffix in formats:
             path = Path(folder) / f"{stem}-{name}.{suffix}"
             _save(figure, path, suffix)
             paths.append(path)
     return paths
-
-
-def _settle(figure: Figure) -> None:
-    """Lay the figure out once, for all formats alike."""
-    with styled():
-        figure.draw_without_rendering()
-    figure.set_layout_engine("none")
 
 
 def _save(figure: Figure, path: Path, suffix: str) -> None:
@@ -64,7 +53,7 @@ def _save(figure: Figure, path: Path, suffix: str) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with styled():
-            figure.savefig(path, format=suffix, metadata=_UNDATED.get(suffix))
+            figure.savefig(path, format=suffix)
     except OSError as error:
         reason = error.strerror or str(error)
         raise PlotError(f"{path}: cannot write the picture: {reason}") from error

@@ -53,7 +53,6 @@ STYLE: dict[str, Any] = {
     "mathtext.fontset": "dejavusans",
     "pdf.fonttype": 42,  # TrueType, which journals ask for
     "savefig.dpi": 160,
-    "svg.hashsalt": "hsp_control",  # the same log gives the same file
     "text.color": palette.INK,
     "xtick.color": palette.MUTED,
     "xtick.labelcolor": palette.INK,

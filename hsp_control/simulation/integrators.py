@@ -12,14 +12,14 @@ import pinocchio as pin
 from scipy.integrate import DOP853
 
 from hsp_control.arrays import Array
-from hsp_control.exceptions import SimulationError
+from hsp_control.exceptions import HspControlError, SimulationError
 from hsp_control.robot import Robot
 
 Dynamics = Callable[[float, Array, Array], Array]
 """(t, q, v) ↦ v'."""
 
-LONGEST_FIRST_STEP = 0.02
-"""The longest step that `Dop853` tries without knowing the motion [s]."""
+Equation = Callable[[float, Array], Array]
+"""(t, y) ↦ y'."""
 
 CHART_RADIUS = 1.0
 """How far a root may turn [rad] before its chart is laid anew (singular at 2π)."""
@@ -49,7 +49,7 @@ class Chart:
         )
         return np.concatenate([np.linalg.solve(J_r, v), a])
 
-    def equation(self, dynamics: Dynamics) -> Callable[[float, Array], Array]:
+    def equation(self, dynamics: Dynamics) -> Equation:
         """Return the ordinary differential equation (t, y) ↦ y'."""
         return lambda t, y: self.rate(y, dynamics(t, *self.point(y)))
 
@@ -129,8 +129,9 @@ class SemiImplicitEuler:
 class Dop853:
     """Dormand and Prince's adaptive eighth-order method, SciPy's implementation.
 
-    It first tries to take an interval in one step, or 20 ms of it, which the tolerance
-    then judges: much longer trials can overflow before they are judged.
+    It first tries to take an interval in one step, which the tolerance then judges. A
+    trial that strays so far that the dynamics fail there is shortened, like any other
+    that misses the tolerance.
     """
 
     def __init__(self, rtol: float = 1e-9, atol: float = 1e-9) -> None:
@@ -148,29 +149,52 @@ class Dop853:
 
         Raises:
             SimulationError: If the tolerance cannot be met however small the step.
+            HspControlError: If the dynamics fail however small the step.
         """
         while t < end:
             chart = Chart(robot, q)
+            trial = _Trial(chart.equation(dynamics))
             solver = DOP853(
-                chart.equation(dynamics),
+                trial,
                 t,
                 np.concatenate([np.zeros(robot.nv), v]),
                 end,
-                first_step=min(end - t, LONGEST_FIRST_STEP),
+                first_step=end - t,
                 rtol=self.rtol,
                 atol=self.atol,
             )
             while solver.status == "running":
-                message = solver.step()
+                trial.failure = None
+                with np.errstate(over="ignore", invalid="ignore"):  # in rejected trials
+                    message = solver.step()
+                if isinstance(trial.failure, HspControlError) and message is not None:
+                    raise trial.failure
                 if message is not None:
                     raise SimulationError(
-                        f"the integrator gave up at t = {solver.t:.6g} s: {message}"
-                    )
+                        f"the integrator gave up at t = {solver.t:.6g} s: "
+                        f"{trial.failure or message}"
+                    ) from trial.failure
                 if chart.worn(solver.y):
                     break
             t = float(solver.t)
             q, v = chart.point(solver.y)
         return q, v
+
+
+class _Trial:
+    """An equation that is NaN where it fails, so that SciPy rejects the step."""
+
+    def __init__(self, equation: Equation) -> None:
+        self.equation = equation
+        self.failure: Exception | None = None
+
+    def __call__(self, t: float, y: Array) -> Array:
+        if np.isfinite(y).all():
+            try:
+                return self.equation(t, y)
+            except (HspControlError, ArithmeticError, np.linalg.LinAlgError) as failure:
+                self.failure = failure
+        return np.full(y.shape, np.nan)
 
 
 def _positive(value: float, name: str) -> float:

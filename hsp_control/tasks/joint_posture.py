@@ -45,8 +45,8 @@ class JointPosture(Task):
 
         Raises:
             JointNotFoundError: If a joint does not exist.
-            TaskError: If no joint is named, one twice, or one that has several freedoms
-                (a root: give it a pose task), or the displacement has another dimension.
+            TaskError: If no joint is named, one twice, or one of several freedoms (a
+                root: give it a pose task), or the displacement has another dimension.
             ShapeError: If the reference has the wrong shape.
         """
         self._reference = robot.check_configuration(reference).copy()

@@ -8,10 +8,12 @@ import pinocchio as pin
 from hsp_control.arrays import Array
 from hsp_control.robot import Robot
 from hsp_control.viewer.commands import Command, set_camera
+from hsp_control.viewer.stage import scene_size
 
 FIELD_OF_VIEW = 32.0
 """Height of the picture [deg]: a narrow one, in which straight arms look straight."""
-_MARGIN = 1.18
+_THICKNESS = 0.11
+"""Of what is about the points, over their distance from their middle."""
 _SLANT = np.array([1.0, -1.35, 0.62])
 _STEEP = np.cos(np.radians(30.0))
 _MOST_POINTS = 300
@@ -46,13 +48,13 @@ def look_at(
         stride = max(1, len(points) // _MOST_POINTS)
         view["direction"] = direction.tolist()
         view["points"] = points[::stride].tolist()
+        view["radius"] = _THICKNESS * scene_size(points)
     steep = abs(direction[2]) > _STEEP * np.linalg.norm(direction)
     return set_camera(
         **view,
         target=center.tolist(),
         up=[0.0, 1.0, 0.0] if steep else [0.0, 0.0, 1.0],
         field_of_view=FIELD_OF_VIEW,
-        margin=_MARGIN,
     )
 
 

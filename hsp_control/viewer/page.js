@@ -29,8 +29,8 @@ function set_object(command) {
 // Pinocchio's z is up, three.js's y.
 function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
 
-// Look at a target, from an eye or, along a direction, from where all the points are seen.
-function camera({target, eye, direction, up, points, field_of_view, margin}) {
+// Look at a target, from an eye or, along a direction, from where all balls are seen.
+function camera({target, eye, direction, up, points, radius, field_of_view}) {
   const center = vector(target);
   const toEye = vector(eye ?? direction);
   if (eye) toEye.sub(center);
@@ -42,8 +42,8 @@ function camera({target, eye, direction, up, points, field_of_view, margin}) {
   const above = toEye.clone().cross(right);
   const needed = (point) => {
     const offset = vector(point).sub(center);
-    const across = Math.max(Math.abs(offset.dot(right)) / wide, Math.abs(offset.dot(above)) / tall);
-    return offset.dot(toEye) + margin * across;
+    const x = Math.abs(offset.dot(right)) + radius, y = Math.abs(offset.dot(above)) + radius;
+    return offset.dot(toEye) + Math.max(x / wide, y / tall);
   };
   const away = distance || Math.max(...points.map(needed));
   const lens = viewer.camera;
@@ -94,7 +94,10 @@ function connect(again = false) {
   socket.binaryType = "arraybuffer";
   viewer.connection = socket;
   socket.onopen = () => { if (again) location.reload(); };
-  socket.onmessage = ({data}) => viewer.handle_command_bytearray(new Uint8Array(data));
+  socket.onmessage = ({data}) => {
+    viewer.handle_command_bytearray(new Uint8Array(data));
+    socket.send("taken");  // only then comes the next: nothing out of date waits in between
+  };
   socket.onclose = () => {
     document.getElementById("lost").hidden = false;
     setTimeout(connect, 1000, true);

@@ -24,6 +24,7 @@ from hsp_control.viewer.records import ASK, DELETE, Decoder, Record
 
 ADDRESS = "127.0.0.1"
 PORTS = (*range(7000, 7100), 0)  # 0: any that is free
+TAKEN = "taken"  # what a page answers to each message
 
 _LOOPBACK_NAMES = {"127.0.0.1", "localhost"}
 _LARGEST_MESSAGE = 1_000_000  # bytes; what moves the robot is far below
@@ -85,6 +86,7 @@ class Page(WebSocketHandler):
         self.mail = Kept()
         self.news = asyncio.Event()
         self.answered = self._asked = 0
+        self._ready = asyncio.Event()
 
     def open(self, *args: str, **kwargs: str) -> None:
         """Send the page the whole scene, and from then on what changes."""
@@ -94,8 +96,11 @@ class Page(WebSocketHandler):
         self._delivery = asyncio.create_task(self._deliver())
 
     def on_message(self, message: str | bytes) -> None:
-        """Note up to where the page has come."""
-        self.answered = max(self.answered, int(message))
+        """Note that the page has taken a message, or up to where it shows all."""
+        if message == TAKEN:
+            self._ready.set()
+        else:
+            self.answered = max(self.answered, int(message))
 
     def on_close(self) -> None:
         """Forget the page."""
@@ -116,10 +121,12 @@ class Page(WebSocketHandler):
             await self.news.wait()
             self.news.clear()
             for message in _messages(self.mail.take()):
+                self._ready.clear()
                 try:
                     await self.write_message(message, binary=True)
                 except WebSocketClosedError:
                     return
+                await self._ready.wait()  # meanwhile, what is newer replaces the mail
 
 
 class File(RequestHandler):
@@ -152,10 +159,8 @@ def main(meshcat: str, port: int, parent: int) -> NoReturn:
         port: The port to listen on, or 0 for a free one.
         parent: The parent's process id.
     """
-    try:
-        asyncio.run(_serve(Path(meshcat), port, parent))
-    finally:
-        os._exit(0)
+    asyncio.run(_serve(Path(meshcat), port, parent))
+    os._exit(0)
 
 
 async def _serve(meshcat: Path, port: int, parent: int) -> None:

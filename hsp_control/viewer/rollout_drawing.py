@@ -132,9 +132,7 @@ def _marker(target: Target, radius: float) -> Json:
     arrows = []
     for axis, color in zip(np.eye(3), AXES, strict=True):
         body = threejs.arrow(40.0 * radius, 1.5 * radius)
-        arrows.append(
-            threejs.mesh(body, threejs.material(color), along(axis))
-        )
+        arrows.append(threejs.mesh(body, threejs.material(color), along(axis)))
     return threejs.group(arrows)
 
 

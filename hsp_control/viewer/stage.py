@@ -57,8 +57,8 @@ def scene_size(points: Array) -> float:
 
 
 def _lights(center: Array, size: float) -> Iterator[Command]:
-    sky = threejs.light("HemisphereLight", 0.6, groundColor=0xD5DCE2)
-    fill = threejs.light("DirectionalLight", 0.15)
+    sky = threejs.light("HemisphereLight", 0.57, groundColor=0xD5DCE2)
+    fill = threejs.light("DirectionalLight", 0.14)
     back = np.array([-_LIGHT_FROM[0], 1.2 * abs(_LIGHT_FROM[1]), 0.6])
     yield set_object("/lights/sky", threejs.group([sky]))
     yield set_object("/lights/fill", threejs.group([fill]))
@@ -68,7 +68,7 @@ def _lights(center: Array, size: float) -> Iterator[Command]:
     distance = 4.0 * around
     key = threejs.light(
         "DirectionalLight",
-        0.5,
+        0.44,
         castShadow=True,
         shadow={
             "radius": 3.0,

@@ -12,7 +12,7 @@ from hsp_control.viewer.appearance import JOINT, LINK
 from hsp_control.viewer.commands import Json
 from hsp_control.viewer.poses import along
 
-_THICKNESS = 0.028
+_THICKNESS = 0.034
 """A link's radius at the base, over the robot's reach."""
 _TAPER = 0.55
 """What is left of it at the hand."""
@@ -26,8 +26,8 @@ def stand_in(robot: Robot, joint: int) -> Json | None:
         joint: The joint's index; 0 is what stands still.
     """
     radius = _radius(robot, joint)
-    surface = threejs.material(LINK)
-    things = [] if joint == 0 else [_drum(robot, joint, radius)]
+    surface = threejs.material(LINK, glow=0.25)
+    things = [_drum(robot, joint, radius)] if joint else _feet(robot, radius)
     for start, end, end_radius in _links(robot, joint):
         length = float(np.linalg.norm(end - start))
         if length > radius:
@@ -61,6 +61,19 @@ def _base(robot: Robot, joint: str) -> Array:
     part = next(part for part in robot.parts if joint.startswith(part.prefix))
     place: Array = part.placement.translation
     return place
+
+
+def _feet(robot: Robot, radius: float) -> list[Json]:
+    """Return the plates that fixed robots stand on."""
+    surface = threejs.material(JOINT)
+    plate = [2.2 * radius, 0.4 * radius, 0.15 * radius]
+    return [
+        threejs.mesh(
+            threejs.rounded_cylinder(*plate), surface, part.placement.homogeneous
+        )
+        for part in robot.parts
+        if part.source.root == "fixed"
+    ]
 
 
 def _drum(robot: Robot, joint: int, radius: float) -> Json:

@@ -23,13 +23,14 @@ def material(
     Args:
         color: ``#RRGGBB``, or red, green and blue from 0 to 1.
         opacity: 1 solid, 0 invisible.
-        glow: Its share of its colour that needs no light, from 0 to 1.
+        glow: The share of its colour that needs no light, from 0 to 1; the rest does.
     """
     number = color_number(color)
+    lit = color_number([(1.0 - glow) * (number >> k & 255) / 255 for k in (16, 8, 0)])
     surface: Json = {
         "uuid": unique_name(),
         "type": "MeshStandardMaterial",
-        "color": number,
+        "color": lit,
         "roughness": 0.55,
         "metalness": 0.0,
         "emissive": number,

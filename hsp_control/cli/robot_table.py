@@ -1,0 +1,199 @@
+"""Every robot that is known, and what it can serve: the table of ``hsp robots``."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hsp_control.exceptions import ModelError
+from hsp_control.loading import (
+    RobotSource,
+    example_robots,
+    examples_without_urdf,
+    find_robot,
+)
+from hsp_control.resources import bundled_robots
+from hsp_control.robot import Robot
+from hsp_control.suggest import listing
+
+_BRAVO = {"bravo_finger1_joint": 0.0, "bravo_finger2_joint": 0.0}
+_ROMEO = {
+    f"{side}{part}": 0.0
+    for side in "LR"
+    for part in (
+        *("Hand", "Finger12", "Finger13", "Finger21", "Finger22", "Finger23"),
+        *("Finger31", "Finger32", "Finger33", "Thumb1", "Thumb2", "Thumb3"),
+    )
+}
+REMEDIES: dict[str, dict[str, Any]] = {
+    "alex_psyonic_hands": {"mimic": False},
+    "bluevolta_bravo7_gripper": {"locked": _BRAVO},
+    "bravo7_gripper": {"locked": _BRAVO},
+    "falcon_bravo7_gripper": {"locked": _BRAVO},
+    "icub": {"locked": {"neck_yaw": 0.0}},
+    "romeo": {"mimic": False, "locked": _ROMEO},
+    "talos_full": {"mimic": False},
+    "talos_full_box": {"mimic": False},
+}
+"""Options of `Robot.load` for robots that do not load, or cannot move, without."""
+
+REMARKS = {
+    "icub": "no mass moves with neck_yaw at its home",
+    "talos_legs": "the URDF is the whole robot's",
+    "ur3": "the URDF is a UR5's",
+}
+"""What one would not expect."""
+
+FLOATING = "floating base: needs contacts"
+NO_URDF = "has no URDF (only SDF, which is not read)"
+_PREFACE = """\
+# Robots
+
+What `Robot.load` finds by name, as `hsp robots` prints it and `hsp robots --markdown`
+writes it. Any other robot loads by the path of its URDF.
+
+The end effector is the frame that the robot's source names, or else the likeliest by
+its tree of joints (`Robot.end_effector`). *Position* and *pose* give the rank of these
+tasks there, and how many of the joints that move the end effector remain for
+self-motion: 3 + 4 for an arm of seven. Every robot with a number there is driven in
+`tests/test_every_robot.py`. Those with a floating base, which needs contacts, are
+driven there with `root: fixed`.
+"""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A robot as the table shows it.
+
+    Attributes:
+        name: Its name.
+        origin: ``bundled`` or ``example-robot-data``.
+        root: How it stands in the world.
+        nq: Numbers in a configuration; None where it does not load.
+        nv: Freedoms.
+        frames: Frames.
+        end_effector: The frame of its hand.
+        joints: How many freedoms move the hand's frame.
+        position: How many of the three rows of a position task are independent.
+        pose: How many of the six rows of a pose task are.
+        note: What one must know, or why it cannot serve.
+    """
+
+    name: str
+    origin: str
+    root: str
+    nq: int | None = None
+    nv: int | None = None
+    frames: int | None = None
+    end_effector: str = ""
+    joints: int = 0
+    position: int = 0
+    pose: int = 0
+    note: str = ""
+
+    @property
+    def serves(self) -> bool:
+        """Whether the controller can drive it as it is loaded."""
+        return self.nv is not None and self.root != "free_flyer"
+
+
+def rows() -> Iterator[Row]:
+    """Describe every robot: the bundled ones, those that serve, those that do not."""
+    sources = {name: find_robot(name) for name in bundled_robots()}
+    sources |= {k: v for k, v in example_robots().items() if k not in sources}
+    for floating in (False, True):
+        for name, source in sources.items():
+            if (source.root == "free_flyer") == floating:
+                yield _row(name, source)
+    for name in examples_without_urdf():
+        yield Row(name, "example-robot-data", "-", note=NO_URDF)
+
+
+def markdown() -> str:
+    """Return the table as the document ``docs/robots.md``."""
+    headings = (
+        *("robot", "root", "nq", "nv", "end effector"),
+        *("joints to it", "position", "pose", "note"),
+    )
+    lines = [
+        *_PREFACE.splitlines(),
+        "",
+        f"| {' | '.join(headings)} |",
+        "|---|---|--:|--:|---|--:|---|---|---|",
+    ]
+    for row in rows():
+        cells = (
+            row.name + (" (bundled)" if row.origin == "bundled" else ""),
+            *(row.root.replace("_", "-"), _number(row.nq), _number(row.nv)),
+            f"`{row.end_effector}`" if row.end_effector else "-",
+            _number(row.joints or None),
+            *(task(row, row.position, 3), task(row, row.pose, 6), row.note),
+        )
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def task(row: Row, rank: int, full: int) -> str:
+    """Return rank and redundancy of a task, such as ``3 + 4``; ``-`` where it cannot.
+
+    A position task may leave axes out, so any rank serves; a pose task may not.
+    """
+    if rank == 0 or (full == 6 and rank < full):
+        return "-"
+    return f"{rank} + {row.joints - rank}"
+
+
+def _row(name: str, source: RobotSource) -> Row:
+    notes = [REMARKS[name]] if name in REMARKS else []
+    if source.root == "free_flyer":
+        notes.insert(0, FLOATING)
+    try:
+        robot = Robot.load(name)
+    except ModelError as error:
+        reason = str(error).removeprefix(f"{source.urdf}: ")
+        reason = reason.removeprefix("not a robot that can be built: ")
+        notes.append(reason.split("; ")[0].split(", so that")[0])
+        if name not in REMEDIES:
+            return Row(name, source.origin, source.root, note="; ".join(notes))
+    if name in REMEDIES:
+        notes.append(f"load it with {_options(name)}")
+        robot = Robot.load(name, **REMEDIES[name])
+    found: dict[str, Any] = {"end_effector": robot.end_effector}
+    if source.root != "free_flyer":
+        found |= abilities(robot)
+    return Row(
+        *(name, source.origin, source.root),
+        *(robot.nq, robot.nv, len(robot.frame_names)),
+        note="; ".join(notes),
+        **found,
+    )
+
+
+def _options(name: str) -> str:
+    """Return the remedy as a configuration has it."""
+    options = []
+    for key, value in REMEDIES[name].items():
+        if key == "locked":
+            locks = [f"{joint}: {position:g}" for joint, position in value.items()]
+            options.append(f"`locked: {{{listing(locks, limit=3)}}}`")
+        else:
+            options.append(f"`{key}: {str(value).lower()}`")
+    return " and ".join(options)
+
+
+def abilities(robot: Robot) -> dict[str, int]:
+    """Return how many joints move the end effector and the ranks of its Jacobian."""
+    # Anywhere, for limits may be missing: chance does not make it singular.
+    spread = np.random.default_rng(0).uniform(-1.0, 1.0, robot.nv)
+    q = robot.integrate(robot.home(), spread)
+    J = robot.state(0.0, q, np.zeros(robot.nv)).frame(robot.end_effector).jacobian
+    return {
+        "joints": int((np.abs(J) > 1e-9).any(axis=0).sum()),
+        "position": int(np.linalg.matrix_rank(J[:3], tol=1e-6)),
+        "pose": int(np.linalg.matrix_rank(J, tol=1e-6)),
+    }
+
+
+def _number(value: int | None) -> str:
+    return "-" if value is None else str(value)
