@@ -22,6 +22,7 @@ class ConfigurationSpace:
         joints: The joints that have freedoms, by name, in the order of velocities.
         joint_names: Their names.
         freedom_names: A name for each freedom, ``root_joint.x`` where a joint has many.
+        units: The unit of each freedom, ``rad`` or ``m``.
         unit_blocks: (start, size) of every quaternion and (cos, sin) pair in q.
         flat: Whether every joint has one freedom, so that δ' = v holds globally.
         mimics: Whether some joints follow others.
@@ -38,6 +39,7 @@ class ConfigurationSpace:
         self.joints = moving_joints(model)
         self.joint_names: tuple[str, ...] = tuple(self.joints)
         self.freedom_names: tuple[str, ...] = _freedom_names(self.joints)
+        self.units: tuple[str, ...] = _units(self.joints)
         self.unit_blocks: tuple[tuple[int, int], ...] = _unit_blocks(self.joints)
         self.flat: bool = all(joint.nv == 1 for joint in self.joints.values())
         self.mimics: bool = model.nvExtended != model.nv
@@ -141,6 +143,18 @@ class ConfigurationSpace:
             NonFiniteError: If it holds a NaN or an infinity.
         """
         return _check_vector(vector, self.nv, what, self)
+
+
+def _units(joints: Mapping[str, Any]) -> tuple[str, ...]:
+    roots = {3: ("m", "m", "rad"), 6: ("m", "m", "m", "rad", "rad", "rad")}
+    units: list[str] = []
+    for joint in joints.values():
+        prismatic = joint.shortname().startswith(
+            ("JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismatic")
+        )
+        single = ("m",) if prismatic else ("rad",)
+        units.extend(roots.get(joint.nv, single * joint.nv))
+    return tuple(units)
 
 
 def _unit_blocks(joints: Mapping[str, Any]) -> tuple[tuple[int, int], ...]:

@@ -92,3 +92,7 @@ class ConfigError(HspControlError, ValueError):
 
 class ViewerError(HspControlError, RuntimeError):
     """A 3-D view that cannot be opened, or that is gone."""
+
+
+class PlotError(HspControlError, ValueError):
+    """A log that cannot be drawn, or a picture that cannot be written."""

@@ -27,7 +27,7 @@ def test_run_leaves_a_log_that_numpy_alone_reads(
         assert columns["t"].shape == (11,)
         meta = json.loads(str(columns["meta"]))
     assert meta["config"]["simulation"]["duration"] == 0.1
-    assert meta["columns"]["tau"]["unit"] == "N·m or N"
+    assert meta["columns"]["tau"]["unit"] == "N·m"
 
 
 def test_plot_draws_beside_the_log(

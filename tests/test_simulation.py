@@ -645,6 +645,14 @@ def test_starts_that_are_none(q0: Any, v0: Any, kind: Any, message: str) -> None
 # --- what is kept --------------------------------------------------------------------
 
 
+def simulate_until_interrupted(*arguments: Any, **options: Any) -> Rollout:
+    """Simulate; a Ctrl-C that gets through fails the test, not the session."""
+    try:
+        return simulate(*arguments, **options)
+    except KeyboardInterrupt:
+        pytest.fail("the Ctrl-C got through")
+
+
 @pytest.mark.parametrize("row", [0, 1, 17, 50])
 def test_ctrl_c_keeps_what_was_computed(row: int, planar_run: Rollout) -> None:
     """Interrupted at row k: k + 1 rows, the same as the whole run's."""
@@ -653,7 +661,7 @@ def test_ctrl_c_keeps_what_was_computed(row: int, planar_run: Rollout) -> None:
         if round(fraction * 50) == row:
             raise KeyboardInterrupt
 
-    run = simulate(
+    run = simulate_until_interrupted(
         planar_controller(),
         planar_start(),
         duration=0.5,
@@ -683,7 +691,7 @@ def test_ctrl_c_in_the_middle_of_a_row(
     controller = Controller(robot, planar_controller().tasks, field)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        run = simulate(
+        run = simulate_until_interrupted(
             controller, planar_start(), duration=0.5, control_period=control_period
         )
     finally:
@@ -706,7 +714,7 @@ def test_ctrl_c_before_the_first_row() -> None:
     field = FunctionField(robot, pressed)
     controller = Controller(robot, planar_controller().tasks, field)
     built.append(True)
-    run = simulate(controller, planar_start(), duration=0.5)
+    run = simulate_until_interrupted(controller, planar_start(), duration=0.5)
     assert run.status == "interrupted"
     assert len(run) == 0
     assert repr(run) == "Rollout(0 rows, empty, interrupted)"

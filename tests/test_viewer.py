@@ -12,8 +12,11 @@ import threading
 import time
 import urllib.error
 import urllib.request
+import webbrowser
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 from dataclasses import replace
+from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +24,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import umsgpack
-from tornado.httpclient import HTTPClientError, HTTPRequest
-from tornado.websocket import websocket_connect
+from tornado.websocket import WebSocketClosedError, websocket_connect
 
 from hsp_control import Obstacle, Robot, Rollout, Scene, load_experiment
 from hsp_control.exceptions import ViewerError
@@ -524,32 +526,44 @@ time.sleep(60)
 """
 
 
+ENDS = {
+    "exit": None,
+    "terminate": signal.SIGTERM,
+    "hang up": signal.SIGHUP,
+    "crash": signal.SIGSEGV,
+    "kill": signal.SIGKILL,
+    "fork": signal.SIGKILL,
+}
+
+
 @LINUX
 def test_it_ends_with_its_parent_however_that_ends() -> None:
-    ends = {"exit": 0, "kill": signal.SIGKILL, "term": signal.SIGTERM,
-            "crash": signal.SIGSEGV, "hangup": signal.SIGHUP,
-            "fork": signal.SIGKILL}  # fmt: skip
-    parents = {
-        end: subprocess.Popen(
-            [sys.executable, "-c", PARENT, end],
-            stdout=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
-        for end in ends
-    }
-    for end, parent in parents.items():
-        with parent:
+    with ExitStack() as stack:
+        parents = []
+        for end in ENDS:  # side by side: each imports Pinocchio first
+            command = [sys.executable, "-c", PARENT, end]
+            parent = subprocess.Popen(
+                command, stdout=subprocess.PIPE, text=True, start_new_session=True
+            )
+            stack.enter_context(parent)
+            stack.callback(end_group, parent.pid)
+            parents.append(parent)
+        for parent, sign in zip(parents, ENDS.values(), strict=True):
             assert parent.stdout is not None
             pid, url = parent.stdout.readline().split()
-            if ends[end]:
+            if sign is not None:
                 assert answers(port_of(url))
-                parent.send_signal(ends[end])
+                parent.send_signal(sign)
             parent.wait(10)
-            assert wait_until(lambda: gone(int(pid)))  # noqa: B023
-            assert not answers(port_of(url))
-            if end == "fork":
-                os.killpg(parent.pid, signal.SIGKILL)
+            deadline = time.monotonic() + 8.0
+            while not gone(int(pid)) and time.monotonic() < deadline:
+                time.sleep(0.05)
+            assert gone(int(pid))
+
+
+def end_group(leader: int) -> None:
+    with suppress(ProcessLookupError):
+        os.killpg(leader, signal.SIGKILL)
 
 
 def test_two_viewers_have_two_addresses(started: Server) -> None:
@@ -567,12 +581,19 @@ def test_two_viewers_have_two_addresses(started: Server) -> None:
         other.close()
 
 
-def test_without_a_browser_nothing_waits(arm: Robot, run: Rollout) -> None:
+@LINUX
+def test_without_a_browser_nothing_waits(
+    arm: Robot, run: Rollout, monkeypatch: pytest.MonkeyPatch
+) -> None:
     begin = time.monotonic()
     announced: list[str] = []
     view = {**(run.config or {}), "view": {"speed": 50.0}}
     fast = Rollout(run.columns, {**run.meta, "config": view})
-    with view_rollout(arm, fast, announce=announced.append) as viewer:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    with view_rollout(
+        arm, fast, announce=announced.append, open_browser=True
+    ) as viewer:
         assert announced == [viewer.url]
         for _ in range(5000):  # more than any pipe holds
             viewer.show(arm.home())
@@ -615,13 +636,18 @@ class Page(threading.Thread):
 
     async def look(self) -> None:
         page = await websocket_connect(self.url.replace("http", "ws") + "scene")
-        while (message := await page.read_message()) is not None:
-            for command in umsgpack.unpackb(message):
-                self.commands.append(command)
-                if command["type"] == "ask":
-                    await page.write_message(str(command["number"]))
-            await asyncio.sleep(self.pause)
-            await page.write_message("taken")
+        try:
+            while (message := await page.read_message()) is not None:
+                for command in umsgpack.unpackb(message):
+                    self.commands.append(command)
+                    if command["type"] == "ask":
+                        await page.write_message(str(command["number"]))
+                await asyncio.sleep(self.pause)
+                await page.write_message("taken")
+        except WebSocketClosedError:
+            pass
+        finally:
+            page.close()
 
     def last(self, kind: str, path: str) -> dict[str, Any]:
         return next(
@@ -654,6 +680,8 @@ def test_a_page_that_opens_late_sees_everything(arm: Robot, run: Rollout) -> Non
         ]
         paths = [command.get("path", "") for command in second.commands]
         assert not any(path.startswith("/tasks") for path in paths)
+    first.join(5.0)
+    second.join(5.0)
 
 
 def test_a_slow_page_skips_what_is_out_of_date(arm: Robot) -> None:
@@ -663,13 +691,13 @@ def test_a_slow_page_skips_what_is_out_of_date(arm: Robot) -> None:
         assert viewer.wait_for_browser(8.0)
         before = len(page.commands)
         q = arm.home()
-        for angle in np.linspace(0.0, 1.0, 3000):
+        for angle in np.linspace(0.0, 1.0, 400):
             q = arm.integrate(arm.neutral(), np.full(3, angle))
             viewer.show(q)
-            time.sleep(1e-4)
+            time.sleep(1e-3)
         assert viewer.wait_for_browser(8.0)
         moves = [c for c in page.commands[before:] if c["type"] == "set_transform"]
-        assert len(moves) < 3 * 300
+        assert len(moves) < 3 * 100  # of 400 moves of three joints
         last = page.last("set_transform", "/robot/joint1")["matrix"]
         expected = arm.state(0.0, q, np.zeros(3)).data.oMi[1].homogeneous
         np.testing.assert_array_equal(
@@ -693,13 +721,18 @@ def test_its_files_are_for_this_machine_alone(started: Server) -> None:
         refused.value.close()
         assert refused.value.code == (403 if headers else 404)
 
-    async def from_elsewhere() -> None:
-        address = f"ws://127.0.0.1:{port_of(started.url)}/scene"
-        origin = {"Origin": "http://evil.example"}
-        await websocket_connect(HTTPRequest(address, headers=origin))
-
-    with pytest.raises(HTTPClientError, match="403"):
-        asyncio.run(from_elsewhere())
+    handshake = {
+        "Upgrade": "websocket",
+        "Connection": "Upgrade",
+        "Sec-WebSocket-Version": "13",
+        "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+    }
+    for origin, status in (("http://evil.example", 403), (started.url[:-1], 101)):
+        connection = HTTPConnection("127.0.0.1", port_of(started.url))
+        connection.request("GET", "/scene", headers={**handshake, "Origin": origin})
+        with connection.getresponse() as answer:
+            assert answer.status == status
+        connection.close()
 
 
 def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -719,22 +752,26 @@ def test_a_server_that_cannot_start_says_why(
         Server()
 
 
-def test_without_a_display_no_browser_is_tried(
+def test_a_browser_is_opened_only_where_there_is_one(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    opened: list[str] = []
-    monkeypatch.setattr(
-        browser.webbrowser, "open", lambda url, new: opened.append(url) or False
-    )
+    url, opened = "http://127.0.0.1:7000/", threading.Event()
+    monkeypatch.setattr(browser.webbrowser, "open", lambda url, new: opened.set())
+    monkeypatch.setattr(browser.sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(browser.sys, "platform", "linux")
-    browser.open_browser("http://127.0.0.1:7000/")
-    assert opened == []
-    assert "no display to open a browser on" in caplog.text
+    assert not browser.open_browser(url)
+    assert f"no display to open a browser on; the view is at {url}" in caplog.text
     monkeypatch.setenv("DISPLAY", ":0")
-    browser.open_browser("http://127.0.0.1:7000/")
-    assert wait_until(lambda: "no browser could be opened" in caplog.text)
+    terminal = webbrowser.GenericBrowser("w3m")
+    monkeypatch.setattr(browser.webbrowser, "get", lambda: terminal)
+    assert not browser.open_browser(url)
+    assert "w3m would take over the terminal" in caplog.text
+    assert not opened.is_set()
+    graphical = webbrowser.BackgroundBrowser("firefox")
+    monkeypatch.setattr(browser.webbrowser, "get", lambda: graphical)
+    assert browser.open_browser(url)
+    assert opened.wait(5.0)
 
 
 # -- its parts ------------------------------------------------------------------------

@@ -89,7 +89,11 @@ def plot(options: argparse.Namespace) -> int:
     rollout = Rollout.load(options.log)
     folder = options.out or options.log.parent
     for file in save_figures(
-        rollout, folder, options.log.stem, formats=tuple(options.formats or ["png"])
+        rollout,
+        folder,
+        options.log.stem,
+        formats=options.formats or ["png"],
+        absolute=not options.relative,
     ):
         _out.print(f"Figure: {file}")
     return 0

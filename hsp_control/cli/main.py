@@ -71,6 +71,12 @@ def _parser() -> argparse.ArgumentParser:
         help="may be given more than once; default: png",
     )
 
+    plot.add_argument(
+        "--relative",
+        action="store_true",
+        help="draw joint angles, not absolute ones, where the robot has both",
+    )
+
     robots = _command(commands, "robots", "list what can be loaded, or describe one")
     which = robots.add_mutually_exclusive_group()
     which.add_argument("name", nargs="?", metavar="ROBOT", help="a name or a URDF")

@@ -11,9 +11,7 @@ contact and beyond."""
 
 
 @kernel
-def barrier(
-    distances: Array, influence: float, slopes: Array, bends: Array
-) -> float:
+def barrier(distances: Array, influence: float, slopes: Array, bends: Array) -> float:
     """Return Σ b(d_k), write b' and b'': b = -(1 - s)² ln s with s = d/influence.
 
     Twice continuously differentiable: zero for s ≥ 1, infinite towards s = 0 but for

@@ -91,9 +91,7 @@ class WeightedSum(NullSpaceField):
         samples: What each term contributed at the last `evaluate`, weighted.
     """
 
-    def __init__(
-        self, terms: Sequence[tuple[Weight | float, NullSpaceField]]
-    ) -> None:
+    def __init__(self, terms: Sequence[tuple[Weight | float, NullSpaceField]]) -> None:
         """Add fields of one robot.
 
         Raises:

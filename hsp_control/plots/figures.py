@@ -6,8 +6,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hsp_control import palette
+from hsp_control.exceptions import PlotError
 from hsp_control.plots.conditioning import draw_manipulability, draw_singular_values
-from hsp_control.plots.errors import PlotError
 from hsp_control.plots.frames import columns_for, draw_frames, draw_superimposed
 from hsp_control.plots.joints import draw_efforts, draw_joint_positions
 from hsp_control.plots.legends import plain

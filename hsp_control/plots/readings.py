@@ -89,17 +89,8 @@ def joint_positions(rollout: Rollout, *, absolute: bool = True) -> tuple[Array, 
 
 
 def position_unit(rollout: Rollout) -> str:
-    """Return the unit of the joints' positions: ``rad``, ``m`` or ``rad or m``.
-
-    A log with ``robot.units`` (one a freedom) tells; so does nq = 2 nv, since only
-    continuous joints take two numbers for one freedom.
-    """
-    robot = rollout.meta["robot"]
-    if units := robot.get("units"):
-        return " or ".join(dict.fromkeys(map(str, units)))
-    if robot["nq"] == 2 * robot["nv"]:
-        return "rad"
-    return column_unit(rollout, "joint_positions")
+    """Return the unit of the joints' positions: ``rad``, ``m`` or ``rad or m``."""
+    return " or ".join(dict.fromkeys(map(str, rollout.meta["robot"]["units"])))
 
 
 def effort_unit(rollout: Rollout) -> str:
@@ -109,23 +100,11 @@ def effort_unit(rollout: Rollout) -> str:
 
 
 def constant_metric(rollout: Rollout) -> Array | None:
-    """Return the metric W, shape (nv, nv), if it is constant and the log tells it.
-
-    A log of a run from a configuration does; else one can tell the identity alone.
-    """
-    robot, told = rollout.meta["robot"], rollout.config or {}
-    nv = int(robot["nv"])
+    """Return the metric W, shape (nv, nv), if it is constant."""
     if rollout.meta.get("metric") == "IdentityMetric":
-        return np.eye(nv)
-    metric = told.get("null_space", {}).get("metric", {})
-    matrix = np.asarray(metric.get("matrix") or np.zeros(0), dtype=float)
-    if metric.get("type") == "constant":
-        return np.diag(matrix) if matrix.ndim == 1 else matrix
-    if metric.get("type") != "coordinates":
-        return None
-    if not matrix.size and robot.get("joint_coordinates") == "absolute":
-        matrix = np.tril(np.ones((nv, nv)))
-    return matrix.T @ matrix if matrix.size else None
+        return np.eye(int(rollout.meta["robot"]["nv"]))
+    matrix = rollout.meta.get("metric_matrix")
+    return None if matrix is None else np.array(matrix)
 
 
 def field_terms(rollout: Rollout) -> list[str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from hsp_control.plots.errors import PlotError
+from hsp_control.exceptions import PlotError
 from hsp_control.plots.figures import diagnostics_figure, paper_figure
 from hsp_control.plots.style import styled
 from hsp_control.simulation import Rollout
@@ -17,6 +17,8 @@ def save_figures(
     folder: str | Path,
     stem: str,
     formats: Sequence[str] = ("png",),
+    *,
+    absolute: bool = True,
 ) -> list[Path]:
     """Write ``<stem>-paper`` and ``<stem>-diagnostics`` in every format.
 
@@ -25,6 +27,7 @@ def save_figures(
         folder: Where to; made if need be.
         stem: What the files' names begin with.
         formats: Such as ``png``, ``pdf`` or ``svg``.
+        absolute: Draw absolute angles where the literature on the robot does.
 
     Returns:
         The files.
@@ -32,10 +35,12 @@ def save_figures(
     Raises:
         PlotError: If a format is not known, or a file cannot be written.
     """
-    figures = {"paper": paper_figure, "diagnostics": diagnostics_figure}
+    figures = {
+        "paper": paper_figure(rollout, absolute=absolute),
+        "diagnostics": diagnostics_figure(rollout),
+    }
     paths = []
-    for name, draw in figures.items():
-        figure = draw(rollout)
+    for name, figure in figures.items():
         for suffix in formats:
             path = Path(folder) / f"{stem}-{name}.{suffix}"
             _save(figure, path, suffix)

@@ -1,6 +1,5 @@
 """Where things are in a log: the skeleton, the paths of tasks, and all together."""
 
-from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -82,17 +81,13 @@ def _task_path(rollout: Rollout, name: str) -> TaskPath | None:
 def _located(rollout: Rollout, name: str, actual: Array) -> tuple[str, Array]:
     """Return the axes along which a position was measured, and the point's path.
 
-    The point is one of the skeleton's: the one, and the axes, whose numbers these are.
+    The point is one of the skeleton's, which tells the axes that are not measured.
     """
-    told = rollout.meta["tasks"][name].get("axes")
-    skeleton = rollout["skeleton"]
-    rows = actual.shape[1]
-    for axes in [told] if told else ["".join(p) for p in permutations("xyz", rows)]:
-        columns = ["xyz".index(axis) for axis in axes]
-        for point in reversed(range(skeleton.shape[1])):
-            if np.array_equal(skeleton[:, point, columns], actual):
-                return axes, skeleton[:, point]
-    axes = told or "xyz"[:rows]
+    axes = str(rollout.meta["tasks"][name]["axes"])
+    skeleton, columns = rollout["skeleton"], ["xyz".index(axis) for axis in axes]
+    for point in reversed(range(skeleton.shape[1])):
+        if np.array_equal(skeleton[:, point, columns], actual):
+            return axes, skeleton[:, point]
     path = np.zeros((len(actual), 3))
-    path[:, ["xyz".index(axis) for axis in axes]] = actual
+    path[:, columns] = actual
     return axes, path

@@ -1,8 +1,8 @@
 """Fills a rollout's columns, one row at a time, into memory that is there already."""
 
 import platform
-from pathlib import Path
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import pinocchio as pin
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller, ControlOutput
 from hsp_control.fields import FieldSample, NullSpaceField, WeightedSum
+from hsp_control.metrics import ConstantMetric, Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle, Scene
 from hsp_control.simulation.rollout import FORMAT, Rollout
@@ -28,7 +29,9 @@ class Recorder:
         self._columns: dict[str, Array] = {}
         self._meaning: dict[str, dict[str, str]] = {}
         robot = controller.robot
-        nv, joint_unit = robot.nv, "rad or m"
+        nv, joint_unit = robot.nv, " or ".join(dict.fromkeys(robot.units))
+        effort_unit = joint_unit.replace("rad", "N·m").replace("or m", "or N")
+        effort_unit = "N" if joint_unit == "m" else effort_unit
 
         def column(name: str, shape: tuple[int, ...], unit: str, meaning: str) -> None:
             self._columns[name] = np.zeros((rows, *shape))
@@ -37,7 +40,7 @@ class Recorder:
         column("t", (), "s", "time")
         column("q", (robot.nq,), joint_unit, "configuration")
         column("v", (nv,), f"{joint_unit}/s", "velocity")
-        column("tau", (nv,), "N·m or N", "effort M a + N")
+        column("tau", (nv,), effort_unit, "effort M a + N")
         column("acceleration", (nv,), f"({joint_unit})/s²", "commanded acceleration")
         column("joint_positions", (nv,), joint_unit, "joints' positions, unwound")
         for task in controller.tasks:
@@ -127,17 +130,23 @@ class Recorder:
                     "nq": robot.nq,
                     "nv": robot.nv,
                     "freedoms": list(robot.freedom_names),
+                    "units": list(robot.units),
                     "skeleton_parents": self._edges,
                     "joint_coordinates": robot.source.joint_coordinates,
                 },
                 "tasks": {
-                    task.name: {"type": type(task).__name__, "rows": task.rows}
+                    task.name: {
+                        "type": type(task).__name__,
+                        "rows": task.rows,
+                        "axes": getattr(task, "axes", None),
+                    }
                     for task in controller.tasks
                 },
                 "field": controller.field.name,
                 "controls_null_space": controller.field.controls,
                 "null_space_gain": controller.null_space_gain.tolist(),
                 "metric": type(controller.metric).__name__,
+                "metric_matrix": _constant_matrix(controller.metric),
                 "obstacles": {o.name: _described(o) for o in self._scene.values()},
                 "versions": versions(),
                 **meta,
@@ -176,6 +185,12 @@ def _described(obstacle: Obstacle) -> dict[str, Any]:
                        for k, v in vars(obstacle.shape).items()},
         "radius": reach if np.isfinite(reach) else None,
     }  # fmt: skip
+
+
+def _constant_matrix(metric: Metric) -> list[list[float]] | None:
+    if isinstance(metric, ConstantMetric):
+        return [[float(x) for x in row] for row in metric.W]
+    return None
 
 
 def _probe(robot: Robot) -> RobotState:

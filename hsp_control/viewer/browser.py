@@ -9,16 +9,28 @@ import webbrowser
 _log = logging.getLogger(__name__)
 
 
-def open_browser(url: str) -> None:
-    """Open a page in the user's browser; a line in the log says if there is none."""
-    graphical = os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY", "BROWSER"}
-    if sys.platform.startswith("linux") and not graphical:
-        # A browser in the terminal, if there is one, would take the terminal over.
-        _log.warning("there is no display to open a browser on; the view is at %s", url)
-        return
+def open_browser(url: str) -> bool:
+    """Open a page in the user's browser, if there is one; return whether it was tried.
 
-    def attempt() -> None:
-        if not webbrowser.open(url, new=2):
-            _log.warning("no browser could be opened; the view is at %s", url)
+    A line in the log says so if there is none.
+    """
+    missing = _what_is_missing()
+    if missing is not None:
+        _log.warning("%s; the view is at %s", missing, url)
+        return False
+    threading.Thread(target=webbrowser.open, args=(url, 2), daemon=True).start()
+    return True
 
-    threading.Thread(target=attempt, daemon=True).start()
+
+def _what_is_missing() -> str | None:
+    chosen = "BROWSER" in os.environ
+    display = os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}
+    if sys.platform.startswith("linux") and not (display or chosen):
+        return "there is no display to open a browser on"
+    try:
+        browser = webbrowser.get()
+    except webbrowser.Error:
+        return "there is no browser to open"
+    if type(browser) is webbrowser.GenericBrowser and not chosen:
+        return f"{browser.name} would take over the terminal"
+    return None

@@ -16,6 +16,7 @@ from hsp_control.viewer import threejs
 from hsp_control.viewer.appearance import OBSTACLE, OBSTACLE_OPACITY
 from hsp_control.viewer.commands import Json
 from hsp_control.viewer.poses import moved_to
+from hsp_control.viewer.surfaces import material
 
 _CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 _FACES = np.array(
@@ -50,7 +51,7 @@ def logged_shape(about: Mapping[str, Any]) -> Shape | None:
 
 def obstacle(shape: Shape, extent: float) -> Json:
     """Return an obstacle of a shape; a half-space as a square of an extent [m]."""
-    surface = threejs.material(OBSTACLE, opacity=OBSTACLE_OPACITY, glow=0.3)
+    surface = material(OBSTACLE, opacity=OBSTACLE_OPACITY, glow=0.3)
     pose = np.eye(4)
     match shape:
         case shapes.Sphere():

@@ -19,6 +19,7 @@ from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
+from hsp_control.viewer.batches import batches
 from hsp_control.viewer.kept import Kept, key_of
 from hsp_control.viewer.records import ASK, DELETE, Decoder, Record
 
@@ -27,7 +28,6 @@ PORTS = (*range(7000, 7100), 0)  # 0: any that is free
 TAKEN = "taken"  # what a page answers to each message
 
 _LOOPBACK_NAMES = {"127.0.0.1", "localhost"}
-_LARGEST_MESSAGE = 1_000_000  # bytes; what moves the robot is far below
 _CHILD_WATCH = 1.0  # s
 
 
@@ -120,7 +120,7 @@ class Page(WebSocketHandler):
         while True:
             await self.news.wait()
             self.news.clear()
-            for message in _messages(self.mail.take()):
+            for message in batches(self.mail.take()):
                 self._ready.clear()
                 try:
                     await self.write_message(message, binary=True)
@@ -181,7 +181,7 @@ async def _serve(meshcat: Path, port: int, parent: int) -> None:
     asyncio.get_running_loop().add_reader(0, _read, hub)
     _tell_parent(url=f"http://{ADDRESS}:{sockets[0].getsockname()[1]}/")
     # Other children of the parent may hold our standard input open after its death.
-    while os.getppid() == parent:
+    while True:
         await asyncio.sleep(_CHILD_WATCH)
 
 
@@ -201,26 +201,8 @@ def _read(hub: Hub) -> None:
     except BlockingIOError:
         return
     if not data:  # the parent is gone
-        os._exit(0)
+        return
     hub.feed(data)
-
-
-def _messages(commands: list[bytes]) -> list[bytes]:
-    """Return the commands as arrays, each one message that the page shows at once."""
-    messages: list[bytes] = []
-    batch: list[bytes] = []
-    size = 0
-    for packed in commands:
-        if batch and size + len(packed) > _LARGEST_MESSAGE:
-            messages.append(_array(batch))
-            batch, size = [], 0
-        batch.append(packed)
-        size += len(packed)
-    return [*messages, _array(batch)] if batch else messages
-
-
-def _array(batch: list[bytes]) -> bytes:
-    return struct.pack(">BI", 0xDD, len(batch)) + b"".join(batch)
 
 
 def _tell_parent(**facts: Any) -> None:

@@ -12,10 +12,11 @@ from hsp_control.config.validation import validate
 from hsp_control.exceptions import HspControlError, ViewerError
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
+from hsp_control.viewer import browser
 from hsp_control.viewer.transport import Transport
 from hsp_control.viewer.viewer import Viewer
 
-PAGE_TIMEOUT = 20.0  # s
+PAGE_TIMEOUT = 15.0  # s
 
 
 def robot_of(rollout: Rollout) -> Robot:
@@ -67,7 +68,6 @@ def view_rollout(
         settings = ViewModel.model_validate((rollout.config or {}).get("view", {}))
     viewer = Viewer(
         robot,
-        open_browser=open_browser,
         camera=settings.camera,
         target=settings.target,
         transport=transport,
@@ -76,7 +76,7 @@ def view_rollout(
         viewer.draw_scene(rollout)
         if announce is not None and viewer.url is not None:
             announce(viewer.url)
-        if open_browser:
+        if open_browser and viewer.url and browser.open_browser(viewer.url):
             viewer.wait_for_browser(PAGE_TIMEOUT)
         viewer.play(rollout, speed=settings.speed)
     except BaseException:

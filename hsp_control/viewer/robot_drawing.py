@@ -13,6 +13,7 @@ from hsp_control.viewer.commands import Command, Json, set_object, set_transform
 from hsp_control.viewer.mesh_files import collada_object, mesh_geometry
 from hsp_control.viewer.poses import moved_to
 from hsp_control.viewer.stand_ins import stand_in
+from hsp_control.viewer.surfaces import material
 from hsp_control.viewer.visuals import Visual, read_visuals
 
 ROOT = "/robot"
@@ -101,7 +102,7 @@ def _half_height(visual: Visual) -> float:
 
 def _thing(visual: Visual) -> Json | None:
     """Return one piece of a link, or None if it cannot be shown."""
-    surface = threejs.material(visual.color, opacity=visual.color[3])
+    surface = material(visual.color, opacity=visual.color[3])
     size, pose = visual.size, visual.pose
     match visual.kind:
         case "box":

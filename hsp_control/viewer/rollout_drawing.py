@@ -31,6 +31,7 @@ from hsp_control.viewer.obstacle_drawing import (
 )
 from hsp_control.viewer.obstacle_shapes import logged_shape
 from hsp_control.viewer.poses import along
+from hsp_control.viewer.surfaces import material, paint
 from hsp_control.viewer.targets import Target, read_targets
 from hsp_control.viewer.tube import tube
 
@@ -111,10 +112,10 @@ def _draw_path(
         return  # it stands still: the marker shows where
     rows = np.linspace(0, len(points) - 1, min(len(points), _MOST_RINGS)).round()
     if desired:
-        surface = threejs.paint(DESIRED, inside=True)
+        surface = paint(DESIRED, inside=True)
         radius *= DESIRED_WIDENING
     else:
-        surface = threejs.paint(ACTUAL)
+        surface = paint(ACTUAL)
     line = threejs.mesh(tube(points[rows.astype(int)], radius), surface, shadow=False)
     yield set_object(path, threejs.group([line]))
 
@@ -122,17 +123,17 @@ def _draw_path(
 def _marker(target: Target, radius: float) -> Json:
     """Return what shows the target now: a ball, an arrow, or three axes."""
     if target.direction is not None:
-        surface = threejs.material(DESIRED)
+        surface = material(DESIRED)
         return threejs.group(
             [threejs.mesh(threejs.arrow(60 * radius, 2 * radius), surface)]
         )
     if target.rotation is None:
-        surface = threejs.material(DESIRED)
+        surface = material(DESIRED)
         return threejs.group([threejs.mesh(threejs.sphere(4.5 * radius), surface)])
     arrows = []
     for axis, color in zip(np.eye(3), AXES, strict=True):
         body = threejs.arrow(40.0 * radius, 1.5 * radius)
-        arrows.append(threejs.mesh(body, threejs.material(color), along(axis)))
+        arrows.append(threejs.mesh(body, material(color), along(axis)))
     return threejs.group(arrows)
 
 

@@ -11,6 +11,7 @@ from hsp_control.viewer import threejs
 from hsp_control.viewer.appearance import JOINT, LINK
 from hsp_control.viewer.commands import Json
 from hsp_control.viewer.poses import along
+from hsp_control.viewer.surfaces import material
 
 _THICKNESS = 0.034
 """A link's radius at the base, over the robot's reach."""
@@ -26,7 +27,7 @@ def stand_in(robot: Robot, joint: int) -> Json | None:
         joint: The joint's index; 0 is what stands still.
     """
     radius = _radius(robot, joint)
-    surface = threejs.material(LINK, glow=0.25)
+    surface = material(LINK, glow=0.25)
     things = [_drum(robot, joint, radius)] if joint else _feet(robot, radius)
     for start, end, end_radius in _links(robot, joint):
         length = float(np.linalg.norm(end - start))
@@ -65,7 +66,7 @@ def _base(robot: Robot, joint: str) -> Array:
 
 def _feet(robot: Robot, radius: float) -> list[Json]:
     """Return the plates that fixed robots stand on."""
-    surface = threejs.material(JOINT)
+    surface = material(JOINT)
     plate = [2.2 * radius, 0.4 * radius, 0.15 * radius]
     return [
         threejs.mesh(
@@ -78,7 +79,7 @@ def _feet(robot: Robot, radius: float) -> list[Json]:
 
 def _drum(robot: Robot, joint: int, radius: float) -> Json:
     """Return what shows where a joint is, and which way it turns."""
-    surface = threejs.material(JOINT)
+    surface = material(JOINT)
     model = robot.model
     if model.joints[joint].nv != 1:
         return threejs.mesh(threejs.sphere(1.15 * radius), surface)

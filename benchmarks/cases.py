@@ -1,0 +1,140 @@
+"""The common case: one robot, trajectory, start, field, obstacle and set of gains.
+
+Every controller gets the same numbers, and the same field g in the form that it can
+take: see `Case.posture_acceleration`.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+
+import hsp_control as hsp
+from hsp_control.arrays import Array
+from hsp_control.fields import ObstacleClearance
+from hsp_control.metrics import MetricSample
+from hsp_control.shapes import Sphere
+from hsp_control.trajectories import Blend, ComposedPose, HoldOrientation, PoseSample
+
+FRAME = "panda_tcp"
+
+
+@dataclass
+class Case:
+    """A Panda's hand draws a circle while a ball comes and goes beside its elbow.
+
+    Attributes:
+        rows: 6 holds the hand's orientation too; 3 leaves it free.
+        obstacle: Whether the field keeps clear of the ball; the ball moves anyway.
+        period: How long an effort is held [s].
+        duration: Length of a run [s].
+        settled: When the transient is over and measuring begins [s].
+        natural_frequency: ω0 of the critically damped task [rad/s].
+        null_space_gain: K_N [1/s].
+        posture_rate: α of the field's posture part, g = -α (q - q_home) [1/s].
+        clearance_weight: Weight of the field's obstacle part.
+    """
+
+    rows: int = 6
+    obstacle: bool = True
+    period: float = 1e-3
+    duration: float = 8.0
+    settled: float = 2.0
+    natural_frequency: float = 10.0
+    null_space_gain: float = 10.0
+    posture_rate: float = 1.0
+    clearance_weight: float = 0.3
+    robot: hsp.Robot = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Build what all controllers share."""
+        self.robot = robot = hsp.Robot.load("panda")
+        self.q0 = robot.home()
+        start = robot.state(0.0, self.q0, np.zeros(robot.nv)).frame(FRAME)
+        circle = hsp.Circle(
+            start.position + [0.1, 0.0, 0.0], 0.1, 2.0, np.pi, normal=[0.0, 0.0, 1.0]
+        )
+        self.trajectory = ComposedPose(
+            Blend(start.position, circle, 1.0), HoldOrientation(start.rotation)
+        )
+        ball = hsp.Circle(
+            [-0.1, 0.42, 0.62], 0.3, 1.3, np.pi / 2, normal=[0.0, 0.0, 1.0]
+        )
+        self.ball = hsp.Obstacle("ball", Sphere(0.1), ball)
+        self.gains = hsp.Gains.from_frequency(self.natural_frequency)
+        posture = hsp.TargetPosture(robot, self.q0, weights=self.posture_rate)
+        self.clearance = ObstacleClearance(robot, [self.ball], influence=0.25)
+        self.field: hsp.NullSpaceField = posture
+        if self.obstacle:
+            self.field = posture + self.clearance_weight * self.clearance
+        self._metric = hsp.IdentityMetric().evaluate(
+            robot.state(0.0, self.q0, np.zeros(robot.nv)),
+            MetricSample.allocate(robot.nv),
+        )
+        self._state = hsp.RobotState(robot)
+        self._pose = PoseSample.allocate()
+
+    # -- what the peers track ---------------------------------------------------------
+
+    @property
+    def kp(self) -> float:
+        """Task stiffness [1/s²], critically damped with `kv`."""
+        return self.natural_frequency**2
+
+    @property
+    def kv(self) -> float:
+        """Task damping [1/s]."""
+        return 2.0 * self.natural_frequency
+
+    @property
+    def posture_kp(self) -> float:
+        """Posture stiffness that equals K_N and α: see `posture_acceleration` [1/s²]."""
+        return self.null_space_gain * self.posture_rate
+
+    @property
+    def posture_kv(self) -> float:
+        """Posture damping that equals K_N and α [1/s]."""
+        return self.null_space_gain + self.posture_rate
+
+    def desired(self, t: float) -> PoseSample:
+        """Return the hand's pose at a time, with both rates; overwritten each call."""
+        return self.trajectory.sample(t, self._pose)
+
+    def repulsion(self, t: float, q: Array) -> Array:
+        """Return the obstacle's part of g, shape (nv,), zeros without one [rad/s]."""
+        if not self.obstacle:
+            return np.zeros(self.robot.nv)
+        state = self._state.update(t, q, np.zeros(self.robot.nv))
+        return -self.clearance_weight * self.clearance.gradient(state)
+
+    def posture_acceleration(self, t: float, q: Array, v: Array) -> Array:
+        """Return the null-space acceleration of controllers that know no g'.
+
+        K_N (g - v) + g', with g' = -α v of the posture part and without the obstacle's:
+        Kp (q_home - q) - Kv v + K_N g_ball, a posture task beside the gradient of an
+        artificial potential, which is the usual way.
+        """
+        posture = self.posture_kp * (self.q0 - q) - self.posture_kv * v
+        return posture + self.null_space_gain * self.repulsion(t, q)
+
+    # -- what is measured -------------------------------------------------------------
+
+    def measure(self, t: float, q: Array, v: Array) -> dict[str, float]:
+        """Return the numbers of one instant, the same way for every controller."""
+        state = self._state.update(t, q, v)
+        frame, wanted = state.frame(FRAME), self.desired(t)
+        turned = pin.log3(wanted.orientation.rotation.T @ frame.rotation)
+        J = frame.jacobian[: self.rows]
+        g = self.field.evaluate(
+            state, self._metric, 0, hsp.fields.FieldSample.allocate(self.robot.nv)
+        ).g
+        P = np.eye(self.robot.nv) - np.linalg.pinv(J) @ J
+        return {
+            "position": float(np.linalg.norm(wanted.position.position - frame.position)),
+            "orientation": float(np.linalg.norm(turned)) if self.rows == 6 else 0.0,
+            "null_space_error": float(np.linalg.norm(P @ (g - v))),
+            "null_space_flow": float(np.linalg.norm(P @ g)),
+            "manipulability": float(np.linalg.det(J @ J.T)),
+            "posture": float(np.linalg.norm(q - self.q0)),
+            "distance": self.clearance.least_distance(state),
+        }

@@ -1,0 +1,36 @@
+"""This package: `hsp_control.Controller`, as a user would call it."""
+
+from collections.abc import Callable
+
+import hsp_control as hsp
+from cases import FRAME, Case
+from hsp_control.arrays import Array
+
+SETTINGS = "W = I, public API, exact rate g' of the whole field"
+
+
+def make(
+    case: Case,
+    field: hsp.NullSpaceField | None = None,
+    metric: hsp.Metric | None = None,
+) -> Callable[[float, Array, Array], Array]:
+    """Return the controller; another field or metric for timing and comparison."""
+    robot = case.robot
+    task: hsp.Task
+    if case.rows == 6:
+        task = hsp.FramePose(robot, FRAME, case.trajectory, case.gains)
+    else:
+        task = hsp.FramePosition(robot, FRAME, case.trajectory.position, case.gains)
+    controller = hsp.Controller(
+        robot,
+        [task],
+        field or case.field,
+        null_space_gain=case.null_space_gain,
+        metric=metric,
+    )
+    state = hsp.RobotState(robot)
+
+    def compute(t: float, q: Array, v: Array) -> Array:
+        return controller.compute(state.update(t, q, v)).tau
+
+    return compute
