@@ -81,7 +81,7 @@ class Controller:
         *,
         null_space_gain: Any = 10.0,
         metric: Metric | None = None,
-        singularity_threshold: float = 0.01,
+        singularity_threshold: float = 0.03,
     ) -> None:
         """Compose a controller.
 
@@ -92,7 +92,9 @@ class Controller:
             null_space_gain: K_N > 0 [1/s]: scalar, shape (nv,) or (nv, nv).
             metric: Joint-space metric; None: identity.
             singularity_threshold: Singular value of the stacked Jacobian (in the
-                metric) below which its inverse is bounded instead of exact.
+                metric) below which its inverse is bounded instead of exact. For
+                positions about 3 % of the arm's reach [m]; efforts on the way into a
+                singularity grow with its inverse cube.
 
         Raises:
             ControllerError: If tasks, field and robot do not belong together, or the

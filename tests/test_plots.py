@@ -41,7 +41,8 @@ from hsp_control import (
     palette,
     simulate,
 )
-from hsp_control.plots import PlotError, bodies, box, paths, readings, views, world
+from hsp_control.exceptions import PlotError
+from hsp_control.plots import bodies, box, paths, readings, views, world
 from hsp_control.plots.null_space import predicted_decay
 from hsp_control.resources import bundled_configs
 from hsp_control.shapes import (

@@ -885,14 +885,14 @@ def test_home_is_the_sources_or_neutral_or_the_middle_of_the_range() -> None:
     panda = load("panda")
     np.testing.assert_array_equal(panda.home(), panda.source.home)
     # One joint locked: the recommended posture no longer fits, so limits decide. The
-    # fourth joint's range, -3.0718 to -0.0698, does not contain 0.
-    shorter = Robot.load(
-        "panda", locked={"panda_joint1": 0.0, "panda_finger_joint1": 0.0}
-    )
+    # fourth joint's range, -3.0718 to -0.0698, does not contain 0; the sixth's, -0.0175
+    # to 3.7525, does, if barely.
+    locks = {"panda_joint1": 0.0, "panda_finger_joint1": 0.0}
+    shorter = Robot.load("panda", locked=locks)
+    middle = (-3.0718 - 0.0698) / 2
     np.testing.assert_allclose(
-        shorter.home(), [0, 0, (-3.0718 - 0.0698) / 2, 0, shorter.home()[4], 0],
-        rtol=0, atol=1e-15,
-    )  # fmt: skip
+        shorter.home(), [0, 0, middle, 0, 0, 0], rtol=0, atol=1e-15
+    )
     lower, upper = shorter.position_limits()
     assert ((lower <= shorter.home()) & (shorter.home() <= upper)).all()
     # Continuous joints: home is given as angles.

@@ -2,7 +2,6 @@
 
 from .conditioning import draw_manipulability as draw_manipulability
 from .conditioning import draw_singular_values as draw_singular_values
-from .errors import PlotError as PlotError
 from .figures import diagnostics_figure as diagnostics_figure
 from .figures import paper_figure as paper_figure
 from .frames import draw_frame as draw_frame

@@ -181,7 +181,7 @@ async def _serve(meshcat: Path, port: int, parent: int) -> None:
     asyncio.get_running_loop().add_reader(0, _read, hub)
     _tell_parent(url=f"http://{ADDRESS}:{sockets[0].getsockname()[1]}/")
     # Other children of the parent may hold our standard input open after its death.
-    while True:
+    while os.getppid() == parent:
         await asyncio.sleep(_CHILD_WATCH)
 
 
@@ -201,7 +201,7 @@ def _read(hub: Hub) -> None:
     except BlockingIOError:
         return
     if not data:  # the parent is gone
-        return
+        os._exit(0)
     hub.feed(data)
 
 

@@ -51,5 +51,5 @@ class NullSpaceModel(Model):
     """The joint-space metric."""
     fields: list[AnyField] = []
     """Fields, added up; at rest when there is none."""
-    singularity_threshold: Positive = 0.01
+    singularity_threshold: Positive = 0.03
     """Singular value of the tasks' Jacobian below which its inverse is bounded."""
