@@ -627,7 +627,7 @@ def test_file_that_may_not_be_read(
             gripper().replace(
                 '"follower" type="revolute"', '"follower" type="continuous"'
             ),
-            "can be built: Mimicking and .* spaces have different sizes; load .*mimic=False",
+            "can be built: Mimicking and .* different sizes; load its mimic .*mimic=False",
         ),
     ],
 )
@@ -705,7 +705,7 @@ def test_root_that_moves_no_mass(write: Callable[..., Path]) -> None:
     slide = slide.replace('xyz="0.5 0.1 0.2" rpy="0.3 0.2 0.1"', 'xyz="1 0 0"')
     path = write(robot_xml(link("base", point), link("slider", point), slide))
     assert Robot.load(path).nv == 1
-    message = r"joint 'root_joint' moves no mass, .* an inertia, or root: fixed$"
+    message = r"no mass moves with root_joint, .* an inertia, or root: fixed$"
     with pytest.raises(ModelError, match=message):
         Robot.load(path, root="free_flyer")
 
@@ -717,7 +717,7 @@ def test_root_and_joint_that_do_the_same(write: Callable[..., Path]) -> None:
     )
     path = write(text.replace(' rpy="0.3 0.2 0.1"', ""))
     assert Robot.load(path).nv == 1
-    with pytest.raises(ModelError, match="joint '(root_joint|shoulder)' moves no mass"):
+    with pytest.raises(ModelError, match=r"no mass moves with (root_joint|shoulder),"):
         Robot.load(path, root="planar")
 
 
