@@ -1,8 +1,9 @@
 """Shapes of obstacles and links, as Coal computes distances between them.
 
-A capsule's distance to another *rounded* shape (sphere, capsule, half-space) has a
-continuous gradient. Against a shape with flat faces it jumps where parallel features
-slide, a sphere's does not: `hsp_control.geometry` chooses accordingly.
+A capsule's distance to another *rounded* shape (sphere, capsule) has a continuous
+gradient, but for two capsules at the instant that they are parallel. Against flat faces
+it jumps wherever the capsule comes to lie along one, a sphere's does not:
+`ObstacleClearance` chooses accordingly.
 """
 
 from abc import ABC, abstractmethod
@@ -99,8 +100,6 @@ class Capsule(Shape):
 @dataclass(frozen=True)
 class HalfSpace(Shape):
     """All below its own x-y plane: a floor, or a wall when it is turned."""
-
-    rounded: ClassVar[bool] = True
 
     def geometry(self) -> Any:
         """Return Coal's half-space."""

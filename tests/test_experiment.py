@@ -328,6 +328,13 @@ def test_periods_that_do_not_fit_are_named() -> None:
         experiment.run()
 
 
+def test_mistakes_in_data_that_came_from_no_file_are_named() -> None:
+    with pytest.raises(exceptions.RobotNotFoundError, match=r"^configuration: robot"):
+        load_experiment(changed("robot.name", "pandda"))
+    with pytest.raises(exceptions.ConfigError, match=r"^configuration: tasks"):
+        load_experiment(changed("tasks", {}))
+
+
 def test_unknown_configuration_names_the_nearest() -> None:
     with pytest.raises(exceptions.ConfigError, match=r"did you mean 'paper/2_rest'\?"):
         load_experiment("paper/2_rset")

@@ -283,7 +283,7 @@ TASKS: dict[str, TaskCase] = {
 }
 every_task = pytest.mark.parametrize("which", TASKS)
 LOG_PERIOD = 0.005  # [s]
-DURATION = 0.8  # of self-motion [s]
+DURATION = 0.5  # of self-motion [s]
 
 
 @cache
@@ -429,7 +429,7 @@ every_run = pytest.mark.parametrize("run", RUNS, ids=str)
 
 @cache
 def self_motion(run: Run) -> Rollout:
-    """Return 0.8 s of tracking off the path, with a field that moves in time."""
+    """Return half a second of tracking off the path, with a field that moves in time."""
     robot, frame, q0 = load(run.robot), FRAMES[run.robot], home(run.robot)
     start = plain(run.robot).placement(q0, frame)
     gains = Gains.from_frequency(7.0)
@@ -634,8 +634,8 @@ HELD: dict[str, Held] = {
         ),
         centering_and_posture,
         lambda q: plain("panda").placement(q, "panda_tcp").translation,
-        1.0,
-        8.0,
+        2.0,
+        4.0,
     ),
     "panda pose": Held(
         "panda",
@@ -653,8 +653,8 @@ HELD: dict[str, Held] = {
                 .actInv(plain("panda").placement(q, "panda_tcp"))
             ).vector
         ),
-        1.0,
-        8.0,
+        2.0,
+        4.0,
     ),
 }
 HELD_RUNS = [

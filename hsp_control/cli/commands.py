@@ -45,11 +45,7 @@ def run(options: argparse.Namespace) -> int:
     _out.print(_summary(rollout))
     _out.print(f"Log: {log}")
     if options.view and status == 0:
-        from hsp_control.viewer import view_rollout
-
-        view_rollout(
-            experiment.robot, rollout, experiment.scenario.view, open_browser=True
-        )
+        _show(experiment, rollout)
     return status
 
 
@@ -134,6 +130,21 @@ def schema(options: argparse.Namespace) -> int:
     """Print the JSON Schema."""
     print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
     return 0
+
+
+def _show(experiment: Experiment, rollout: Rollout) -> None:
+    """Play a run in the browser; a person closes the view, a script is not kept."""
+    from hsp_control.viewer import view_rollout
+
+    with view_rollout(
+        experiment.robot,
+        rollout,
+        experiment.scenario.view,
+        open_browser=True,
+        announce=lambda address: _out.print(f"View: {address}"),
+    ):
+        if sys.stdin.isatty():
+            input("Press Enter to close the view. ")
 
 
 def _run_with_progress(experiment: Experiment) -> Rollout:

@@ -155,9 +155,9 @@ class Document:
             raise
 
     def _origin(self, path: KeyPath) -> Mark | str:
-        while path not in self._origins:
+        while path and path not in self._origins:
             path = path[:-1]
-        return self._origins[path]
+        return self._origins.get(path, self.name)  # data that came from no file
 
 
 def _why_unreadable(name: str, error: OSError | ValueError) -> str:

@@ -57,7 +57,7 @@ class Hub:
     def _take(self, record: Record) -> None:
         kind, name, packed = record
         if kind == ASK:
-            self._answer(again=name == "again")
+            self._answer(int(name))
         elif kind == DELETE:
             self.scene.drop(name)
             for page in self.pages:
@@ -68,13 +68,13 @@ class Hub:
             for page in self.pages:
                 page.mail.put(name, packed)
 
-    def _answer(self, *, again: bool) -> None:
-        """Tell the parent how many pages have shown all that came before it asked."""
-        self.asked += not again
+    def _answer(self, number: int) -> None:
+        """Tell the parent how many pages show all that came before its question."""
+        self.asked = number
         for page in self.pages:
-            page.ask(self.asked)
-        up_to_date = sum(page.answered >= self.asked for page in self.pages)
-        _tell_parent(pages=len(self.pages), up_to_date=up_to_date)
+            page.ask(number)
+        up_to_date = sum(page.answered >= number for page in self.pages)
+        _tell_parent(number=number, pages=len(self.pages), up_to_date=up_to_date)
 
 
 class Page(WebSocketHandler):

@@ -16,7 +16,7 @@ class Record(NamedTuple):
 
     Attributes:
         kind: ``SET`` a key, ``DELETE`` a path, or ``ASK`` whether a page shows it all.
-        name: The key, the path, or ``again`` for a question that was asked before.
+        name: The key, the path, or the question's number; asked again, it is the same.
         packed: The command for the page.
     """
 

@@ -6,7 +6,6 @@ from pathlib import Path
 from hsp_control.config.build_robot import build_robot
 from hsp_control.config.document import Document
 from hsp_control.config.models.view import ViewModel
-from hsp_control.config.reading import Mark
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
 from hsp_control.exceptions import HspControlError, ViewerError
@@ -32,7 +31,7 @@ def robot_of(rollout: Rollout) -> Robot:
             "was built; give the robot, as in Viewer(robot).play(rollout)"
         )
     try:
-        document = Document(rollout.config, {(): Mark(1, 1)}, "the log's configuration")
+        document = Document(rollout.config, {}, "the log's configuration")
         robot, _ = build_robot(document, validate(document, Scenario), Path())
     except HspControlError as error:
         raise ViewerError(f"the log's robot cannot be found again: {error}") from error

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,9 @@ class Server:
             raise ViewerError(f"port {port} is not between 1 and 65535")
         self.url: str | None = None
         self._lock = threading.Lock()
-        self._answers = bytearray()
+        self._unsent = b""
+        self._answers = b""
+        self._asked = 0
         arguments = [Path(__file__).parent, _meshcat_page(), port or 0, os.getpid()]
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-c", _LAUNCH, *map(str, arguments)],
@@ -105,16 +108,16 @@ class Server:
             ViewerError: If the server has ended, or does not answer.
         """
         deadline = time.monotonic() + timeout
-        question = ""
+        self._asked += 1
+        question = encode(Record(ASK, str(self._asked)))
         while True:
             with self._lock:
-                self._write(encode(Record(ASK, question)))
+                self._write(question)
                 answer = self._answer(time.monotonic() + STALL_TIMEOUT)
-            if answer["up_to_date"]:
+            if answer["number"] == self._asked and answer["up_to_date"]:
                 return True
             if time.monotonic() >= deadline:
                 return False
-            question = "again"
             time.sleep(_POLL)
 
     def close(self) -> None:
@@ -135,16 +138,17 @@ class Server:
         if pipe is None or pipe.closed:
             raise ViewerError("the viewer is closed")
         descriptor = pipe.fileno()
-        rest = memoryview(data)
-        while rest:
-            if not _wait(descriptor, select.POLLOUT, STALL_TIMEOUT):
-                self._give_up(f"takes nothing for {STALL_TIMEOUT:g} s")
-            try:
-                rest = rest[os.write(descriptor, rest) :]
-            except BlockingIOError:
-                continue
-            except OSError as error:
-                self._give_up(f"has ended ({error.strerror})")
+        rest = memoryview(self._unsent + data)
+        try:
+            while rest:
+                if not _wait(descriptor, select.POLLOUT, STALL_TIMEOUT):
+                    self._give_up(f"takes nothing for {STALL_TIMEOUT:g} s")
+                with suppress(BlockingIOError):
+                    rest = rest[os.write(descriptor, rest) :]
+        except OSError as error:
+            self._give_up(f"has ended ({error.strerror})")
+        finally:
+            self._unsent = bytes(rest)  # some, if Ctrl-C came: no record is cut
 
     def _answer(self, deadline: float) -> dict[str, Any]:
         """Return its next line."""
@@ -157,8 +161,7 @@ class Server:
             if not data:
                 self._give_up("has ended")
             self._answers += data
-        line, _, rest = bytes(self._answers).partition(b"\n")
-        self._answers = bytearray(rest)
+        line, _, self._answers = self._answers.partition(b"\n")
         answer: dict[str, Any] = json.loads(line)
         if "error" in answer:
             raise ViewerError(f"the viewer's server cannot start: {answer['error']}")

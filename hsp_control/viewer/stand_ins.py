@@ -27,7 +27,7 @@ def stand_in(robot: Robot, joint: int) -> Json | None:
         joint: The joint's index; 0 is what stands still.
     """
     radius = _radius(robot, joint)
-    surface = material(LINK, glow=0.25)
+    surface = material(LINK, glow=0.5)
     things = [_drum(robot, joint, radius)] if joint else _feet(robot, radius)
     for start, end, end_radius in _links(robot, joint):
         length = float(np.linalg.norm(end - start))
