@@ -39,6 +39,13 @@ lint: $(STAMP) ## ruff, mypy --strict and the floors of the architecture
 coverage: $(STAMP) ## run the tests with the kernels uncompiled, report the lines not run
 	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term $(ARGS)
 
+bench: $(STAMP) ## compare with other controllers, in .venv-peers (TSID builds: 20 minutes)
+	@if ! .venv-peers/bin/python -m pip --version > /dev/null 2>&1; then \
+	  echo "Creating .venv-peers ..."; $(call new-venv,$(BIN)/python,.venv-peers); \
+	fi
+	@.venv-peers/bin/python benchmarks/install_peers.py
+	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/side_by_side.py
+
 wheel-test: $(STAMP) ## build the wheel, install it elsewhere, use it from there
 	@dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; mkdir "$$dir/cwd"; \
 	echo "Building the wheel and installing it into a fresh environment ..."; \

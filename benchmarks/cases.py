@@ -11,12 +11,14 @@ import pinocchio as pin
 
 import hsp_control as hsp
 from hsp_control.arrays import Array
-from hsp_control.fields import ObstacleClearance
+from hsp_control.fields import FieldSample, ObstacleClearance
 from hsp_control.metrics import MetricSample
+from hsp_control.metrics.metric import IDENTITY
 from hsp_control.shapes import Sphere
 from hsp_control.trajectories import Blend, ComposedPose, HoldOrientation, PoseSample
 
 FRAME = "panda_tcp"
+CENTER = np.array([0.1, 0.0, 0.0])  # of the circle, from the start [m]
 
 
 @dataclass
@@ -52,13 +54,13 @@ class Case:
         self.q0 = robot.home()
         start = robot.state(0.0, self.q0, np.zeros(robot.nv)).frame(FRAME)
         circle = hsp.Circle(
-            start.position + [0.1, 0.0, 0.0], 0.1, 2.0, np.pi, normal=[0.0, 0.0, 1.0]
+            start.position + CENTER, 0.1, 2.0, np.pi, normal=[0.0, 0.0, 1.0]
         )
         self.trajectory = ComposedPose(
             Blend(start.position, circle, 1.0), HoldOrientation(start.rotation)
         )
         ball = hsp.Circle(
-            [-0.1, 0.42, 0.62], 0.3, 1.3, np.pi / 2, normal=[0.0, 0.0, 1.0]
+            [-0.1, 0.51, 0.61], 0.3, 1.1, np.pi / 2, normal=[0.0, 0.0, 1.0]
         )
         self.ball = hsp.Obstacle("ball", Sphere(0.1), ball)
         self.gains = hsp.Gains.from_frequency(self.natural_frequency)
@@ -71,6 +73,7 @@ class Case:
             robot.state(0.0, self.q0, np.zeros(robot.nv)),
             MetricSample.allocate(robot.nv),
         )
+        self._sample = FieldSample.allocate(robot.nv)
         self._state = hsp.RobotState(robot)
         self._pose = PoseSample.allocate()
 
@@ -88,12 +91,12 @@ class Case:
 
     @property
     def posture_kp(self) -> float:
-        """Posture stiffness that equals K_N and α: see `posture_acceleration` [1/s²]."""
+        """Posture stiffness of K_N and α, see `posture_acceleration` [1/s²]."""
         return self.null_space_gain * self.posture_rate
 
     @property
     def posture_kv(self) -> float:
-        """Posture damping that equals K_N and α [1/s]."""
+        """Posture damping of K_N and α [1/s]."""
         return self.null_space_gain + self.posture_rate
 
     def desired(self, t: float) -> PoseSample:
@@ -117,6 +120,11 @@ class Case:
         posture = self.posture_kp * (self.q0 - q) - self.posture_kv * v
         return posture + self.null_space_gain * self.repulsion(t, q)
 
+    def exact_acceleration(self, t: float, q: Array, v: Array) -> Array:
+        """Return K_N (g - v) + g' with this package's exact rate of the whole field."""
+        sample = self._evaluate(self._state.update(t, q, v))
+        return self.null_space_gain * (sample.g - v) + sample.g_dot
+
     # -- what is measured -------------------------------------------------------------
 
     def measure(self, t: float, q: Array, v: Array) -> dict[str, float]:
@@ -125,16 +133,25 @@ class Case:
         frame, wanted = state.frame(FRAME), self.desired(t)
         turned = pin.log3(wanted.orientation.rotation.T @ frame.rotation)
         J = frame.jacobian[: self.rows]
-        g = self.field.evaluate(
-            state, self._metric, 0, hsp.fields.FieldSample.allocate(self.robot.nv)
-        ).g
+        g = self._evaluate(state).g
         P = np.eye(self.robot.nv) - np.linalg.pinv(J) @ J
+        M = state.mass_matrix
+        J_M = np.linalg.solve(M, J.T)
+        P_M = np.eye(self.robot.nv) - J_M @ np.linalg.solve(J @ J_M, J)
+        error_M, flow_M = P_M @ (g - v), P_M @ g
         return {
-            "position": float(np.linalg.norm(wanted.position.position - frame.position)),
+            "position": float(
+                np.linalg.norm(wanted.position.position - frame.position)
+            ),
             "orientation": float(np.linalg.norm(turned)) if self.rows == 6 else 0.0,
             "null_space_error": float(np.linalg.norm(P @ (g - v))),
             "null_space_flow": float(np.linalg.norm(P @ g)),
+            "null_space_error_M": float(np.sqrt(error_M @ M @ error_M)),
+            "null_space_flow_M": float(np.sqrt(flow_M @ M @ flow_M)),
             "manipulability": float(np.linalg.det(J @ J.T)),
             "posture": float(np.linalg.norm(q - self.q0)),
             "distance": self.clearance.least_distance(state),
         }
+
+    def _evaluate(self, state: hsp.RobotState) -> FieldSample:
+        return self.field.evaluate(state, self._metric, IDENTITY, self._sample)

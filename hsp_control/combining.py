@@ -37,7 +37,8 @@ def combine(parts: Sequence[tuple[Part, pin.Model]]) -> pin.Model:
 
     Raises:
         ModelError: If there are fewer than two, prefixes repeat, one consists of
-            several already, or a joint mimics another (Pinocchio cannot append it).
+            several already, their gravity differs, or a joint mimics another
+            (Pinocchio cannot append it).
     """
     prefixes = [part.prefix for part, _ in parts]
     if len(parts) < 2 or len(set(prefixes)) < len(prefixes):
@@ -62,6 +63,8 @@ def combine(parts: Sequence[tuple[Part, pin.Model]]) -> pin.Model:
         for index in range(1, own.nframes):
             own.frames[index].name = part.prefix + own.frames[index].name
         whole = pin.appendModel(whole, own, 0, part.placement)
+    if any(model.gravity != parts[0][1].gravity for _, model in parts):
+        raise ModelError("robots to combine differ in gravity; load them with the same")
     whole.gravity = parts[0][1].gravity
     return whole
 

@@ -102,14 +102,17 @@ class ConfigurationSpace:
     def position_limits(self) -> tuple[Array, Array]:
         """Return lower and upper joint positions, shape (nv,); ±inf where unlimited.
 
-        Continuous joints and the root have no limits, whatever the model's numbers.
+        Continuous joints and the root have no limits, whatever the model's numbers,
+        and neither has a joint whose two limits are equal: its URDF leaves them out.
         """
         lower = np.full(self.nv, -np.inf)
         upper = np.full(self.nv, np.inf)
         for joint in self.joints.values():
             if joint.nq == 1 and joint.nv == 1:
-                lower[joint.idx_v] = self.model.lowerPositionLimit[joint.idx_q]
-                upper[joint.idx_v] = self.model.upperPositionLimit[joint.idx_q]
+                low = self.model.lowerPositionLimit[joint.idx_q]
+                high = self.model.upperPositionLimit[joint.idx_q]
+                if low < high:
+                    lower[joint.idx_v], upper[joint.idx_v] = low, high
         largest = np.finfo(float).max  # Pinocchio's word for unlimited
         lower[lower <= -largest] = -np.inf
         upper[upper >= largest] = np.inf

@@ -13,7 +13,7 @@ from hsp_control.metrics.metric import VARYING
 from hsp_control.resolution import Resolution
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
-from hsp_control.tasks.gains import as_matrix
+from hsp_control.tasks.gains import as_gain, as_matrix
 
 
 class ControlOutput(NamedTuple):
@@ -139,7 +139,13 @@ class Controller:
         Raises:
             NonFiniteError: If a task or the field gave something that is not finite;
                 an effort that is not finite is never returned.
+            ControllerError: If the state is another robot's.
         """
+        if state.robot is not self.robot:
+            raise ControllerError(
+                f"the state is of another robot object ({state.robot.name}); "
+                f"this controller is for {self.robot.name}"
+            )
         form = self.metric.form
         for task, sample in self._samples:
             task.evaluate(state, sample)
@@ -228,10 +234,7 @@ def _null_space_gain(gain: Any, robot: Robot, metric: Metric) -> Array:
     For the mass matrix W changes with q; there K_N alone is asked to be positive
     definite, and only a multiple of the identity is proved for every q.
     """
-    values = np.asarray(gain, dtype=float)
-    if not np.isfinite(values).all():
-        raise GainError(f"null_space_gain is {values.tolist()}; needs finite numbers")
-    K_N = as_matrix(values, robot.nv, "null_space_gain")
+    K_N = as_matrix(as_gain(gain, "null_space_gain"), robot.nv, "null_space_gain")
     sample = MetricSample.allocate(robot.nv)
     if metric.form != VARYING:
         state = robot.state(0.0, robot.neutral(), np.zeros(robot.nv))

@@ -6,7 +6,9 @@ calls only other kernels. There is one implementation of each: with
 debugging and coverage.
 """
 
+import hashlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
@@ -14,11 +16,28 @@ import numba
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
+def _package_state() -> str:
+    """Return a digest of the times and sizes of the package's files."""
+    state = hashlib.sha256()
+    for file in sorted(Path(__file__).parent.rglob("*.py")):
+        stat = file.stat()
+        state.update(f"{file.name} {stat.st_mtime_ns} {stat.st_size} ".encode())
+    return state.hexdigest()[:12]
+
+
+_PACKAGE_STATE = _package_state()
+
+
 def kernel(function: Function) -> Function:
     """Compile ``function`` at its first call and keep the machine code on disk.
+
+    Numba keeps code for as long as the function's own file does not change, though it
+    has the code of kernels in other files inside. The name that it is kept under
+    therefore tells the state of the whole package.
 
     Division by zero follows NumPy (inf, nan) instead of raising, so that no branch is
     spent on it; finiteness is checked once, at the border (`RobotState.update`).
     """
+    function.__qualname__ += f"_{_PACKAGE_STATE}"
     compiled = numba.njit(cache=True, error_model="numpy")(function)
     return cast("Function", compiled)

@@ -3,7 +3,10 @@
 import importlib.util
 import os
 import re
-from collections.abc import Mapping, Sequence
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -170,7 +173,8 @@ def load_model(
             its own) or load such joints as free ones.
 
     Raises:
-        ModelError: If the URDF does not parse or gives a singular mass matrix.
+        ModelError: If the URDF does not parse, has a joint whose limits are reversed,
+            or gives a singular mass matrix.
         JointNotFoundError: If a joint to lock does not exist.
         FrameNotFoundError: If a tool frame's parent does not exist.
     """
@@ -182,6 +186,7 @@ def load_model(
         _add_frame(model, name, tool)
     if gravity is not None:
         model.gravity.linear = _vector3(gravity, "gravity")
+    _refuse_reversed_limits(model, source)
     _refuse_singular_mass_matrix(model, source)
     return model
 
@@ -289,17 +294,42 @@ def _parse(urdf: Path, root: Root, *, mimic: bool) -> pin.Model:
         raise ModelError(
             f"root {root!r} is not one of {listing(roots)}{did_you_mean(root, roots)}"
         )
+    said: list[str] = []
     try:
-        if root == "fixed":
-            return pin.buildModelFromUrdf(str(urdf), mimic=mimic)
-        joint = _ROOT_JOINTS[root]()
-        return pin.buildModelFromUrdf(str(urdf), joint, "root_joint", mimic=mimic)
+        with _errors_said(said):
+            if root == "fixed":
+                return pin.buildModelFromUrdf(str(urdf), mimic=mimic)
+            joint = _ROOT_JOINTS[root]()
+            return pin.buildModelFromUrdf(str(urdf), joint, "root_joint", mimic=mimic)
     except (ValueError, RuntimeError) as error:
         reason = str(error).strip().splitlines()[-1].removeprefix("hint: ")
+        reason = said[0] if said else reason
         if mimic and "mimic" in reason:
             reason = _explain_mimic(urdf) or reason
             reason += "; load its mimic joints as free ones: mimic=False"
         raise ModelError(f"{urdf}: not a robot that can be built: {reason}") from error
+
+
+@contextmanager
+def _errors_said(said: list[str]) -> Iterator[None]:
+    """Collect the parser's "Error:" lines, which it writes to the process's stderr.
+
+    Its exceptions say only that a URDF is not valid; these lines say why.
+    """
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with tempfile.TemporaryFile() as file:
+        os.dup2(file.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            file.seek(0)
+            lines = file.read().decode(errors="replace").splitlines()
+            said.extend(
+                line.split("Error:", 1)[1].strip() for line in lines if "Error:" in line
+            )
 
 
 def _explain_mimic(urdf: Path) -> str:
@@ -419,6 +449,18 @@ def _add_frame(model: pin.Model, name: str, tool: ToolFrame) -> None:
     )
 
 
+def _refuse_reversed_limits(model: pin.Model, source: RobotSource) -> None:
+    for name, joint in moving_joints(model).items():
+        if joint.nq == joint.nv == 1:
+            lower = model.lowerPositionLimit[joint.idx_q]
+            upper = model.upperPositionLimit[joint.idx_q]
+            if lower > upper:
+                raise ModelError(
+                    f"{source.urdf}: joint {name!r}: its lower limit {lower:g} is above "
+                    f"its upper limit {upper:g}"
+                )
+
+
 def _refuse_singular_mass_matrix(model: pin.Model, source: RobotSource) -> None:
     """Refuse a model with joints that move no mass, and name them.
 
@@ -452,7 +494,10 @@ def _refuse_singular_mass_matrix(model: pin.Model, source: RobotSource) -> None:
 
 
 def _vector3(values: Sequence[float], what: str) -> np.ndarray:
-    vector = np.asarray(values, dtype=float)
+    try:
+        vector = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ShapeError(f"{what} is {values!r}; needs 3 numbers") from None
     if vector.shape != (3,):
         raise ShapeError(f"{what} has shape {vector.shape}; needs 3 numbers")
     if not np.isfinite(vector).all():

@@ -415,7 +415,9 @@ def step_results() -> dict[str, list[float]]:
     field = TargetPosture(panda, home, weights=3.0)
     results = {}
     for name, metric in METRICS.items():
-        controller = Controller(panda, tasks, field, metric=metric(7))
+        controller = Controller(
+            panda, tasks, field, metric=metric(7), singularity_threshold=0.01
+        )
         for where, q in (("general", home), ("singular", SINGULAR)):
             state = panda.state(0.2, q, v)
             out = controller.compute(state)

@@ -659,8 +659,12 @@ def test_file_that_may_not_be_read(
         ),
         ("<mujoco/>", "the top element is <mujoco>, a URDF's is <robot>"),
         ("<sdf version='1.6'/>", "the top element is <sdf>"),
-        ("<robot/>", "not a robot that can be built: .*not contain a valid URDF"),
+        ("<robot/>", "not a robot that can be built: No name given for the robot"),
         ("<robot name='r'/>", "not a robot that can be built"),
+        (
+            ARM.replace('lower="-3" upper="3"', 'lower="3" upper="-3"', 1),
+            "joint 'shoulder': its lower limit 3 is above its upper limit -3",
+        ),
         (robot_xml(link("a")), "the robot has no moving joint"),
         (
             robot_xml(link("a"), link("b"), joint("j", "a", "b", "fixed")),

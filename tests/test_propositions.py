@@ -429,7 +429,7 @@ every_run = pytest.mark.parametrize("run", RUNS, ids=str)
 
 @cache
 def self_motion(run: Run) -> Rollout:
-    """Return half a second of tracking off the path, with a field that moves in time."""
+    """Return half a second of tracking off the path, with a field moving in time."""
     robot, frame, q0 = load(run.robot), FRAMES[run.robot], home(run.robot)
     start = plain(run.robot).placement(q0, frame)
     gains = Gains.from_frequency(7.0)

@@ -1095,3 +1095,23 @@ def test_robots_that_cannot_be_combined() -> None:
         Robot.combine({"only": (load("panda"), here)})
     with pytest.raises(ModelError, match="joints that mimic others cannot be combined"):
         Robot.combine({"a": (load("panda"), here), "b": (load("panda_fingers"), here)})
+
+
+def test_gravity_of_combined_robots_is_their_own() -> None:
+    here = pin.SE3.Identity()
+    weightless = {
+        name: (Robot.load(robot, gravity=(0.0, 0.0, 0.0)), here)
+        for name, robot in (("a", "panda"), ("b", "iiwa14"))
+    }
+    both = Robot.combine(weightless)
+    state = both.state(0.0, both.home(), np.zeros(both.nv))
+    np.testing.assert_allclose(state.nonlinear_effects, 0.0, rtol=0, atol=1e-12)
+    with pytest.raises(ModelError, match="differ in gravity"):
+        Robot.combine({**weightless, "c": (load("iiwa14"), here)})
+
+
+def test_equal_limits_mean_none() -> None:
+    """A URDF that leaves limits out gives 0 to 0 (double_pendulum)."""
+    robot = Robot.load("double_pendulum")
+    assert np.isinf(robot.position_limits()).all()
+    assert robot.random_configuration(np.random.default_rng(0)).all()

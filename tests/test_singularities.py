@@ -13,6 +13,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
@@ -22,6 +23,7 @@ from hsp_control import (
     FramePose,
     FramePosition,
     Gains,
+    Hold,
     Rk4,
     Robot,
     RobotState,
@@ -35,6 +37,7 @@ from hsp_control.trajectories import (
     CallableOrientation,
     CallableTrajectory,
     ComposedPose,
+    HoldPose,
     MinimumJerk,
 )
 
@@ -78,7 +81,6 @@ class Passage:
         duration: How long it takes, with time to recover [s].
         threshold: The singularity threshold.
         effort: What the largest effort stays below [N·m].
-        worse: How many times more the plain pseudo-inverse wants at its peak.
         step: Of the integrator [s].
     """
 
@@ -87,8 +89,7 @@ class Passage:
     duration: float
     threshold: float
     effort: float
-    worse: float = np.inf
-    step: float = 0.001
+    step: float = 0.0005
 
     def controller(self, threshold: float) -> Controller:
         """Return a controller that draws the joints to where they started."""
@@ -101,7 +102,7 @@ class Passage:
             singularity_threshold=threshold,
         )
 
-    def run(self, threshold: float) -> Rollout:
+    def run(self, threshold: float, control_period: float | None = None) -> Rollout:
         """Return the motion; it starts with a speed of its own."""
         v0 = 0.05 * np.sin(1.0 + np.arange(self.task.robot.nv))
         return simulate(
@@ -109,6 +110,7 @@ class Passage:
             self.start,
             v0,
             duration=self.duration,
+            control_period=control_period,
             log_period=0.01,
             integrator=Rk4(self.step),
         )
@@ -121,9 +123,7 @@ def stretched_planar_arm() -> Passage:
     here = robot.state(0.0, q0, np.zeros(3)).position("tip")[:2].copy()
     away = 3.4 * here / np.linalg.norm(here)
     path = MinimumJerk([here, away, away, here], [0.0, 1.5, 2.0, 3.5])
-    task = FramePosition(
-        robot, "tip", path, Gains.from_frequency(FREQUENCY), axes="xy"
-    )
+    task = FramePosition(robot, "tip", path, Gains.from_frequency(FREQUENCY), axes="xy")
     return Passage(task, q0, 5.0, 0.1, effort=1.5e3)
 
 
@@ -141,18 +141,19 @@ def panda_out_of_reach(threshold: float) -> Passage:
 
 
 def driven(
-    name: str, frame: str, joints: dict[int, float], swing: list[float], worse: float
+    name: str, frame: str, joints: dict[int, float], swing: list[float]
 ) -> Passage:
-    """The pose of a motion of the joints that passes the singularity twice, at speed."""
+    """A pose that follows joints which swing through a singularity and back."""
     robot = load(name)
     state, still = RobotState(robot), np.zeros(robot.nv)
     singular = robot.home()
     singular[list(joints)] = list(joints.values())
     span = np.array(swing)
-    half = 1.5  # from side to side [s]
+    there_and_back = 4.0  # [s]
 
     def hand(t: float) -> Any:
-        angle = np.pi * min(t, 2.0 * half) / half
+        u = np.clip(t / there_and_back, 0.0, 1.0)
+        angle = 2.0 * np.pi * u**4 * (35.0 - 84.0 * u + 70.0 * u**2 - 20.0 * u**3)
         return state.update(0.0, singular + span * np.cos(angle), still).frame(frame)
 
     path = ComposedPose(
@@ -160,10 +161,7 @@ def driven(
         CallableOrientation(lambda t: hand(t).rotation.copy()),
     )
     task = FramePose(robot, frame, path, Gains.from_frequency(FREQUENCY))
-    duration = 2.0 * half + 1.5
-    return Passage(
-        task, singular + span, duration, DEFAULT, effort=80.0, worse=worse, step=0.002
-    )
+    return Passage(task, singular + span, 5.0, DEFAULT, effort=80.0, step=0.0025)
 
 
 PASSAGES: dict[str, Callable[[], Passage]] = {
@@ -174,18 +172,15 @@ PASSAGES: dict[str, Callable[[], Passage]] = {
     "panda elbow": lambda: driven(
         *("panda", "panda_tcp", {3: -0.466}),
         [0.1, -0.15, 0.1, 0.5, -0.1, 0.2, 0.1],
-        worse=np.inf,
     ),
     # Three axes of the wrist in a plane with the elbow's. Self-motion goes around it.
     "panda wrist": lambda: driven(
         *("panda", "panda_tcp", {4: np.pi / 2.0, 5: -0.205}),
         [0.1, -0.1, 0.1, 0.1, -0.3, 0.5, 0.1],
-        worse=1.0,
     ),
     "iiwa14 wrist": lambda: driven(
         *("iiwa14", "iiwa_link_ee", {4: np.pi / 2.0, 5: 0.0}),
         [0.1, -0.1, 0.1, 0.1, -0.3, 0.6, 0.1],
-        worse=50.0,
     ),
 }
 every_passage = pytest.mark.parametrize("which", PASSAGES)
@@ -213,16 +208,19 @@ def decayed(rollout: Rollout, name: str, rows: slice) -> tuple[Array, Array]:
 
 @every_passage
 def test_the_law_is_exact_until_the_threshold_is_met(which: str) -> None:
-    """Both propositions to 1e-6 of what there is, all the way to the singularity."""
+    """Both propositions, to 1e-5 of what there was, until the singularity is there.
+
+    What is missing is the integrator's: the last joint speeds grow within milliseconds.
+    """
     passage, rollout = passed(which)
     first, _ = damped_part(rollout)
     assert first > 40
     e, expected = decayed(rollout, passage.task.name, slice(0, first))
     assert np.linalg.norm(e, axis=1).max() > 1e-3  # it had something to get rid of
-    np.testing.assert_allclose(e, expected, rtol=0, atol=1e-6 * np.abs(e).max())
+    np.testing.assert_allclose(e, expected, rtol=0, atol=1e-5 * np.abs(e).max())
     norm, t = rollout["null_space_norm"][:first], rollout.t[:first]
     np.testing.assert_allclose(
-        norm, norm[0] * np.exp(-FREQUENCY * t), rtol=0, atol=1e-6 * norm[0]
+        norm, norm[0] * np.exp(-FREQUENCY * t), rtol=0, atol=1e-5 * norm[0]
     )
 
 
@@ -289,10 +287,185 @@ def test_exact_tracking_is_recovered(which: str) -> None:
 def test_the_plain_pseudo_inverse_fails_or_wants_far_more(which: str) -> None:
     """The threshold is what makes the difference: the same motions without it."""
     passage, rollout = passed(which)
-    if passage.worse == np.inf:
-        with pytest.raises(SimulationError, match="not finite|diverged"):
-            passage.run(TINY)
-        return
-    plain = passage.run(TINY)
+    try:
+        plain = passage.run(TINY)
+    except SimulationError:
+        return  # it diverged, and the simulation said so
     peaks = [np.abs(run["acceleration"]).max() for run in (plain, rollout)]
-    assert peaks[0] > passage.worse * peaks[1]
+    assert peaks[0] > 10.0 * peaks[1]
+
+
+@pytest.mark.parametrize("which", ["planar arm stretched", "panda out of reach"])
+def test_an_effort_that_is_held_for_a_millisecond_survives(which: str) -> None:
+    """At 1 kHz the threshold must leave time: a smaller one is crossed in one period.
+
+    The boundary is crossed in ε²/(speed · length). Thresholds of 0.02 for the Panda
+    and 0.05 for the planar arm ended these motions.
+    """
+    passage = PASSAGES[which]()
+    rollout = passage.run(passage.threshold, control_period=0.001)
+    assert rollout.status == "completed"
+    assert np.abs(rollout.tau).max() < passage.effort
+    e = rollout[f"task.{passage.task.name}.error"]
+    assert np.linalg.norm(e, axis=1).max() > 0.1
+    assert np.linalg.norm(e[-1]) < 1e-5
+
+
+# --- a target out of reach -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("threshold", [DEFAULT, 0.1])
+def test_a_target_out_of_reach_is_pointed_at(threshold: float) -> None:
+    """A step to 20 cm out of reach, sampled at 1 kHz: the arm stretches and rests.
+
+    The error that is left is along the arm: Jᵀ e = 0 in the directions that move.
+    """
+    robot = load("panda")
+    goal = np.array([1.055, 0.0, 0.5])
+    task = FramePosition(robot, "panda_tcp", Hold(goal), Gains.from_frequency(3.0))
+    controller = Controller(
+        robot,
+        [task],
+        TargetPosture(robot, robot.home()),
+        singularity_threshold=threshold,
+    )
+    rollout = simulate(
+        controller,
+        robot.home(),
+        duration=5.0,
+        control_period=0.001,
+        integrator=Rk4(0.001),
+    )
+    assert rollout["damped"][-1]
+    assert np.abs(rollout.tau).max() < {DEFAULT: 600.0, 0.1: 150.0}[threshold]
+    assert np.abs(rollout.v[-1]).max() < 1e-2
+    e = rollout["task.panda_tcp.error"][-1]
+    assert 0.05 < np.linalg.norm(e) < 0.2
+    J = robot.state(0.0, rollout.q[-1], np.zeros(7)).frame("panda_tcp").jacobian[:3]
+    assert np.linalg.norm(J.T @ e) < 0.1 * np.linalg.norm(J, 2) * np.linalg.norm(e)
+
+
+# --- random starts -------------------------------------------------------------------
+
+STARTS = 1250
+ROBOTS = {
+    "planar3r": "xy",
+    "panda": "pose",
+    "iiwa14": "pose",
+    "ur5": "xyz",
+    "kinova": "xyz",
+    "xarm7": "pose",
+    "talos_arm": "pose",
+    "tiago_no_hand": "pose",
+}
+
+
+def random_start(robot: Robot, rng: np.random.Generator) -> Array:
+    """Return a configuration; every other one on singularities of all kinds.
+
+    Joints at multiples of a right angle align axes, exactly or to 1e-1 ... 1e-12.
+    """
+    q = robot.joint_positions(robot.random_configuration(rng))
+    if rng.random() < 0.5:
+        some = rng.random(robot.nv) < 0.7
+        q[some] = np.pi / 2.0 * rng.integers(-1, 2, size=int(some.sum()))
+        q += rng.choice([0.0, 10.0 ** rng.uniform(-12.0, -1.0)]) * rng.normal(
+            size=robot.nv
+        )
+    return robot.integrate(robot.neutral(), q)
+
+
+class Target:
+    """A task whose target is set anew for every start."""
+
+    def __init__(self, robot: Robot, kind: str) -> None:
+        frame, gains = robot.end_effector, Gains.from_frequency(FREQUENCY)
+        self.robot, self.kind = robot, kind
+        self.task: Task
+        if kind == "pose":
+            self.task = FramePose(robot, frame, HoldPose(pin.SE3.Identity()), gains)
+        else:
+            self.task = FramePosition(
+                robot, frame, Hold(np.zeros(len(kind))), gains, axes=kind
+            )
+
+    def move(self, state: RobotState, away: Array, turn: Array) -> None:
+        """Put the target ``away`` [m] and turned by ``turn`` [rad] from the frame."""
+        here = state.frame(self.task.frame)
+        if self.kind == "pose":
+            goal = pin.SE3(here.rotation @ pin.exp3(turn), here.position + away)
+            self.task.trajectory = HoldPose(goal)
+        else:
+            axes = ["xyz".index(axis) for axis in self.kind]
+            self.task.trajectory = Hold((here.position + away)[axes])
+
+
+def loaded(name: str) -> Robot:
+    if name not in {"planar3r", "panda", "iiwa14"}:
+        pytest.importorskip("example_robot_data")
+    return load(name)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_random_starts(name: str) -> None:
+    """10,000 in all: finite, bounded, exact where nothing is damped, and said so."""
+    robot = loaded(name)
+    rng = np.random.default_rng(sum(map(ord, name)))
+    target = Target(robot, ROBOTS[name])
+    field = TargetPosture(robot, robot.random_configuration(rng))
+    controller = Controller(robot, [target.task], field, null_space_gain=FREQUENCY)
+    state = RobotState(robot)
+    singular = 0
+    for _ in range(STARTS):
+        q, v = random_start(robot, rng), rng.normal(size=robot.nv)
+        state.update(0.0, q, v)
+        target.move(state, rng.normal(size=3), rng.uniform(-1.0, 1.0, 3))
+        output = controller.compute(state)
+        a, task = output.acceleration, output.task
+        limit = bound(state, output, DEFAULT)
+        assert np.isfinite(output.tau).all()
+        assert np.linalg.norm(a) <= limit
+        values = controller.diagnose(state).singular_values
+        assert output.damped == (values[-1] < DEFAULT)
+        singular += output.damped
+        # ‖e_N‖ ≤ ‖g - v‖: a projection where exact, a contraction where damped.
+        x = output.field.g - v
+        assert np.linalg.norm(output.null_space_error) <= np.linalg.norm(x) * (1 + 1e-9)
+        if not output.damped:
+            answer = task.jacobian @ a + task.jacobian_dot @ v
+            np.testing.assert_allclose(
+                answer, task.acceleration, rtol=0, atol=1e-10 * (1.0 + limit * DEFAULT)
+            )
+            left = task.jacobian @ output.null_space_error
+            np.testing.assert_allclose(left, 0.0, rtol=0, atol=1e-10)
+    assert 30 <= singular <= STARTS - 30  # of both kinds
+
+
+@pytest.mark.parametrize("name", ["planar3r", "panda", "iiwa14", "ur5"])
+def test_rollouts_from_singular_starts(name: str) -> None:
+    """A quarter of a second at 1 kHz from twelve of them: none runs away."""
+    robot = loaded(name)
+    rng = np.random.default_rng(5)
+    target = Target(robot, ROBOTS[name])
+    field = TargetPosture(robot, robot.home())
+    controller = Controller(robot, [target.task], field, null_space_gain=FREQUENCY)
+    state, runs = RobotState(robot), 0
+    while runs < 12:
+        q, v = random_start(robot, rng), 0.3 * rng.normal(size=robot.nv)
+        target.move(
+            state.update(0.0, q, v), 0.1 * rng.normal(size=3), rng.uniform(-0.3, 0.3, 3)
+        )
+        if not controller.compute(state).damped:
+            continue
+        runs += 1
+        rollout = simulate(
+            controller,
+            q,
+            v,
+            duration=0.25,
+            control_period=0.001,
+            integrator=Rk4(0.001),
+        )
+        assert rollout.status == "completed"
+        assert np.isfinite(rollout.tau).all()
+        assert np.abs(rollout.v).max() < 60.0

@@ -11,9 +11,8 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 from cases import FRAME, Case
-from hsp_control.arrays import Array
 
-SETTINGS = "plain NumPy, with drift J'v; posture torque M a_0 in the null space"
+from hsp_control.arrays import Array
 
 
 def make(case: Case) -> Callable[[float, Array, Array], Array]:
@@ -31,7 +30,10 @@ def make(case: Case) -> Callable[[float, Array, Array], Array]:
 
         x, R = case.desired(t)
         e = np.concatenate(
-            [x.position - pose.translation, pose.rotation @ pin.log3(pose.rotation.T @ R.rotation)]
+            [
+                x.position - pose.translation,
+                pose.rotation @ pin.log3(pose.rotation.T @ R.rotation),
+            ]
         )
         rate = np.concatenate([x.velocity, R.angular_velocity])[:rows] - J @ v
         feed_forward = np.concatenate([x.acceleration, R.angular_acceleration])

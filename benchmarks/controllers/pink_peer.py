@@ -12,8 +12,9 @@ import numpy as np
 import pink
 import pinocchio as pin
 from cases import FRAME, Case
-from hsp_control.arrays import Array
 from pink.tasks import FrameTask, PostureTask
+
+from hsp_control.arrays import Array
 
 
 def make(
@@ -46,7 +47,8 @@ def make(
             plan, tasks, dt, solver=solver, constraints=constraints
         )
         a = (next_velocity - velocity) / dt
-        e, e_dot = plan.q - q, next_velocity - v
+        # The plan's velocity is one of intervals: at t it is the mean of two.
+        e, e_dot = plan.q - q, 0.5 * (velocity + next_velocity) - v
         tau = pin.rnea(model, data, q, v, a + case.kp * e + case.kv * e_dot)
         velocity[:] = next_velocity
         plan.integrate_inplace(next_velocity, dt)

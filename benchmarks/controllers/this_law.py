@@ -2,11 +2,10 @@
 
 from collections.abc import Callable
 
-import hsp_control as hsp
 from cases import FRAME, Case
-from hsp_control.arrays import Array
 
-SETTINGS = "W = I, public API, exact rate g' of the whole field"
+import hsp_control as hsp
+from hsp_control.arrays import Array
 
 
 def make(

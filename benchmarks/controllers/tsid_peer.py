@@ -10,13 +10,18 @@ from collections.abc import Callable
 import numpy as np
 import tsid
 from cases import FRAME, Case
+
 from hsp_control.arrays import Array
 
 
 def make(
-    case: Case, *, posture_weight: float = 1e-3, strict: bool = False
+    case: Case,
+    *,
+    posture_weight: float = 1e-3,
+    strict: bool = False,
+    exact_rate: bool = False,
 ) -> Callable[[float, Array, Array], Array]:
-    """Return the controller."""
+    """Return the controller; with ``exact_rate`` it is given this package's g'."""
     model, nv = case.robot.model, case.robot.nv
     robot = tsid.RobotWrapper(model, tsid.FIXED_BASE_SYSTEM, False)
     problem = tsid.InverseDynamicsFormulationAccForce("tsid", robot, False)
@@ -58,7 +63,11 @@ def make(
         hand_sample.derivative(rate)
         hand_sample.second_derivative(rate_dot)
         hand.setReference(hand_sample)
-        if case.obstacle:
+        if exact_rate:
+            a_0 = case.exact_acceleration(t, q, v)
+            own = case.posture_kp * (case.q0 - q) - case.posture_kv * v
+            posture_sample.second_derivative(a_0 - own)
+        elif case.obstacle:
             push = case.null_space_gain * case.repulsion(t, q)
             posture_sample.second_derivative(push)
         posture.setReference(posture_sample)

@@ -99,6 +99,8 @@ class JacobianCost(Cost):
                 f"{len(self._freedoms)} freedoms move; they are singular everywhere"
             )
         self._B, self._B_dot = np.zeros((6, robot.nv)), np.zeros((6, robot.nv))
+        self._at: tuple[RobotState, int] | None = None
+        self._derivatives = (np.zeros(0), np.zeros(0))
         self._sums = np.zeros((4, len(self._freedoms) + 1, 3))
 
     @abstractmethod
@@ -126,6 +128,9 @@ class JacobianCost(Cost):
         )
 
     def _gradient_and_rate(self, state: RobotState) -> tuple[Array, Array]:
+        """Return ∇f and (∇f)', which share their sums, computed once per state."""
+        if self._at == (state, state.stamp):
+            return self._derivatives
         frame = state.frame(self.frame)
         _, slope, slope_rate = self._terms(state)
         scale = self._scale[:, None]
@@ -143,7 +148,8 @@ class JacobianCost(Cost):
             gradient,
             rate,
         )
-        return gradient, rate
+        self._at, self._derivatives = (state, state.stamp), (gradient, rate)
+        return self._derivatives
 
 
 @kernel

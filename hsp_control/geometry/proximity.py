@@ -43,13 +43,16 @@ class Proximity:
             robot: The robot.
             links: Shapes of its links.
             obstacles: Obstacles.
-            pairs: Indices into links followed by obstacles; the first is a link.
+            pairs: Indices into links followed by obstacles; the first is a link. A
+                pair that is named twice counts once.
 
         Raises:
             FieldError: If there is no pair.
         """
         if not pairs:
             raise FieldError("no pair of shapes is left to keep apart")
+        # Pinocchio, too, keeps each pair once, in either order.
+        pairs = list({frozenset(pair): pair for pair in pairs}.values())
         self.robot = robot
         self.links = tuple(links)
         self.obstacles = tuple(obstacles)

@@ -24,8 +24,8 @@ class Gains:
         Raises:
             GainError: If a gain is negative, zero, not finite or not a matrix.
         """
-        self.kp = _gain(kp, "kp")
-        self.kv = _gain(kv, "kv")
+        self.kp = as_gain(kp, "kp")
+        self.kv = as_gain(kv, "kv")
 
     @classmethod
     def from_frequency(cls, natural_frequency: Any, damping_ratio: Any = 1.0) -> Self:
@@ -38,8 +38,8 @@ class Gains:
         Raises:
             GainError: If either is not positive.
         """
-        frequency = _gain(natural_frequency, "natural_frequency")
-        ratio = _gain(damping_ratio, "damping_ratio")
+        frequency = as_gain(natural_frequency, "natural_frequency")
+        ratio = as_gain(damping_ratio, "damping_ratio")
         if frequency.ndim > 1 or ratio.ndim > 1:
             raise GainError("natural_frequency and damping_ratio are numbers or lists")
         try:
@@ -85,7 +85,13 @@ def as_matrix(gain: Array, size: int, name: str) -> Array:
     return np.diag(gain) if gain.ndim == 1 else gain.copy()
 
 
-def _gain(value: Any, name: str) -> Array:
+def as_gain(value: Any, name: str) -> Array:
+    """Return a gain as an array of 0, 1 or 2 dimensions.
+
+    Raises:
+        GainError: If it is not made of numbers, not square, not finite, or not positive
+            (a matrix: on its diagonal).
+    """
     try:
         gain = np.array(value, dtype=float)
     except (TypeError, ValueError):

@@ -1,6 +1,7 @@
 """An axis of a frame points along a direction that may move: a task on the sphere."""
 
 from collections.abc import Sequence
+from math import sqrt
 
 import numpy as np
 
@@ -22,8 +23,9 @@ class Pointing(Task):
 
     The error is e = -(n_x, n_y)/(1 + n_z), the stereographic coordinates of the axis
     n seen from the desired direction: |e| = tan(angle/2). In them the error equation is
-    exact up to the antipode (law.md §1); within 12 degrees of it they are held bounded
-    and the equation no longer holds.
+    exact up to the antipode (law.md §1). Within 12 degrees of it all is held bounded:
+    |e| stays at 9.9, the equation no longer holds, but the axis is still led back. The
+    pull is the sine of the angle: an axis at rest exactly opposite stays there.
 
     Attributes:
         frame: The frame's name.
@@ -68,7 +70,7 @@ class Pointing(Task):
         across[1] *= np.sign(np.linalg.det(np.vstack([across, self.axis])))
         self._across = across.copy()
         self._desired = OrientationSample.allocate()
-        self._scratch = np.zeros((12, 3))
+        self._scratch = np.zeros((14, 3))
 
     def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
         """Return the two angular rows across the axis; see `Task.evaluate`."""
@@ -123,8 +125,15 @@ def _pointing(
 ) -> None:
     """Write the sample.
 
-    With m the axis in the world and n = R_dᵀ m: n' = R_dᵀ((w - w_d) × m), and y'' is
-    linear in the two components of w' across the axis.
+    With m the axis in the world, n = R_dᵀ m and n' = R_dᵀ((w - w_d) × m). The
+    coordinates y = n_xy/s, s = 1 + n_z, are conformal: y' = Q n'/s, where
+    Q v = v_xy - n_xy v_z/s is an isometry of the tangent plane at n. Hence y'' = u asks
+    n for the acceleration
+
+        s Qᵀu + 2 (s'/s) n' - (|n'|²/s) ẑ,   ẑ the part of z across n,
+
+    along the sphere, where s Qᵀu = -Qᵀ(Kv Q n' + Kp n_xy) for u = -Kv y' - Kp y: only
+    the terms of second order in n' grow towards the antipode; they are held bounded.
     """
     m, c0, c1 = scratch[0], scratch[1], scratch[2]
     w_rel, m_rel, n, n_dot, rest, turn, moved = (
@@ -168,30 +177,70 @@ def _pointing(
         moved[i] -= turn[i]
     rotate_back(R_d, moved, rest)
 
-    # y = (n_x, n_y)/s and its rates, s = 1 + n_z.
+    # s e and s e', which stay bounded, and what Kv and Kp make of them.
     s = max(1.0 + n[2], NEAREST_TO_ANTIPODE)
-    s_dot = n_dot[2]
-    for k in range(2):
-        e[k] = -n[k] / s
-        e_dot[k] = -(n_dot[k] - n[k] * s_dot / s) / s
-    y_ddot, zero = scratch[10, :2], scratch[11, :2]
-    zero[0] = zero[1] = 0.0
-    track(zero, Kp, Kv, e, e_dot, y_ddot)  # y'' = -e'' = Kv e' + Kp e
-
-    # y'' = D w' + (the rest); a turn about c0 moves m along -c1, one about c1 along c0.
-    for k in range(2):
-        y_ddot[k] -= (rest[k] - n[k] * rest[2] / s) / s
-        y_ddot[k] -= 2.0 * s_dot * e_dot[k] / s
-    rotate_back(R_d, c1, turn)
-    rotate_back(R_d, c0, moved)
-    d00, d10 = -(turn[0] - n[0] * turn[2] / s) / s, -(turn[1] - n[1] * turn[2] / s) / s
-    d01, d11 = (
-        (moved[0] - n[0] * moved[2] / s) / s,
-        (moved[1] - n[1] * moved[2] / s) / s,
+    e_scaled, e_dot_scaled, wanted, zero = (
+        scratch[10, :2],
+        scratch[11, :2],
+        scratch[12, :2],
+        scratch[13, :2],
     )
-    det = d00 * d11 - d01 * d10
-    if det == 0.0:
-        a_x[0] = a_x[1] = 0.0
+    _flatten(n, n_dot, e_dot_scaled)
+    for k in range(2):
+        e_scaled[k] = -n[k]
+        e_dot_scaled[k] = -e_dot_scaled[k]
+        e_dot[k] = e_dot_scaled[k] / s
+        zero[k] = 0.0
+    _stereographic(n, e)
+    track(zero, Kp, Kv, e_scaled, e_dot_scaled, wanted)
+
+    # The tangent vectors R_dᵀc0 and R_dᵀc1: w' along c1 moves n along the first, w'
+    # along c0 against the second.
+    square = n_dot[0] * n_dot[0] + n_dot[1] * n_dot[1] + n_dot[2] * n_dot[2]
+    for k in range(2):
+        rotate_back(R_d, c0 if k == 0 else c1, turn)
+        _flatten(n, turn, moved)
+        total = moved[0] * wanted[0] + moved[1] * wanted[1] - square / s * turn[2]
+        for i in range(3):
+            total += turn[i] * (2.0 * n_dot[2] / s * n_dot[i] - rest[i])
+        if k == 0:
+            a_x[1] = total
+        else:
+            a_x[0] = -total
+
+
+@kernel
+def _flatten(n: Array, v: Array, out: Array) -> None:
+    """Write Q v = v_xy - n_xy v_z/(1 + n_z) for v across the unit vector n.
+
+    Below, where digits would cancel, v_z is had from v · n = 0: Q is then a reflection
+    of v_xy, stretched along n_xy.
+    """
+    if n[2] > -0.5:
+        for k in range(2):
+            out[k] = v[k] - n[k] * v[2] / (1.0 + n[2])
         return
-    a_x[0] = (d11 * y_ddot[0] - d01 * y_ddot[1]) / det
-    a_x[1] = (d00 * y_ddot[1] - d10 * y_ddot[0]) / det
+    x, y = _horizontal(n)
+    along = (x * v[0] + y * v[1]) * (1.0 - n[2]) / n[2]
+    out[0], out[1] = v[0] + x * along, v[1] + y * along
+
+
+@kernel
+def _stereographic(n: Array, e: Array) -> None:
+    """Write -n_xy/(1 + n_z), of bounded length."""
+    if 1.0 + n[2] >= NEAREST_TO_ANTIPODE:
+        for k in range(2):
+            e[k] = -n[k] / (1.0 + n[2])
+        return
+    longest = sqrt(2.0 / NEAREST_TO_ANTIPODE - 1.0)
+    x, y = _horizontal(n)
+    e[0], e[1] = -longest * x, -longest * y
+
+
+@kernel
+def _horizontal(n: Array) -> tuple[float, float]:
+    """Return the direction of n_xy, any if there is none."""
+    length = sqrt(n[0] * n[0] + n[1] * n[1])
+    if length == 0.0:
+        return 1.0, 0.0
+    return n[0] / length, n[1] / length

@@ -1,0 +1,102 @@
+"""Install this checkout and the peers into the environment that runs this script.
+
+`make bench` calls it with .venv-peers/bin/python. What it could not install it writes,
+with the reason, into .venv-peers/peers.json, and the table has a row that says so.
+
+TSID's wheel on PyPI is built for another Pinocchio and aborts next to pin 4.1: it is
+built here from its source package, with a C++ compiler and about 2 GB of memory a
+job. That takes 15 to 30 minutes, once; the wheels are kept in .venv-peers/wheels.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+HOME = Path(sys.prefix)
+WHEELS = HOME / "wheels"
+
+PIN = ["pin==4.1.0", "libpinocchio==4.1.0", "cmeel-eigen==3.4.1"]
+PINK = ["pin-pink==4.4.0", "daqp==0.11.0", "proxsuite==0.8.0", "quadprog==0.1.14"]
+# What building needs and the wheels do not bring: CMake files, headers, `wheel pack`.
+BUILD = ["libpinocchio[build]==4.1.0", "eiquadprog==1.3.2", "jrl-cmakemodules==2.1.0"]
+BUILD += ["cmake<4", "cmeel", "wheel"]
+CHECKS = {
+    "pink": "import pink, qpsolvers; print(pink.__version__)",
+    # It is not enough that TSID imports: the wheel on PyPI aborts on the first robot.
+    "tsid": (
+        "import pinocchio as pin, tsid; m = pin.buildSampleModelManipulator(); "
+        "tsid.RobotWrapper(m, tsid.FIXED_BASE_SYSTEM, False); print('1.10.0')"
+    ),
+}
+
+
+def run(*command: str, **environment: str) -> str:
+    """Run a command, return what it printed.
+
+    Raises:
+        RuntimeError: If it failed; with the last line that says something.
+    """
+    done = subprocess.run(
+        command, env=os.environ | environment, capture_output=True, text=True
+    )
+    if done.returncode:
+        lines = [line for line in (done.stdout + done.stderr).splitlines() if line]
+        telling = [line for line in lines if "rror" in line] or lines or [""]
+        raise RuntimeError(f"exit {done.returncode}: {telling[0].strip()[:200]}")
+    return done.stdout.strip()
+
+
+def pip(*arguments: str, **environment: str) -> None:
+    """Run pip in this environment."""
+    run(sys.executable, "-m", "pip", *arguments, **environment)
+
+
+def install_pink() -> None:
+    """Install pink and its solvers beside our Pinocchio."""
+    pip("install", "--quiet", *PINK, *PIN)
+
+
+def install_tsid() -> None:
+    """Build TSID against this environment's Pinocchio, unless that was done before."""
+    pip("install", "--quiet", *BUILD, *PIN)
+    for name in ("libtsid", "tsid"):
+        if not list(WHEELS.glob(f"{name}-1.10.0-*.whl")):
+            print(
+                f"  building {name} 1.10.0 from source (some minutes) ...", flush=True
+            )
+            pip(
+                "wheel", "--no-deps", "--no-build-isolation", "--no-binary", name,
+                "--wheel-dir", str(WHEELS), f"{name}==1.10.0",
+                CMEEL_RUN_TESTS="OFF", CMEEL_JOBS="2",
+            )  # fmt: skip
+        wheel = next(WHEELS.glob(f"{name}-1.10.0-*.whl"))
+        pip("install", "--quiet", "--no-deps", "--force-reinstall", str(wheel))
+
+
+def main() -> None:
+    """Install everything that installs; keep a record of what did not."""
+    print("Installing this checkout into", HOME, flush=True)
+    pip("install", "--quiet", "--editable", f"{ROOT}[robots]", *PIN)
+    installers: dict[str, Callable[[], None]] = {
+        "pink": install_pink,
+        "tsid": install_tsid,
+    }
+    report = {}
+    for name, install in installers.items():
+        print(f"Installing {name} ...", flush=True)
+        try:
+            install()
+            version = run(sys.executable, "-c", CHECKS[name])
+            report[name] = {"version": version.splitlines()[-1]}
+        except RuntimeError as error:
+            print(f"  {name} does not install: {error}", flush=True)
+            report[name] = {"failed": str(error)}
+    (HOME / "peers.json").write_text(json.dumps(report, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()

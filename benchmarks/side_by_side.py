@@ -1,0 +1,327 @@
+"""Run the same Panda task under this law and under what users would pick instead.
+
+    make bench          or          .venv-peers/bin/python benchmarks/side_by_side.py
+
+First every controller runs the case in closed loop, against the same simulator; only
+those that really track are timed, in one process, interleaved. Prints the tables and
+writes them to docs/side_by_side.md. A peer that is not installed is a row that says so.
+"""
+
+import argparse
+import gc
+import importlib
+import json
+import os
+import platform
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from time import perf_counter_ns
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from cases import FRAME, Case
+from controllers import operational_space, this_law
+
+import hsp_control as hsp
+from hsp_control.arrays import Array
+from hsp_control.fields import Manipulability
+
+Compute = Callable[[float, Array, Array], Array]
+Make = Callable[[Case], Compute]
+
+ROOT = Path(__file__).resolve().parent.parent
+TRACKS = 0.02  # a controller whose rms error is larger is not timed [m]
+STEP = 2.5e-4  # the simulator's fourth-order step [s]
+EVERY = 4  # control periods between two measurements
+
+
+# ----------------------------------------------------------------------- the peers
+
+
+def peers() -> tuple[dict[str, Make], dict[str, tuple[str, Make]], dict[str, str]]:
+    """Return what to compare, what to time, and which peers are missing and why.
+
+    What is timed comes with the name of the run that must have tracked before.
+    """
+    law, khatib = "this law", "operational space + posture"
+    compared: dict[str, Make] = {law: this_law.make, khatib: operational_space.make}
+    timed: dict[str, tuple[str, Make]] = {
+        "the Pinocchio calls alone": (law, _pinocchio_calls),
+        law: (law, partial(_this_law, name="centering")),
+        "this law, manipulability": (law, partial(_this_law, name="manipulability")),
+        "this law, one obstacle (capsules)": (law, partial(_this_law, name="obstacle")),
+        "operational space (NumPy)": (khatib, operational_space.make),
+    }
+    missing: dict[str, str] = {}
+    if tsid := _module("tsid_peer", missing):
+        for weight in (1e-1, 1e-2, 1e-3, 1e-4):
+            compared[f"TSID, posture weight {weight:.0e}"] = partial(
+                tsid.make, posture_weight=weight
+            )
+        strict = "TSID, pose as constraint"
+        compared[strict] = partial(tsid.make, strict=True)
+        compared[f"{strict}, given g'"] = partial(
+            tsid.make, strict=True, exact_rate=True
+        )
+        timed["TSID"] = ("TSID, posture weight 1e-03", tsid.make)
+        timed[strict] = (strict, partial(tsid.make, strict=True))
+    if pink := _module("pink_peer", missing):
+        compared["pink + RNEA"] = pink.make
+        compared["pink + RNEA, pose as constraint"] = partial(pink.make, strict=True)
+        for solver in ("quadprog", "daqp", "proxqp"):
+            make = partial(pink.make, solver=solver)
+            timed[f"pink ({solver}) + RNEA"] = ("pink + RNEA", make)
+    return compared, timed, missing
+
+
+def _this_law(case: Case, name: str) -> Compute:
+    robot = case.robot
+    fields: dict[str, hsp.NullSpaceField] = {
+        "centering": hsp.JointCentering(robot, weights=2.0),
+        "manipulability": Manipulability(robot, FRAME),
+        "obstacle": hsp.TargetPosture(robot, case.q0) + 0.3 * case.clearance,
+    }
+    return this_law.make(case, fields[name])
+
+
+def _pinocchio_calls(case: Case) -> Compute:
+    """What no controller with J, J' and inverse dynamics can do without."""
+    model, data = case.robot.model, case.robot.model.createData()
+    frame, a = model.getFrameId(FRAME), np.zeros(case.robot.nv)
+
+    def compute(t: float, q: Array, v: Array) -> Array:
+        pin.computeJointJacobiansTimeVariation(model, data, q, v)
+        pin.updateFramePlacement(model, data, frame)
+        return pin.rnea(model, data, q, v, a)
+
+    return compute
+
+
+def _module(name: str, missing: dict[str, str]) -> Any:
+    try:
+        return importlib.import_module(f"controllers.{name}")
+    except ImportError as error:
+        peer = name.removesuffix("_peer")
+        record = Path(sys.prefix) / "peers.json"
+        known = json.loads(record.read_text()) if record.exists() else {}
+        missing[peer] = known.get(peer, {}).get("failed", str(error))
+        return None
+
+
+# ------------------------------------------------------------------- the closed loop
+
+
+@dataclass
+class Run:
+    """What one controller did."""
+
+    columns: dict[str, Array] = field(default_factory=dict)
+    failure: str = ""
+    states: list[tuple[float, Array, Array]] = field(default_factory=list)
+
+    def rms(self, name: str) -> float:
+        """Return the root mean square of a column after the transient."""
+        return float(np.sqrt((self.columns[name] ** 2).mean()))
+
+    @property
+    def tracks(self) -> bool:
+        """Whether it may be timed."""
+        return not self.failure and self.rms("position") < TRACKS
+
+
+def close_loop(case: Case, make: Make) -> Run:
+    """Run a controller against the rigid-body plant, its effort held each period."""
+    run, rows = Run(), []
+    plant, integrator = hsp.RigidBodyPlant(case.robot), hsp.Rk4(STEP)
+    q, v = case.q0.copy(), np.zeros(case.robot.nv)
+    tau = np.zeros(case.robot.nv)
+
+    def accelerate(t: float, q: Array, v: Array) -> Array:
+        return plant.acceleration(t, q, v, tau)
+
+    try:
+        compute = make(case)
+        for k in range(round(case.duration / case.period)):
+            t = k * case.period
+            run.states.append((t, q, v))
+            tau[:] = compute(t, q, v)
+            if t >= case.settled and k % EVERY == 0:
+                effort = {"effort": float(np.linalg.norm(tau))}
+                rows.append(case.measure(t, q, v) | effort)
+            q, v = integrator.advance(case.robot, accelerate, t, t + case.period, q, v)
+            if not np.abs(v).max() < 50.0:
+                raise RuntimeError(f"diverged at t = {t:.2f} s")
+    except Exception as error:  # the peers have their own kinds: a row, not the end
+        reason = (str(error).splitlines() or [""])[0]
+        run.failure = f"{type(error).__name__}: {reason}"
+    if rows and not run.failure:
+        run.columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return run
+
+
+HEADER = (
+    "| controller | position rms / max [mm] | orientation rms [mrad] | "
+    "‖P(g − v)‖ rms [rad/s] | of ‖P g‖ | least distance [mm] | "
+    "least det(J Jᵀ) | ‖q − q_home‖ rms | effort rms [N·m] |\n"
+    "|---|--:|--:|--:|--:|--:|--:|--:|--:|\n"
+)
+
+
+def row(name: str, run: Run) -> str:
+    """Return a line of the closed-loop table."""
+    if run.failure:
+        return f"| {name} | {run.failure} |" + 7 * " |" + "\n"
+    c, error = run.columns, run.rms("null_space_error")
+    share = f"{100.0 * error / run.rms('null_space_flow'):.1f} %"
+    if name.startswith("operational space"):  # its projector is not the Euclidean one
+        own = run.rms("null_space_error_M") / run.rms("null_space_flow_M")
+        share += f" ({100.0 * own:.1f} % in its metric M)"
+    cells = [
+        f"{1e3 * run.rms('position'):.2g} / {1e3 * c['position'].max():.2g}",
+        f"{1e3 * run.rms('orientation'):.2g}" if c["orientation"].any() else "free",
+        f"{error:.2g}",
+        share,
+        f"{1e3 * c['distance'].min():.1f}",
+        f"{c['manipulability'].min():.2g}",
+        f"{run.rms('posture'):.2f}",
+        f"{run.rms('effort'):.1f}",
+    ]
+    return f"| {name} | " + " | ".join(cells) + " |\n"
+
+
+# --------------------------------------------------------------------------- timing
+
+
+def step_times(
+    case: Case, timed: dict[str, Make], rounds: int, block: int
+) -> dict[str, Array]:
+    """Return the median time of a step [s] in each round, shape (rounds,).
+
+    Every round gives each controller the same block of consecutive states, in turn and
+    in an order that rotates, so that what else the machine does hits all alike.
+    """
+    path = close_loop(case, this_law.make).states
+    controllers = {name: make(case) for name, make in timed.items()}
+    for compute in controllers.values():
+        for t, q, v in path[:20]:
+            compute(t, q, v)
+    names = list(controllers)
+    times = {name: np.zeros(rounds) for name in names}
+    gc.collect()
+    gc.disable()
+    for k in range(rounds):
+        states = path[20 + k * block : 20 + (k + 1) * block]
+        for name in names[k % len(names) :] + names[: k % len(names)]:
+            compute, taken = controllers[name], np.zeros(block)
+            for i, (t, q, v) in enumerate(states):
+                begin = perf_counter_ns()
+                compute(t, q, v)
+                taken[i] = perf_counter_ns() - begin
+            times[name][k] = 1e-9 * np.median(taken)
+    gc.enable()
+    return times
+
+
+def timing_table(times: dict[str, Array]) -> str:
+    """Return a table of ratios, each with the quartiles over the rounds."""
+    references = [n for n in ("TSID", "pink (quadprog) + RNEA") if n in times]
+    lines = "| controller | " + "".join(f"{n} = 1 | " for n in references) + "µs |\n"
+    lines += "|---|" + (len(references) + 1) * "--:|" + "\n"
+    for name, taken in times.items():
+        cells = []
+        for reference in references:
+            low, middle, high = np.quantile(taken / times[reference], [0.25, 0.5, 0.75])
+            cells.append(f"{middle:.2f} ({low:.2f} to {high:.2f})")
+        cells.append(f"{1e6 * np.median(taken):.0f}")
+        lines += f"| {name} | " + " | ".join(cells) + " |\n"
+    return lines
+
+
+# ----------------------------------------------------------------------------- main
+
+TEXT = """\
+# Side by side
+
+Written by `make bench` (`benchmarks/side_by_side.py`); do not edit.
+
+A Panda's hand draws a circle of 0.1 m at 2 rad/s, from rest, while a ball of 0.1 m
+comes and goes beside the elbow. Start, trajectory, ball, gains (ω0 = {w0:g} 1/s
+critically damped, K_N = {K_N:g} 1/s, posture rate {alpha:g} 1/s) and simulator (rigid
+bodies, effort held for 1 ms, RK4 of 0.25 ms) are the same for all; figures are from
+{settled:g} s to {duration:g} s. The field g draws to the home posture and away from the
+ball; P is the Euclidean null-space projector. `benchmarks/README.md` says how each
+controller is set and what g becomes in it.
+
+"""
+
+
+def main() -> None:
+    """Compare, time, print and write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=35, help="rounds of timing")
+    parser.add_argument("--block", type=int, default=200, help="steps in a round")
+    parser.add_argument("--duration", type=float, default=8.0, help="of a run [s]")
+    parser.add_argument("--only", help="run controllers whose name holds this")
+    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "side_by_side.md")
+    options = parser.parse_args()
+
+    compared, timed, missing = peers()
+    wanted = options.only or ""
+    base = Case()
+    text = TEXT.format(
+        w0=base.natural_frequency,
+        K_N=base.null_space_gain,
+        alpha=base.posture_rate,
+        settled=base.settled,
+        duration=options.duration,
+    )
+    print(text, end="")
+
+    def say(line: str) -> None:
+        nonlocal text
+        text += line
+        print(line, end="", flush=True)
+
+    tracked: dict[int, set[str]] = {6: set(), 3: set()}
+    for rows, title in ((6, "Pose (6 rows)"), (3, "Position (3 rows)")):
+        say(f"## {title}, one moving obstacle\n\n" + HEADER)
+        for name, make in compared.items():
+            if wanted in name and not (rows == 3 and name.startswith("pink + RNEA,")):
+                run = close_loop(Case(rows=rows, duration=options.duration), make)
+                say(row(name, run))
+                if run.tracks:
+                    tracked[rows].add(name)
+        without = Case(rows=rows, obstacle=False, duration=options.duration)
+        say(row("this law, field without the ball", close_loop(without, this_law.make)))
+        for name, reason in missing.items():
+            say(f"| {name} | not installed: {reason} |" + 7 * " |" + "\n")
+        say("\n")
+
+    span = 0.001 * (options.rounds * options.block + 20)
+    for rows, title in ((6, "Pose (6 rows)"), (3, "Position (3 rows)")):
+        say(f"## {title}: time of a step\n\n")
+        case = Case(rows=rows, obstacle=False, duration=span)
+        chosen = {n: make for n, (run, make) in timed.items() if run in tracked[rows]}
+        say(timing_table(step_times(case, chosen, options.rounds, options.block)))
+        say(
+            f"\nMedians of {options.rounds} interleaved rounds of {options.block} "
+            "steps, one process, quartiles in brackets; each step takes (t, q, v) and "
+            "returns an effort. Unless a row says otherwise: hand task, posture or "
+            "centering, no obstacle. "
+            "The ball is within the field's influence for a part of its row's rounds: "
+            "there g' is a difference of two gradients, hence the upper quartile.\n\n"
+        )
+    say(
+        f"Python {platform.python_version()}, {os.cpu_count()} cores, hsp_control "
+        f"{hsp.__version__}, numpy {np.__version__}. Only ratios carry over to another "
+        "machine.\n"
+    )
+    options.out.write_text(text)
+
+
+if __name__ == "__main__":
+    main()
