@@ -148,6 +148,8 @@ class JacobianCost(Cost):
             gradient,
             rate,
         )
+        for kept in (gradient, rate):
+            kept.flags.writeable = False
         self._at, self._derivatives = (state, state.stamp), (gradient, rate)
         return self._derivatives
 
