@@ -456,8 +456,8 @@ def _refuse_reversed_limits(model: pin.Model, source: RobotSource) -> None:
             upper = model.upperPositionLimit[joint.idx_q]
             if lower > upper:
                 raise ModelError(
-                    f"{source.urdf}: joint {name!r}: its lower limit {lower:g} is above "
-                    f"its upper limit {upper:g}"
+                    f"{source.urdf}: joint {name!r}: its lower limit {lower:g} is "
+                    f"above its upper limit {upper:g}"
                 )
 
 
