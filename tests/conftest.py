@@ -1,6 +1,13 @@
-"""What all tests share: derandomised property tests without a clock."""
+"""What all tests share: derandomised property tests, and signals that arrive."""
+
+import signal
 
 from hypothesis import settings
 
 settings.register_profile("proof", derandomize=True, deadline=None)
 settings.load_profile("proof")
+
+# A shell may start the tests with these ignored (in the background, under nohup), which
+# every process that they start would inherit.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
