@@ -27,6 +27,7 @@ from hsp_control import (
     JointPosture,
     Pointing,
     Robot,
+    ToolFrame,
     Task,
     simulate,
 )
@@ -1047,3 +1048,10 @@ def test_errors_of_gains(which: str) -> None:
     build, message = GAIN_ERRORS[which]
     with pytest.raises(GainError, match=message):
         build()
+
+
+def test_a_task_is_named_after_its_frame_as_a_column_may_be() -> None:
+    frames = {"tip/1.0": ToolFrame("panda_hand")}
+    robot = Robot.load("panda", tool_frames=frames)
+    task = FramePosition(robot, "tip/1.0", Hold([0.4, 0, 0.4]), Gains(1, 1))
+    assert task.name == "tip_1_0"

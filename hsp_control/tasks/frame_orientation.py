@@ -18,7 +18,7 @@ from hsp_control.rotations import (
     rotate_back,
 )
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample, track
+from hsp_control.tasks.task import Task, TaskSample, named_after, track
 from hsp_control.trajectories import OrientationSample, OrientationTrajectory
 
 
@@ -57,7 +57,7 @@ class FrameOrientation(Task):
             GainError: If the gains do not fit.
         """
         robot.frame_id(frame)
-        super().__init__(robot, 3, gains, name or f"{frame}_orientation")
+        super().__init__(robot, 3, gains, name or f"{named_after(frame)}_orientation")
         self.frame = frame
         self.trajectory = trajectory
         self._desired = OrientationSample.allocate()

@@ -11,7 +11,7 @@ from hsp_control.tasks.frame_orientation import (
     orientation_error,
 )
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample, track
+from hsp_control.tasks.task import Task, TaskSample, named_after, track
 from hsp_control.trajectories import PoseSample, PoseTrajectory
 
 
@@ -50,7 +50,7 @@ class FramePose(Task):
             GainError: If the gains do not fit.
         """
         robot.frame_id(frame)
-        super().__init__(robot, 6, gains, name or frame)
+        super().__init__(robot, 6, gains, name or named_after(frame))
         self.frame = frame
         self.trajectory = trajectory
         self._desired = PoseSample.allocate()

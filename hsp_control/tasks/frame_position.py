@@ -9,7 +9,7 @@ from hsp_control.exceptions import TaskError
 from hsp_control.kernels import kernel
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample, track
+from hsp_control.tasks.task import Task, TaskSample, named_after, track
 from hsp_control.trajectories import Trajectory, TrajectorySample
 
 
@@ -51,7 +51,7 @@ class FramePosition(Task):
         letters = "".join(axes)
         if not letters or len(set(letters)) < len(letters) or set(letters) - set("xyz"):
             raise TaskError(f"axes {letters!r}: name distinct axes among x, y and z")
-        super().__init__(robot, len(letters), gains, name or frame)
+        super().__init__(robot, len(letters), gains, name or named_after(frame))
         if trajectory.dimension != self.rows:
             raise TaskError(
                 f"task {self.name!r} tracks the axes {letters!r}; its trajectory has "

@@ -11,7 +11,7 @@ from hsp_control.kernels import kernel
 from hsp_control.robot import Robot, RobotState
 from hsp_control.rotations import cross, rotate, rotate_back
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample, track
+from hsp_control.tasks.task import Task, TaskSample, named_after, track
 from hsp_control.trajectories import OrientationSample, OrientationTrajectory
 
 NEAREST_TO_ANTIPODE = 0.02
@@ -58,7 +58,7 @@ class Pointing(Task):
             GainError: If the gains do not fit.
         """
         robot.frame_id(frame)
-        super().__init__(robot, 2, gains, name or f"{frame}_pointing")
+        super().__init__(robot, 2, gains, name or f"{named_after(frame)}_pointing")
         vector = np.asarray(axis, dtype=float)
         if vector.shape != (3,) or not 0.0 < np.linalg.norm(vector) < np.inf:
             raise TaskError(f"axis {list(axis)} is not a direction: needs 3 numbers")

@@ -1,5 +1,6 @@
 """What a task is: rows of J, their rates, and the acceleration that tracks exactly."""
 
+import re
 from abc import ABC, abstractmethod
 from typing import NamedTuple
 
@@ -101,6 +102,11 @@ class Task(ABC):
 
     def _out(self, out: TaskSample | None) -> TaskSample:
         return TaskSample.allocate(self.rows, self.robot.nv) if out is None else out
+
+
+def named_after(frame: str) -> str:
+    """Return a task's name for a frame's, without what a log's column may not have."""
+    return re.sub("[^0-9A-Za-z_-]", "_", frame)
 
 
 @kernel
