@@ -241,16 +241,6 @@ def placed(robot: Robot, shapes: Iterable[LinkShape], q: Array) -> list[pin.SE3]
     return [data.oMi[shape.joint] * shape.placement for shape in shapes]
 
 
-def geometry_of(robot: Robot) -> list[pin.GeometryObject]:
-    """Return the URDF's collision geometry, read anew, links by parent frame."""
-    source = robot.source
-    folders = [str(folder) for folder in source.package_dirs]
-    full = pin.buildModelFromUrdf(str(source.urdf))
-    kind = pin.GeometryType.COLLISION
-    model = pin.buildGeomFromUrdf(full, str(source.urdf), kind, package_dirs=folders)
-    return list(model.geometryObjects)
-
-
 def numbers(element: ElementTree.Element | None, key: str) -> Array:
     """Return an attribute's three numbers, zeros where it is not written."""
     text = element.get(key) if element is not None else None
@@ -358,6 +348,25 @@ def test_capsules_hold_every_vertex_of_a_mesh() -> None:
         state = robot.state(0.0, robot.random_configuration(rng), np.zeros(6))
         safe, true = (field.least_distance(state) for field in both)
         assert true - 0.15 < safe <= true + 1e-6
+
+
+def test_hulls_are_the_meshes_hulls() -> None:
+    """Convex, and as wide as the mesh in every direction."""
+    robot = load("ur5")
+    rng = np.random.default_rng(15)
+    directions = rng.normal(size=(50, 3))
+    meshes, hulls = link_shapes(robot, "meshes"), link_shapes(robot, "hulls")
+    for mesh, hull in zip(meshes, hulls, strict=True):
+        np.testing.assert_array_equal(
+            mesh.placement.homogeneous, hull.placement.homogeneous
+        )
+        if isinstance(mesh.geometry, coal.Box):
+            assert isinstance(hull.geometry, coal.Box)
+            continue
+        assert isinstance(hull.geometry, coal.Convex)
+        of_mesh = np.array(mesh.geometry.vertices()) @ directions.T
+        of_hull = np.array(hull.geometry.points()) @ directions.T
+        np.testing.assert_allclose(of_hull.max(axis=0), of_mesh.max(axis=0), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["panda", "iiwa14", "ur5"])
@@ -899,6 +908,30 @@ def test_gradient_and_rate_for_every_shape(
     assert passed_over <= 5, f"{passed_over} states near an edge"
 
 
+def test_gradient_by_hulls_is_as_good_as_gjk() -> None:
+    """The Panda's cylinders and a cylinder: 1e-4, with Coal's own tolerance 1e-2."""
+    robot = load("panda")
+    obstacle = Obstacle("it", Cylinder(0.1, 0.3), AIR, TURNING)
+    field = ObstacleClearance(robot, [obstacle], influence=0.4, proxy="hulls")
+    rng = np.random.default_rng(16)
+    agreed = 0
+    while agreed < 8:
+        q = robot.random_configuration(rng)
+        state = robot.state(0.7, q, np.zeros(7))
+        if not 0.06 < field.least_distance(state) < 0.3:
+            continue
+        agreed += 1
+
+        def value(x: Array, q: Array = q) -> float:
+            return field.value(robot.state(0.7, q + x, np.zeros(7)))
+
+        expected = gradient(value, 7, 1e-3)
+        scale = float(np.abs(expected).max())
+        np.testing.assert_allclose(
+            field.gradient(state), expected, rtol=0, atol=2e-4 * scale
+        )
+
+
 def rate_at_one_time(field: Cost, state: Any) -> Array:
     """Return the gradient's rate with the obstacles frozen where they are."""
     return slope(lambda s: field.gradient(state.displaced(0.0, s * state.v)), 5e-4)
@@ -1189,6 +1222,19 @@ def test_pairs_between_robots_are_all_kept() -> None:
     assert own
 
 
+def test_pairs_that_overlap_at_home_are_left_out() -> None:
+    """Shoulders 15 cm apart, 9 cm thick: there is no keeping them clear."""
+    panda = load("panda")
+    near = pin.SE3(turned(0.0, 0.0, np.pi), np.array([-0.15, 0.0, 0.0]))
+    both = Robot.combine({"a": (panda, pin.SE3.Identity()), "b": (panda, near)})
+    field = SelfClearance(both)
+    watched = names(field)
+    assert frozenset(("a_panda_link1", "b_panda_link1")) not in watched
+    assert frozenset(("a_panda_link0", "b_panda_link1")) not in watched
+    assert frozenset(("a_panda_link1", "b_panda_hand")) in watched
+    assert field.least_distance(still(both)) > 0.0
+
+
 def test_each_robot_is_the_others_moving_obstacle() -> None:
     """Gradient and rate of the pairs between two arms that both move."""
     panda = load("panda")
@@ -1376,7 +1422,6 @@ def test_every_mistake_is_named(
     error: type[HspControlError],
     message: str,
     tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
 ) -> None:
     with pytest.raises(error) as caught:
         make(tmp_path)

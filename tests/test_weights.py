@@ -492,7 +492,7 @@ def test_limits_that_are_not_written_count_as_none(tmp_path: Path) -> None:
     joints = "".join(
         f'<joint name="j{k}" type="revolute">'
         f'<parent link="l{k}"/><child link="l{k + 1}"/>'
-        f'<origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>'
+        '<origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>'
         f'<limit {two} effort="1" velocity="1"/></joint>'
         for k, two in enumerate(numbers)
     )
