@@ -121,6 +121,7 @@ class Robot(ConfigurationSpace):
             (Part(f"{name}_", robot.source, place), robot.model)
             for name, (robot, place) in robots.items()
         ]
+        model = combine(parts)
         homes = [robot.joint_positions(robot.home()) for robot, _ in robots.values()]
         source = RobotSource(
             name="+".join(part.source.name for part, _ in parts),
@@ -128,7 +129,7 @@ class Robot(ConfigurationSpace):
             origin="combined",
             home=tuple(float(x) for home in homes for x in home),
         )
-        return cls(combine(parts), source, [part for part, _ in parts])
+        return cls(model, source, [part for part, _ in parts])
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, nq={self.nq}, nv={self.nv})"

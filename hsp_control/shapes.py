@@ -1,9 +1,9 @@
 """Shapes of obstacles and links, as Coal computes distances between them.
 
-A capsule's distance to another *rounded* shape (sphere, capsule) has a continuous
-gradient, but for two capsules at the instant that they are parallel. Against flat faces
-it jumps wherever the capsule comes to lie along one, a sphere's does not:
-`ObstacleClearance` chooses accordingly.
+A capsule's distance to a ball has a continuous gradient. Against a flat face it jumps
+wherever the capsule comes to lie along it, and against another capsule when the two are
+parallel; a ball's distance to any convex shape does not. `ObstacleClearance` chooses
+accordingly.
 """
 
 from abc import ABC, abstractmethod
@@ -80,7 +80,6 @@ class Capsule(Shape):
 
     radius: float
     length: float
-    rounded: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         """Refuse what is no length."""

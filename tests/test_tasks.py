@@ -27,8 +27,8 @@ from hsp_control import (
     JointPosture,
     Pointing,
     Robot,
-    ToolFrame,
     Task,
+    ToolFrame,
     simulate,
 )
 from hsp_control.exceptions import (

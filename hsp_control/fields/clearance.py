@@ -22,10 +22,11 @@ class Clearance(Cost):
     exact gradient along the flow, so that it holds the obstacles' own velocity and the
     sliding of the witness points: freezing them would cost up to half of it.
 
-    Where the nearest features are flat and slide over each other, the gradient of a
-    distance jumps. Here it does not: capsules meet only rounded shapes, balls along
-    them meet all others, and the distance of a ball to a convex shape has a Lipschitz
-    gradient. The exponential law then holds across the rate's jumps.
+    Where the nearest features are flat or parallel and slide over each other, the
+    gradient of a distance jumps. Between links and obstacles it does not: capsules meet
+    only balls, and balls along the capsules meet all other shapes; the distance of a
+    ball to a convex shape has a Lipschitz gradient. The exponential law then holds
+    across the rate's jumps.
 
     Attributes:
         influence: Distance at which the cost begins [m].
@@ -137,6 +138,9 @@ class SelfClearance(Clearance):
 
         Pairs of neighbours and those that the SRDF disables are left out, and so are
         pairs that overlap at the robot's home: proxies are fatter than the links.
+
+        The gradient between two capsules jumps at the instant that they are parallel:
+        rare in space, but not for a planar arm; ``spheres`` do not, at their price.
 
         Args:
             robot: The robot.

@@ -46,7 +46,7 @@ def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
     """Return the shapes of the robot's links.
 
     ``capsules``, the default, are 200 times faster than meshes and have exact, smooth
-    gradients against rounded obstacles; ``spheres`` are beads along those capsules,
+    gradients against balls; ``spheres`` are beads along those capsules,
     smooth against everything convex; ``hulls`` and ``meshes`` are the robot's own
     collision geometry. A robot without any gets capsules between its joints, and
     one warning.
