@@ -697,7 +697,7 @@ def test_distance_witnesses_and_gradient_in_closed_form(link: str, other: str) -
             (measured,) = proximity.measure(state)
             assert measured == pytest.approx(d, abs=tolerance)
             seen["apart" if d > 0.0 else "overlapping"] += 1
-            first, second = proximity.first[0], proximity.second[0]
+            first, second = proximity.witness(0)[0], proximity.witness(0)[1]
             np.testing.assert_allclose(first - second, d * n, rtol=0, atol=1e-7)
             expected = point_jacobian(robot, q, int(joint), first).T @ n
             np.testing.assert_allclose(
@@ -728,7 +728,7 @@ def test_two_links_of_one_robot_push_each_other() -> None:
         d, n = closed_form(shapes[0], a, shapes[1], b)
         np.testing.assert_allclose(proximity.measure(state), d, rtol=0, atol=1e-12)
         np.testing.assert_allclose(swapped.measure(state), d, rtol=0, atol=1e-12)
-        first, second = proximity.first[0], proximity.second[0]
+        first, second = proximity.witness(0)[0], proximity.witness(0)[1]
         expected = n @ (
             point_jacobian(robot, q, 3, first) - point_jacobian(robot, q, 7, second)
         )
@@ -795,7 +795,7 @@ def test_meshes_hulls_clouds_and_terrain(tmp_path: Path) -> None:
         gaps = np.linalg.norm(center - where - points, axis=1) - 0.03
         # A point lies in its cube of 0.01 m: √3 · 0.01 m from its farthest corner.
         assert abs(cloud.distances[0] - gaps.min()) <= 0.0174
-        first, second = cloud.first[0], cloud.second[0]
+        first, second = cloud.witness(0)[0], cloud.witness(0)[1]
         assert np.linalg.norm(first - center) == pytest.approx(0.03, abs=1e-7)
         assert np.linalg.norm(second - where - points, axis=1).min() <= 0.0174
         n = (first - second) / cloud.distances[0]
@@ -966,10 +966,10 @@ def test_a_frozen_obstacle_or_witness_point_is_measurably_wrong() -> None:
         hung = LinkShape(
             link.link,
             link.joint,
-            pin.SE3(np.eye(3), place.actInv(proximity.first[k])),
+            pin.SE3(np.eye(3), place.actInv(proximity.witness(k)[0])),
             coal.Sphere(0.0),
         )
-        offset = proximity.second[k] - obstacle.placement(0.7).translation
+        offset = proximity.witness(k)[1] - obstacle.placement(0.7).translation
         moving = Obstacle("point", Sphere(0.0), Shifted(AIR, offset))
         points = Proximity(robot, [hung], [moving], [(0, 1)])
         if len(alone.proximity.pairs) > 1:
@@ -1087,7 +1087,7 @@ def test_a_quick_obstacle_does_not_slip_past_the_shortcut() -> None:
         field = ObstacleClearance(robot, [resting])
         d = field.least_distance(state)
         k = int(np.argmin(field.proximity.distances))
-        n = field.proximity.first[k] - field.proximity.second[k]
+        n = field.proximity.witness(k)[0] - field.proximity.witness(k)[1]
         ball = Obstacle("ball", Sphere(0.1), UniformLine(start, 20.0 * n / d))
         quick = ObstacleClearance(robot, [ball], influence=d - gap)
         np.testing.assert_array_equal(evaluate(quick, state).g, 0.0)

@@ -26,8 +26,6 @@ class Proximity:
 
     Attributes:
         distances: At the last `measure`, shape (k,) [m]; negative where shapes overlap.
-        first: Witness points on the first shape, shape (k, 3), world [m].
-        second: Witness points on the second shape, shape (k, 3), world [m].
     """
 
     def __init__(
@@ -71,14 +69,12 @@ class Proximity:
             request.epa_tolerance = GJK_TOLERANCE
         count = len(pairs)
         self.distances: Array = np.zeros(count)
-        self.first: Array = np.zeros((count, 3))
-        self.second: Array = np.zeros((count, 3))
-        self._normals: Array = np.zeros((count, 3))
-        self._reversed = [
+        self._results = list(self._data.distanceResults)  # references: they follow
+        self._reversed = frozenset(
             k
             for k, (_, second) in enumerate(pairs)
             if second >= len(links) and obstacles[second - len(links)].shape.reversed
-        ]
+        )
         self._measured: tuple[RobotState, int] | None = None
         joints = [link.joint for link in links] + [0] * len(obstacles)
         support = {joint: joint_support(robot.model, joint) for joint in set(joints)}
@@ -99,16 +95,21 @@ class Proximity:
             self.robot.model, state.data, self._geometry, self._data
         )
         pin.computeDistances(self._geometry, self._data)
-        for k, result in enumerate(self._data.distanceResults):
-            self.distances[k] = result.min_distance
-            self.first[k] = result.getNearestPoint1()
-            self.second[k] = result.getNearestPoint2()
-            self._normals[k] = result.normal  # from the first shape to the second
-        for k in self._reversed:
-            self.first[k], self.second[k] = self.second[k].copy(), self.first[k].copy()
-            self._normals[k] *= -1.0
+        self.distances[:] = [result.min_distance for result in self._results]
         self._measured = (state, state.stamp)
         return self.distances
+
+    def witness(self, k: int) -> tuple[Array, Array, Array]:
+        """Return what realises the k-th distance, world axes, shape (3,) each.
+
+        The points on the first and on the second shape [m], and the unit normal from
+        the first to the second. Read when asked for: few pairs are near enough.
+        """
+        result = self._results[k]
+        first, second = result.getNearestPoint1(), result.getNearestPoint2()
+        if k in self._reversed:
+            return second, first, -result.normal
+        return first, second, result.normal
 
     def gradient(self, state: RobotState, slopes: Array) -> Array:
         """Return Σ slopes_k ∇d_k, shape (nv,); pairs of slope 0 cost nothing.
@@ -121,17 +122,12 @@ class Proximity:
         result = np.zeros(self.robot.nv)
         for k in np.flatnonzero(slopes):
             columns, freedoms, columns2, freedoms2 = self._supports[k]
-            force = -slopes[k] * self._normals[k]
-            _push(state.world_jacobian, columns, freedoms, self.first[k], force, result)
+            first, second, normal = self.witness(int(k))
+            force = -slopes[k] * normal
+            J = state.world_jacobian
+            _push(J, columns, freedoms, first, force, result)
             if len(columns2):
-                _push(
-                    state.world_jacobian,
-                    columns2,
-                    freedoms2,
-                    self.second[k],
-                    -force,
-                    result,
-                )
+                _push(J, columns2, freedoms2, second, -force, result)
         return result
 
     def nearest(self, state: RobotState) -> tuple[float, str]:
