@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.exceptions import ModelError
-from hsp_control.loading import RobotSource
+from hsp_control.sources import RobotSource
 
 
 @dataclass(frozen=True)

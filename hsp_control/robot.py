@@ -25,14 +25,8 @@ from hsp_control.kinematics import (
     frame_kinematics,
     mass_matrix_difference,
 )
-from hsp_control.loading import (
-    RobotSource,
-    Root,
-    ToolFrame,
-    end_effector_frame,
-    find_robot,
-    load_model,
-)
+from hsp_control.loading import ToolFrame, end_effector_frame, load_model
+from hsp_control.sources import RobotSource, Root, find_robot
 from hsp_control.suggest import did_you_mean, listing
 
 

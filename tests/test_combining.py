@@ -28,8 +28,8 @@ from hsp_control.exceptions import (
     ModelError,
 )
 from hsp_control.geometry import link_shapes
-from hsp_control.loading import RobotSource
 from hsp_control.resources import bundled_robots
+from hsp_control.sources import RobotSource
 
 pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]

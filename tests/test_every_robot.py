@@ -32,8 +32,8 @@ from hsp_control import (
 from hsp_control.cli import main, robot_table
 from hsp_control.cli.robot_table import FLOATING, REMEDIES
 from hsp_control.exceptions import ModelError
-from hsp_control.loading import example_robots
 from hsp_control.resources import bundled_robots
+from hsp_control.sources import example_robots
 from hsp_control.trajectories import HoldPose
 
 pytestmark = pytest.mark.filterwarnings("error")

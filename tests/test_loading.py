@@ -21,13 +21,9 @@ from hsp_control.exceptions import (
     RobotNotFoundError,
     ShapeError,
 )
-from hsp_control.loading import (
-    end_effector_frame,
-    example_robots,
-    find_robot,
-    load_model,
-)
+from hsp_control.loading import end_effector_frame, load_model
 from hsp_control.resources import bundled_robots
+from hsp_control.sources import example_robots, find_robot
 
 BUNDLED = ("iiwa14", "panda", "planar3r")
 

@@ -24,8 +24,8 @@ from hsp_control import Robot, ToolFrame, differences
 from hsp_control.exceptions import FieldError, FrameNotFoundError, HspControlError
 from hsp_control.fields import InverseCondition, Manipulability, Transmission
 from hsp_control.fields.jacobian_cost import JacobianCost
-from hsp_control.loading import example_robots
 from hsp_control.resources import bundled_robots
+from hsp_control.sources import example_robots
 
 pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]

@@ -31,7 +31,8 @@ from hsp_control.exceptions import (
     NonFiniteError,
     ShapeError,
 )
-from hsp_control.loading import RobotSource, example_robots, find_robot, load_model
+from hsp_control.loading import load_model
+from hsp_control.sources import RobotSource, example_robots, find_robot
 
 Array = NDArray[np.float64]
 LWA = pin.LOCAL_WORLD_ALIGNED

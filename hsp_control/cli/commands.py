@@ -14,9 +14,9 @@ from rich.table import Table
 from hsp_control.cli import robot_table
 from hsp_control.config import Experiment, json_schema, load_experiment
 from hsp_control.exceptions import SimulationError
-from hsp_control.loading import example_robots
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
+from hsp_control.sources import example_robots
 
 # A pipe or a file has no width of its own: tables then need not be squeezed.
 _out = Console(

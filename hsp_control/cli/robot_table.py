@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from hsp_control.exceptions import ModelError
-from hsp_control.loading import (
+from hsp_control.resources import bundled_robots
+from hsp_control.robot import Robot
+from hsp_control.sources import (
     RobotSource,
     example_robots,
     examples_without_urdf,
     find_robot,
 )
-from hsp_control.resources import bundled_robots
-from hsp_control.robot import Robot
 from hsp_control.suggest import listing
 
 _BRAVO = {"bravo_finger1_joint": 0.0, "bravo_finger2_joint": 0.0}

@@ -10,8 +10,8 @@ import pinocchio as pin
 
 from hsp_control.arrays import Array
 from hsp_control.combining import Part
-from hsp_control.loading import RobotSource
 from hsp_control.robot import Robot
+from hsp_control.sources import RobotSource
 
 _GREY = (0.72, 0.74, 0.76, 1.0)
 _MESHES = {".dae", ".obj", ".stl"}  # what the page can read
