@@ -42,6 +42,19 @@ def test_plot_draws_beside_the_log(
     assert all(figure.stat().st_size > 10_000 for figure in figures)
 
 
+def test_plot_draws_relative_angles_when_asked(tmp_path: Path) -> None:
+    main(["run", MOVING, "--out", str(tmp_path), *SHORT])
+    log, folders = str(tmp_path / "4_moving_obstacle.npz"), ("absolute", "relative")
+    for folder in folders:
+        options = ["--relative"] if folder == "relative" else []
+        assert main(["plot", log, "--out", str(tmp_path / folder), *options]) == 0
+    absolute, relative = (
+        (tmp_path / folder / "4_moving_obstacle-paper.png").read_bytes()
+        for folder in folders
+    )
+    assert absolute != relative
+
+
 def test_check_says_what_it_found(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", MOVING]) == 0
     text = capsys.readouterr().out
