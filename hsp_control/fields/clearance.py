@@ -58,19 +58,17 @@ class Clearance(Cost):
         return self.proximity.gradient(state, self._slopes)
 
     def gradient_rate(self, state: RobotState) -> Array:
-        """Return the gradient's rate along the flow; exactly zero out of influence."""
-        margin = self.proximity.measure(state).min() - self.influence
-        if margin > FAR:
+        """Return the gradient's rate along the flow; exactly zero out of influence.
+
+        There the gradient is zero in a whole neighbourhood, so nothing is differenced.
+        """
+        if self.proximity.measure(state).min() > self.influence:
             return np.zeros(self.robot.nv)
         return rate_along_flow(self.gradient, state)
 
     def least_distance(self, state: RobotState) -> float:
         """Return the least distance of all pairs [m]."""
         return self.proximity.nearest(state)[0]
-
-
-FAR = 0.05
-"""Beyond the influence by this [m], no difference step reaches back into it."""
 
 
 class ObstacleClearance(Clearance):
@@ -94,7 +92,7 @@ class ObstacleClearance(Clearance):
             influence: Distance at which the cost begins [m].
             links: Names of the links that keep clear; None: all that can move.
             proxy: What stands for the links. ``capsules`` become balls along them
-                where an obstacle is not rounded.
+                before an obstacle that is not a ball.
             name: What the log calls it.
 
         Raises:
