@@ -1,7 +1,7 @@
 """The law of Hsu, Hauser and Sastry (1989) over a metric: equations (7) and (13).
 
     x = g - v                          the self-motion that the field still asks for
-    e_N = (I - J#J) x                                      the null-space error, (12)
+    e_N = (I - J#J) x                                            the null-space error
     u = g' + K_N e_N - W⁻¹[ J'ᵀ w - W'(x - e_N/2) ],  w = ΛJx      φ_N = P u is (13)
     a = J#(a_x - J'v) + (I - J#J) u                                               (7)
 
