@@ -9,7 +9,7 @@ from hsp_control.arrays import Array
 from hsp_control.exceptions import ControllerError, GainError, NonFiniteError
 from hsp_control.fields import FieldSample, NullSpaceField, Rest
 from hsp_control.metrics import IdentityMetric, Metric, MetricSample
-from hsp_control.metrics.metric import VARYING
+from hsp_control.metrics.metric import CONSTANT, VARYING
 from hsp_control.resolution import Resolution
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
@@ -65,7 +65,8 @@ class Controller:
 
     Attributes:
         robot: The robot.
-        tasks: The tasks, stacked at one level.
+        levels: The tasks of each level, the highest priority first.
+        tasks: All of them, in the same order.
         field: The null-space field.
         metric: The joint-space metric.
         null_space_gain: K_N, shape (nv, nv) [1/s].
@@ -76,7 +77,7 @@ class Controller:
     def __init__(
         self,
         robot: Robot,
-        tasks: Sequence[Task],
+        tasks: Sequence[Task | Sequence[Task]],
         field: NullSpaceField | None = None,
         *,
         null_space_gain: Any = 10.0,
@@ -87,7 +88,8 @@ class Controller:
 
         Args:
             robot: The robot.
-            tasks: One task or more, with distinct names.
+            tasks: One task or more, with distinct names, stacked at one level; or a
+                list of such lists, the highest priority first.
             field: Where self-motion shall go; None: to rest.
             null_space_gain: K_N > 0 [1/s]: scalar, shape (nv,) or (nv, nv).
             metric: Joint-space metric; None: identity.
@@ -98,39 +100,43 @@ class Controller:
 
         Raises:
             ControllerError: If tasks, field and robot do not belong together, or the
-                tasks have more rows than the robot has freedoms.
+                tasks of one level have more rows than the robot has freedoms.
             GainError: If K_N does not make the null-space error decay.
             MetricError: If the metric does not fit the robot.
         """
         field = Rest(robot) if field is None else field
         metric = IdentityMetric() if metric is None else metric
-        _check_parts(robot, tasks, field)
+        levels = _levels(tasks)
+        _check_parts(robot, levels, field)
         metric.check(robot.nv)
         if not 0.0 < singularity_threshold < np.inf:
             raise ControllerError(
                 f"singularity_threshold is {singularity_threshold}; must be positive"
             )
         self.robot = robot
-        self.tasks = tuple(tasks)
+        self.levels = levels
+        self.tasks = tuple(task for level in levels for task in level)
         self.field = field
         self.metric = metric
-        self._metric = MetricSample.allocate(robot.nv)
         self.null_space_gain = _null_space_gain(null_space_gain, robot, metric)
-
-        rows = sum(task.rows for task in tasks)
-        self._stack = TaskSample.allocate(rows, robot.nv)
-        ends = np.cumsum([task.rows for task in tasks])
+        self._resolution = Resolution(
+            [sum(task.rows for task in level) for level in levels],
+            robot.nv,
+            metric.form,
+            self.null_space_gain,
+            singularity_threshold,
+        )
+        problem = self._resolution.problem
+        self._stack, self._metric = problem.task, problem.metric
+        self.field_sample = problem.field
+        ends = np.cumsum([task.rows for task in self.tasks])
         self.task_rows = {
             task.name: slice(int(end) - task.rows, int(end))
-            for task, end in zip(tasks, ends, strict=True)
+            for task, end in zip(self.tasks, ends, strict=True)
         }
         self._samples = tuple(
             (task, self._stack.rows(where.start, where.stop))
-            for task, where in zip(tasks, self.task_rows.values(), strict=True)
-        )
-        self.field_sample = FieldSample.allocate(robot.nv)
-        self._resolution = Resolution(
-            rows, robot.nv, metric.form, self.null_space_gain, singularity_threshold
+            for task, where in zip(self.tasks, self.task_rows.values(), strict=True)
         )
 
     def compute(self, state: RobotState) -> ControlOutput:
@@ -146,21 +152,16 @@ class Controller:
                 f"the state is of another robot object ({state.robot.name}); "
                 f"this controller is for {self.robot.name}"
             )
-        form = self.metric.form
         for task, sample in self._samples:
             task.evaluate(state, sample)
         metric = self.metric.evaluate(state, self._metric)
-        field = self.field.evaluate(state, metric, form, self.field_sample)
-        a, e_N, damped = self._resolution.resolve(
-            self._stack,
-            state.v,
-            field,
-            metric,
-            controls_null_space=self.field.controls,
+        field = self.field.evaluate(state, metric, self.metric.form, self.field_sample)
+        a, e_N, damped, finite = self._resolution.resolve(
+            state.v, controls_null_space=self.field.controls
         )
-        tau = state.inverse_dynamics(a)  # M a + N, the paper's equation (7)
-        if not np.isfinite(tau).all():
+        if not finite:
             self._explain_non_finite(state)
+        tau = state.inverse_dynamics(a)  # M a + N, the paper's equation (7)
         return ControlOutput(tau, a, self._stack, field, e_N, damped)
 
     def diagnose(self, state: RobotState) -> Diagnostics:
@@ -181,11 +182,21 @@ class Controller:
         previews a field, and a start with this velocity has no transient.
         """
         state = self.robot.state(t, q, np.zeros(self.robot.nv))
-        g = self.compute(state).field.g
+        self.compute(state)
+        # At rest, without drift and with unit gain the law's acceleration is the flow.
         rates = [task.reference_rate(state) for task in self.tasks]
-        J_sharp = self._resolution.pseudo_inverse
-        tracked = J_sharp @ (np.concatenate(rates) - self._stack.jacobian @ g)
-        return np.asarray(tracked + g)
+        flow = Resolution(
+            np.diff(self._resolution.ends, prepend=0).tolist(),
+            self.robot.nv,
+            min(self.metric.form, CONSTANT),
+            np.eye(self.robot.nv),
+            self._resolution.threshold,
+        )
+        flow.problem.task.jacobian[:] = self._stack.jacobian
+        flow.problem.task.acceleration[:] = np.concatenate(rates)
+        flow.problem.field.g[:] = self.field_sample.g
+        flow.problem.metric.W[:], flow.problem.metric.L[:] = self._metric[:2]
+        return flow.resolve(state.v).acceleration
 
     def _explain_non_finite(self, state: RobotState) -> None:
         for task, sample in self._samples:
@@ -204,9 +215,24 @@ class Controller:
         )
 
 
-def _check_parts(robot: Robot, tasks: Sequence[Task], field: NullSpaceField) -> None:
-    if not tasks:
-        raise ControllerError("a controller needs at least one task")
+def _levels(tasks: Sequence[Task | Sequence[Task]]) -> tuple[tuple[Task, ...], ...]:
+    """Return the tasks level by level; a plain list of tasks is one level."""
+    nested = [entry for entry in tasks if not isinstance(entry, Task)]
+    if nested and len(nested) != len(tasks):
+        raise ControllerError(
+            "tasks mixes tasks and lists of tasks; needs a list of tasks (one level) "
+            "or a list of lists (one a level)"
+        )
+    levels = nested or [tasks]
+    return tuple(tuple(level) for level in levels)  # type: ignore[arg-type]
+
+
+def _check_parts(
+    robot: Robot, levels: Sequence[Sequence[Task]], field: NullSpaceField
+) -> None:
+    tasks = [task for level in levels for task in level]
+    if not tasks or not all(levels):
+        raise ControllerError("a controller needs at least one task, at every level")
     names = [task.name for task in tasks]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
@@ -219,13 +245,15 @@ def _check_parts(robot: Robot, tasks: Sequence[Task], field: NullSpaceField) -> 
                 f"{kind} {part.name!r} was built for another robot object "
                 f"({part.robot.name}); build it with the controller's"
             )
-    rows = sum(task.rows for task in tasks)
-    if rows > robot.nv:
-        each = ", ".join(f"{task.name}: {task.rows}" for task in tasks)
-        raise ControllerError(
-            f"the tasks have {rows} rows ({each}); "
-            f"{robot.name} has only {robot.nv} freedoms"
-        )
+    for number, level in enumerate(levels, start=1):
+        rows = sum(task.rows for task in level)
+        if rows > robot.nv:
+            each = ", ".join(f"{task.name}: {task.rows}" for task in level)
+            where = f" of level {number}" if len(levels) > 1 else ""
+            raise ControllerError(
+                f"the tasks{where} have {rows} rows ({each}); "
+                f"{robot.name} has only {robot.nv} freedoms"
+            )
 
 
 def _null_space_gain(gain: Any, robot: Robot, metric: Metric) -> Array:

@@ -4,7 +4,7 @@ Three oracles: the paper's equation with a (J⁺)' by differences along the moti
 short form of `oracles.law` in plain NumPy, and the derivative of V itself.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -39,9 +39,8 @@ from hsp_control.exceptions import MetricError
 from hsp_control.fields import FieldSample
 from hsp_control.metrics import MetricSample
 from hsp_control.metrics.metric import CONSTANT, IDENTITY, VARYING
-from hsp_control.resolution import Resolution
+from hsp_control.resolution import Problem, Resolution
 from hsp_control.resolution.pseudo_inverse import weighted_pseudo_inverse
-from hsp_control.tasks import TaskSample
 from hsp_control.trajectories import HoldOrientation
 
 Array = NDArray[np.float64]
@@ -289,16 +288,27 @@ def numbers(seed: int, m: int, n: int, form: int) -> Numbers:
     )
 
 
+def fill(problem: Problem, x: Numbers) -> None:
+    problem.task.jacobian[:], problem.task.jacobian_dot[:] = x.J, x.J_dot
+    problem.task.acceleration[:] = x.a_x
+    problem.field.g[:], problem.field.g_dot[:] = x.g, x.g_dot
+    problem.metric.W[:], problem.metric.W_dot[:] = x.W, x.W_dot
+    problem.metric.L[:] = np.linalg.cholesky(x.W)
+
+
 def resolve(
-    x: Numbers, form: int, *, controls: bool = True, threshold: float = 0.01
+    x: Numbers,
+    form: int,
+    *,
+    controls: bool = True,
+    threshold: float = 0.01,
+    levels: Sequence[int] = (),
 ) -> tuple[Array, Array, bool]:
     """Return the package's acceleration and e_N, and whether it was damped."""
     m, n = x.J.shape
-    resolution = Resolution(m, n, form, x.K_N, threshold)
-    task = TaskSample(x.J, x.J_dot, np.zeros(m), np.zeros(m), x.a_x)
-    metric = MetricSample(x.W, np.linalg.cholesky(x.W), x.W_dot)
-    field = FieldSample(x.g, x.g_dot)
-    out = resolution.resolve(task, x.v, field, metric, controls_null_space=controls)
+    resolution = Resolution(levels or [m], n, form, x.K_N, threshold)
+    fill(resolution.problem, x)
+    out = resolution.resolve(x.v, controls_null_space=controls)
     return out.acceleration.copy(), out.null_space_error.copy(), out.damped
 
 
@@ -725,7 +735,7 @@ def test_projector_and_error_in_the_metric(name: str, kind: str) -> None:
     x = terms(c, state, metric)
     ours = controller(c, metric, 7.0)
     out = ours.compute(state)
-    J_sharp = ours._resolution.pseudo_inverse
+    J_sharp, _ = pseudo_inverse(x.J, x.W, threshold=1e-4)
     P = np.eye(c.robot.nv) - J_sharp @ x.J
     atol = 1e-11 * np.linalg.norm(x.W, 2)
     np.testing.assert_allclose(x.W @ P, P.T @ x.W, rtol=0, atol=atol)

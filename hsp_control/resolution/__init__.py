@@ -1,4 +1,5 @@
 """Resolutions: from tasks and a field to an acceleration."""
 
+from .problem import Problem as Problem
 from .resolution import Resolution as Resolution
 from .resolution import Resolved as Resolved

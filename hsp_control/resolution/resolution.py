@@ -1,17 +1,18 @@
-"""From tasks and a field to one acceleration: the law, its memory and its numbers."""
+"""From tasks and a field to one acceleration: the law with its memory."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.fields import FieldSample
+from hsp_control.arrays import Array, Indices
 from hsp_control.kernels import kernel
-from hsp_control.linalg import orthogonalise_columns
-from hsp_control.metrics import MetricSample
+from hsp_control.linalg import orthogonalise_columns, solve_lower
+from hsp_control.metrics.metric import IDENTITY
+from hsp_control.resolution.hierarchy import resolve_levels
 from hsp_control.resolution.law import acceleration, null_space_command
+from hsp_control.resolution.problem import Problem, parts
 from hsp_control.resolution.pseudo_inverse import weighted_pseudo_inverse
-from hsp_control.tasks import TaskSample
 
 
 class Resolved(NamedTuple):
@@ -19,127 +20,180 @@ class Resolved(NamedTuple):
 
     Attributes:
         acceleration: a, shape (nv,).
-        null_space_error: e_N = (I - J#J)(g - v), shape (nv,).
+        null_space_error: e_N = P(g - v), shape (nv,).
         damped: Whether a singular value was below the threshold, so that the law was
             bounded rather than exact.
+        finite: Whether a is made of numbers.
     """
 
     acceleration: Array
     null_space_error: Array
     damped: bool
+    finite: bool
 
 
 class Resolution:
-    """The law for one stack of tasks: `law.py` with its buffers.
+    """The law for levels of tasks: the kernels with their buffers.
 
-    It has scratch but no memory: the same input gives the same output.
+    It has scratch but nothing that it remembers: the same input gives the same output.
+
+    Attributes:
+        problem: What is to be resolved, to be filled in before `resolve`.
+        ends: Where each level's rows end in the stack.
+        threshold: Singular value below which the inverse is bounded.
+        null_space_error: e_N of the last `resolve`, shape (nv,).
     """
 
     def __init__(
-        self, rows: int, nv: int, form: int, gain: Array, threshold: float
+        self, levels: Sequence[int], nv: int, form: int, gain: Array, threshold: float
     ) -> None:
         """Allocate.
 
         Args:
-            rows: Rows m of all tasks.
+            levels: Rows of each level, the highest priority first.
             nv: Freedoms.
             form: The metric's form.
             gain: Null-space gain K_N, shape (nv, nv) [1/s].
             threshold: Singular value of the whitened Jacobian below which it is damped.
         """
+        m = sum(levels)
+        self.problem = Problem(m, nv, gain)
+        self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
         self._form = form
-        self._gain = gain
-        self._threshold = threshold
-        self.pseudo_inverse: Array = np.zeros((nv, rows))
-        self._B, self._Q = np.zeros((nv, rows)), np.zeros((nv, rows))
-        self._R, self._V = np.zeros((rows, rows)), np.zeros((rows, rows))
-        self._scratch = np.zeros((5, nv))
-        self._u, self._a = np.zeros(nv), np.zeros(nv)
-        self.null_space_error: Array = np.zeros(nv)
+        self.threshold = threshold
+        self._scratch = np.zeros(_scratch_size(m, nv))
+        self._a, self.null_space_error = np.zeros(nv), np.zeros(nv)
 
-    def resolve(
-        self,
-        task: TaskSample,
-        v: Array,
-        field: FieldSample,
-        metric: MetricSample,
-        *,
-        controls_null_space: bool,
-    ) -> Resolved:
+    def resolve(self, v: Array, *, controls_null_space: bool = True) -> Resolved:
         """Return the acceleration that tracks the tasks and the field.
 
         Args:
-            task: All tasks stacked.
             v: Velocity, shape (nv,).
-            field: g and g'.
-            metric: W, L and W'.
             controls_null_space: False for φ_N = 0, the paper's first simulation.
         """
-        damped = _resolve(
-            task.jacobian,
-            task.jacobian_dot,
-            task.acceleration,
+        damped, finite = _resolve(
+            self.problem.block,
             v,
-            *field,
-            self._gain,
-            *metric,
+            self.ends,
             self._form,
-            self._threshold,
+            self.threshold,
             controls_null_space,
-            self._B,
-            self._Q,
-            self._R,
-            self._V,
             self._scratch,
-            self.pseudo_inverse,
             self.null_space_error,
-            self._u,
             self._a,
         )
-        return Resolved(self._a, self.null_space_error, damped)
+        return Resolved(self._a, self.null_space_error, damped, finite)
 
     def singular_values(self) -> Array:
-        """Return the singular values of J L⁻ᵀ at the last `resolve`, largest first.
+        """Return the singular values of the problem's J L⁻ᵀ, largest first.
 
         Their product squared is det(J W⁻¹ Jᵀ), the manipulability of the paper.
         """
-        columns = self._B.copy()
-        orthogonalise_columns(columns, self._V)
-        return np.asarray(np.sort(np.sqrt((columns**2).sum(axis=0)))[::-1])
+        task, metric = self.problem.task, self.problem.metric
+        values = np.zeros(min(task.jacobian.shape))
+        _singular_values(task.jacobian, metric.L, self._form, self._scratch, values)
+        return values
+
+
+@kernel
+def _scratch_size(m: int, n: int) -> int:
+    return n * n + 3 * n * m + 3 * m * m + 5 * max(m, n) + n
 
 
 @kernel
 def _resolve(
-    J: Array,
-    J_dot: Array,
-    a_x: Array,
+    block: Array,
     v: Array,
-    g: Array,
-    g_dot: Array,
-    K_N: Array,
-    W: Array,
-    L: Array,
-    W_dot: Array,
+    ends: Indices,
     form: int,
     threshold: float,
-    controls_null_space: bool,
-    B: Array,
-    Q: Array,
-    R: Array,
-    V: Array,
+    controls: bool,
     scratch: Array,
-    J_sharp: Array,
     e_N: Array,
-    u: Array,
     a: Array,
-) -> bool:
-    """Write e_N and a; return whether the pseudo-inverse was damped."""
-    damped = weighted_pseudo_inverse(J, L, form, threshold, B, Q, R, V, J_sharp)
-    null_space_command(
-        J, J_dot, J_sharp, v, g, g_dot, K_N, W, L, W_dot, form, scratch, e_N, u
-    )
-    if not controls_null_space:
-        for i in range(u.shape[0]):
-            u[i] = 0.0
-    acceleration(J, J_dot, J_sharp, v, a_x, u, scratch, a)
-    return damped
+) -> tuple[bool, bool]:
+    """Write e_N and a; return whether it was damped, and whether a is finite."""
+    m, n = ends[-1], v.shape[0]
+    J, J_dot, _, _, a_x, g, g_dot, W, L, W_dot, K_N = parts(block, m, n)
+    mn, mm, wide = m * n, m * m, max(m, n)
+    at = 3 * mn + 3 * mm
+    J_sharp = scratch[:mn].reshape(n, m)
+    B = scratch[mn : 2 * mn].reshape(n, m)
+    Q = scratch[2 * mn : 3 * mn].reshape(n, m)
+    R = scratch[3 * mn : 3 * mn + mm].reshape(m, m)
+    V = scratch[3 * mn + mm : 3 * mn + 2 * mm].reshape(m, m)
+    vectors = scratch[at : at + 5 * wide].reshape(5, wide)
+    u = scratch[at + 5 * wide : at + 5 * wide + n]
+
+    conflicting = m > n
+    damped = False
+    if not conflicting:
+        damped = weighted_pseudo_inverse(J, L, form, threshold, B, Q, R, V, J_sharp)
+        conflicting = damped and ends.shape[0] > 1
+    if conflicting:
+        square = scratch[3 * mn : 3 * mn + 2 * mm].reshape(2, m, m)
+        G_inverse = scratch[3 * mn + 2 * mm : 3 * mn + 3 * mm].reshape(m, m)
+        inner = scratch[at + 5 * wide + n :].reshape(n, n)
+        damped = resolve_levels(
+            J,
+            J_dot,
+            a_x,
+            v,
+            g,
+            g_dot,
+            K_N,
+            W,
+            L,
+            W_dot,
+            form,
+            threshold,
+            controls,
+            ends,
+            inner,
+            B,
+            G_inverse,
+            square,
+            vectors,
+            e_N,
+            a,
+        )
+    else:
+        null_space_command(
+            J, J_dot, J_sharp, v, g, g_dot, K_N, W, L, W_dot, form, vectors, e_N, u
+        )
+        if not controls:
+            for i in range(n):
+                u[i] = 0.0
+        acceleration(J, J_dot, J_sharp, v, a_x, u, vectors, a)
+    total = 0.0
+    for i in range(n):
+        total += a[i]
+    return damped, bool(np.isfinite(total))
+
+
+@kernel
+def _singular_values(
+    J: Array, L: Array, form: int, scratch: Array, values: Array
+) -> None:
+    """Write the singular values of J L⁻ᵀ, largest first; J of any shape."""
+    m, n = J.shape
+    columns = scratch[: m * n].reshape(n, m)
+    for k in range(m):
+        for i in range(n):
+            columns[i, k] = J[k, i]
+        if form != IDENTITY:
+            solve_lower(L, columns[:, k])
+    V = scratch[m * n : m * n + m * m].reshape(m, m)
+    orthogonalise_columns(columns, V)
+    squares = scratch[m * n : m * n + m]
+    for k in range(m):
+        squares[k] = 0.0
+        for i in range(n):
+            squares[k] += columns[i, k] * columns[i, k]
+    for rank in range(values.shape[0]):
+        best = rank
+        for k in range(rank + 1, m):
+            if squares[k] > squares[best]:
+                best = k
+        squares[rank], squares[best] = squares[best], squares[rank]
+        values[rank] = np.sqrt(squares[rank])
