@@ -56,12 +56,15 @@ from .simulation import Rk4 as Rk4
 from .simulation import Rollout as Rollout
 from .simulation import SemiImplicitEuler as SemiImplicitEuler
 from .simulation import simulate as simulate
+from .tasks import AngularMomentum as AngularMomentum
+from .tasks import CenterOfMass as CenterOfMass
 from .tasks import FrameOrientation as FrameOrientation
 from .tasks import FramePose as FramePose
 from .tasks import FramePosition as FramePosition
 from .tasks import Gains as Gains
 from .tasks import JointPosture as JointPosture
 from .tasks import Pointing as Pointing
+from .tasks import RelativePose as RelativePose
 from .tasks import Task as Task
 from .trajectories import Blend as Blend
 from .trajectories import BlendOrientation as BlendOrientation

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.arrays import Array, Indices
+from hsp_control.centroidal import CentroidalMotion
 from hsp_control.combining import Part, combine
 from hsp_control.configuration_space import ConfigurationSpace
 from hsp_control.exceptions import (
@@ -242,7 +243,8 @@ class RobotState:
         self._frames: dict[str, FrameKinematics] = {}
         self._stamp = 0
         self._mass_matrix_stamp = self._mass_matrix_rate_stamp = -1
-        self._effects_stamp = -1
+        self._effects_stamp = self._centroidal_stamp = -1
+        self._centroidal: CentroidalMotion | None = None
         self._mass_matrix_rate: Array = np.zeros((robot.nv, robot.nv))
         self._displaced: RobotState | None = None
 
@@ -302,6 +304,16 @@ class RobotState:
     def position(self, frame: str) -> Array:
         """Return the origin of a frame in the world [m], shape (3,)."""
         return self.frame(frame).position
+
+    @property
+    def centroidal(self) -> CentroidalMotion:
+        """The centre of mass, the angular momentum about it, and their Jacobians."""
+        if self._centroidal is None:
+            self._centroidal = CentroidalMotion(self.robot.model)
+        if self._centroidal_stamp != self._stamp:
+            self._centroidal.update(self.robot.model, self.data, self.q, self.v)
+            self._centroidal_stamp = self._stamp
+        return self._centroidal
 
     @property
     def mass_matrix(self) -> Array:

@@ -18,6 +18,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hsp_control import (
+    AngularMomentum,
+    CenterOfMass,
     Controller,
     FrameOrientation,
     FramePose,
@@ -26,6 +28,7 @@ from hsp_control import (
     Hold,
     JointPosture,
     Pointing,
+    RelativePose,
     Robot,
     Task,
     ToolFrame,
@@ -231,10 +234,13 @@ class Orientation(Family):
     frame: str
     rows = 3
 
+    def placement(self, motion: Motion, s: float) -> pin.SE3:
+        return motion.placement(s, self.frame)
+
     def reference(
         self, motion: Motion, error: float, rng: np.random.Generator
     ) -> OrientationTrajectory:
-        R = motion.placement(0.0, self.frame).rotation
+        R = self.placement(motion, 0.0).rotation
         return Tumble(R @ pin.exp3(-error * unit(rng, 3)))
 
     def build(
@@ -244,13 +250,13 @@ class Orientation(Family):
         return FrameOrientation(robot, self.frame, reference, gains)
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
-        R = motion.placement(0.0, self.frame).rotation
-        return lambda s: pin.log3(motion.placement(s, self.frame).rotation @ R.T)
+        R = self.placement(motion, 0.0).rotation
+        return lambda s: pin.log3(self.placement(motion, s).rotation @ R.T)
 
     def check_measure(
         self, task: Any, motion: Motion, reference: Array, actual: Array, e: Array
     ) -> None:
-        R = motion.placement(0.0, self.frame).rotation
+        R = self.placement(motion, 0.0).rotation
         check_quaternions(reference, actual, R, e)
 
 
@@ -262,7 +268,7 @@ class Pose(Orientation):
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
         rng = np.random.default_rng(seed)
-        x = motion.placement(0.0, self.frame).translation
+        x = self.placement(motion, 0.0).translation
         turned = self.reference(motion, error, rng)
         moved = wobble(x + error * unit(rng, 3))
         return FramePose(robot, self.frame, ComposedPose(moved, turned), gains)
@@ -270,7 +276,7 @@ class Pose(Orientation):
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         turned = super().coordinates(task, motion)
         return lambda s: np.concatenate(
-            [motion.placement(s, self.frame).translation, turned(s)]
+            [self.placement(motion, s).translation, turned(s)]
         )
 
     def size(self, error: float) -> float:
@@ -279,12 +285,61 @@ class Pose(Orientation):
     def check_measure(
         self, task: Any, motion: Motion, reference: Array, actual: Array, e: Array
     ) -> None:
-        placement = motion.placement(0.0, self.frame)
+        placement = self.placement(motion, 0.0)
         np.testing.assert_allclose(
             actual[:3], placement.translation, rtol=0, atol=1e-14
         )
         np.testing.assert_allclose((reference - actual)[:3], e[:3], rtol=0, atol=1e-14)
         check_quaternions(reference[3:], actual[3:], placement.rotation, e[3:])
+
+
+@dataclass(frozen=True)
+class Seen(Pose):
+    """The pose of one frame in another's axes."""
+
+    reference_frame: str = ""
+
+    def placement(self, motion: Motion, s: float) -> pin.SE3:
+        seen_from = motion.placement(s, self.reference_frame)
+        return seen_from.actInv(motion.placement(s, self.frame))
+
+    def build(
+        self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
+    ) -> Task:
+        pose = super().build(robot, motion, error, gains, seed)
+        return RelativePose(
+            robot, self.frame, self.reference_frame, pose.trajectory, gains
+        )
+
+
+@dataclass(frozen=True)
+class Mass(Family):
+    """The centre of mass."""
+
+    axes: str = "xyz"
+
+    @property
+    def rows(self) -> int:  # type: ignore[override]
+        return len(self.axes)
+
+    def build(
+        self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
+    ) -> Task:
+        target = self.coordinates(None, motion)(0.0)
+        target = target + error * unit(np.random.default_rng(seed), self.rows)
+        return CenterOfMass(robot, wobble(target), gains, axes=self.axes)
+
+    def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
+        model, data = motion.robot.model, motion.robot.model.createData()
+        indices = ["xyz".index(axis) for axis in self.axes]
+        return lambda s: pin.centerOfMass(model, data, motion.configuration(s))[indices]
+
+    def check_measure(
+        self, task: Any, motion: Motion, reference: Array, actual: Array, e: Array
+    ) -> None:
+        x = self.coordinates(task, motion)(0.0)
+        np.testing.assert_allclose(actual, x, rtol=0, atol=1e-14)
+        np.testing.assert_allclose(reference - actual, e, rtol=0, atol=1e-14)
 
 
 @dataclass(frozen=True)
@@ -491,6 +546,19 @@ CASES = [
             ("tiago_no_hand", HAND, "spinning"),
         )
     ),
+    *(
+        Case(robot, Seen(FRAMES[robot], reference_frame=frame), root)
+        for robot, frame, root in (
+            ("panda", "panda_link1", None),
+            ("tiago_no_hand", "base_link", None),
+            ("ur5", "base_link", "free_flyer"),
+        )
+    ),
+    Case("planar3r", Mass("xy")),
+    Case("panda", Mass("yz")),
+    Case("tiago_no_hand", Mass("xy"), "planar"),
+    Case("ur5", Mass("xyz"), "free_flyer"),
+    Case("ur5", Mass("yx"), "planar"),
     Case("planar3r", Posture(None, False)),
     Case("planar3r", Posture(None, True)),
     Case("planar3r", Posture(("joint3", "joint1"), True)),
@@ -1055,3 +1123,50 @@ def test_a_task_is_named_after_its_frame_as_a_column_may_be() -> None:
     robot = Robot.load("panda", tool_frames=frames)
     task = FramePosition(robot, "tip/1.0", Hold([0.4, 0, 0.4]), Gains(1, 1))
     assert task.name == "tip_1_0"
+
+
+# --- angular momentum ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "root"), [("panda", None), ("iiwa14", None), ("ur5", "free_flyer")]
+)
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=20)
+def test_angular_momentum_obeys_its_first_order_equation(
+    name: str, root: Any, seed: int
+) -> None:
+    """ℓ = A v / m is Pinocchio's; J' is dJ/dt; ℓ' = J a + J'v gives e' = -K e."""
+    robot = load(name, root)
+    rng = np.random.default_rng(seed)
+    q = robot.random_configuration(rng)
+    v, a = rng.standard_normal((2, robot.nv))
+    motion = Motion(robot, q, v, a)
+    target = wobble(np.array([0.1, -0.2, 0.3]))
+    task = AngularMomentum(robot, target, 7.0)
+    sample = task.evaluate(robot.state(TIME, q, v))
+    data, mass = robot.model.createData(), pin.computeTotalMass(robot.model)
+
+    def rows(s: float) -> Array:
+        matrix = pin.ccrba(robot.model, data, motion.configuration(s), v)
+        return matrix[3:] / mass
+
+    def momentum(s: float) -> Array:
+        return rows(s) @ (v + s * a)
+
+    np.testing.assert_allclose(sample.jacobian, rows(0.0), rtol=0, atol=1e-13)
+    scale = max(1.0, float(np.abs(sample.jacobian_dot).max()))
+    np.testing.assert_allclose(
+        sample.jacobian_dot, motion.derivative(rows), rtol=0, atol=1e-9 * scale
+    )
+    rate = motion.derivative(momentum)
+    np.testing.assert_allclose(
+        sample.jacobian @ a + sample.jacobian_dot @ v, rate, rtol=0, atol=1e-9 * scale
+    )
+    # Where the law is obeyed, ℓ' = a_x, the error's rate is what the sample says.
+    desired = target.sample(TIME)
+    np.testing.assert_allclose(sample.error, desired.position - momentum(0.0))
+    np.testing.assert_allclose(
+        desired.velocity - sample.acceleration, -7.0 * sample.error, atol=1e-12
+    )
+    np.testing.assert_allclose(sample.error_rate, -7.0 * sample.error)

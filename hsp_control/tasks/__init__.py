@@ -1,10 +1,13 @@
 """Tasks: what the robot shall track."""
 
+from .angular_momentum import AngularMomentum as AngularMomentum
+from .center_of_mass import CenterOfMass as CenterOfMass
 from .frame_orientation import FrameOrientation as FrameOrientation
 from .frame_pose import FramePose as FramePose
 from .frame_position import FramePosition as FramePosition
 from .gains import Gains as Gains
 from .joint_posture import JointPosture as JointPosture
 from .pointing import Pointing as Pointing
+from .relative_pose import RelativePose as RelativePose
 from .task import Task as Task
 from .task import TaskSample as TaskSample

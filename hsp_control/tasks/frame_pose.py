@@ -63,7 +63,7 @@ class FramePose(Task):
         out = self._out(out)
         frame = state.frame(self.frame)
         desired = self.trajectory.sample(state.t, self._desired)
-        _frame_pose(
+        pose_error_equation(
             frame.jacobian,
             frame.jacobian_dot,
             frame.rotation,
@@ -103,7 +103,7 @@ class FramePose(Task):
 
 
 @kernel
-def _frame_pose(
+def pose_error_equation(
     J_frame: Array,
     J_frame_dot: Array,
     R: Array,

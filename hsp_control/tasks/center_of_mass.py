@@ -1,0 +1,81 @@
+"""The centre of mass follows a trajectory."""
+
+from collections.abc import Sequence
+
+from hsp_control.arrays import Array
+from hsp_control.exceptions import TaskError
+from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks.axes import axis_indices
+from hsp_control.tasks.gains import Gains
+from hsp_control.tasks.task import Task, TaskSample, track
+from hsp_control.trajectories import Trajectory, TrajectorySample
+
+
+class CenterOfMass(Task):
+    """Centre of mass in the world: e = c_d - c, exactly linear.
+
+    Attributes:
+        axes: World axes that are tracked, such as ``"xyz"`` or ``"xy"``.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        trajectory: Trajectory,
+        gains: Gains,
+        *,
+        axes: str | Sequence[str] = "xyz",
+        name: str = "center_of_mass",
+    ) -> None:
+        """Set the task.
+
+        Args:
+            robot: The robot.
+            trajectory: c_d(t) of the tracked axes [m], of dimension ``len(axes)``.
+            gains: Feedback gains.
+            axes: World axes that are tracked, in the trajectory's order.
+            name: What the log calls it.
+
+        Raises:
+            TaskError: If the axes are not distinct letters of "xyz", or the trajectory
+                has another dimension.
+            GainError: If the gains do not fit.
+        """
+        self._axes = axis_indices(axes)
+        super().__init__(robot, len(self._axes), gains, name)
+        self.axes = "".join(axes)
+        if trajectory.dimension != self.rows:
+            raise TaskError(
+                f"task {name!r} tracks the axes {self.axes!r}; its trajectory has "
+                f"dimension {trajectory.dimension}, needs {self.rows}"
+            )
+        self.trajectory = trajectory
+        self._desired = TrajectorySample.allocate(self.rows)
+
+    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
+        """Return the rows of the tracked axes; see `Task.evaluate`."""
+        out = self._out(out)
+        mass = state.centroidal
+        desired = self.trajectory.sample(state.t, self._desired)
+        mass.jacobian.take(self._axes, axis=0, out=out.jacobian)
+        mass.jacobian_dot.take(self._axes, axis=0, out=out.jacobian_dot)
+        out.error[:] = desired.position - mass.position[self._axes]
+        out.error_rate[:] = desired.velocity - mass.velocity[self._axes]
+        track(
+            desired.acceleration,
+            self.Kp,
+            self.Kv,
+            out.error,
+            out.error_rate,
+            out.acceleration,
+        )
+        return out
+
+    def reference_rate(self, state: RobotState) -> Array:
+        """Return c_d' [m/s]."""
+        return self.trajectory.sample(state.t).velocity
+
+    def measure(self, state: RobotState) -> tuple[Array, Array]:
+        """Return desired and actual centre of mass along the tracked axes [m]."""
+        desired = self.trajectory.sample(state.t)
+        return desired.position, state.centroidal.position[self._axes]

@@ -1,0 +1,210 @@
+"""One frame follows a pose as seen from another: two hands carry one thing."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.arrays import Array
+from hsp_control.exceptions import TaskError
+from hsp_control.kernels import kernel
+from hsp_control.robot import Robot, RobotState
+from hsp_control.rotations import quaternion_from_rotation
+from hsp_control.tasks.frame_pose import pose_error_equation
+from hsp_control.tasks.gains import Gains
+from hsp_control.tasks.task import Task, TaskSample, named_after
+from hsp_control.trajectories import PoseSample, PoseTrajectory
+
+
+class Relative(NamedTuple):
+    """How a frame moves as seen from another, in the other's axes.
+
+    Attributes:
+        jacobian: Shape (6, nv), linear before angular.
+        jacobian_dot: Its time derivative, shape (6, nv).
+        rotation: Reference ← frame, shape (3, 3).
+        position: The frame's origin [m], shape (3,).
+        velocity: J v, shape (6,).
+    """
+
+    jacobian: Array
+    jacobian_dot: Array
+    rotation: Array
+    position: Array
+    velocity: Array
+
+
+class RelativePose(Task):
+    """Pose of a frame in another frame's axes; both errors are exactly linear there.
+
+    Position is R_rᵀ(p - p_r) and orientation R_rᵀR; the rest is `FramePose`.
+
+    Attributes:
+        frame: The frame that is seen.
+        reference: The frame that it is seen from.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        frame: str,
+        reference: str,
+        trajectory: PoseTrajectory,
+        gains: Gains,
+        *,
+        name: str | None = None,
+    ) -> None:
+        """Set the task.
+
+        Args:
+            robot: The robot.
+            frame: Name of the frame.
+            reference: Name of the frame that it is seen from.
+            trajectory: The desired pose in the reference's axes.
+            gains: Feedback gains of the six rows.
+            name: What the log calls it; ``<frame>_from_<reference>`` by default.
+
+        Raises:
+            FrameNotFoundError: If the robot has no such frame.
+            TaskError: If the two are one frame, or the robot has fewer than six
+                freedoms.
+            GainError: If the gains do not fit.
+        """
+        robot.frame_id(frame)
+        robot.frame_id(reference)
+        if frame == reference:
+            raise TaskError(f"a pose of {frame!r} relative to itself is no task")
+        default = named_after(f"{frame}_from_{reference}")
+        super().__init__(robot, 6, gains, name or default)
+        self.frame = frame
+        self.reference = reference
+        self.trajectory = trajectory
+        self._desired = PoseSample.allocate()
+        nv = robot.nv
+        self._relative = Relative(
+            np.zeros((6, nv)),
+            np.zeros((6, nv)),
+            np.zeros((3, 3)),
+            np.zeros(3),
+            np.zeros(6),
+        )
+        self._scratch = np.zeros((8, 3))
+        self._matrices = np.zeros((3, 3, 3))
+        self._wanted = np.zeros(6)
+
+    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
+        """Return the six rows; see `Task.evaluate`."""
+        out = self._out(out)
+        desired = self.trajectory.sample(state.t, self._desired)
+        pose_error_equation(
+            *self._seen(state),
+            *desired.position,
+            *desired.orientation,
+            self.Kp,
+            self.Kv,
+            self._wanted,
+            self._scratch,
+            self._matrices,
+            *out,
+        )
+        return out
+
+    def reference_rate(self, state: RobotState) -> Array:
+        """Return x_d' and w_d in the reference's axes [m/s, rad/s]."""
+        sample = self.trajectory.sample(state.t)
+        return np.concatenate(
+            [sample.position.velocity, sample.orientation.angular_velocity]
+        )
+
+    def measure(self, state: RobotState) -> tuple[Array, Array]:
+        """Return desired and actual (x, y, z, quaternion x, y, z, w)."""
+        sample, seen = self.trajectory.sample(state.t), self._seen(state)
+        desired, actual = np.zeros(7), np.zeros(7)
+        desired[:3], actual[:3] = sample.position.position, seen.position
+        quaternion_from_rotation(sample.orientation.rotation, desired[3:])
+        quaternion_from_rotation(seen.rotation, actual[3:])
+        if desired[3:] @ actual[3:] < 0.0:
+            actual[3:] *= -1.0
+        return desired, actual
+
+    def _seen(self, state: RobotState) -> Relative:
+        frame, reference = state.frame(self.frame), state.frame(self.reference)
+        _relative_kinematics(
+            frame.jacobian,
+            frame.jacobian_dot,
+            frame.rotation,
+            frame.position,
+            reference.jacobian,
+            reference.jacobian_dot,
+            reference.rotation,
+            reference.position,
+            state.v,
+            *self._relative,
+        )
+        return self._relative
+
+
+@kernel
+def _relative_kinematics(
+    J_f: Array,
+    J_f_dot: Array,
+    R_f: Array,
+    p_f: Array,
+    J_r: Array,
+    J_r_dot: Array,
+    R_r: Array,
+    p_r: Array,
+    v: Array,
+    J: Array,
+    J_dot: Array,
+    R: Array,
+    p: Array,
+    velocity: Array,
+) -> None:
+    """Write the kinematics of frame f in the axes of frame r.
+
+    With d = p_f - p_r: J = R_rᵀ(J_f - J_r - [w_r-part] × d), and since R_rᵀ' =
+    -R_rᵀ[w_r]×, J' = R_rᵀ(K' - w_r × K) with K the bracket.
+    """
+    n = v.shape[0]
+    for i in range(3):
+        p[i] = 0.0
+        for k in range(3):
+            p[i] += R_r[k, i] * (p_f[k] - p_r[k])
+            R[i, k] = 0.0
+            for s in range(3):
+                R[i, k] += R_r[s, i] * R_f[s, k]
+    dx, dy, dz = p_f[0] - p_r[0], p_f[1] - p_r[1], p_f[2] - p_r[2]
+    ux = uy = uz = wx = wy = wz = 0.0
+    for j in range(n):
+        ux += (J_f[0, j] - J_r[0, j]) * v[j]
+        uy += (J_f[1, j] - J_r[1, j]) * v[j]
+        uz += (J_f[2, j] - J_r[2, j]) * v[j]
+        wx += J_r[3, j] * v[j]
+        wy += J_r[4, j] * v[j]
+        wz += J_r[5, j] * v[j]
+    for i in range(6):
+        velocity[i] = 0.0
+    for j in range(n):
+        ax, ay, az = J_r[3, j], J_r[4, j], J_r[5, j]
+        bx, by, bz = J_r_dot[3, j], J_r_dot[4, j], J_r_dot[5, j]
+        kx = J_f[0, j] - J_r[0, j] - (ay * dz - az * dy)
+        ky = J_f[1, j] - J_r[1, j] - (az * dx - ax * dz)
+        kz = J_f[2, j] - J_r[2, j] - (ax * dy - ay * dx)
+        lx = J_f_dot[0, j] - J_r_dot[0, j] - (by * dz - bz * dy) - (ay * uz - az * uy)
+        ly = J_f_dot[1, j] - J_r_dot[1, j] - (bz * dx - bx * dz) - (az * ux - ax * uz)
+        lz = J_f_dot[2, j] - J_r_dot[2, j] - (bx * dy - by * dx) - (ax * uy - ay * ux)
+        gx, gy, gz = J_f[3, j] - ax, J_f[4, j] - ay, J_f[5, j] - az
+        hx, hy, hz = J_f_dot[3, j] - bx, J_f_dot[4, j] - by, J_f_dot[5, j] - bz
+        lx -= wy * kz - wz * ky
+        ly -= wz * kx - wx * kz
+        lz -= wx * ky - wy * kx
+        hx -= wy * gz - wz * gy
+        hy -= wz * gx - wx * gz
+        hz -= wx * gy - wy * gx
+        for i in range(3):
+            J[i, j] = R_r[0, i] * kx + R_r[1, i] * ky + R_r[2, i] * kz
+            J_dot[i, j] = R_r[0, i] * lx + R_r[1, i] * ly + R_r[2, i] * lz
+            J[3 + i, j] = R_r[0, i] * gx + R_r[1, i] * gy + R_r[2, i] * gz
+            J_dot[3 + i, j] = R_r[0, i] * hx + R_r[1, i] * hy + R_r[2, i] * hz
+        for i in range(6):
+            velocity[i] += J[i, j] * v[j]
