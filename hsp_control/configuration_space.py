@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.arrays import Array
+from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import ConfigurationError, NonFiniteError, ShapeError
 from hsp_control.loading import moving_joints
 
@@ -26,6 +26,9 @@ class ConfigurationSpace:
         unit_blocks: (start, size) of every quaternion and (cos, sin) pair in q.
         flat: Whether every joint has one freedom, so that δ' = v holds globally.
         mimics: Whether some joints follow others.
+        unactuated: The freedoms that no motor moves, those of a free-flyer root.
+        freedom_indices: Where each freedom's own coordinate stands in q; -1 where it
+            has none (roots, continuous joints).
     """
 
     def __init__(
@@ -43,6 +46,17 @@ class ConfigurationSpace:
         self.unit_blocks: tuple[tuple[int, int], ...] = _unit_blocks(self.joints)
         self.flat: bool = all(joint.nv == 1 for joint in self.joints.values())
         self.mimics: bool = model.nvExtended != model.nv
+        self.unactuated: tuple[int, ...] = tuple(
+            joint.idx_v + k
+            for joint in self.joints.values()
+            if joint.shortname() == "JointModelFreeFlyer"
+            for k in range(6)
+        )
+        own = np.full(self.nv, -1, dtype=np.int64)
+        for joint in self.joints.values():
+            if joint.nq == joint.nv == 1:
+                own[joint.idx_v] = joint.idx_q
+        self.freedom_indices: Indices = own
         fits = home is not None and len(home) == self.nv
         self._home = np.array(home) if fits else None
 

@@ -1,19 +1,33 @@
 """The controller: tasks, a null-space field and a metric make one effort."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Set
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from hsp_control.actuation import Actuation
 from hsp_control.arrays import Array
-from hsp_control.exceptions import ControllerError, GainError, NonFiniteError
+from hsp_control.composition import (
+    Base,
+    check_parts,
+    check_schedules,
+    check_support,
+    checked_gain,
+    levels_of,
+)
+from hsp_control.contacts import Contact
+from hsp_control.exceptions import ControllerError, NonFiniteError
 from hsp_control.fields import FieldSample, NullSpaceField, Rest
-from hsp_control.metrics import IdentityMetric, Metric, MetricSample
-from hsp_control.metrics.metric import CONSTANT, VARYING
-from hsp_control.resolution import Resolution
+from hsp_control.limits import Limits
+from hsp_control.metrics import IdentityMetric, Metric
+from hsp_control.metrics.metric import CONSTANT
+from hsp_control.mode import Mode
+from hsp_control.resolution import Resolution, Resolved
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks import Task, TaskSample
-from hsp_control.tasks.gains import as_gain, as_matrix
+from hsp_control.schedules import Schedule
+from hsp_control.tasks import Gains, Task, TaskSample
+from hsp_control.tasks.gain_ramp import GainRamp
 
 
 class ControlOutput(NamedTuple):
@@ -23,13 +37,18 @@ class ControlOutput(NamedTuple):
     what must outlive it.
 
     Attributes:
-        tau: Effort M a + N, shape (nv,) [N·m or N].
+        tau: Effort M a + N, less what contacts bear, shape (nv,) [N·m or N].
         acceleration: a, shape (nv,).
         task: All tasks stacked: J, J', e, e', a_x.
         field: g and g', shape (nv,) each.
         null_space_error: e_N = (I - J#J)(g - v), shape (nv,).
         damped: Whether a task is so near a singularity that the law was bounded
             rather than exact.
+        forces: At the points of the contacts that bear, in the axes of each (two
+            tangents, normal), shape (3 points,) [N]; see `Mode.support`.
+        status: What of the law could be delivered: `actuation.status`.
+        relaxation: By how much the worst limit is missed, where limits contradict each
+            other [rad/s² or m/s²].
     """
 
     tau: Array
@@ -38,6 +57,9 @@ class ControlOutput(NamedTuple):
     field: FieldSample
     null_space_error: Array
     damped: bool
+    forces: Array
+    status: int
+    relaxation: float
 
 
 class Diagnostics(NamedTuple):
@@ -46,7 +68,8 @@ class Diagnostics(NamedTuple):
     Attributes:
         field_value: The field's cost f, or its norm.
         null_space_norm: ‖e_N‖_W, which decays like exp(-K_N t) for a scalar gain.
-        singular_values: Of the stacked Jacobian in the metric, J L⁻ᵀ, largest first.
+        singular_values: Of the tasks' stacked Jacobian in the metric, J L⁻ᵀ, largest
+            first.
         manipulability: det(J W⁻¹ Jᵀ), the product of their squares.
     """
 
@@ -59,9 +82,10 @@ class Diagnostics(NamedTuple):
 class Controller:
     """Computes tau = M a + N with the law of Hsu, Hauser and Sastry over a metric.
 
-    Wherever the stacked Jacobian keeps its rank: every task's error obeys
-    e'' + Kv e' + Kp e = 0, and V = ½ e_NᵀW e_N obeys V' = -e_NᵀW K_N e_N. It has no
-    memory: the same state gives the same effort.
+    Wherever the stacked Jacobian keeps its rank and no limit binds: every task's error
+    obeys e'' + Kv e' + Kp e = 0, and V = ½ e_NᵀW e_N obeys V' = -e_NᵀW K_N e_N. It has
+    no memory, but for the last effort where its rate is limited (see `applied`): the
+    same state gives the same effort.
 
     Attributes:
         robot: The robot.
@@ -70,8 +94,9 @@ class Controller:
         field: The null-space field.
         metric: The joint-space metric.
         null_space_gain: K_N, shape (nv, nv) [1/s].
-        task_rows: Where each task's rows stand in the stack, by name.
-        field_sample: g and g' of the last `compute`.
+        contacts: Where a floating base may rest.
+        limits: What the efforts and the motion are kept within, if anything.
+        schedules: When each task counts, by name; those not named always do.
     """
 
     def __init__(
@@ -83,6 +108,10 @@ class Controller:
         null_space_gain: Any = 10.0,
         metric: Metric | None = None,
         singularity_threshold: float = 0.03,
+        limits: Limits | None = None,
+        contacts: Sequence[Contact] = (),
+        base: Base | None = None,
+        schedules: Mapping[str, Schedule] | None = None,
     ) -> None:
         """Compose a controller.
 
@@ -97,47 +126,55 @@ class Controller:
                 metric) below which its inverse is bounded instead of exact. For
                 positions about 3 % of the arm's reach [m]; efforts on the way into a
                 singularity grow with its inverse cube.
+            limits: What efforts and motion are kept within; None: no limits.
+            contacts: Where a robot with a free-flyer root may rest.
+            base: What else moves such a root: ``flying``, nothing when no contact
+                bears; ``driven``, something that delivers the root's effort, as a wind
+                tunnel or a simulator may.
+            schedules: When tasks count, by name; all others always do.
 
         Raises:
             ControllerError: If tasks, field and robot do not belong together, or the
                 tasks of one level have more rows than the robot has freedoms.
+            ContactError: If a floating base has neither contact nor word of what else
+                moves it, or a fixed one has.
             GainError: If K_N does not make the null-space error decay.
             MetricError: If the metric does not fit the robot.
         """
         field = Rest(robot) if field is None else field
         metric = IdentityMetric() if metric is None else metric
-        levels = _levels(tasks)
-        _check_parts(robot, levels, field)
+        levels = levels_of(tasks)
+        check_parts(robot, levels, field)
+        check_support(robot, contacts, base)
         metric.check(robot.nv)
         if not 0.0 < singularity_threshold < np.inf:
             raise ControllerError(
                 f"singularity_threshold is {singularity_threshold}; must be positive"
             )
+        if limits is not None and limits.robot is not robot:
+            raise ControllerError("the limits were built for another robot object")
         self.robot = robot
         self.levels = levels
         self.tasks = tuple(task for level in levels for task in level)
         self.field = field
         self.metric = metric
-        self.null_space_gain = _null_space_gain(null_space_gain, robot, metric)
-        self._resolution = Resolution(
-            [sum(task.rows for task in level) for level in levels],
-            robot.nv,
-            metric.form,
-            self.null_space_gain,
-            singularity_threshold,
+        self.null_space_gain = checked_gain(null_space_gain, robot, metric)
+        self.contacts = tuple(contacts)
+        self.limits = limits
+        self.schedules = dict(schedules or {})
+        check_schedules(self.schedules, [task.name for task in self.tasks])
+        self._threshold = singularity_threshold
+        self._actuation = Actuation(
+            robot, limits, () if base == "driven" else robot.unactuated
         )
-        problem = self._resolution.problem
-        self._stack, self._metric = problem.task, problem.metric
-        self.field_sample = problem.field
-        ends = np.cumsum([task.rows for task in self.tasks])
-        self.task_rows = {
-            task.name: slice(int(end) - task.rows, int(end))
-            for task, end in zip(self.tasks, ends, strict=True)
-        }
-        self._samples = tuple(
-            (task, self._stack.rows(where.start, where.stop))
-            for task, where in zip(self.tasks, self.task_rows.values(), strict=True)
+        self._modes: dict[tuple[Any, ...], Mode] = {}
+        self._mode: Mode | None = None
+        self._ramps: list[GainRamp] = []
+        self._timeless = not self.schedules and all(
+            contact.schedule.constant for contact in self.contacts
         )
+
+    # -- the step ---------------------------------------------------------------------
 
     def compute(self, state: RobotState) -> ControlOutput:
         """Return the effort at a state.
@@ -152,25 +189,136 @@ class Controller:
                 f"the state is of another robot object ({state.robot.name}); "
                 f"this controller is for {self.robot.name}"
             )
-        for task, sample in self._samples:
-            task.evaluate(state, sample)
-        metric = self.metric.evaluate(state, self._metric)
-        field = self.field.evaluate(state, metric, self.metric.form, self.field_sample)
-        a, e_N, damped, finite = self._resolution.resolve(
-            state.v, controls_null_space=self.field.controls
-        )
-        if not finite:
+        if self._ramps:
+            self._ramps = [ramp for ramp in self._ramps if not ramp.apply(state.t)]
+        mode = self._mode
+        if mode is None or not self._timeless:
+            resolved = self._scheduled(state)
+            mode = self.mode
+        else:
+            resolved = mode.resolve(state, self.metric, self.field)
+        if not resolved.finite:
             self._explain_non_finite(state)
-        tau = state.inverse_dynamics(a)  # M a + N, the paper's equation (7)
-        return ControlOutput(tau, a, self._stack, field, e_N, damped)
+        delivered = self._actuation.deliver(
+            state, resolved.acceleration, mode.resolution, mode.support
+        )
+        return ControlOutput(
+            delivered.tau,
+            delivered.acceleration,
+            mode.stack,
+            mode.resolution.problem.field,
+            resolved.null_space_error,
+            resolved.damped,
+            delivered.forces,
+            delivered.status,
+            delivered.relaxation,
+        )
+
+    def applied(self, tau: Array, period: float) -> None:
+        """Take note of an effort that goes out, and of when the next one will.
+
+        Only where the rate of efforts is limited does it matter.
+
+        Args:
+            tau: Effort, shape (nv,).
+            period: Time until the next effort [s].
+        """
+        self._actuation.applied(tau, period)
+
+    def _scheduled(self, state: RobotState) -> Resolved:
+        """Return the law's acceleration with what the schedules have on.
+
+        A task that comes or goes has a weight between 0 and 1. With w1 ≥ w2 ≥ ... the
+        weights of such tasks, the acceleration is
+
+            (1 - w1) a{} + (w1 - w2) a{1} + (w2 - w3) a{1, 2} + ...
+
+        with a{...} the law for the tasks that always count and those in the braces. It
+        is continuous in the weights, and since the tasks in all sets are linear in a,
+        those keep their exact error equation throughout.
+        """
+        t = state.t
+        weights = {
+            name: schedule.weight(t) for name, schedule in self.schedules.items()
+        }
+        coming = sorted(
+            (name for name, w in weights.items() if 0.0 < w < 1.0),
+            key=lambda name: -weights[name],
+        )
+        off = {name for name, w in weights.items() if w < 1.0}
+        shares = [1.0, *(weights[name] for name in coming), 0.0]
+        mixed: Array | None = None
+        for k, (share, following) in enumerate(pairwise(shares)):
+            self._mode = self._mode_without(state, off - set(coming[:k]))
+            resolved = self._mode.resolve(state, self.metric, self.field)
+            if not coming:
+                return resolved
+            part = (share - following) * resolved.acceleration
+            mixed = part if mixed is None else mixed + part
+        return resolved._replace(acceleration=mixed)
+
+    def _mode_without(self, state: RobotState, off: Set[str]) -> Mode:
+        """Return the mode of the contacts that bear now, without some tasks."""
+        bearing = tuple(c for c in self.contacts if c.schedule.active(state.t))
+        key = (tuple(c.name for c in bearing), frozenset(off))
+        if key not in self._modes:
+            levels = [[t for t in level if t.name not in off] for level in self.levels]
+            self._modes[key] = Mode(
+                state,
+                bearing,
+                levels,
+                self._actuation.base,
+                self._actuation.support(bearing),
+                self.metric,
+                self.null_space_gain,
+                self._threshold,
+            )
+        return self._modes[key]
+
+    # -- what explains it -------------------------------------------------------------
+
+    @property
+    def mode(self) -> Mode:
+        """What was on at the last `compute`.
+
+        Raises:
+            ControllerError: If there was none yet.
+        """
+        if self._mode is None:
+            raise ControllerError("nothing has been computed yet")
+        return self._mode
+
+    def level_of(self, task: str) -> int:
+        """Return the level that a task is at, 0 the highest.
+
+        Raises:
+            ControllerError: If there is no such task.
+        """
+        check_schedules({task: None}, [each.name for each in self.tasks])
+        return next(
+            k
+            for k, level in enumerate(self.levels)
+            if any(each.name == task for each in level)
+        )
+
+    @property
+    def task_rows(self) -> dict[str, slice]:
+        """Where each task's rows stand in the last output's stack, by name."""
+        return self.mode.task_rows
+
+    @property
+    def field_sample(self) -> FieldSample:
+        """The field, g and g', at the last `compute`."""
+        return self.mode.resolution.problem.field
 
     def diagnose(self, state: RobotState) -> Diagnostics:
         """Return what one would plot, after `compute` at the same state."""
-        e_N = self._resolution.null_space_error
-        singular_values = self._resolution.singular_values()
+        resolution = self.mode.resolution
+        e_N = resolution.null_space_error
+        singular_values = resolution.singular_values(self.mode.first_task_row)
         return Diagnostics(
             field_value=self.field.value(state),
-            null_space_norm=float(np.sqrt(e_N @ self._metric.W @ e_N)),
+            null_space_norm=float(np.sqrt(e_N @ resolution.problem.metric.W @ e_N)),
             singular_values=singular_values,
             manipulability=float(np.prod(singular_values**2)),
         )
@@ -183,28 +331,97 @@ class Controller:
         """
         state = self.robot.state(t, q, np.zeros(self.robot.nv))
         self.compute(state)
+        mode, problem = self.mode, self.mode.resolution.problem
         # At rest, without drift and with unit gain the law's acceleration is the flow.
-        rates = [task.reference_rate(state) for task in self.tasks]
         flow = Resolution(
-            np.diff(self._resolution.ends, prepend=0).tolist(),
+            np.diff(mode.resolution.ends, prepend=0).tolist(),
             self.robot.nv,
             min(self.metric.form, CONSTANT),
             np.eye(self.robot.nv),
-            self._resolution.threshold,
+            self._threshold,
         )
-        flow.problem.task.jacobian[:] = self._stack.jacobian
-        flow.problem.task.acceleration[:] = np.concatenate(rates)
-        flow.problem.field.g[:] = self.field_sample.g
-        flow.problem.metric.W[:], flow.problem.metric.L[:] = self._metric[:2]
+        flow.problem.task.jacobian[:] = mode.stack.jacobian
+        for level in mode.levels:
+            for task in level:
+                rate = task.reference_rate(state)
+                flow.problem.task.acceleration[mode.task_rows[task.name]] = rate
+        flow.problem.field.g[:] = problem.field.g
+        flow.problem.metric.W[:], flow.problem.metric.L[:] = problem.metric[:2]
         return flow.resolve(state.v).acceleration
 
+    # -- changes while it runs --------------------------------------------------------
+
+    def add_task(
+        self, task: Task, *, start: float, ramp: float, level: int | None = None
+    ) -> None:
+        """Let a task come, without a jump in effort.
+
+        Args:
+            task: The task, with a name of its own.
+            start: When it begins to count [s].
+            ramp: How long it takes to count in full [s].
+            level: Its level, 0 the highest; None: the lowest there is.
+
+        Raises:
+            ControllerError: If it does not belong here, or there is no such level.
+        """
+        levels = [list(each) for each in self.levels]
+        if level is not None and not 0 <= level <= len(levels):
+            raise ControllerError(
+                f"there is no level {level}; levels are 0 to {len(levels) - 1}, and "
+                f"{len(levels)} opens a new one"
+            )
+        if level == len(levels):
+            levels.append([])
+        levels[-1 if level is None else level].append(task)
+        check_parts(self.robot, levels, self.field)
+        self.levels = tuple(tuple(each) for each in levels)
+        self.tasks = tuple(each for row in self.levels for each in row)
+        self.schedules[task.name] = Schedule([(start, np.inf)], ramp=ramp)
+        self._modes.clear()
+        self._timeless = False
+
+    def remove_task(self, name: str, *, start: float, ramp: float) -> None:
+        """Let a task go, without a jump in effort.
+
+        Args:
+            name: The task.
+            start: When it begins to fade [s].
+            ramp: How long it takes to fade [s].
+
+        Raises:
+            ControllerError: If there is no such task.
+        """
+        check_schedules({name: None}, [task.name for task in self.tasks])
+        self.schedules[name] = Schedule([(-np.inf, start + ramp)], ramp=ramp)
+        self._timeless = False
+
+    def change_gains(
+        self, name: str, gains: Gains, *, start: float, ramp: float
+    ) -> None:
+        """Let a task's gains change smoothly; its error equation holds throughout.
+
+        Args:
+            name: The task.
+            gains: The gains it shall have.
+            start: When they begin to change [s].
+            ramp: How long they take [s].
+
+        Raises:
+            ControllerError: If there is no such task.
+            GainError: If the gains do not fit it.
+        """
+        check_schedules({name: None}, [task.name for task in self.tasks])
+        task = next(task for task in self.tasks if task.name == name)
+        self._ramps.append(GainRamp(task, gains, start, ramp))
+
     def _explain_non_finite(self, state: RobotState) -> None:
-        for task, sample in self._samples:
-            if not all(np.isfinite(array).all() for array in sample):
-                raise NonFiniteError(
-                    f"task {task.name!r} is not finite at t = {state.t:.6g} s; "
-                    "does its trajectory return NaN or infinity there?"
-                )
+        culprit = self.mode.culprit()
+        if culprit is not None:
+            raise NonFiniteError(
+                f"{culprit} is not finite at t = {state.t:.6g} s; "
+                "does its trajectory return NaN or infinity there?"
+            )
         if not all(np.isfinite(array).all() for array in self.field_sample):
             raise NonFiniteError(
                 f"field {self.field.name!r} is not finite at t = {state.t:.6g} s"
@@ -213,65 +430,3 @@ class Controller:
             f"the effort is not finite at t = {state.t:.6g} s, "
             f"q = {state.q.tolist()}, v = {state.v.tolist()}"
         )
-
-
-def _levels(tasks: Sequence[Task | Sequence[Task]]) -> tuple[tuple[Task, ...], ...]:
-    """Return the tasks level by level; a plain list of tasks is one level."""
-    nested = [entry for entry in tasks if not isinstance(entry, Task)]
-    if nested and len(nested) != len(tasks):
-        raise ControllerError(
-            "tasks mixes tasks and lists of tasks; needs a list of tasks (one level) "
-            "or a list of lists (one a level)"
-        )
-    levels = nested or [tasks]
-    return tuple(tuple(level) for level in levels)  # type: ignore[arg-type]
-
-
-def _check_parts(
-    robot: Robot, levels: Sequence[Sequence[Task]], field: NullSpaceField
-) -> None:
-    tasks = [task for level in levels for task in level]
-    if not tasks or not all(levels):
-        raise ControllerError("a controller needs at least one task, at every level")
-    names = [task.name for task in tasks]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise ControllerError(f"two tasks are called {twice[0]!r}; give them names")
-    parts: list[Task | NullSpaceField] = [*tasks, field]
-    for part in parts:
-        if part.robot is not robot:
-            kind = "task" if isinstance(part, Task) else "field"
-            raise ControllerError(
-                f"{kind} {part.name!r} was built for another robot object "
-                f"({part.robot.name}); build it with the controller's"
-            )
-    for number, level in enumerate(levels, start=1):
-        rows = sum(task.rows for task in level)
-        if rows > robot.nv:
-            each = ", ".join(f"{task.name}: {task.rows}" for task in level)
-            where = f" of level {number}" if len(levels) > 1 else ""
-            raise ControllerError(
-                f"the tasks{where} have {rows} rows ({each}); "
-                f"{robot.name} has only {robot.nv} freedoms"
-            )
-
-
-def _null_space_gain(gain: Any, robot: Robot, metric: Metric) -> Array:
-    """Return K_N as a matrix for which V' = -e_NᵀW K_N e_N < 0.
-
-    For the mass matrix W changes with q; there K_N alone is asked to be positive
-    definite, and only a multiple of the identity is proved for every q.
-    """
-    K_N = as_matrix(as_gain(gain, "null_space_gain"), robot.nv, "null_space_gain")
-    sample = MetricSample.allocate(robot.nv)
-    if metric.form != VARYING:
-        state = robot.state(0.0, robot.neutral(), np.zeros(robot.nv))
-        metric.evaluate(state, sample)
-    decay = sample.W @ K_N
-    least = float(np.linalg.eigvalsh(0.5 * (decay + decay.T))[0])
-    if least <= 0.0:
-        raise GainError(
-            "null_space_gain does not make the null-space error decay: the least "
-            f"eigenvalue of W K_N is {least:.3g}; must be greater than 0"
-        )
-    return K_N

@@ -68,6 +68,18 @@ class SceneError(HspControlError, ValueError):
     """An obstacle that is ill-defined, or that does not exist."""
 
 
+class ScheduleError(HspControlError, ValueError):
+    """Intervals of time that overlap, or leave no room for their ramps."""
+
+
+class LimitError(HspControlError, ValueError):
+    """Limits that contradict each other, or a start outside them."""
+
+
+class ContactError(HspControlError, ValueError):
+    """A contact that this robot cannot have, or a floating base without support."""
+
+
 class ControllerError(HspControlError, ValueError):
     """Tasks, field and metric that do not fit together."""
 

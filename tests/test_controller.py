@@ -290,13 +290,13 @@ def test_effort_is_m_a_plus_n(kind: str) -> None:
 def test_tasks_are_stacked_in_order() -> None:
     tasks = [hold_orientation(), track(axes="xyz", name="origin")]
     controller = Controller(panda(), tasks, singularity_threshold=EXACT)
+    t, q, v = states(1)[0]
+    state = panda().state(t, q, v)
+    out = controller.compute(state)
     assert controller.task_rows == {
         "panda_tcp_orientation": slice(0, 3),
         "origin": slice(3, 6),
     }
-    t, q, v = states(1)[0]
-    state = panda().state(t, q, v)
-    out = controller.compute(state)
     for task in tasks:
         where = controller.task_rows[task.name]
         for stacked, own in zip(out.task, task.evaluate(state), strict=True):

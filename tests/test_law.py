@@ -591,6 +591,7 @@ def controller(c: Case, metric: Metric, gain: Any) -> Controller:
         # Exact wherever these states are: the mass matrix' whitening makes J large or
         # small by itself.
         singularity_threshold=1e-4,
+        base="driven" if c.robot.unactuated else None,
     )
 
 

@@ -488,7 +488,11 @@ def test_a_floating_robot_follows_the_law() -> None:
     )
     task = FramePose(robot, frame, path, Gains.from_frequency(6.0))
     controller = Controller(
-        robot, [task], TargetPosture(robot, robot.home()), null_space_gain=6.0
+        robot,
+        [task],
+        TargetPosture(robot, robot.home()),
+        null_space_gain=6.0,
+        base="driven" if robot.unactuated else None,
     )
     options: Any = {"duration": 0.6, "log_period": 0.1}
     exact = simulate(controller, q0, v0, integrator=EXACT, **options)

@@ -84,14 +84,14 @@ class Resolution:
         )
         return Resolved(self._a, self.null_space_error, damped, finite)
 
-    def singular_values(self) -> Array:
-        """Return the singular values of the problem's J L⁻ᵀ, largest first.
+    def singular_values(self, first: int = 0) -> Array:
+        """Return the singular values of J L⁻ᵀ from a row on, largest first.
 
         Their product squared is det(J W⁻¹ Jᵀ), the manipulability of the paper.
         """
-        task, metric = self.problem.task, self.problem.metric
-        values = np.zeros(min(task.jacobian.shape))
-        _singular_values(task.jacobian, metric.L, self._form, self._scratch, values)
+        J = self.problem.task.jacobian[first:]
+        values = np.zeros(min(J.shape))
+        _singular_values(J, self.problem.metric.L, self._form, self._scratch, values)
         return values
 
 

@@ -59,6 +59,18 @@ class Recorder:
         rows_of_tasks = sum(task.rows for task in controller.tasks)
         column("singular_values", (rows_of_tasks,), "-", "of J L⁻ᵀ, W = L Lᵀ")
         column("damped", (), "-", "1 where a singularity made the law bounded")
+        column("status", (), "-", "0 the law; 1 forces redistributed; 2 limited; 3 "
+               "limits relaxed")  # fmt: skip
+        column(
+            "relaxation", (), "(rad or m)/s²", "by how much the worst limit is missed"
+        )
+        for contact in controller.contacts:
+            prefix = f"contact.{contact.name}"
+            column(f"{prefix}.force", (3,), "N", "on the robot, in the world")
+            column(f"{prefix}.position", (3,), "m", "its centre of pressure")
+            column(
+                f"{prefix}.friction_used", (), "-", "‖f_t‖/(μ f_n), the worst point's"
+            )
         self._joints, self._edges = _skeleton(robot, controller)
         column("skeleton", (len(self._edges), 3), "m", "joints and task frames")
         self._terms = _terms(controller)
@@ -82,10 +94,13 @@ class Recorder:
         columns["acceleration"][i] = output.acceleration
         columns["joint_positions"][i] = robot.joint_positions(state.q)
         for task in controller.tasks:
-            rows, prefix = controller.task_rows[task.name], f"task.{task.name}"
+            prefix = f"task.{task.name}"
             reference, actual = task.measure(state)
-            columns[f"{prefix}.error"][i] = output.task.error[rows]
-            columns[f"{prefix}.error_rate"][i] = output.task.error_rate[rows]
+            rows = controller.task_rows.get(task.name)
+            on = rows is not None  # a task that does not count has no error
+            columns[f"{prefix}.error"][i] = output.task.error[rows] if on else np.nan
+            rate = output.task.error_rate[rows] if on else np.nan
+            columns[f"{prefix}.error_rate"][i] = rate
             columns[f"{prefix}.reference"][i] = reference
             columns[f"{prefix}.actual"][i] = actual
         diagnostics = controller.diagnose(state)
@@ -94,14 +109,19 @@ class Recorder:
         columns["null_space_error"][i] = output.null_space_error
         columns["null_space_norm"][i] = diagnostics.null_space_norm
         columns["manipulability"][i] = diagnostics.manipulability
-        columns["singular_values"][i] = diagnostics.singular_values
+        values = diagnostics.singular_values
+        columns["singular_values"][i] = np.nan
+        columns["singular_values"][i, : len(values)] = values
         columns["damped"][i] = output.damped
+        columns["status"][i] = output.status
+        columns["relaxation"][i] = output.relaxation
+        self._record_contacts(output)
         for k, (frame, joint) in enumerate(self._joints):
             columns["skeleton"][i, k] = (
                 state.position(frame) if frame else state.data.oMi[joint].translation
             )
         for name, (sample, field) in self._terms.items():
-            columns[f"field.{name}.g"][i] = sample.g
+            columns[f"field.{name}.g"][i] = (sample or output.field).g
             columns[f"field.{name}.value"][i] = field.value(state)
             if f"distance.{name}" in columns:
                 columns[f"distance.{name}"][i] = field.least_distance(state)
@@ -110,6 +130,27 @@ class Recorder:
             columns[f"obstacle.{obstacle.name}"][i] = placement[:3]
             columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
         self._rows += 1
+
+    def _record_contacts(self, output: ControlOutput) -> None:
+        columns, support = self._columns, self._controller.mode.support
+        world = support.in_world(output.forces)
+        for contact in self._controller.contacts:
+            prefix = f"contact.{contact.name}"
+            force = columns[f"{prefix}.force"][self._rows]
+            place = columns[f"{prefix}.position"][self._rows]
+            used = columns[f"{prefix}.friction_used"]
+            force[:], place[:] = 0.0, np.nan
+            if contact not in support.contacts:
+                continue
+            where = support.points[support.contacts.index(contact)]
+            local = output.forces.reshape(-1, 3)[where]
+            force[:] = world[where].sum(axis=0)
+            pressed = np.maximum(local[:, 2], 1e-9)
+            place[:] = pressed @ support.places[where] / pressed.sum()
+            tangential = np.linalg.norm(local[:, :2], axis=1)
+            loaded = local[:, 2] > 1e-3  # [N]: below it the ratio is of two zeros
+            ratios = tangential[loaded] / (contact.friction * local[loaded, 2])
+            used[self._rows] = ratios.max(initial=0.0)
 
     def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
         """Return the rows recorded so far as a rollout."""
@@ -138,6 +179,7 @@ class Recorder:
                     task.name: {
                         "type": type(task).__name__,
                         "rows": task.rows,
+                        "level": controller.level_of(task.name),
                         "axes": getattr(task, "axes", None),
                     }
                     for task in controller.tasks
@@ -164,11 +206,16 @@ def versions() -> dict[str, str]:
     }
 
 
-def _terms(controller: Controller) -> dict[str, tuple[FieldSample, NullSpaceField]]:
-    """Return each term of the controller's field and where its share of g stands."""
+def _terms(
+    controller: Controller,
+) -> dict[str, tuple[FieldSample | None, NullSpaceField]]:
+    """Return each term of the controller's field and where its share of g stands.
+
+    None stands for the whole g, where there is but one.
+    """
     field = controller.field
     if not isinstance(field, WeightedSum):
-        return {field.name: (controller.field_sample, field)}
+        return {field.name: (None, field)}
     terms = zip(field.samples, (term for _, term in field.terms), strict=True)
     names = [term.name for _, term in field.terms]
     return {

@@ -1,0 +1,325 @@
+"""From the law's acceleration to efforts and contact forces within the limits.
+
+Minimise ½ δᵀH δ over a = a* + δ, with a* the law's acceleration and
+
+    H = Σ ρ_k N_k N_kᵀ,      ρ_1 = 1 > ρ_2 > ... > ρ_N
+
+in whitened coordinates, N_k the directions of the tasks of level k in the null space of
+those above, and ρ_N that of the rest: first the null space gives way, then the tasks in
+the order of their priority. The rows are affine in (δ, f):
+
+    effort      |M a + N - F f| ≤ limits, and within the effort rate of the last one
+    base        (M a + N - F f)_base = 0                          no motor pushes there
+    contacts    J_c δ = 0, f within friction cones
+    motion      bounds on a from position, velocity and acceleration limits
+
+Where a* violates no row it is the optimum, and nothing is solved. ``law.md`` §5, §6.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.actuation.programme import Rows, solve, stacked
+from hsp_control.actuation.status import EXACT, LIMITED, REDISTRIBUTED, RELAXED
+from hsp_control.actuation.support import Support
+from hsp_control.actuation.yielding import yielding_metric
+from hsp_control.arrays import Array, Indices
+from hsp_control.limits import Limits
+from hsp_control.limits.acceleration_bounds import acceleration_bounds
+from hsp_control.resolution import Resolution
+from hsp_control.robot import Robot, RobotState
+
+_FORCE_COST = 1e-9
+"""Of forces in robot weights squared, beside accelerations: it only decides what
+nothing else does."""
+_ORDER = {"contacts": 1e4, "motion": 1.0}
+"""What yields last has the greatest cost, where limits contradict each other."""
+
+
+class Delivered(NamedTuple):
+    """What is done about the law's acceleration.
+
+    Attributes:
+        tau: Effort, shape (nv,), zero where no motor is [N·m or N].
+        acceleration: a, shape (nv,).
+        forces: At the points of the contacts, in their axes, shape (size,) [N].
+        status: `EXACT`, `REDISTRIBUTED`, `LIMITED` or `RELAXED`.
+        relaxation: By how much the worst bound is missed [rad/s² or m/s²].
+    """
+
+    tau: Array
+    acceleration: Array
+    forces: Array
+    status: int
+    relaxation: float
+
+
+class Actuation:
+    """Efforts and contact forces for accelerations, within limits.
+
+    Its one memory is the last effort, and only where the rate of efforts is limited:
+    see `applied`.
+
+    Attributes:
+        limits: The limits, if any.
+        base: The freedoms that no motor moves.
+    """
+
+    def __init__(
+        self, robot: Robot, limits: Limits | None, base: Sequence[int] = ()
+    ) -> None:
+        """Allocate.
+
+        Args:
+            robot: The robot.
+            limits: Its limits; None for none.
+            base: The freedoms that no motor moves.
+        """
+        nv = robot.nv
+        self._robot = robot
+        self.limits = limits
+        self.base: Indices = np.array(base, dtype=np.int64)
+        self._motors: Indices = np.setdiff1d(np.arange(nv), self.base)
+        self._mass = sum(inertia.mass for inertia in robot.model.inertias)
+        self._weight = 9.81 * self._mass
+        self._least, self._greatest = np.full(nv, -np.inf), np.full(nv, np.inf)
+        self._low, self._high = np.full(nv, -np.inf), np.full(nv, np.inf)
+        self._no_support = Support((), nv, self._weight)
+        self.forget()
+
+    def support(self, contacts: Sequence) -> Support:
+        """Return what contacts can do; none: nothing."""
+        if not contacts:
+            return self._no_support
+        return Support(contacts, self._robot.nv, self._weight)
+
+    def applied(self, tau: Array, period: float) -> None:
+        """Take note of the effort that goes out now and of when the next one will.
+
+        Args:
+            tau: Effort, shape (nv,).
+            period: Time until the next effort [s].
+        """
+        if self.limits is None or not np.isfinite(self.limits.effort_rate).any():
+            return
+        step = self.limits.effort_rate * period
+        np.maximum(-self.limits.effort, tau - step, out=self._low)
+        np.minimum(self.limits.effort, tau + step, out=self._high)
+        # An effort from before the limits may lie outside them: then towards them.
+        np.minimum(self._low, self.limits.effort, out=self._low)
+        np.maximum(self._high, -self.limits.effort, out=self._high)
+
+    def forget(self) -> None:
+        """Forget the last effort: the next one may be any within the limits."""
+        if self.limits is not None:
+            self._low[:], self._high[:] = -self.limits.effort, self.limits.effort
+
+    def deliver(
+        self, state: RobotState, a: Array, resolution: Resolution, support: Support
+    ) -> Delivered:
+        """Return efforts and forces for an acceleration, or what is nearest to it.
+
+        Args:
+            state: The robot's state.
+            a: The law's acceleration, shape (nv,).
+            resolution: Where it comes from: whose tasks yield in which order.
+            support: The contacts that bear; updated here.
+        """
+        wanted = state.inverse_dynamics(a)  # M a + N
+        if self.limits is None and not self.base.size:
+            return Delivered(wanted, a, np.zeros(0), EXACT, 0.0)
+        wanted = wanted.copy()
+        forces = np.zeros(support.size)
+        tau = wanted
+        if support.size:
+            support.update(state)
+            forces = support.least_norm(self.base, wanted[self.base])
+            tau = wanted - support.map @ forces
+        moves = self._moves(state, a)
+        if moves and support.bears(forces) and self._within_efforts(tau):
+            tau[self.base] = 0.0
+            return Delivered(tau, a, forces, EXACT, 0.0)
+        if moves and support.size:
+            shared = self._redistribute(wanted, forces, support)
+            if shared is not None:
+                return self._finish(wanted, a, shared, support, REDISTRIBUTED, 0.0)
+        return self._limit(state, wanted, a, forces, resolution, support)
+
+    def _moves(self, state: RobotState, a: Array) -> bool:
+        """Write the bounds on the acceleration; return whether a is within them."""
+        if self.limits is None:
+            return True
+        limits = self.limits
+        acceleration_bounds(
+            state.q,
+            state.v,
+            self._robot.freedom_indices,
+            limits.lower,
+            limits.upper,
+            limits.velocity,
+            limits.acceleration,
+            limits.bandwidth,
+            self._least,
+            self._greatest,
+        )
+        return bool((a >= self._least).all() and (a <= self._greatest).all())
+
+    def _within_efforts(self, tau: Array) -> bool:
+        motors = self._motors
+        return bool(
+            (tau[motors] >= self._low[motors]).all()
+            and (tau[motors] <= self._high[motors]).all()
+        )
+
+    def _redistribute(
+        self, wanted: Array, forces: Array, support: Support
+    ) -> Array | None:
+        """Return other forces for the same acceleration, nearest to the least ones."""
+        scale, base = self._weight, self.base
+        H = np.diag(1.0 / np.maximum(support.ease, 1e-6))
+        rows = stacked(
+            self._base_rows(support.map[base] * scale, wanted[base]),
+            *self._force_rows(support),
+            self._effort_rows(-support.map * scale, wanted),
+        )
+        x = solve(H, -H @ (forces / scale), rows)
+        return None if x is None else x * scale
+
+    def _limit(
+        self,
+        state: RobotState,
+        wanted: Array,
+        a: Array,
+        forces: Array,
+        resolution: Resolution,
+        support: Support,
+    ) -> Delivered:
+        """Return the acceleration nearest to the law's that the limits permit."""
+        n, p, scale = len(a), support.size, self._weight
+        M, F = state.mass_matrix, support.map * scale
+        H = np.zeros((n + p, n + p))
+        H[:n, :n] = yielding_metric(resolution, len(support.contacts) > 0)
+        # Beside directions that cost nothing else, a force costs next to nothing.
+        H[n:, n:] = np.diag(_FORCE_COST / np.maximum(support.ease, 1e-6))
+        f = np.zeros(n + p)
+        f[n:] = -H[n:, n:] @ (forces / scale)
+
+        base = self.base
+        hard = [
+            self._base_rows(np.hstack([-M[base], F[base]]), wanted[base]),
+            self._effort_rows(np.hstack([M, -F]), wanted),
+            *(_padded(rows, n, 0) for rows in self._force_rows(support)),
+        ]
+        contacts = self._contact_rows(resolution, support, n + p)
+        bounded = np.flatnonzero(np.isfinite(self._least) | np.isfinite(self._greatest))
+        motion = Rows(
+            np.eye(n + p)[bounded],
+            (self._least - a)[bounded],
+            (self._greatest - a)[bounded],
+        )
+        x = solve(H, f, stacked(*hard, contacts, motion))
+        status, relaxation = LIMITED, 0.0
+        if x is None:
+            contacts, motion, relaxation = _relax(stacked(*hard), contacts, motion)
+            x = solve(H, f, stacked(*hard, contacts, motion))
+            status = RELAXED
+        if x is None:  # beyond what the solver can do: still no effort beyond limits
+            tau = np.clip(wanted - support.map @ forces, self._low, self._high)
+            tau[base] = 0.0
+            return Delivered(tau, a, forces, RELAXED, np.inf)
+        wanted = wanted + M @ x[:n]
+        return self._finish(
+            wanted, a + x[:n], x[n:] * scale, support, status, relaxation
+        )
+
+    def _finish(
+        self,
+        wanted: Array,
+        a: Array,
+        forces: Array,
+        support: Support,
+        status: int,
+        relaxation: float,
+    ) -> Delivered:
+        """Return the efforts that go with forces; the solver leaves 1e-9 of them."""
+        forces = np.clip(forces, support.least, support.greatest)
+        tau = np.clip(wanted - support.map @ forces, self._low, self._high)
+        tau[self.base] = 0.0
+        return Delivered(tau, a, forces, status, relaxation)
+
+    def _base_rows(self, A: Array, wrench: Array) -> Rows:
+        """Return rows A x = wrench, per robot mass."""
+        return Rows(A / self._mass, wrench / self._mass, wrench / self._mass)
+
+    def _effort_rows(self, A: Array, wanted: Array) -> Rows:
+        limited = self._motors[
+            np.isfinite(self._low[self._motors]) | np.isfinite(self._high[self._motors])
+        ]
+        return Rows(
+            A[limited],
+            self._low[limited] - wanted[limited],
+            self._high[limited] - wanted[limited],
+        )
+
+    def _force_rows(self, support: Support) -> tuple[Rows, Rows]:
+        """Return cones and bounds of forces in robot weights."""
+        bounded = np.flatnonzero(np.isfinite(support.least))
+        return (
+            Rows(
+                support.cone,
+                np.zeros(len(support.cone)),
+                np.full(len(support.cone), np.inf),
+            ),
+            Rows(
+                np.eye(support.size)[bounded],
+                support.least[bounded] / self._weight,
+                support.greatest[bounded] / self._weight,
+            ),
+        )
+
+    def _contact_rows(
+        self, resolution: Resolution, support: Support, width: int
+    ) -> Rows:
+        """Return rows J_c δ = 0."""
+        count = sum(contact.rows for contact in support.contacts)
+        J = resolution.problem.task.jacobian[:count]
+        A = np.zeros((count, width))
+        A[:, : J.shape[1]] = J
+        return Rows(A, np.zeros(count), np.zeros(count))
+
+
+def _padded(rows: Rows, before: int, after: int) -> Rows:
+    """Return rows with columns of zeros on either side."""
+    return rows._replace(A=np.pad(rows.A, ((0, 0), (before, after))))
+
+
+def _relax(hard: Rows, contacts: Rows, motion: Rows) -> tuple[Rows, Rows, float]:
+    """Return rows widened by the least violation that the hard rows leave possible.
+
+    Contacts move before joints pass their bounds at a ten-thousandth of the cost, and
+    no more than is needed.
+    """
+    soft = stacked(contacts, motion)
+    n, s = hard.A.shape[1], len(soft.A)
+    cost = np.full(s, _ORDER["motion"])
+    cost[: len(contacts.A)] = _ORDER["contacts"]
+    H = np.diag(np.concatenate([np.full(n, 1e-8), cost]))
+    rows = stacked(_padded(hard, 0, s), Rows(np.hstack([soft.A, np.eye(s)]), *soft[1:]))
+    x = solve(H, np.zeros(n + s), rows)
+    if x is None:
+        return contacts, motion, np.inf
+    reached = soft.A @ x[:n]
+    slack = 1e-7 * (1.0 + np.abs(reached))
+    widened = Rows(
+        soft.A,
+        np.minimum(soft.lower, reached - slack),
+        np.maximum(soft.upper, reached + slack),
+    )
+    k = len(contacts.A)
+    return (
+        Rows(*(part[:k] for part in widened)),
+        Rows(*(part[k:] for part in widened)),
+        float(np.abs(x[n:]).max(initial=0.0)),
+    )

@@ -1,0 +1,106 @@
+"""What the contacts that bear now can do: their forces, cones and where they act."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from hsp_control.arrays import Array, Indices
+from hsp_control.contacts import Contact
+from hsp_control.robot import RobotState
+
+_HEAVIEST = 3.0
+"""What one contact may bear at most, in robot weights, when fully on."""
+
+
+class Support:
+    """Forces f at the points of some contacts, in the axes (tangents, normal) of each.
+
+    Attributes:
+        contacts: The contacts that bear.
+        size: Numbers in f, three a point.
+        map: What f pushes: the generalised force is ``map @ f``, shape (nv, size).
+        arms: Where the points are in the world, shape (size/3, 3) [m].
+        cone: Rows with cone f ≥ 0, four a point, shape (4 size/3, size).
+        least: Least force, shape (size,) [N].
+        greatest: Greatest force, shape (size,) [N].
+        ease: How readily each force is used, shape (size,): the norm that the closed
+            form makes least is Σ f²/ease.
+    """
+
+    def __init__(self, contacts: Sequence[Contact], nv: int, weight: float) -> None:
+        """Allocate for contacts of a robot of nv freedoms and a weight [N]."""
+        self.contacts = tuple(contacts)
+        counts = [len(contact.points) for contact in contacts]
+        points = sum(counts)
+        self.size = 3 * points
+        self.map: Array = np.zeros((nv, self.size))
+        self.places: Array = np.zeros((points, 3))
+        self.cone: Array = np.zeros((4 * points, self.size))
+        self.least = np.full(self.size, -np.inf)
+        self.greatest = np.full(self.size, np.inf)
+        self.least[2::3] = 0.0
+        self.ease = np.ones(self.size)
+        self._weight = weight
+        ends = np.cumsum([0, *counts])
+        self.points = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        for contact, where in zip(self.contacts, self.points, strict=True):
+            side = contact.friction / np.sqrt(2.0)  # the square inscribed in the cone
+            for k in range(where.start, where.stop):
+                for row, (axis, sign) in enumerate(
+                    ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0))
+                ):
+                    self.cone[4 * k + row, 3 * k + axis] = sign
+                    self.cone[4 * k + row, 3 * k + 2] = side
+
+    def update(self, state: RobotState) -> None:
+        """Compute the map, the places, and what the schedules let each contact bear."""
+        for contact, where in zip(self.contacts, self.points, strict=True):
+            frame = state.frame(contact.frame)
+            arms = contact.arms(frame)
+            self.places[where] = frame.position + arms
+            columns = slice(3 * where.start, 3 * where.stop)
+            pushed = np.zeros((6, columns.stop - columns.start))
+            for k, arm in enumerate(arms):
+                block = slice(3 * k, 3 * k + 3)
+                pushed[:3, block] = contact.axes
+                pushed[3:, block] = np.cross(arm, contact.axes.T).T
+            self.map[:, columns] = frame.jacobian.T @ pushed
+            if not contact.schedule.constant or contact.schedule.ramp:
+                on = max(contact.schedule.weight(state.t), 1e-6)
+                self.greatest[columns][2::3] = on * _HEAVIEST * self._weight
+            else:
+                on = 1.0
+            easy = contact.friction**2
+            self.ease[columns] = np.tile([on * easy, on * easy, on], len(arms))
+
+    def least_norm(self, base: Indices, wrench: Array) -> Array:
+        """Return the forces of least Σ f²/ease that push the base with a wrench.
+
+        Args:
+            base: The freedoms that no motor moves.
+            wrench: What they need, shape (len(base),).
+        """
+        A = self.map[base]
+        eased = A * self.ease
+        # The wrench lies in the range of A: directions without support are left out.
+        values, U = np.linalg.eigh(eased @ A.T)
+        kept = values > 1e-10 * values[-1]
+        inverse = (U[:, kept] / values[kept]) @ U[:, kept].T
+        return np.asarray(eased.T @ (inverse @ wrench))
+
+    def bears(self, forces: Array) -> bool:
+        """Return whether forces are within cones and bounds."""
+        return bool(
+            (self.cone @ forces >= 0.0).all()
+            and (forces >= self.least).all()
+            and (forces <= self.greatest).all()
+        )
+
+    def in_world(self, forces: Array) -> Array:
+        """Return the forces in world axes, shape (points, 3) [N]."""
+        out = np.zeros((self.size // 3, 3))
+        for contact, where in zip(self.contacts, self.points, strict=True):
+            local = forces.reshape(-1, 3)[where]
+            out[where] = local @ contact.axes.T
+        return out

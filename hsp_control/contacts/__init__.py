@@ -1,0 +1,6 @@
+"""Contacts: where a robot stands on the world, and what the world can bear."""
+
+from .ball_contact import BallContact as BallContact
+from .contact import Contact as Contact
+from .point_contact import PointContact as PointContact
+from .surface_contact import SurfaceContact as SurfaceContact

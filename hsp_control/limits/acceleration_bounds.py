@@ -1,0 +1,61 @@
+"""Position, velocity and acceleration limits as bounds on the acceleration."""
+
+import numpy as np
+
+from hsp_control.arrays import Array, Indices
+from hsp_control.kernels import kernel
+
+
+@kernel
+def acceleration_bounds(
+    q: Array,
+    v: Array,
+    where: Indices,
+    lower: Array,
+    upper: Array,
+    velocity: Array,
+    acceleration: Array,
+    bandwidth: float,
+    least: Array,
+    greatest: Array,
+) -> None:
+    """Write the bounds that the barriers of `Limits` put on a.
+
+    Where they contradict each other, position goes before velocity before acceleration:
+    each narrows the range that those before it leave, as far as it can.
+
+    Args:
+        q: Configuration, shape (nq,).
+        v: Velocity, shape (nv,).
+        where: Where each freedom's coordinate stands in q, -1 for none, shape (nv,).
+        lower: Least position, shape (nv,).
+        upper: Greatest position, shape (nv,).
+        velocity: Greatest speed, shape (nv,).
+        acceleration: Greatest acceleration, shape (nv,).
+        bandwidth: α [1/s].
+        least: Least acceleration, shape (nv,).
+        greatest: Greatest acceleration, shape (nv,).
+    """
+    for i in range(v.shape[0]):
+        low, high = -np.inf, np.inf
+        if where[i] >= 0:
+            position = q[where[i]]
+            damping = 2.0 * bandwidth * v[i]
+            low = -bandwidth * bandwidth * (position - lower[i]) - damping
+            high = bandwidth * bandwidth * (upper[i] - position) - damping
+        slowing = 2.0 * bandwidth * (-velocity[i] - v[i])
+        rising = 2.0 * bandwidth * (velocity[i] - v[i])
+        low, high = _narrow(low, high, slowing, rising)
+        low, high = _narrow(low, high, -acceleration[i], acceleration[i])
+        least[i], greatest[i] = low, high
+
+
+@kernel
+def _narrow(
+    low: float, high: float, least: float, greatest: float
+) -> tuple[float, float]:
+    """Return the part of [low, high] within [least, greatest], or its nearest point."""
+    return (
+        max(low, min(least, high)),
+        min(high, max(greatest, low)),
+    )

@@ -1,0 +1,171 @@
+"""What a robot's motors and joints allow: efforts, their rate, and joint motion."""
+
+from typing import Any, Literal
+
+import numpy as np
+
+from hsp_control.arrays import Array
+from hsp_control.exceptions import LimitError
+from hsp_control.robot import Robot
+
+Default = Literal["robot"]
+"""The robot's own limit, as its URDF gives it."""
+
+
+class Limits:
+    """Box limits on effort and joint motion, which the controller then keeps.
+
+    Efforts and their rate are hard. Position, velocity and acceleration become bounds
+    on the acceleration, by barriers that let a limit be approached and not crossed,
+    however near it is (an exponential control barrier function of bandwidth α):
+
+        position        a ≤ α²(q_max - q) - 2α v
+        velocity        a ≤ 2α (v_max - v)
+        acceleration    a ≤ a_max
+
+    and alike from below. A bound that cannot be kept yields to those above it in this
+    list, and all of them to the effort.
+
+    Attributes:
+        robot: The robot.
+        effort: Greatest effort, shape (nv,) [N·m or N]; inf where unlimited.
+        effort_rate: Greatest rate of effort, shape (nv,) [N·m/s or N/s].
+        velocity: Greatest speed, shape (nv,) [rad/s or m/s].
+        acceleration: Greatest acceleration, shape (nv,) [rad/s² or m/s²].
+        lower: Least joint position, shape (nv,) [rad or m]; -inf where unlimited.
+        upper: Greatest joint position, shape (nv,) [rad or m].
+        bandwidth: α of the barriers [1/s].
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        effort: Any | Default | None = "robot",
+        effort_rate: Any | None = None,
+        velocity: Any | Default | None = "robot",
+        acceleration: Any | None = None,
+        position: tuple[Any, Any] | Default | None = "robot",
+        position_margin: float = 0.0,
+        bandwidth: float = 10.0,
+    ) -> None:
+        """Set the limits; each is a number, one per freedom, or None for no limit.
+
+        Args:
+            robot: The robot.
+            effort: Greatest effort [N·m or N]; "robot": the URDF's.
+            effort_rate: Greatest rate of effort [N·m/s]; a Panda's is 1000.
+            velocity: Greatest speed [rad/s or m/s]; "robot": the URDF's.
+            acceleration: Greatest acceleration [rad/s² or m/s²].
+            position: (lower, upper) joint positions [rad or m]; "robot": the URDF's.
+            position_margin: How far inside its limits a position is kept [rad or m].
+            bandwidth: α [1/s]. 5 to 20 is what a motor follows: faster barriers ask at
+                the last moment for more than the effort's rate can give.
+
+        Raises:
+            LimitError: If a limit is not positive, lower is not below upper, or the
+                shape is not the robot's.
+        """
+        self.robot = robot
+        nv = robot.nv
+        self.effort = _greatest(robot, effort, "effort", robot.model.effortLimit)
+        self.velocity = _greatest(
+            robot, velocity, "velocity", robot.model.velocityLimit
+        )
+        self.effort_rate = _greatest(robot, effort_rate, "effort_rate", None)
+        self.acceleration = _greatest(robot, acceleration, "acceleration", None)
+        if position is None:
+            position = (np.full(nv, -np.inf), np.full(nv, np.inf))
+        elif isinstance(position, str):
+            _check_word(position, "position")
+            position = robot.position_limits()
+        lower = _array(robot, position[0], "position's lower limit")
+        upper = _array(robot, position[1], "position's upper limit")
+        if not np.isfinite(position_margin) or position_margin < 0.0:
+            raise LimitError(
+                f"position_margin is {position_margin}; must be at least 0"
+            )
+        self.lower = lower + position_margin
+        self.upper = upper - position_margin
+        crossed = np.flatnonzero(~(self.lower < self.upper))
+        if crossed.size:
+            i = crossed[0]
+            raise LimitError(
+                f"position limits of {robot.freedom_names[i]} leave no room: "
+                f"{lower[i]:.6g} to {upper[i]:.6g} with a margin of {position_margin:g}"
+            )
+        rooted = robot.freedom_indices < 0
+        if np.isfinite(lower[rooted]).any() or np.isfinite(upper[rooted]).any():
+            raise LimitError(
+                "position limits on a joint without a coordinate of its own (a root, "
+                "or a continuous joint); leave them infinite"
+            )
+        if not 0.0 < bandwidth < np.inf:
+            raise LimitError(f"bandwidth is {bandwidth}; must be positive")
+        self.bandwidth = float(bandwidth)
+
+    def check_start(self, q: Array, v: Array) -> None:
+        """Refuse a start outside the limits.
+
+        Args:
+            q: Configuration, shape (nq,).
+            v: Velocity, shape (nv,).
+
+        Raises:
+            LimitError: Names the joint, its position or speed, and the limit.
+        """
+        names = self.robot.freedom_names
+        positions = self.robot.joint_positions(q)
+        outside = np.flatnonzero((positions < self.lower) | (positions > self.upper))
+        if outside.size:
+            i = outside[0]
+            raise LimitError(
+                f"the start is outside the limits: {names[i]} is at {positions[i]:.6g},"
+                f" its limits are {self.lower[i]:.6g} to {self.upper[i]:.6g}"
+            )
+        fast = np.flatnonzero(np.abs(v) > self.velocity)
+        if fast.size:
+            i = fast[0]
+            raise LimitError(
+                f"the start is outside the limits: {names[i]} moves at {v[i]:.6g}, "
+                f"its limit is {self.velocity[i]:.6g}"
+            )
+
+
+def _greatest(robot: Robot, value: Any, what: str, own: Array | None) -> Array:
+    """Return a symmetric limit of shape (nv,), inf where there is none."""
+    if value is None:
+        return np.full(robot.nv, np.inf)
+    if isinstance(value, str):
+        _check_word(value, what, known=own is not None)
+        limit = np.array(own, dtype=float)
+        limit[robot.unactuated] = np.inf
+        # URDFs write 0, or the largest number there is, where they know no limit.
+        limit[(limit <= 0.0) | (limit >= np.finfo(np.float32).max)] = np.inf
+        return limit
+    limit = _array(robot, value, what)
+    if not (limit > 0.0).all():
+        raise LimitError(f"{what} limit is {limit.tolist()}; must be greater than 0")
+    return limit
+
+
+def _array(robot: Robot, value: Any, what: str) -> Array:
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise LimitError(f"{what} is {value!r}; needs numbers") from None
+    if array.ndim == 0:
+        array = np.full(robot.nv, float(array))
+    if array.shape != (robot.nv,):
+        raise LimitError(
+            f"{what} has shape {array.shape}; needs one number or {robot.nv}"
+        )
+    if np.isnan(array).any():
+        raise LimitError(f"{what} holds a NaN")
+    return array
+
+
+def _check_word(value: str, what: str, *, known: bool = True) -> None:
+    if value != "robot" or not known:
+        allowed = 'numbers, None or "robot"' if known else "numbers or None"
+        raise LimitError(f"{what} is {value!r}; needs {allowed}")
