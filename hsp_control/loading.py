@@ -93,6 +93,22 @@ def moving_joints(model: pin.Model) -> dict[str, Any]:
     return {name: joint for name, joint in named if joint.nv > 0}
 
 
+def standing(model: pin.Model, source: RobotSource) -> tuple[float, ...] | None:
+    """Return the posture that a source's SRDF has its robot stand in, shape (nv,).
+
+    None where there is none, or where the model has other joints than the SRDF means.
+    """
+    if source.srdf is None or source.posture is None:
+        return None
+    model = model.copy()  # the postures are stored in the model
+    pin.loadReferenceConfigurations(model, str(source.srdf), False)
+    postures = {pair.key(): pair.data() for pair in model.referenceConfigurations}
+    q = postures.get(source.posture)
+    if q is None or q.shape != (model.nq,) or not np.isfinite(q).all():
+        return None
+    return tuple(pin.difference(model, pin.neutral(model), pin.normalize(model, q)))
+
+
 def end_effector_frame(model: pin.Model) -> str:
     """Return the frame that is most likely the hand, judged by the tree of joints.
 

@@ -26,7 +26,12 @@ from hsp_control.kinematics import (
     frame_kinematics,
     mass_matrix_difference,
 )
-from hsp_control.loading import ToolFrame, end_effector_frame, load_model
+from hsp_control.loading import (
+    ToolFrame,
+    end_effector_frame,
+    load_model,
+    standing,
+)
 from hsp_control.sources import RobotSource, Root, find_robot
 from hsp_control.suggest import did_you_mean, listing
 
@@ -48,7 +53,7 @@ class Robot(ConfigurationSpace):
         self, model: pin.Model, source: RobotSource, parts: Sequence[Part] = ()
     ) -> None:
         """Wrap a Pinocchio model; most callers want `Robot.load`."""
-        super().__init__(model, source.name, source.home)
+        super().__init__(model, source.name, source.home or standing(model, source))
         self.source = source
         self.parts = tuple(parts) or (Part("", source, pin.SE3.Identity()),)
         self.frame_names: tuple[str, ...] = tuple(f.name for f in model.frames)

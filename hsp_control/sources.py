@@ -42,6 +42,7 @@ class RobotSource:
         locked: Joints locked unless told otherwise, name to value [rad or m].
         end_effector: The frame that tasks use by default, if known.
         home: Joint values of a good start posture, shape (nv,), if known.
+        posture: The SRDF's name of a posture to stand in, if known.
         joint_coordinates: The matrix A of coordinates theta = A q that the literature
             uses for this robot (``absolute`` for the planar arm), if any.
     """
@@ -55,6 +56,7 @@ class RobotSource:
     locked: Mapping[str, float] = field(default_factory=dict)
     end_effector: str | None = None
     home: tuple[float, ...] | None = None
+    posture: str | None = None
     joint_coordinates: str | None = None
 
 
@@ -107,6 +109,7 @@ def example_robots() -> dict[str, RobotSource]:
                 root="free_flyer" if loader.free_flyer else "fixed",
                 package_dirs=(root.parent, root / "robots"),
                 origin="example-robot-data",
+                posture=loader.ref_posture if loader.free_flyer else None,
                 end_effector=_END_EFFECTORS.get(name),
             )
     return sources

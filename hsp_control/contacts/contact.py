@@ -71,9 +71,8 @@ class Contact(ABC):
     def evaluate(self, state: RobotState, out: TaskSample) -> TaskSample:
         """Write the rows: J, J', and the acceleration that brings it to rest."""
         self.constrain(state.frame(self.frame), out)
-        np.matmul(out.jacobian, state.v, out=out.error_rate)
-        out.error_rate *= -1.0
-        np.multiply(out.error_rate, self.damping, out=out.acceleration)
+        out.error_rate[:] = -(out.jacobian @ state.v)
+        out.acceleration[:] = self.damping * out.error_rate
         return out
 
     @abstractmethod

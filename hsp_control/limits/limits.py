@@ -139,7 +139,7 @@ def _greatest(robot: Robot, value: Any, what: str, own: Array | None) -> Array:
     if isinstance(value, str):
         _check_word(value, what, known=own is not None)
         limit = np.array(own, dtype=float)
-        limit[robot.unactuated] = np.inf
+        limit[list(robot.unactuated)] = np.inf
         # URDFs write 0, or the largest number there is, where they know no limit.
         limit[(limit <= 0.0) | (limit >= np.finfo(np.float32).max)] = np.inf
         return limit

@@ -1,5 +1,7 @@
 """The angular momentum about the centre of mass follows a trajectory."""
 
+import numpy as np
+
 from hsp_control.arrays import Array
 from hsp_control.exceptions import TaskError
 from hsp_control.robot import Robot, RobotState
@@ -54,10 +56,8 @@ class AngularMomentum(Task):
         out = self._out(out)
         mass = state.centroidal
         desired = self.trajectory.sample(state.t, self._desired)
-        out.jacobian[:] = mass.momentum_matrix
-        out.jacobian_dot[:] = mass.momentum_matrix_dot
-        out.jacobian[:] /= mass.mass
-        out.jacobian_dot[:] /= mass.mass
+        np.divide(mass.momentum_matrix, mass.mass, out=out.jacobian)
+        np.divide(mass.momentum_matrix_dot, mass.mass, out=out.jacobian_dot)
         out.error[:] = desired.position - out.jacobian @ state.v
         out.error_rate[:] = -self.rate * out.error
         out.acceleration[:] = desired.velocity - out.error_rate
