@@ -34,6 +34,9 @@ class Limits:
         acceleration: Greatest acceleration, shape (nv,) [rad/s² or m/s²].
         lower: Least joint position, shape (nv,) [rad or m]; -inf where unlimited.
         upper: Greatest joint position, shape (nv,) [rad or m].
+        guarded_velocity: The speed that the barriers keep, within its margin.
+        guarded_lower: The position that the barriers keep, within its margin.
+        guarded_upper: The position that the barriers keep, within its margin.
         bandwidth: α of the barriers [1/s].
     """
 
@@ -46,7 +49,8 @@ class Limits:
         velocity: Any | Default | None = "robot",
         acceleration: Any | None = None,
         position: tuple[Any, Any] | Default | None = "robot",
-        position_margin: float = 0.0,
+        position_margin: float = 0.005,
+        velocity_margin: float = 0.02,
         bandwidth: float = 10.0,
     ) -> None:
         """Set the limits; each is a number, one per freedom, or None for no limit.
@@ -58,7 +62,10 @@ class Limits:
             velocity: Greatest speed [rad/s or m/s]; "robot": the URDF's.
             acceleration: Greatest acceleration [rad/s² or m/s²].
             position: (lower, upper) joint positions [rad or m]; "robot": the URDF's.
-            position_margin: How far inside its limits a position is kept [rad or m].
+            position_margin: How far inside its limits a position is kept [rad or m]:
+                with efforts held for a period a barrier lets the motion reach the
+                acceleration's error over α² beyond it.
+            velocity_margin: How far inside its limits a speed is kept, as a part of it.
             bandwidth: α [1/s]. 5 to 20 is what a motor follows: faster barriers ask at
                 the last moment for more than the effort's rate can give.
 
@@ -72,6 +79,11 @@ class Limits:
         self.velocity = _greatest(
             robot, velocity, "velocity", robot.model.velocityLimit
         )
+        if not 0.0 <= velocity_margin < 1.0:
+            raise LimitError(
+                f"velocity_margin is {velocity_margin}; must be at least 0, and below 1"
+            )
+        self.guarded_velocity = (1.0 - velocity_margin) * self.velocity
         self.effort_rate = _greatest(robot, effort_rate, "effort_rate", None)
         self.acceleration = _greatest(robot, acceleration, "acceleration", None)
         if position is None:
@@ -85,9 +97,10 @@ class Limits:
             raise LimitError(
                 f"position_margin is {position_margin}; must be at least 0"
             )
-        self.lower = lower + position_margin
-        self.upper = upper - position_margin
-        crossed = np.flatnonzero(~(self.lower < self.upper))
+        self.lower, self.upper = lower, upper
+        self.guarded_lower = lower + position_margin
+        self.guarded_upper = upper - position_margin
+        crossed = np.flatnonzero(~(self.guarded_lower < self.guarded_upper))
         if crossed.size:
             i = crossed[0]
             raise LimitError(
