@@ -36,8 +36,15 @@ from .metrics import ConstantMetric as ConstantMetric
 from .metrics import IdentityMetric as IdentityMetric
 from .metrics import MassMatrixMetric as MassMatrixMetric
 from .metrics import Metric as Metric
+from .plants import ContinuousPlant as ContinuousPlant
+from .plants import Dop853 as Dop853
+from .plants import IntegratedPlant as IntegratedPlant
 from .plants import Plant as Plant
+from .plants import Reading as Reading
 from .plants import RigidBodyPlant as RigidBodyPlant
+from .plants import Rk4 as Rk4
+from .plants import SampledPlant as SampledPlant
+from .plants import SemiImplicitEuler as SemiImplicitEuler
 from .robot import Robot as Robot
 from .robot import RobotState as RobotState
 from .scene import Obstacle as Obstacle
@@ -51,10 +58,7 @@ from .shapes import Mesh as Mesh
 from .shapes import PointCloud as PointCloud
 from .shapes import Shape as Shape
 from .shapes import Sphere as Sphere
-from .simulation import Dop853 as Dop853
-from .simulation import Rk4 as Rk4
 from .simulation import Rollout as Rollout
-from .simulation import SemiImplicitEuler as SemiImplicitEuler
 from .simulation import simulate as simulate
 from .tasks import FrameOrientation as FrameOrientation
 from .tasks import FramePose as FramePose
