@@ -39,12 +39,17 @@ from .metrics import Metric as Metric
 from .plants import ContinuousPlant as ContinuousPlant
 from .plants import Dop853 as Dop853
 from .plants import IntegratedPlant as IntegratedPlant
+from .plants import JointFriction as JointFriction
 from .plants import Plant as Plant
+from .plants import Push as Push
 from .plants import Reading as Reading
 from .plants import RigidBodyPlant as RigidBodyPlant
 from .plants import Rk4 as Rk4
 from .plants import SampledPlant as SampledPlant
 from .plants import SemiImplicitEuler as SemiImplicitEuler
+from .plants.mujoco import ContactShape as ContactShape
+from .plants.mujoco import Ground as Ground
+from .plants.mujoco import MujocoPlant as MujocoPlant
 from .robot import Robot as Robot
 from .robot import RobotState as RobotState
 from .scene import Obstacle as Obstacle

@@ -1,5 +1,6 @@
 """Plants: what answers the controller's effort."""
 
+from .friction import JointFriction as JointFriction
 from .integrated import IntegratedPlant as IntegratedPlant
 from .integrators import Dop853 as Dop853
 from .integrators import Integrator as Integrator
@@ -10,4 +11,5 @@ from .plant import Plant as Plant
 from .plant import Reading as Reading
 from .plant import SampledPlant as SampledPlant
 from .plant import check_plant as check_plant
+from .push import Push as Push
 from .rigid_body import RigidBodyPlant as RigidBodyPlant
