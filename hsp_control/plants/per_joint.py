@@ -3,14 +3,15 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import SimulationError
 from hsp_control.robot import Robot
 
 
-def joint_freedoms(robot: Robot) -> Array:
-    """Return which freedoms belong to joints with one, shape (nv,) of bool.
+def joint_freedoms(robot: Robot) -> NDArray[np.bool_]:
+    """Return which freedoms belong to joints with one, shape (nv,).
 
     The others are those of a root or of a ball joint, which have no motor, no gear and
     no encoder.

@@ -4,6 +4,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from hsp_control.arrays import Array
 from hsp_control.exceptions import SimulationError
 from hsp_control.robot import Robot
@@ -91,6 +93,30 @@ class SampledPlant(Plant, ABC):
         It is called once a control period, in order of time: sensors may remember.
         """
         return q, v
+
+
+def differing_bodies(plant: Plant, robot: Robot) -> dict[str, Any]:
+    """Return the plant's inertias as JSON data, if they are not the model's.
+
+    By joint: ``mass`` [kg], ``com`` [m] and ``inertia`` (xx, xy, xz, yy, yz, zz) about
+    it [kg·m²] in the joint's frame, and ``armature`` of each freedom.
+    """
+    ours, theirs = robot.model, plant.robot.model
+    pairs = zip(ours.inertias, theirs.inertias, strict=True)
+    same = np.array_equal(ours.armature, theirs.armature)
+    if same and all(mine == other for mine, other in pairs):
+        return {}
+    bodies = {}
+    for index in range(1, theirs.njoints):
+        body, joint = theirs.inertias[index], theirs.joints[index]
+        own = theirs.armature[joint.idx_v : joint.idx_v + joint.nv]
+        bodies[str(theirs.names[index])] = {
+            "mass": body.mass,
+            "com": body.lever.tolist(),
+            "inertia": body.inertia[np.triu_indices(3)].tolist(),
+            "armature": own.tolist(),
+        }
+    return {"bodies": bodies}
 
 
 def check_plant(plant: Plant, robot: Robot) -> None:

@@ -42,10 +42,9 @@ class Push:
                 "the duration must be positive"
             )
 
-    def acts(self, t: float, end: float | None = None) -> bool:
-        """Return whether it acts at a time [s], or at some time before ``end``."""
-        stop = self.start + self.duration
-        return self.start <= t < stop if end is None else t < stop and self.start < end
+    def acts(self, t: float) -> bool:
+        """Return whether it acts at a time [s]."""
+        return self.start <= t < self.start + self.duration
 
 
 class Pushes:
@@ -64,7 +63,9 @@ class Pushes:
 
     def act(self, t: float, end: float) -> bool:
         """Return whether one acts at some time from t to ``end`` [s]."""
-        return any(push.acts(t, end) for push in self.pushes)
+        return any(
+            push.start <= end and t < push.start + push.duration for push in self.pushes
+        )
 
     def effort(self, t: float, q: Array) -> Array:
         """Return Σ Jᵀ wrench of the pushes that act at time t [s], shape (nv,)."""

@@ -16,6 +16,7 @@ from hsp_control.plants import (
     RigidBodyPlant,
     SampledPlant,
     check_plant,
+    differing_bodies,
 )
 from hsp_control.scene import Scene
 from hsp_control.simulation.loops import continuous_loop, sampled_loop
@@ -90,7 +91,8 @@ def simulate(
             "control_period [s], for example 0.001"
         )
     recorder = Recorder(controller, scene or Scene(), rows)
-    meta = {"plant": plant.describe(), **(meta or {})}
+    about = {**plant.describe(), **differing_bodies(plant, robot)}
+    meta = {"plant": about, **(meta or {})}
 
     status, message = "completed", ""
     try:
