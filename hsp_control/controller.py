@@ -225,6 +225,10 @@ class Controller:
         """
         self._actuation.applied(tau, period)
 
+    def restart(self) -> None:
+        """Forget the last effort: what follows is another run."""
+        self._actuation.forget()
+
     def _scheduled(self, state: RobotState) -> Resolved:
         """Return the law's acceleration with what the schedules have on.
 

@@ -19,17 +19,11 @@ from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
 from hsp_control.controller import Controller
 from hsp_control.exceptions import ConfigError, SimulationError
+from hsp_control.plants import Dop853, Integrator, Rk4, SemiImplicitEuler
 from hsp_control.resources import bundled_configs
 from hsp_control.robot import Robot
 from hsp_control.scene import Scene
-from hsp_control.simulation import (
-    Dop853,
-    Integrator,
-    Rk4,
-    Rollout,
-    SemiImplicitEuler,
-    simulate,
-)
+from hsp_control.simulation import Rollout, simulate
 from hsp_control.suggest import did_you_mean, listing
 
 

@@ -1,6 +1,7 @@
 """Fills a rollout's columns, one row at a time, into memory that is there already."""
 
 import platform
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from hsp_control.arrays import Array
 from hsp_control.controller import Controller, ControlOutput
 from hsp_control.fields import FieldSample, NullSpaceField, WeightedSum
 from hsp_control.metrics import ConstantMetric, Metric
+from hsp_control.plants import Reading
 from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle, Scene
 from hsp_control.simulation.rollout import FORMAT, Rollout
@@ -83,14 +85,27 @@ class Recorder:
             column(f"obstacle.{obstacle.name}", (3,), "m", "its centre")
             column(f"obstacle.{obstacle.name}.quaternion", (4,), "-", "x, y, z, w")
 
-    def record(self, state: RobotState, output: ControlOutput) -> None:
-        """Append the row of a state and of what the controller made of it."""
+    def record(
+        self,
+        state: RobotState,
+        output: ControlOutput,
+        tau: Array,
+        readings: Mapping[str, Reading],
+    ) -> None:
+        """Append a row.
+
+        Args:
+            state: The true state.
+            output: What the controller makes of the true state.
+            tau: The effort that it commands, of what it is shown, shape (nv,).
+            readings: What the plant tells of itself.
+        """
         i, columns, controller = self._rows, self._columns, self._controller
         robot = controller.robot
         columns["t"][i] = state.t
         columns["q"][i] = state.q
         columns["v"][i] = state.v
-        columns["tau"][i] = output.tau
+        columns["tau"][i] = tau
         columns["acceleration"][i] = output.acceleration
         columns["joint_positions"][i] = robot.joint_positions(state.q)
         for task in controller.tasks:
@@ -129,6 +144,15 @@ class Recorder:
             placement = pin.SE3ToXYZQUAT(obstacle.placement(state.t))
             columns[f"obstacle.{obstacle.name}"][i] = placement[:3]
             columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
+        for name, reading in readings.items():
+            if name not in columns:
+                shape = np.shape(reading.value)
+                columns[name] = np.zeros((len(columns["t"]), *shape))
+                self._meaning[name] = {
+                    "unit": reading.unit,
+                    "meaning": reading.meaning,
+                }
+            columns[name][i] = reading.value
         self._rows += 1
 
     def _record_contacts(self, output: ControlOutput) -> None:

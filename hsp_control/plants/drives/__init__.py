@@ -1,0 +1,8 @@
+"""Drives: what becomes of an effort that is commanded."""
+
+from .drive import Drive as Drive
+from .dropped_periods import DroppedPeriods as DroppedPeriods
+from .effort_delay import EffortDelay as EffortDelay
+from .effort_noise import EffortNoise as EffortNoise
+from .jitter import Jitter as Jitter
+from .saturation import Saturation as Saturation

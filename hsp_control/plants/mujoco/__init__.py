@@ -1,0 +1,6 @@
+"""MuJoCo as a plant; it is imported when such a plant is built, not before."""
+
+from .contact_shapes import ContactShape as ContactShape
+from .mjcf import Ground as Ground
+from .plant import MujocoIntegrator as MujocoIntegrator
+from .plant import MujocoPlant as MujocoPlant

@@ -1,0 +1,8 @@
+"""Sensors: what the controller is shown of the true state."""
+
+from .differenced_velocity import DifferencedVelocity as DifferencedVelocity
+from .encoder import Encoder as Encoder
+from .position_noise import PositionNoise as PositionNoise
+from .sensor import Sensor as Sensor
+from .sensor_delay import SensorDelay as SensorDelay
+from .velocity_noise import VelocityNoise as VelocityNoise

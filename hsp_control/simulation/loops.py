@@ -1,0 +1,101 @@
+"""The closed loop, row by row: the law in the integrator's stages, or sampled."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.arrays import Array
+from hsp_control.controller import Controller, ControlOutput
+from hsp_control.exceptions import SimulationError
+from hsp_control.plants import ContinuousPlant, Integrator, SampledPlant
+from hsp_control.robot import RobotState
+
+RUNAWAY_SPEED = 1e4
+"""Joint speed [rad/s or m/s] beyond which a simulation is said to have diverged."""
+
+
+class Instant(NamedTuple):
+    """One instant of the closed loop; what it holds is overwritten by the next.
+
+    Attributes:
+        state: The true state.
+        output: What the controller makes of the true state.
+        tau: The effort that it commands, of what it is shown, shape (nv,).
+    """
+
+    state: RobotState
+    output: ControlOutput
+    tau: Array
+
+
+def continuous_loop(
+    controller: Controller,
+    plant: ContinuousPlant,
+    integrator: Integrator,
+    times: Sequence[float],
+    q: Array,
+    v: Array,
+) -> Iterator[Instant]:
+    """Yield the instants at given times of a loop without sampling, as in the proofs.
+
+    Raises:
+        SimulationError: If the motion diverges.
+    """
+    state = RobotState(controller.robot)
+    controller.restart()
+
+    def feedback(t: float, q: Array, v: Array) -> Array:
+        tau = controller.compute(state.update(t, q, v)).tau
+        return plant.acceleration(t, q, v, tau)
+
+    for k, t in enumerate(times):
+        if k > 0:
+            q, v = integrator.advance(plant.robot, feedback, times[k - 1], t, q, v)
+            _stop_runaway(t, q, v)
+        output = controller.compute(state.update(t, q, v))
+        yield Instant(state, output, output.tau)
+
+
+def sampled_loop(
+    controller: Controller,
+    plant: SampledPlant,
+    periods: int,
+    times: Sequence[float],
+    q: Array,
+    v: Array,
+) -> Iterator[Instant]:
+    """Yield the instants at given times of a loop with ``periods`` efforts in between.
+
+    Raises:
+        SimulationError: If the motion diverges.
+    """
+    state = RobotState(controller.robot)
+    plant.reset(times[0], q, v)
+    controller.restart()
+    for start, end in zip(times, (*times[1:], times[-1]), strict=True):
+        for k in range(periods):
+            t = start + k * (end - start) / periods
+            shown = plant.measure(t, q, v)
+            output = controller.compute(state.update(t, *shown))
+            tau = output.tau.copy()
+            if k == 0:
+                if not (shown[0] is q and shown[1] is v):
+                    output = controller.compute(state.update(t, q, v))
+                yield Instant(state, output, tau)
+            if end == start:  # the last row: nobody waits for what comes next
+                return
+            controller.applied(tau, (end - start) / periods)
+            stop = start + (k + 1) * (end - start) / periods
+            q, v = plant.advance(t, stop, tau)
+        _stop_runaway(end, q, v)
+
+
+def _stop_runaway(t: float, q: Array, v: Array) -> None:
+    speed = float(np.abs(v).max())
+    if not (np.isfinite(q).all() and speed < RUNAWAY_SPEED):
+        raise SimulationError(
+            f"the motion diverged before t = {t:.6g} s: a joint moves at {speed:.3g} "
+            "rad/s (or m/s). A singularity, gains too high for the control period, or "
+            "a field without a minimum do that"
+        )
