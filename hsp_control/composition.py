@@ -26,14 +26,14 @@ def levels_of(tasks: Sequence[Task | Sequence[Task]]) -> tuple[tuple[Task, ...],
     Raises:
         ControllerError: If tasks and lists of tasks are mixed.
     """
-    nested = [entry for entry in tasks if not isinstance(entry, Task)]
-    if nested and len(nested) != len(tasks):
+    single = [entry for entry in tasks if isinstance(entry, Task)]
+    nested = [tuple(entry) for entry in tasks if not isinstance(entry, Task)]
+    if single and nested:
         raise ControllerError(
             "tasks mixes tasks and lists of tasks; needs a list of tasks (one level) "
             "or a list of lists (one a level)"
         )
-    levels = nested or [tasks]
-    return tuple(tuple(level) for level in levels)  # type: ignore[arg-type]
+    return tuple(nested) if nested else (tuple(single),)
 
 
 def check_parts(

@@ -251,14 +251,13 @@ class Controller:
         )
         off = {name for name, w in weights.items() if w < 1.0}
         shares = [1.0, *(weights[name] for name in coming), 0.0]
-        mixed: Array | None = None
+        mixed = np.zeros(self.robot.nv)
         for k, (share, following) in enumerate(pairwise(shares)):
             self._mode = self._mode_without(state, off - set(coming[:k]))
             resolved = self._mode.resolve(state, self.metric, self.field)
             if not coming:
                 return resolved
-            part = (share - following) * resolved.acceleration
-            mixed = part if mixed is None else mixed + part
+            mixed += (share - following) * resolved.acceleration
         return resolved._replace(acceleration=mixed)
 
     def _mode_without(self, state: RobotState, off: Set[str]) -> Mode:

@@ -65,12 +65,11 @@ class Mode:
         tasks = [task for level in self.levels for task in level]
         self.first_task_row = held + free
         self.task_rows = _places(tasks, self.first_task_row)
+        parts: list[Task | Contact] = [*self.contacts, *tasks]
+        places = [*self.contact_rows.values(), *self.task_rows.values()]
         self._parts = tuple(
             (part, self.stack.rows(where.start, where.stop))
-            for part, where in [
-                *zip(self.contacts, self.contact_rows.values(), strict=True),
-                *zip(tasks, self.task_rows.values(), strict=True),
-            ]
+            for part, where in zip(parts, places, strict=True)
         )
 
     def resolve(

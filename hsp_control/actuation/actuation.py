@@ -26,6 +26,7 @@ from hsp_control.actuation.status import EXACT, LIMITED, REDISTRIBUTED, RELAXED
 from hsp_control.actuation.support import Support
 from hsp_control.actuation.yielding import yielding_metric
 from hsp_control.arrays import Array, Indices
+from hsp_control.contacts import Contact
 from hsp_control.limits import Limits
 from hsp_control.limits.acceleration_bounds import acceleration_bounds
 from hsp_control.resolution import Resolution
@@ -89,7 +90,7 @@ class Actuation:
         self._no_support = Support((), nv, self._weight)
         self.forget()
 
-    def support(self, contacts: Sequence) -> Support:
+    def support(self, contacts: Sequence[Contact]) -> Support:
         """Return what contacts can do; none: nothing."""
         if not contacts:
             return self._no_support

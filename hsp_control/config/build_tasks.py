@@ -15,12 +15,15 @@ from hsp_control.config.models import tasks as s
 from hsp_control.exceptions import GainError, TaskError
 from hsp_control.robot import RobotState
 from hsp_control.tasks import (
+    AngularMomentum,
+    CenterOfMass,
     FrameOrientation,
     FramePose,
     FramePosition,
     Gains,
     JointPosture,
     Pointing,
+    RelativePose,
     Task,
 )
 from hsp_control.trajectories import (
@@ -43,6 +46,8 @@ def build_task(
         gains = _gains(model.gains)
     if isinstance(model, s.JointPostureModel):
         return _joint_posture(document, name, model, gains, start)
+    if isinstance(model, s.CenterOfMassModel | s.AngularMomentumModel):
+        return _whole_body(document, name, model, gains, start)
     frame = end_effector(document, ("tasks", name), model.frame, robot)
     here = start.frame(frame)
     with document.at("tasks", name):
@@ -63,9 +68,40 @@ def build_task(
                 with document.at("tasks", name, "trajectory"):
                     pose = _pose(model, pin.SE3(here.rotation, here.position))
                 return FramePose(robot, frame, pose, gains, name=name)
+            case s.RelativePoseModel():
+                with document.at("tasks", name, "reference"):
+                    seen_from = start.frame(model.reference)
+                with document.at("tasks", name, "trajectory"):
+                    there = pin.SE3(seen_from.rotation, seen_from.position)
+                    seen = there.actInv(pin.SE3(here.rotation, here.position))
+                    pose = _pose(model, seen)
+                return RelativePose(
+                    robot, frame, model.reference, pose, gains, name=name
+                )
             case s.PointingModel():
                 direction = HoldOrientation(_facing(model.direction))
                 return Pointing(robot, frame, model.axis, direction, gains, name=name)
+
+
+def _whole_body(
+    document: Document,
+    name: str,
+    model: s.CenterOfMassModel | s.AngularMomentumModel,
+    gains: Gains,
+    start: RobotState,
+) -> Task:
+    robot = start.robot
+    if isinstance(model, s.AngularMomentumModel):
+        with document.at("tasks", name, "trajectory"):
+            momentum = position_trajectory(model.trajectory, np.zeros(3))
+        with document.at("tasks", name):
+            return AngularMomentum(robot, momentum, model.rate, name=name)
+    with document.at("tasks", name, "axes"):
+        axes = _axes(model.axes)
+    with document.at("tasks", name, "trajectory"):
+        position = _position(model, start.centroidal.position[axes])
+    with document.at("tasks", name):
+        return CenterOfMass(robot, position, gains, axes=model.axes, name=name)
 
 
 def _gains(model: s.GainsModel) -> Gains:
@@ -112,7 +148,9 @@ def _axes(letters: str) -> list[int]:
     return ["xyz".index(letter) for letter in letters]
 
 
-def _position(model: s.FramePositionModel, start: Array) -> Trajectory:
+def _position(
+    model: s.FramePositionModel | s.CenterOfMassModel, start: Array
+) -> Trajectory:
     trajectory = position_trajectory(model.trajectory, start)
     if model.blend is None:
         return trajectory
@@ -126,7 +164,9 @@ def _orientation(model: s.FrameOrientationModel, start: Array) -> OrientationTra
     return BlendOrientation(start, trajectory, model.blend)
 
 
-def _pose(model: s.FramePoseModel, start: pin.SE3) -> PoseTrajectory:
+def _pose(
+    model: s.FramePoseModel | s.RelativePoseModel, start: pin.SE3
+) -> PoseTrajectory:
     trajectory = pose_trajectory(model.trajectory, start)
     if model.blend is None:
         return trajectory

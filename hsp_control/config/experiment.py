@@ -9,9 +9,16 @@ from typing import Any
 import numpy as np
 
 from hsp_control.arrays import Array
+from hsp_control.composition import check_support
 from hsp_control.config.build_null_space import build_fields, build_metric
 from hsp_control.config.build_robot import build_robot, build_start
 from hsp_control.config.build_scene import build_scene
+from hsp_control.config.build_support import (
+    build_contacts,
+    build_limits,
+    build_schedules,
+    by_priority,
+)
 from hsp_control.config.build_tasks import build_task
 from hsp_control.config.document import Document
 from hsp_control.config.models.simulation import Dop853Model, Rk4Model
@@ -135,14 +142,23 @@ def build(document: Document) -> Experiment:
     ]
     metric = build_metric(document, scenario.null_space.metric, robot)
     field = build_fields(document, scenario.null_space.fields, start, scene)
+    contacts = build_contacts(document, scenario.contacts, robot)
+    with document.at("base"):
+        check_support(robot, contacts, scenario.base)
+    limits = build_limits(document, scenario.limits, robot)
+    schedules = build_schedules(document, scenario.tasks)
     with document.at("null_space"):
         controller = Controller(
             robot,
-            tasks,
+            by_priority(tasks, scenario.tasks),
             field,
             null_space_gain=scenario.null_space.gain,
             metric=metric,
             singularity_threshold=scenario.null_space.singularity_threshold,
+            limits=limits,
+            contacts=contacts,
+            base=scenario.base,
+            schedules=schedules,
         )
     velocity = scenario.start.velocity
     with document.at("start", "velocity"):
@@ -150,6 +166,9 @@ def build(document: Document) -> Experiment:
             v0 = controller.flow(0.0, q0)
         else:
             v0 = robot.check_tangent(start.v if velocity == "rest" else velocity, "v0")
+    if limits is not None:
+        with document.at("start"):
+            limits.check_start(q0, v0)
     return Experiment(
         name=Path(document.name).stem,
         scenario=scenario,

@@ -4,11 +4,13 @@ Each ``type:`` is one class in one visible union; the builders map it to the obj
 the same name. Units are SI: metres, radians, seconds.
 """
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from hsp_control.config.models.base import Model
+from hsp_control.config.models.contacts import AnyContact
+from hsp_control.config.models.limits import LimitsModel
 from hsp_control.config.models.null_space import NullSpaceModel
 from hsp_control.config.models.robot import RobotModel, StartModel
 from hsp_control.config.models.scene import SceneModel
@@ -31,7 +33,13 @@ class Scenario(Model):
     scene: SceneModel = SceneModel()
     """What else there is."""
     tasks: Annotated[dict[str, AnyTask], Field(min_length=1)]
-    """Tasks by name, stacked at one level."""
+    """Tasks by name; those of one priority are stacked at one level."""
+    contacts: dict[str, AnyContact] = Field(default_factory=dict)
+    """Where a robot with a free-flyer root rests, by name."""
+    base: Literal["flying", "driven"] | None = None
+    """What moves a free-flyer root where no contact does."""
+    limits: LimitsModel | None = None
+    """What efforts and motion are kept within; no limits by default."""
     null_space: NullSpaceModel = NullSpaceModel()
     """Where self-motion goes."""
     simulation: SimulationModel = SimulationModel()

@@ -31,7 +31,7 @@ class SurfaceContact(Contact):
         robot: Robot,
         frame: str,
         *,
-        corners: Sequence[Sequence[float]],
+        corners: Sequence[Sequence[float]] | Array,
         **options: Any,
     ) -> None:
         """Set the contact.
@@ -71,10 +71,8 @@ class SurfaceContact(Contact):
     ) -> "SurfaceContact":
         """Return a sole of a length along the frame's x and a width along its y [m]."""
         x, y = 0.5 * length, 0.5 * width
-        corners = [
-            np.add(center, (s * x, t * y, 0.0)) for s in (1, -1) for t in (1, -1)
-        ]
-        return cls(robot, frame, corners=corners, **options)
+        square = np.array([[x, y, 0.0], [x, -y, 0.0], [-x, y, 0.0], [-x, -y, 0.0]])
+        return cls(robot, frame, corners=square + np.array(center), **options)
 
     def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
         """Write the frame's six rows: it neither moves nor turns."""

@@ -4,7 +4,15 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from hsp_control.config.models.base import Gain, Model, Positive, Vector, Vector3
+from hsp_control.config.models.base import (
+    Gain,
+    Model,
+    NonNegative,
+    Number,
+    Positive,
+    Vector,
+    Vector3,
+)
 from hsp_control.config.models.motion import (
     OrientationModel,
     PointTrajectory,
@@ -25,9 +33,25 @@ class GainsModel(Model):
     """ζ [-]; 1, critical, by default."""
 
 
+class ScheduleModel(Model):
+    """When something is on."""
+
+    intervals: Annotated[
+        list[Annotated[list[Number], Field(min_length=2, max_length=2)]],
+        Field(min_length=1),
+    ]
+    """[from, until] of each interval [s]."""
+    ramp: NonNegative = 0.3
+    """How long each rise and each fall takes, inside the intervals [s]."""
+
+
 class TaskModel(Model):
     """What all tasks share."""
 
+    priority: Annotated[int, Field(ge=1)] = 1
+    """1 is the highest; tasks of one priority share a level."""
+    schedule: ScheduleModel | None = None
+    """When it counts; always by default."""
     gains: GainsModel = GainsModel(natural_frequency=10.0)
     """Feedback gains; critically damped at 10 rad/s by default."""
 
@@ -83,6 +107,38 @@ class PointingModel(TaskModel):
     """The direction in the world."""
 
 
+class CenterOfMassModel(Blended):
+    """The centre of mass follows a point."""
+
+    type: Literal["center_of_mass"]
+    axes: str = "xyz"
+    """World axes that are tracked."""
+    trajectory: PointTrajectory
+    """Where to."""
+
+
+class AngularMomentumModel(TaskModel):
+    """The angular momentum about the centre of mass, per mass, follows a point."""
+
+    type: Literal["angular_momentum"]
+    rate: Positive = 10.0
+    """K of e' + K e = 0 [1/s]; `gains` are not used, for want of a second order."""
+    trajectory: PointTrajectory
+    """Where to [m²/s]."""
+
+
+class RelativePoseModel(Blended):
+    """A frame follows a pose as seen from another."""
+
+    type: Literal["relative_pose"]
+    frame: str | None = None
+    """Name of the frame; the robot's end effector by default."""
+    reference: str
+    """Name of the frame that it is seen from."""
+    trajectory: PoseModel
+    """Where to, in the reference's axes."""
+
+
 class JointPostureModel(TaskModel):
     """Joints follow a posture."""
 
@@ -100,6 +156,9 @@ AnyTask = Annotated[
     | FrameOrientationModel
     | FramePoseModel
     | PointingModel
+    | CenterOfMassModel
+    | AngularMomentumModel
+    | RelativePoseModel
     | JointPostureModel,
     Field(discriminator="type"),
 ]

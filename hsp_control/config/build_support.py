@@ -1,0 +1,128 @@
+"""Contacts, limits and schedules out of a configuration, each error located."""
+
+from typing import Any
+
+import numpy as np
+
+from hsp_control.arrays import Array
+from hsp_control.config.document import Document
+from hsp_control.config.models import contacts as c
+from hsp_control.config.models import limits as l
+from hsp_control.config.models.tasks import AnyTask, ScheduleModel
+from hsp_control.contacts import BallContact, Contact, PointContact, SurfaceContact
+from hsp_control.exceptions import ContactError
+from hsp_control.limits import Limits
+from hsp_control.robot import Robot
+from hsp_control.schedules import Schedule
+from hsp_control.tasks import Task
+
+
+def build_contacts(
+    document: Document, models: dict[str, c.AnyContact], robot: Robot
+) -> list[Contact]:
+    """Return the contacts, by the names that the configuration gives them."""
+    return [_contact(document, name, model, robot) for name, model in models.items()]
+
+
+def _contact(
+    document: Document, name: str, model: c.AnyContact, robot: Robot
+) -> Contact:
+    with document.at("contacts", name, "frame"):
+        robot.frame_id(model.frame)
+    with document.at("contacts", name, "schedule"):
+        schedule = build_schedule(model.schedule)
+    shared: dict[str, Any] = {
+        "friction": model.friction,
+        "normal": model.normal,
+        "damping": model.damping,
+        "schedule": schedule,
+        "name": name,
+    }
+    with document.at("contacts", name):
+        match model:
+            case c.PointContactModel():
+                return PointContact(robot, model.frame, point=model.point, **shared)
+            case c.BallContactModel():
+                return BallContact(robot, model.frame, radius=model.radius, **shared)
+            case c.SurfaceContactModel():
+                return _surface(model, robot, shared)
+
+
+def _surface(
+    model: c.SurfaceContactModel, robot: Robot, shared: dict[str, Any]
+) -> Contact:
+    sized = model.length is not None and model.width is not None
+    if sized == (model.corners is not None):
+        raise ContactError("give length and width of the sole, or its corners")
+    if model.corners is not None:
+        return SurfaceContact(robot, model.frame, corners=model.corners, **shared)
+    return SurfaceContact.rectangle(
+        robot,
+        model.frame,
+        length=model.length or 0.0,
+        width=model.width or 0.0,
+        center=model.center,
+        **shared,
+    )
+
+
+def build_limits(
+    document: Document, model: l.LimitsModel | None, robot: Robot
+) -> Limits | None:
+    """Return the limits, if there are any."""
+    if model is None:
+        return None
+    position: Any = {"robot": "robot", "none": None}.get(str(model.position))
+    if isinstance(model.position, l.PositionRangeModel):
+        position = (model.position.lower, model.position.upper)
+    with document.at("limits"):
+        own = Limits(robot, position=None)
+        return Limits(
+            robot,
+            effort=_greatest(model.effort, own.effort),
+            effort_rate=model.effort_rate,
+            velocity=_greatest(model.velocity, own.velocity),
+            acceleration=model.acceleration,
+            position=position,
+            position_margin=model.position_margin,
+            velocity_margin=model.velocity_margin,
+            bandwidth=model.bandwidth,
+        )
+
+
+def _greatest(model: l.Greatest, own: Array) -> Any:
+    if isinstance(model, l.ScaledModel):
+        return model.scale * own
+    if isinstance(model, str):
+        return own if model == "robot" else None
+    return np.asarray(model)
+
+
+def build_schedule(model: ScheduleModel | None) -> Schedule | None:
+    """Return a schedule, if there is one."""
+    if model is None:
+        return None
+    intervals = [(start, end) for start, end in model.intervals]
+    return Schedule(intervals, ramp=model.ramp)
+
+
+def build_schedules(
+    document: Document, models: dict[str, AnyTask]
+) -> dict[str, Schedule]:
+    """Return when tasks count, for those that do not always."""
+    schedules = {}
+    for name, model in models.items():
+        with document.at("tasks", name, "schedule"):
+            schedule = build_schedule(model.schedule)
+        if schedule is not None:
+            schedules[name] = schedule
+    return schedules
+
+
+def by_priority(tasks: list[Task], models: dict[str, AnyTask]) -> list[list[Task]]:
+    """Return tasks level by level, the highest priority first."""
+    priorities = sorted({model.priority for model in models.values()})
+    return [
+        [task for task in tasks if models[task.name].priority == priority]
+        for priority in priorities
+    ]

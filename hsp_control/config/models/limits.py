@@ -1,0 +1,47 @@
+"""What efforts and motion are kept within."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from hsp_control.config.models.base import Model, NonNegative, Number, Positive, Vector
+
+
+class ScaledModel(Model):
+    """The robot's own limit, times a number."""
+
+    scale: Positive
+    """The number; 0.5 for a robot of half its strength."""
+
+
+Greatest = Literal["robot", "none"] | ScaledModel | Positive | list[Positive]
+
+
+class PositionRangeModel(Model):
+    """Joint positions in numbers."""
+
+    lower: Vector
+    """Least position of every freedom [rad or m]."""
+    upper: Vector
+    """Greatest position of every freedom [rad or m]."""
+
+
+class LimitsModel(Model):
+    """Limits that the controller keeps; the robot's own unless told otherwise."""
+
+    effort: Greatest = "robot"
+    """Greatest effort [N·m or N]."""
+    effort_rate: Positive | list[Positive] | None = None
+    """Greatest rate of effort [N·m/s or N/s]; a Panda's is 1000."""
+    velocity: Greatest = "robot"
+    """Greatest speed [rad/s or m/s]."""
+    acceleration: Positive | list[Positive] | None = None
+    """Greatest acceleration [rad/s² or m/s²]."""
+    position: Literal["robot", "none"] | PositionRangeModel = "robot"
+    """Joint positions [rad or m]."""
+    position_margin: NonNegative = 0.005
+    """How far inside its limits a position is kept [rad or m]."""
+    velocity_margin: Annotated[Number, Field(ge=0.0, lt=1.0)] = 0.02
+    """How far inside its limits a speed is kept, as a part of it."""
+    bandwidth: Positive = 10.0
+    """Of the barriers before position and velocity limits [1/s]."""
