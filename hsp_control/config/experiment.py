@@ -10,6 +10,7 @@ import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.config.build_null_space import build_fields, build_metric
+from hsp_control.config.build_plant import build_plant
 from hsp_control.config.build_robot import build_robot, build_start
 from hsp_control.config.build_scene import build_scene
 from hsp_control.config.build_tasks import build_task
@@ -19,7 +20,7 @@ from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
 from hsp_control.controller import Controller
 from hsp_control.exceptions import ConfigError, SimulationError
-from hsp_control.plants import Dop853, Integrator, Rk4, SemiImplicitEuler
+from hsp_control.plants import Dop853, Integrator, Plant, Rk4, SemiImplicitEuler
 from hsp_control.resources import bundled_configs
 from hsp_control.robot import Robot
 from hsp_control.scene import Scene
@@ -40,6 +41,7 @@ class Experiment:
         q0: Start configuration, shape (nq,).
         v0: Start velocity, shape (nv,).
         integrator: How the simulation moves on.
+        plant: What the controller's efforts move.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Experiment:
     q0: Array
     v0: Array
     integrator: Integrator
+    plant: Plant
 
     def run(self, on_progress: Callable[[float], None] | None = None) -> Rollout:
         """Simulate it; see `simulate` for what is raised and kept."""
@@ -62,6 +65,7 @@ class Experiment:
             control_period=settings.control_period,
             log_period=settings.log_period,
             integrator=self.integrator,
+            plant=self.plant,
             scene=self.scene,
             on_progress=on_progress,
             meta={
@@ -150,6 +154,8 @@ def build(document: Document) -> Experiment:
             v0 = controller.flow(0.0, q0)
         else:
             v0 = robot.check_tangent(start.v if velocity == "rest" else velocity, "v0")
+    integrator = _integrator(document, scenario)
+    plant, scenario = build_plant(document, scenario, folder, robot, integrator)
     return Experiment(
         name=Path(document.name).stem,
         scenario=scenario,
@@ -158,7 +164,8 @@ def build(document: Document) -> Experiment:
         scene=scene,
         q0=q0,
         v0=v0.copy(),
-        integrator=_integrator(document, scenario),
+        integrator=integrator,
+        plant=plant,
     )
 
 
