@@ -11,6 +11,7 @@ from hsp_control.config.models import plant as s
 from hsp_control.config.models.robot import LoadModel
 from hsp_control.config.scenario import Scenario
 from hsp_control.plants import (
+    ContactPlant,
     ContinuousPlant,
     ImperfectPlant,
     IntegratedPlant,
@@ -19,6 +20,7 @@ from hsp_control.plants import (
     Plant,
     Push,
     RigidBodyPlant,
+    RigidContact,
     SampledPlant,
     StickingPlant,
     check_plant,
@@ -53,7 +55,9 @@ from hsp_control.robot import Robot
 _STEP = 1e-3
 """Largest step of joints that stick, where the integrator says none [s]."""
 
-_BY_NAME: dict[str, s.RigidBodyPlantModel | s.MujocoPlantModel] = {
+AnyModel = s.RigidBodyPlantModel | s.ContactPlantModel | s.MujocoPlantModel
+
+_BY_NAME: dict[str, AnyModel] = {
     "rigid_body": s.RigidBodyPlantModel(type="rigid_body"),
     "mujoco": s.MujocoPlantModel(type="mujoco"),
 }
@@ -76,16 +80,7 @@ def build_plant(
     period = scenario.simulation.control_period
     with document.at("plant"):
         own = _robot(document, model, robot)
-        friction = _friction(document, model, own)
-        pushes = _pushes(document, model, own)
-        plant: Plant
-        if isinstance(model, s.MujocoPlantModel):
-            plant = _mujoco(document, model, own, friction, pushes)
-        elif friction is not None:
-            step = getattr(integrator, "step", _STEP)
-            plant = StickingPlant(own, friction, step, pushes)
-        else:
-            plant = RigidBodyPlant(own, pushes)
+        plant = _engine(document, model, own, integrator)
         sensors, drives = _sensors(model), _drives(model)
         if isinstance(plant, ContinuousPlant) and (sensors or drives):
             plant = IntegratedPlant(plant, integrator)
@@ -145,8 +140,26 @@ def _robot(document: Document, model: s.PlantModel, robot: Robot) -> Robot:
     return own
 
 
+def _engine(
+    document: Document, model: AnyModel, robot: Robot, integrator: Integrator
+) -> Plant:
+    pushes = _pushes(document, model, robot)
+    match model:
+        case s.ContactPlantModel():
+            return _held(document, model, robot, pushes)
+        case s.MujocoPlantModel():
+            friction = _friction(document, model, robot)
+            return _mujoco(document, model, robot, friction, pushes)
+        case s.RigidBodyPlantModel():
+            friction = _friction(document, model, robot)
+            if friction is None:
+                return RigidBodyPlant(robot, pushes)
+            step = getattr(integrator, "step", _STEP)
+            return StickingPlant(robot, friction, step, pushes)
+
+
 def _friction(
-    document: Document, model: s.PlantModel, robot: Robot
+    document: Document, model: s.FrictionalPlantModel, robot: Robot
 ) -> JointFriction | None:
     with document.at("plant", "friction"):
         if model.friction == "urdf":
@@ -163,6 +176,18 @@ def _pushes(document: Document, model: s.PlantModel, robot: Robot) -> list[Push]
             robot.frame_id(p.frame)
             pushes.append(Push(p.frame, p.force, p.moment, p.start, p.duration))
     return pushes
+
+
+def _held(
+    document: Document, model: s.ContactPlantModel, robot: Robot, pushes: list[Push]
+) -> ContactPlant:
+    contacts = []
+    for frame, contact in model.contacts.items():
+        with document.at("plant", "contacts", frame):
+            robot.frame_id(frame)
+            on = None if contact.on is None else [(a, b) for a, b in contact.on]
+            contacts.append(RigidContact(frame, contact.kind, on))
+    return ContactPlant(robot, contacts, damping=model.damping, pushes=pushes)
 
 
 def _mujoco(

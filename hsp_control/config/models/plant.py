@@ -119,8 +119,6 @@ class PlantModel(Model):
     """Something in the hand."""
     motor_inertia: Weights = 0.0
     """Rotor inertia times gear ratio squared [kg·m² or kg]: of all, or of each."""
-    friction: FrictionModel | Literal["urdf"] | None = None
-    """In the joints; ``urdf``: as the robot's file says. None by default."""
     pushes: list[PushModel] = []
     """Wrenches from outside."""
     sensors: SensorsModel = SensorsModel()
@@ -131,10 +129,36 @@ class PlantModel(Model):
     """Of all random numbers."""
 
 
-class RigidBodyPlantModel(PlantModel):
+class FrictionalPlantModel(PlantModel):
+    """A plant whose joints may have friction."""
+
+    friction: FrictionModel | Literal["urdf"] | None = None
+    """In the joints; ``urdf``: as the robot's file says. None by default."""
+
+
+class RigidBodyPlantModel(FrictionalPlantModel):
     """Pinocchio's rigid bodies."""
 
     type: Literal["rigid_body"]
+
+
+class RigidContactModel(Model):
+    """How the world holds a frame, both ways and without slip."""
+
+    kind: Literal["point", "surface"] = "surface"
+    """Whether its origin is held, or its orientation too."""
+    on: list[Annotated[list[Number], Field(min_length=2, max_length=2)]] | None = None
+    """When it holds, begin and end [s] each; always by default."""
+
+
+class ContactPlantModel(PlantModel):
+    """Pinocchio's rigid bodies, held by rigid contacts."""
+
+    type: Literal["rigid_contacts"]
+    contacts: Annotated[dict[str, RigidContactModel], Field(min_length=1)]
+    """What is held, by frame."""
+    damping: NonNegative = 100.0
+    """How fast the velocity of a contact dies out [1/s]."""
 
 
 class ContactShapeModel(Model):
@@ -163,7 +187,7 @@ class GroundModel(Model):
     """Coulomb's coefficient between it and whatever touches it."""
 
 
-class MujocoPlantModel(PlantModel):
+class MujocoPlantModel(FrictionalPlantModel):
     """MuJoCo, with its own integrator, friction and contacts."""
 
     type: Literal["mujoco"]
@@ -181,5 +205,8 @@ class MujocoPlantModel(PlantModel):
 
 AnyPlant = (
     Literal["rigid_body", "mujoco"]
-    | Annotated[RigidBodyPlantModel | MujocoPlantModel, Field(discriminator="type")]
+    | Annotated[
+        RigidBodyPlantModel | ContactPlantModel | MujocoPlantModel,
+        Field(discriminator="type"),
+    ]
 )
