@@ -31,14 +31,16 @@ def build_robot(
         raise document.error(("robot",), "give either name or parts")
     gravity = model.gravity
     if model.parts is None:
-        found = _located(model, folder)
-        robot = _load(document, ("robot",), found, gravity)
+        found = located_model(model, folder)
+        robot = load_robot(document, ("robot",), found, gravity)
     else:
-        parts = {name: _located(part, folder) for name, part in model.parts.items()}
+        parts = {
+            name: located_model(part, folder) for name, part in model.parts.items()
+        }
         found = model.model_copy(update={"parts": parts})
         robots = {
             name: (
-                _load(document, ("robot", "parts", name), part, gravity),
+                load_robot(document, ("robot", "parts", name), part, gravity),
                 placement(part.position, part.rpy),
             )
             for name, part in parts.items()
@@ -48,7 +50,7 @@ def build_robot(
     return robot, scenario.model_copy(update={"robot": found})
 
 
-def _located(model: Loaded, folder: Path) -> Loaded:
+def located_model(model: Loaded, folder: Path) -> Loaded:
     """Return the model with the path of a URDF beside the configuration."""
     name = model.name or ""
     if name.endswith((".urdf", ".xml")) and (folder / name).is_file():
@@ -56,9 +58,10 @@ def _located(model: Loaded, folder: Path) -> Loaded:
     return model
 
 
-def _load(
+def load_robot(
     document: Document, at: KeyPath, model: s.LoadModel, gravity: list[float] | None
 ) -> Robot:
+    """Return the robot that a part of the configuration at a key path names."""
     if model.name is None:
         raise document.error(at, "missing key 'name'")
     tools = {

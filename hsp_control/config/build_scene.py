@@ -28,7 +28,7 @@ def build_scene(document: Document, model: s.SceneModel, folder: Path) -> Scene:
         where = ("scene", "obstacles", name)
         with document.at(*where):
             with document.at(*where, "shape"):
-                shape = _shape(obstacle.shape, folder)
+                shape = build_shape(obstacle.shape, folder)
                 shape.geometry()  # fails here, where it can be located
             with document.at(*where, "center"):
                 center = position_trajectory(obstacle.center, None)
@@ -42,7 +42,8 @@ def build_scene(document: Document, model: s.SceneModel, folder: Path) -> Scene:
     return Scene(obstacles)
 
 
-def _shape(model: s.AnyShape, folder: Path) -> Shape:
+def build_shape(model: s.AnyShape, folder: Path) -> Shape:
+    """Return a shape; files are looked up in a folder."""
     match model:
         case s.SphereModel():
             return Sphere(model.radius)

@@ -11,6 +11,7 @@ import numpy as np
 from hsp_control.arrays import Array
 from hsp_control.composition import check_support
 from hsp_control.config.build_null_space import build_fields, build_metric
+from hsp_control.config.build_plant import build_plant
 from hsp_control.config.build_robot import build_robot, build_start
 from hsp_control.config.build_scene import build_scene
 from hsp_control.config.build_support import (
@@ -26,7 +27,7 @@ from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
 from hsp_control.controller import Controller
 from hsp_control.exceptions import ConfigError, SimulationError
-from hsp_control.plants import Dop853, Integrator, Rk4, SemiImplicitEuler
+from hsp_control.plants import Dop853, Integrator, Plant, Rk4, SemiImplicitEuler
 from hsp_control.resources import bundled_configs
 from hsp_control.robot import Robot
 from hsp_control.scene import Scene
@@ -47,6 +48,7 @@ class Experiment:
         q0: Start configuration, shape (nq,).
         v0: Start velocity, shape (nv,).
         integrator: How the simulation moves on.
+        plant: What the controller's efforts move.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Experiment:
     q0: Array
     v0: Array
     integrator: Integrator
+    plant: Plant
 
     def run(self, on_progress: Callable[[float], None] | None = None) -> Rollout:
         """Simulate it; see `simulate` for what is raised and kept."""
@@ -69,6 +72,7 @@ class Experiment:
             control_period=settings.control_period,
             log_period=settings.log_period,
             integrator=self.integrator,
+            plant=self.plant,
             scene=self.scene,
             on_progress=on_progress,
             meta={
@@ -169,6 +173,8 @@ def build(document: Document) -> Experiment:
     if limits is not None:
         with document.at("start"):
             limits.check_start(q0, v0)
+    integrator = _integrator(document, scenario)
+    plant, scenario = build_plant(document, scenario, folder, robot, integrator)
     return Experiment(
         name=Path(document.name).stem,
         scenario=scenario,
@@ -177,7 +183,8 @@ def build(document: Document) -> Experiment:
         scene=scene,
         q0=q0,
         v0=v0.copy(),
-        integrator=_integrator(document, scenario),
+        integrator=integrator,
+        plant=plant,
     )
 
 

@@ -12,6 +12,7 @@ from hsp_control.config.models.base import Model
 from hsp_control.config.models.contacts import AnyContact
 from hsp_control.config.models.limits import LimitsModel
 from hsp_control.config.models.null_space import NullSpaceModel
+from hsp_control.config.models.plant import AnyPlant
 from hsp_control.config.models.robot import RobotModel, StartModel
 from hsp_control.config.models.scene import SceneModel
 from hsp_control.config.models.simulation import SimulationModel
@@ -42,6 +43,8 @@ class Scenario(Model):
     """What efforts and motion are kept within; no limits by default."""
     null_space: NullSpaceModel = NullSpaceModel()
     """Where self-motion goes."""
+    plant: AnyPlant = "rigid_body"
+    """What its efforts move, and how that differs from the controller's model."""
     simulation: SimulationModel = SimulationModel()
     """How it is simulated."""
     view: ViewModel = ViewModel()

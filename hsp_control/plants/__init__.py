@@ -1,5 +1,8 @@
 """Plants: what answers the controller's effort."""
 
+from .contact import ContactKind as ContactKind
+from .contact import ContactPlant as ContactPlant
+from .contact import RigidContact as RigidContact
 from .friction import JointFriction as JointFriction
 from .imperfect import ImperfectPlant as ImperfectPlant
 from .integrated import IntegratedPlant as IntegratedPlant

@@ -11,10 +11,11 @@ import pinocchio as pin
 from hsp_control.arrays import Array
 from hsp_control.exceptions import SimulationError
 from hsp_control.plants.describing import described
+from hsp_control.plants.floating import FloatingRoots
 from hsp_control.plants.friction import JointFriction
 from hsp_control.plants.integrators import number_of_steps
 from hsp_control.plants.mujoco.contact_shapes import ContactShape, geoms_of
-from hsp_control.plants.mujoco.conventions import FREE, Conventions, joints_of
+from hsp_control.plants.mujoco.conventions import Conventions, joints_of
 from hsp_control.plants.mujoco.mjcf import Ground, write_mjcf
 from hsp_control.plants.plant import Reading, SampledPlant
 from hsp_control.plants.push import Push, Pushes
@@ -23,9 +24,6 @@ from hsp_control.robot import Robot
 MujocoIntegrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
 
 _log = logging.getLogger(__name__)
-
-_ROOT_EFFORT = 1e-6
-"""What rounding may leave of the effort on a root without a motor [N or N·m]."""
 
 
 class MujocoPlant(SampledPlant):
@@ -116,7 +114,7 @@ class MujocoPlant(SampledPlant):
             {name: int(j.qposadr[0]) for name, j in zip(names, at, strict=True)},
             {name: int(j.dofadr[0]) for name, j in zip(names, at, strict=True)},
         )
-        self._floating = [slice(j.v, j.v + 6) for j in joints if j.kind == FREE]
+        self._roots = FloatingRoots(robot)
         self._geoms = {
             self.model.geom(name).id: contact for name, contact in touching.items()
         }
@@ -137,13 +135,13 @@ class MujocoPlant(SampledPlant):
                 diverges.
         """
         data = self.data
-        self._refuse_root_effort(t, tau)
+        motors = self._roots.without(t, tau)
         steps = number_of_steps(end - t, self.timestep)
         h = self.model.opt.timestep = (end - t) / steps
         q, v = self.conventions.from_mujoco(data.qpos, data.qvel)
         at_once = steps if not self.pushes.act(t, end) else 1
         for k in range(0, steps, at_once):
-            effort = tau + self.pushes.effort(t + (k + 0.5) * h, q)
+            effort = motors + self.pushes.effort(t + (k + 0.5) * h, q)
             self.conventions.effort_to_mujoco(q, effort, data.qfrc_applied)
             self._mujoco.mj_step(self.model, data, at_once)
             self._stop_warned(end)
@@ -218,16 +216,6 @@ class MujocoPlant(SampledPlant):
             wrenches[name][:3] += force
             wrenches[name][3:] += moment + np.cross(contact.pos - origin, force)
         return wrenches
-
-    def _refuse_root_effort(self, t: float, tau: Array) -> None:
-        for root in self._floating:
-            effort = float(np.abs(tau[root]).max())
-            if effort > _ROOT_EFFORT:
-                raise SimulationError(
-                    f"the effort at t = {t:.6g} s pushes the floating root with "
-                    f"{effort:.3g} N or N·m, and no motor is there; the root's efforts "
-                    "must be zero, and contacts declared"
-                )
 
     def _stop_warned(self, end: float) -> None:
         warnings = self._mujoco.mjtWarning
