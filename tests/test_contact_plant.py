@@ -90,12 +90,12 @@ def test_acceleration_and_forces_agree_with_pinocchio(name: str) -> None:
         state = robot.state(0.0, q, v)
         for contact, theirs in zip(plant.contacts, found, strict=True):
             turn = state.frame(contact.frame).rotation
-            force = np.asarray(readings[f"contact.{contact.frame}.force"].value)
+            force = np.asarray(readings[f"plant.contact.{contact.frame}.force"].value)
             size = np.abs(force).max()
             np.testing.assert_allclose(
                 force, turn @ theirs.contact_force.linear, rtol=0, atol=1e-9 * size
             )
-            moment = np.asarray(readings[f"contact.{contact.frame}.moment"].value)
+            moment = np.asarray(readings[f"plant.contact.{contact.frame}.moment"].value)
             if contact.kind == "surface":
                 np.testing.assert_allclose(
                     moment,
@@ -121,7 +121,7 @@ def test_the_equations_of_motion_hold(name: str) -> None:
     readings = plant.readings(0.0, q, v, tau)
     for contact in plant.contacts:
         wrench = [
-            readings[f"contact.{contact.frame}.{k}"].value for k in ("force", "moment")
+            readings[f"plant.contact.{contact.frame}.{k}"].value for k in ("force", "moment")
         ]
         rest -= state.frame(contact.frame).jacobian.T @ np.concatenate(wrench)
     np.testing.assert_allclose(rest, 0.0, atol=1e-7)
@@ -187,8 +187,8 @@ def test_contacts_are_switched_by_the_clock() -> None:
     ]:
         a = plant.acceleration(t, q, v, tau)
         readings = plant.readings(t, q, v, tau)
-        assert np.asarray(readings["contact.FL_FOOT.force"].value).any() == holds
-        assert not np.asarray(readings["contact.FR_FOOT.force"].value).any()
+        assert np.asarray(readings["plant.contact.FL_FOOT.force"].value).any() == holds
+        assert not np.asarray(readings["plant.contact.FR_FOOT.force"].value).any()
         assert np.allclose(a, free, atol=1e-9) != holds
 
 
@@ -208,10 +208,10 @@ def test_redundant_contacts_share_the_force() -> None:
         atol=1e-6 * abs(expected).max(),
     )
     total = sum(
-        np.asarray(both.readings(0.0, q, v, tau)[f"contact.{f}.force"].value)
+        np.asarray(both.readings(0.0, q, v, tau)[f"plant.contact.{f}.force"].value)
         for f in (foot, also)
     )
-    alone = one.readings(0.0, q, v, tau)[f"contact.{foot}.force"].value
+    alone = one.readings(0.0, q, v, tau)[f"plant.contact.{foot}.force"].value
     np.testing.assert_allclose(total, alone, rtol=1e-6, atol=1e-5)
 
 
@@ -230,7 +230,7 @@ def test_a_push_is_felt() -> None:
     rest -= state.frame("base_link").jacobian[:3].T @ np.array([3.0, 0.0, 1.0])
     readings = pushed.readings(0.2, q, v, tau)
     for contact in pushed.contacts:
-        force = np.asarray(readings[f"contact.{contact.frame}.force"].value)
+        force = np.asarray(readings[f"plant.contact.{contact.frame}.force"].value)
         rest -= state.frame(contact.frame).jacobian[:3].T @ force
     np.testing.assert_allclose(rest, 0.0, atol=1e-8)
 
@@ -279,7 +279,7 @@ def test_contacts_from_yaml() -> None:
     held = run.t < 0.2
     assert np.abs(hand[held] - hand[0]).max() < 1e-6
     assert np.abs(hand[-1] - hand[0]).max() > 0.01
-    forces = np.linalg.norm(run["contact.panda_tcp.force"], axis=1)
+    forces = np.linalg.norm(run["plant.contact.panda_tcp.force"], axis=1)
     assert forces[held][-1] > 1.0
     assert not forces[~held].any()
     config["plant"]["contacts"] = {"panda_tpc": {}}  # type: ignore[index]

@@ -24,6 +24,35 @@ def build_contacts(
     return [_contact(document, name, model, robot) for name, model in models.items()]
 
 
+def put_on_ground(
+    document: Document, height: float, contacts: list[Contact], robot: Robot, q: Array
+) -> Array:
+    """Return q with the root moved up or down until the lowest contact is at a height.
+
+    Raises:
+        ContactError: If the robot cannot be moved like that, or has no contact.
+    """
+    with document.at("start", "ground"):
+        if not (robot.unactuated and contacts):
+            raise ContactError(
+                f"{robot.name} has no contact to put on the ground"
+                if robot.unactuated
+                else f"{robot.name} has no free-flyer root to put on the ground"
+            )
+        state = robot.state(0.0, q, np.zeros(robot.nv))
+        frames = [state.frame(contact.frame) for contact in contacts]
+        lowest = min(
+            float((frame.position + contact.arms(frame))[:, 2].min())
+            for contact, frame in zip(contacts, frames, strict=True)
+        )
+        # A root's linear displacement is in its own axes.
+        root = next(iter(robot.joints.values()))
+        lift = np.zeros(robot.nv)
+        up = state.data.oMi[1].rotation.T @ np.array([0.0, 0.0, height - lowest])
+        lift[root.idx_v : root.idx_v + 3] = up
+        return robot.integrate(q, lift)
+
+
 def _contact(
     document: Document, name: str, model: c.AnyContact, robot: Robot
 ) -> Contact:
@@ -102,7 +131,10 @@ def build_schedule(model: ScheduleModel | None) -> Schedule | None:
     """Return a schedule, if there is one."""
     if model is None:
         return None
-    intervals = [(start, end) for start, end in model.intervals]
+    intervals = [
+        (-np.inf if start is None else start, np.inf if end is None else end)
+        for start, end in model.intervals
+    ]
     return Schedule(intervals, ramp=model.ramp)
 
 

@@ -19,6 +19,7 @@ from hsp_control.config.build_support import (
     build_limits,
     build_schedules,
     by_priority,
+    put_on_ground,
 )
 from hsp_control.config.build_tasks import build_task
 from hsp_control.config.document import Document
@@ -138,6 +139,9 @@ def build(document: Document) -> Experiment:
     folder = Path(document.name).resolve().parent
     robot, scenario = build_robot(document, scenario, folder)
     q0 = build_start(document, scenario.start, robot)
+    contacts = build_contacts(document, scenario.contacts, robot)
+    if scenario.start.ground is not None:
+        q0 = put_on_ground(document, scenario.start.ground, contacts, robot, q0)
     start = robot.state(0.0, q0, np.zeros(robot.nv))
 
     scene = build_scene(document, scenario.scene, folder)
@@ -146,7 +150,6 @@ def build(document: Document) -> Experiment:
     ]
     metric = build_metric(document, scenario.null_space.metric, robot)
     field = build_fields(document, scenario.null_space.fields, start, scene)
-    contacts = build_contacts(document, scenario.contacts, robot)
     with document.at("base"):
         check_support(robot, contacts, scenario.base)
     limits = build_limits(document, scenario.limits, robot)

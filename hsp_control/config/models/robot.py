@@ -59,5 +59,7 @@ class StartModel(Model):
     """Joint coordinates theta = A q, where the robot's source defines A."""
     configuration: Vector | None = None
     """The configuration itself, nq numbers."""
+    ground: Number | None = None
+    """Height that the lowest contact is put at, by moving a free-flyer root [m]."""
     velocity: Literal["rest", "flow"] | Vector = "rest"
     """At rest, on the flow that the law leads to, or nv numbers [rad/s or m/s]."""

@@ -37,10 +37,10 @@ class ScheduleModel(Model):
     """When something is on."""
 
     intervals: Annotated[
-        list[Annotated[list[Number], Field(min_length=2, max_length=2)]],
+        list[Annotated[list[Number | None], Field(min_length=2, max_length=2)]],
         Field(min_length=1),
     ]
-    """[from, until] of each interval [s]."""
+    """[from, until] of each interval [s]; null where it has always been, or stays."""
     ramp: NonNegative = 0.3
     """How long each rise and each fall takes, inside the intervals [s]."""
 
