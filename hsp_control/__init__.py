@@ -97,6 +97,7 @@ from .trajectories import PoseTrajectory as PoseTrajectory
 from .trajectories import ScrewInterpolation as ScrewInterpolation
 from .trajectories import Spin as Spin
 from .trajectories import Spline as Spline
+from .trajectories import Stops as Stops
 from .trajectories import Trajectory as Trajectory
 from .trajectories import UniformLine as UniformLine
 from .version import __version__ as __version__

@@ -22,6 +22,7 @@ from hsp_control.trajectories import (
     ScrewInterpolation,
     Spin,
     Spline,
+    Stops,
     Trajectory,
     UniformLine,
 )
@@ -78,6 +79,8 @@ def position_trajectory(model: s.PointTrajectory, start: Array | None) -> Trajec
             return Lissajous(
                 point(model.center), model.amplitudes, model.rates, model.phases
             )
+        case s.StopsModel():
+            return Stops(_points(model.waypoints, point), model.times)
         case s.MinimumJerkModel():
             return MinimumJerk(_points(model.waypoints, point), model.times)
         case s.SplineModel():

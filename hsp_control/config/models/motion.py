@@ -88,6 +88,16 @@ class MinimumJerkModel(Moving):
     """When to be there [s]."""
 
 
+class StopsModel(Moving):
+    """Move straight from waypoint to waypoint, resting at each."""
+
+    type: Literal["stops"]
+    waypoints: Annotated[list[Vector], Field(min_length=2)]
+    """The points; one twice is a pause."""
+    times: Vector
+    """When to be there [s]."""
+
+
 class SplineModel(Moving):
     """Pass through waypoints along a spline, from rest to rest."""
 
@@ -107,6 +117,7 @@ PointTrajectory = Annotated[
     | CircleModel
     | LissajousModel
     | MinimumJerkModel
+    | StopsModel
     | SplineModel,
     Field(discriminator="type"),
 ]
