@@ -7,6 +7,10 @@ of a field that may move in time.
 
 from .config import Experiment as Experiment
 from .config import load_experiment as load_experiment
+from .contacts import BallContact as BallContact
+from .contacts import Contact as Contact
+from .contacts import PointContact as PointContact
+from .contacts import SurfaceContact as SurfaceContact
 from .controller import Controller as Controller
 from .controller import ControlOutput as ControlOutput
 from .controller import Diagnostics as Diagnostics
@@ -31,6 +35,7 @@ from .fields import Transmission as Transmission
 from .fields import Uncontrolled as Uncontrolled
 from .fields import VectorField as VectorField
 from .fields import WeightedSum as WeightedSum
+from .limits import Limits as Limits
 from .loading import ToolFrame as ToolFrame
 from .metrics import ConstantMetric as ConstantMetric
 from .metrics import IdentityMetric as IdentityMetric
@@ -58,6 +63,7 @@ from .robot import Robot as Robot
 from .robot import RobotState as RobotState
 from .scene import Obstacle as Obstacle
 from .scene import Scene as Scene
+from .schedules import Schedule as Schedule
 from .shapes import Box as Box
 from .shapes import Capsule as Capsule
 from .shapes import Cylinder as Cylinder

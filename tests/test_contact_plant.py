@@ -121,7 +121,8 @@ def test_the_equations_of_motion_hold(name: str) -> None:
     readings = plant.readings(0.0, q, v, tau)
     for contact in plant.contacts:
         wrench = [
-            readings[f"plant.contact.{contact.frame}.{k}"].value for k in ("force", "moment")
+            readings[f"plant.contact.{contact.frame}.{k}"].value
+            for k in ("force", "moment")
         ]
         rest -= state.frame(contact.frame).jacobian.T @ np.concatenate(wrench)
     np.testing.assert_allclose(rest, 0.0, atol=1e-7)

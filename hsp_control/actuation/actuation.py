@@ -32,11 +32,13 @@ from hsp_control.limits.acceleration_bounds import acceleration_bounds
 from hsp_control.resolution import Resolution
 from hsp_control.robot import Robot, RobotState
 
-_FORCE_COST = 1e-9
-"""Of forces in robot weights squared, beside accelerations: it only decides what
-nothing else does."""
-_ORDER = {"contacts": 1e4, "motion": 1.0}
+_FORCE_COST = 1e-6
+"""Of forces in robot weights squared, beside accelerations: it decides what nothing
+else does. With 1e-8 and less the solver takes Talos' programmes for infeasible."""
+_ORDER = {"contacts": 1e3, "motion": 1.0}
 """What yields last has the greatest cost, where limits contradict each other."""
+_INDIFFERENT = 1e-4
+"""Cost of all else, while the least violation is looked for."""
 
 
 class Delivered(NamedTuple):
@@ -299,14 +301,13 @@ def _padded(rows: Rows, before: int, after: int) -> Rows:
 def _relax(hard: Rows, contacts: Rows, motion: Rows) -> tuple[Rows, Rows, float]:
     """Return rows widened by the least violation that the hard rows leave possible.
 
-    Contacts move before joints pass their bounds at a ten-thousandth of the cost, and
-    no more than is needed.
+    Joints pass their bounds before contacts move, and neither more than is needed.
     """
     soft = stacked(contacts, motion)
     n, s = hard.A.shape[1], len(soft.A)
     cost = np.full(s, _ORDER["motion"])
     cost[: len(contacts.A)] = _ORDER["contacts"]
-    H = np.diag(np.concatenate([np.full(n, 1e-8), cost]))
+    H = np.diag(np.concatenate([np.full(n, _INDIFFERENT), cost]))
     rows = stacked(_padded(hard, 0, s), Rows(np.hstack([soft.A, np.eye(s)]), *soft[1:]))
     x = solve(H, np.zeros(n + s), rows)
     if x is None:
