@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.patheffects import withStroke
 
 from hsp_control import palette
 from hsp_control.arrays import Array
@@ -18,6 +19,7 @@ from hsp_control.simulation import Rollout
 
 MOST_TICKS = 10
 """More frames than that are not all named at the scale of time."""
+_NUMBER = {"fontsize": 8.5, "fontweight": "bold", "color": palette.INK, "pad": 3.0}
 
 
 def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> None:
@@ -47,7 +49,7 @@ def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> N
 
 
 def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> None:
-    """Draw a strip of frames; axes that are left over are switched off.
+    """Draw a strip of numbered frames; axes that are left over are switched off.
 
     Args:
         axes: One for each row, in reading order.
@@ -57,12 +59,13 @@ def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> 
     for place, one in enumerate(axes):
         if place < len(rows):
             draw_frame(one, rollout, rows[place], key=False)
+            one.set_title(str(place + 1), loc="right", **_NUMBER)
         else:
             one.set_axis_off()
 
 
 def draw_superimposed(axes: Axes, rollout: Rollout, rows: Sequence[int]) -> None:
-    """Draw the robot at all rows in one picture, the later the darker.
+    """Draw the robot at all rows in one picture, the later the darker, and numbered.
 
     Args:
         axes: The axes.
@@ -84,6 +87,7 @@ def draw_superimposed(axes: Axes, rollout: Rollout, rows: Sequence[int]) -> None
         points = rollout["skeleton"][row]
         zorder = 3.0 + 0.2 * place
         draw_arm(axes, scene.view, points, tree, link=link, joint=joint, zorder=zorder)
+        _number(axes, scene.view, points, tree, place + 1)
     scene.finish(axes, shadows=False, key=True)
     if end > start:
         _time_bar(axes, start, end, times.tolist())
@@ -154,6 +158,29 @@ class _Scene(NamedTuple):
         origin = self.view.rows.T @ corner
         draw_directions(axes, self.view, origin, length)
         return np.array([origin, origin - 0.3 * length * self.view.rows[1]])
+
+
+def _number(
+    axes: Axes, view: View, points: Array, tree: Sequence[int], number: int
+) -> None:
+    """Write a frame's number beyond the last point, along the link that leads there."""
+    (x, y), (x0, y0) = (view.project(points[k]) for k in (-1, tree[-1]))
+    along = np.array([float(x - x0), float(y - y0)])
+    length = float(np.linalg.norm(along))
+    offset = along / length if length > 0.0 else np.array([0.0, 1.0])
+    axes.annotate(
+        str(number),
+        (float(x), float(y)),
+        xytext=tuple(8.0 * offset),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=7.5,
+        fontweight="bold",
+        color=palette.INK,
+        zorder=9.0,
+        path_effects=[withStroke(linewidth=2.0, foreground=palette.PAPER)],
+    )
 
 
 def _draw_paths(axes: Axes, view: View, rollout: Rollout, width: float) -> None:
