@@ -1219,3 +1219,15 @@ def test_a_plant_with_other_joints_is_refused() -> None:
     message = r"^the plant moves panda with the joints panda_joint1, .* planar3r has "
     with pytest.raises(SimulationError, match=message):
         simulate(planar_controller(), planar_start(), duration=0.1, plant=plant)
+
+
+def test_a_run_can_be_measured_afterwards(planar_run: Rollout) -> None:
+    """`measure` gives what the log has, and what it has not, at every row."""
+    run, robot = planar_run, load("planar3r", gravity=False)
+    tip = run.measure(robot, lambda state: state.position("tip"))
+    np.testing.assert_array_equal(tip, run["skeleton"][:, -1])
+    speed = run.measure(robot, lambda state: state.v @ state.v)
+    np.testing.assert_array_equal(speed, [v @ v for v in run.v])
+    np.testing.assert_array_equal(run.measure(robot, lambda state: state.t), run.t)
+    with pytest.raises(ShapeError, match=r"panda needs \(7,\)"):
+        run.measure(load("panda"), lambda state: state.t)

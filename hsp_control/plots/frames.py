@@ -64,13 +64,16 @@ def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> 
             one.set_axis_off()
 
 
-def draw_superimposed(axes: Axes, rollout: Rollout, rows: Sequence[int]) -> None:
-    """Draw the robot at all rows in one picture, the later the darker, and numbered.
+def draw_superimposed(
+    axes: Axes, rollout: Rollout, rows: Sequence[int], *, numbered: bool = True
+) -> None:
+    """Draw the robot at all rows in one picture, the later the darker.
 
     Args:
         axes: The axes.
         rollout: The log.
         rows: The rows.
+        numbered: Number them at their ends; not where all ends are at one place.
     """
     scene, tree = _Scene.of(rollout), parents(rollout)
     _draw_paths(axes, scene.view, rollout, 2.2)
@@ -87,7 +90,8 @@ def draw_superimposed(axes: Axes, rollout: Rollout, rows: Sequence[int]) -> None
         points = rollout["skeleton"][row]
         zorder = 3.0 + 0.2 * place
         draw_arm(axes, scene.view, points, tree, link=link, joint=joint, zorder=zorder)
-        _number(axes, scene.view, points, tree, place + 1)
+        if numbered:
+            _number(axes, scene.view, points, tree, place + 1)
     scene.finish(axes, shadows=False, key=True)
     if end > start:
         _time_bar(axes, start, end, times.tolist())
