@@ -1231,3 +1231,16 @@ def test_a_run_can_be_measured_afterwards(planar_run: Rollout) -> None:
     np.testing.assert_array_equal(run.measure(robot, lambda state: state.t), run.t)
     with pytest.raises(ShapeError, match=r"panda needs \(7,\)"):
         run.measure(load("panda"), lambda state: state.t)
+
+
+@pytest.mark.parametrize(
+    ("name", "efforts"),
+    [("planar3r", "N·m"), ("rolling ur5", "N or N·m")],
+)
+def test_efforts_have_the_units_of_their_joints(name: str, efforts: str) -> None:
+    """In the joints' order: a root or a rail that comes first pushes, in newtons."""
+    robot = load(name)
+    posture = JointPosture(robot, np.zeros(robot.nv), Gains.from_frequency(5.0))
+    controller = Controller(robot, [posture])
+    run = simulate(controller, robot.neutral(), duration=0.01)
+    assert run.meta["columns"]["tau"]["unit"] == efforts
