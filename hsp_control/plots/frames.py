@@ -19,7 +19,6 @@ from hsp_control.simulation import Rollout
 
 MOST_TICKS = 10
 """More frames than that are not all named at the scale of time."""
-_NUMBER = {"fontsize": 8.5, "fontweight": "bold", "color": palette.INK, "pad": 3.0}
 
 
 def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> None:
@@ -59,7 +58,7 @@ def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> 
     for place, one in enumerate(axes):
         if place < len(rows):
             draw_frame(one, rollout, rows[place], key=False)
-            one.set_title(str(place + 1), loc="right", **_NUMBER)
+            one.set_title(str(place + 1), loc="right", fontsize=8.5, pad=3.0)
         else:
             one.set_axis_off()
 
