@@ -48,7 +48,7 @@ from hsp_control.exceptions import (
 )
 from hsp_control.plants import integrators
 from hsp_control.shapes import Sphere
-from hsp_control.trajectories import Circle, ComposedPose, Lissajous, Spin
+from hsp_control.trajectories import Circle, ComposedPose, Hold, Lissajous, Spin
 
 pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
@@ -1240,7 +1240,9 @@ def test_a_run_can_be_measured_afterwards(planar_run: Rollout) -> None:
 def test_efforts_have_the_units_of_their_joints(name: str, efforts: str) -> None:
     """In the joints' order: a root or a rail that comes first pushes, in newtons."""
     robot = load(name)
-    posture = JointPosture(robot, np.zeros(robot.nv), Gains.from_frequency(5.0))
-    controller = Controller(robot, [posture])
-    run = simulate(controller, robot.neutral(), duration=0.01)
+    q0 = robot.integrate(robot.home(), np.full(robot.nv, 0.3))
+    start = robot.state(0.0, q0, np.zeros(robot.nv)).position(robot.end_effector)
+    gains = Gains.from_frequency(5.0)
+    task = FramePosition(robot, robot.end_effector, Hold(start[:2]), gains, axes="xy")
+    run = simulate(Controller(robot, [task]), q0, duration=0.01)
     assert run.meta["columns"]["tau"]["unit"] == efforts
