@@ -252,7 +252,9 @@ def test_a_legged_robot_stands_on_its_own_feet(name: str) -> None:
     total = sum(forces[f"plant.contact.{foot}.force"] for foot in feet)
     weight = 9.81 * sum(inertia.mass for inertia in robot.model.inertias)
     np.testing.assert_allclose(total, [0.0, 0.0, weight], rtol=0, atol=0.01 * weight)
-    assert all(forces[f"plant.contact.{foot}.force"][2] > 0.05 * weight for foot in feet)
+    assert all(
+        forces[f"plant.contact.{foot}.force"][2] > 0.05 * weight for foot in feet
+    )
 
 
 @pytest.mark.parametrize(
@@ -311,7 +313,9 @@ def test_a_contact_force_is_the_grounds_on_the_robot_about_the_frame() -> None:
     plant.reset(0.0, q, np.zeros(6))
     q, v = plant.advance(0.0, 1.0, np.zeros(6))
     readings = plant.readings(1.0, q, v, np.zeros(6))
-    force, moment = (readings[f"plant.contact.body.{k}"].value for k in ("force", "moment"))
+    force, moment = (
+        readings[f"plant.contact.body.{k}"].value for k in ("force", "moment")
+    )
     np.testing.assert_allclose(force, [0.0, 0.0, 2.0 * 9.81], rtol=0, atol=1e-3)
     np.testing.assert_allclose(moment, np.zeros(3), rtol=0, atol=1e-3)
     assert readings["plant.contact.body.force"].unit == "N"
