@@ -62,9 +62,10 @@ wheel-test: $(STAMP) ## build the wheel, install it elsewhere, use it from there
 figures: $(STAMP) ## draw the documents' figures anew, into docs/figures
 	@$(BIN)/python docs/make_figures.py
 
-format: $(STAMP) ## let ruff format the code and fix what it can
+format: $(STAMP) ## let ruff format the code and fix what it can, strip the notebooks
 	@$(BIN)/ruff check --fix --quiet || true
 	@$(BIN)/ruff format
+	@$(BIN)/nbstripout notebooks/*.ipynb
 
 constraints: ## refresh constraints.txt with the newest version of everything
 	@$(find-python); dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; \

@@ -1,26 +1,83 @@
 """Draw the figures of the documents: `make figures` (they are committed)."""
 
+import json
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 import hsp_control as hsp
 from hsp_control.palette import DESIRED, INK, SERIES
-from hsp_control.plots import new_figure, paper_figure, styled
+from hsp_control.plots import chosen_rows, new_figure, paper_figure, styled
 
 FOLDER = Path(__file__).parent / "figures"
-PAPER = ("1_uncontrolled", "2_rest", "3_equal_angles", "4_moving_obstacle")
 GAIN, FREQUENCY = 4.0, 6.0
+
+TURN = 2.0 * np.pi / 3.0  # of the paper's circle [s]
+WHOLE_RUN = tuple(10.0 * k / 7.0 for k in range(8))
+SECOND_TURN = tuple(TURN * (1.0 + k / 8.0) for k in range(8))
+
+
+class PaperFigure(NamedTuple):
+    """One of the paper's Figures 2 to 5.
+
+    Attributes:
+        number: The paper's number of it.
+        configuration: Which simulation it shows.
+        times: When the frames of its panels (d) and (e) are taken [s]. Ours: those of
+            the paper could not be read.
+    """
+
+    number: int
+    configuration: str
+    times: tuple[float, ...]
+
+    @property
+    def file(self) -> Path:
+        """Where it is kept."""
+        return FOLDER / f"{self.configuration.replace('/', '_')}.png"
+
+    def figure(self, rollout: hsp.Rollout) -> Figure:
+        """Return it, of a run of its configuration."""
+        config = rollout.config or {}
+        title = f"Figure {self.number}  ·  {config['title']}"
+        return paper_figure(rollout, times=self.times, title=title)
+
+    def save(self, rollout: hsp.Rollout) -> None:
+        """Write it, with what it was drawn from."""
+        about = provenance(rollout, self.times)
+        self.figure(rollout).savefig(self.file, dpi=110, metadata=about)
+
+
+PAPER = (
+    PaperFigure(2, "paper/1_uncontrolled", WHOLE_RUN),
+    PaperFigure(3, "paper/2_rest", SECOND_TURN),
+    PaperFigure(4, "paper/3_equal_angles", SECOND_TURN),
+    PaperFigure(5, "paper/4_moving_obstacle", SECOND_TURN),
+)
+
+
+def provenance(rollout: hsp.Rollout, times: tuple[float, ...]) -> dict[str, str]:
+    """Return what a picture says about its run, so that a test can repeat it.
+
+    The configuration, and at the frames the time, the robot's points [m] and
+    det(J W⁻¹ Jᵀ).
+    """
+    rows = chosen_rows(rollout, times=times)
+    frames = {name: rollout[name][rows] for name in ("t", "skeleton", "manipulability")}
+    return {
+        "configuration": json.dumps(rollout.config, sort_keys=True),
+        "frames": json.dumps({name: a.tolist() for name, a in frames.items()}),
+    }
 
 
 def main() -> None:
     """Draw everything into docs/figures."""
     FOLDER.mkdir(exist_ok=True)
-    for name in PAPER:
-        rollout = hsp.load_experiment(f"paper/{name}").run()
-        with styled():
-            paper_figure(rollout).savefig(FOLDER / f"paper_{name}.png", dpi=110)
+    for one in PAPER:
+        one.save(hsp.load_experiment(one.configuration).run())
     with styled():
         figure = new_figure(11.0, 3.6)
         left, middle, right = figure.subplots(1, 3)

@@ -98,13 +98,30 @@ class ConfigurationSpace:
                 )
         return q
 
-    def integrate(self, q: Array, displacement: Array) -> Array:
-        """Return q ⊕ displacement, shape (nq,)."""
-        return np.asarray(pin.integrate(self.model, q, displacement))
+    def integrate(self, q: Any, displacement: Any) -> Array:
+        """Return q ⊕ displacement, shape (nq,).
 
-    def difference(self, start: Array, end: Array) -> Array:
-        """Return end ⊖ start: the displacement that leads from start to end, (nv,)."""
-        return np.asarray(pin.difference(self.model, start, end))
+        Raises:
+            ShapeError: If they are not nq and nv numbers.
+        """
+        try:
+            return np.asarray(pin.integrate(self.model, q, displacement))
+        except (TypeError, ValueError):  # lists, or what does not fit: look closer
+            q = self.check_configuration(q)
+            displacement = self.check_tangent(displacement, "displacement")
+            return np.asarray(pin.integrate(self.model, q, displacement))
+
+    def difference(self, start: Any, end: Any) -> Array:
+        """Return end ⊖ start: the displacement that leads from start to end, (nv,).
+
+        Raises:
+            ShapeError: If they are not nq numbers each.
+        """
+        try:
+            return np.asarray(pin.difference(self.model, start, end))
+        except (TypeError, ValueError):
+            start, end = self.check_configuration(start), self.check_configuration(end)
+            return np.asarray(pin.difference(self.model, start, end))
 
     def joint_positions(self, q: Array) -> Array:
         """Return every joint's position [rad or m], shape (nv,): the log from neutral.

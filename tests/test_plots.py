@@ -830,3 +830,53 @@ def test_letters_and_headings(drawings: dict[str, list[Figure]]) -> None:
         assert heading in texts
     titles = [axes.get_title(loc="left")[:3] for axes in visible(diagnostics)]
     assert titles == [f"({letter})" for letter in "abcdefgh"]
+
+
+def test_frames_bear_one_number_in_every_panel(logs: dict[str, Rollout]) -> None:
+    """A frame is found again by its number: in the strip, together, and over time."""
+    log, times = logs["obstacle"], [0.2, 0.5, 0.9]
+    figure = plots.paper_figure(log, times=times, title="With $ in it")
+    assert figure.get_suptitle() == r"With \$ in it"
+    figure.canvas.draw()
+    strip = [a for a in figure.axes if a.get_title(loc="left").startswith("t = ")]
+    assert [axes.get_title(loc="right") for axes in strip] == ["1", "2", "3"]
+    (together,) = (a for a in figure.axes if len(a.texts) == len(times))
+    for number, (text, time) in enumerate(zip(together.texts, times, strict=True), 1):
+        assert text.get_text() == str(number)
+        row = int(np.abs(log.t - time).argmin())
+        assert text.xy == pytest.approx(log["skeleton"][row, -1, :2])
+    for panel in ("(b)", "(c)"):
+        (axes,) = (a for a in figure.axes if a.get_title(loc="left").startswith(panel))
+        (upper,) = axes.child_axes
+        np.testing.assert_allclose(upper.get_xticks(), times)
+        assert [t.get_text() for t in upper.get_xticklabels()] == ["1", "2", "3"]
+
+
+def test_many_frames_are_marked_but_not_named(logs: dict[str, Rollout]) -> None:
+    axes = drawn(plots.draw_manipulability, logs["rest"])
+    plots.lines.mark_frames(axes, np.linspace(0.0, 1.0, 15))
+    labels = [t.get_text() for t in axes.child_axes[0].get_xticklabels()]
+    assert labels == [""] * 15
+
+
+def test_a_frame_at_its_parent_is_numbered_above_it(logs: dict[str, Rollout]) -> None:
+    """A hand whose frame lies on the last joint has no link to go on along."""
+    skeleton = logs["rest"]["skeleton"].copy()
+    skeleton[:, -1] = skeleton[:, -2]
+    log = changed(logs["rest"], columns={"skeleton": skeleton})
+    axes = drawn(plots.draw_superimposed, log, [0])
+    assert axes.texts[0].xyann == pytest.approx((0.0, 8.0))
+
+
+def test_a_figure_shows_itself_in_a_notebook(logs: dict[str, Rollout]) -> None:
+    picture = plots.paper_figure(logs["rest"])._repr_png_()
+    assert picture.startswith(b"\x89PNG")
+    assert len(picture) < 300_000
+
+
+def test_the_style_can_be_had_for_good() -> None:
+    with mpl.rc_context():
+        plots.use_style()
+        assert mpl.rcParams["axes.titleweight"] == "bold"
+        assert mpl.rcParams["axes.prop_cycle"].by_key()["color"] == list(palette.SERIES)
+    assert mpl.rcParams["axes.titleweight"] != "bold"

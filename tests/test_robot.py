@@ -1116,3 +1116,24 @@ def test_equal_limits_mean_none() -> None:
     robot = Robot.load("double_pendulum")
     assert np.isinf(robot.position_limits()).all()
     assert robot.random_configuration(np.random.default_rng(0)).all()
+
+
+def test_lists_will_do_for_integrate_and_difference() -> None:
+    robot = load("panda")
+    home, step = robot.home(), [0.1, 0, 0, 0, 0, 0, -0.2]
+    moved = robot.integrate(list(home), step)
+    np.testing.assert_array_equal(moved, robot.integrate(home, np.array(step)))
+    np.testing.assert_array_equal(
+        robot.difference(home.tolist(), moved.tolist()), robot.difference(home, moved)
+    )
+
+
+@pytest.mark.parametrize("wrong", [[0.1], np.zeros(8), "left", None])
+def test_integrate_and_difference_say_what_does_not_fit(wrong: object) -> None:
+    robot = load("panda")
+    with pytest.raises(ShapeError, match=r"^displacement (has shape|is not an array)"):
+        robot.integrate(robot.home(), wrong)
+    with pytest.raises(ShapeError, match=r"^configuration q "):
+        robot.integrate(wrong, np.zeros(7))
+    with pytest.raises(ShapeError, match=r"^configuration q "):
+        robot.difference(robot.home(), wrong)

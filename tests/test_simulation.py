@@ -48,7 +48,7 @@ from hsp_control.exceptions import (
 )
 from hsp_control.plants import integrators
 from hsp_control.shapes import Sphere
-from hsp_control.trajectories import Circle, ComposedPose, Lissajous, Spin
+from hsp_control.trajectories import Circle, ComposedPose, Hold, Lissajous, Spin
 
 pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
@@ -1219,3 +1219,30 @@ def test_a_plant_with_other_joints_is_refused() -> None:
     message = r"^the plant moves panda with the joints panda_joint1, .* planar3r has "
     with pytest.raises(SimulationError, match=message):
         simulate(planar_controller(), planar_start(), duration=0.1, plant=plant)
+
+
+def test_a_run_can_be_measured_afterwards(planar_run: Rollout) -> None:
+    """`measure` gives what the log has, and what it has not, at every row."""
+    run, robot = planar_run, load("planar3r", gravity=False)
+    tip = run.measure(robot, lambda state: state.position("tip"))
+    np.testing.assert_array_equal(tip, run["skeleton"][:, -1])
+    speed = run.measure(robot, lambda state: state.v @ state.v)
+    np.testing.assert_array_equal(speed, [v @ v for v in run.v])
+    np.testing.assert_array_equal(run.measure(robot, lambda state: state.t), run.t)
+    with pytest.raises(ShapeError, match=r"panda needs \(7,\)"):
+        run.measure(load("panda"), lambda state: state.t)
+
+
+@pytest.mark.parametrize(
+    ("name", "efforts"),
+    [("planar3r", "N·m"), ("rolling ur5", "N or N·m")],
+)
+def test_efforts_have_the_units_of_their_joints(name: str, efforts: str) -> None:
+    """In the joints' order: a root or a rail that comes first pushes, in newtons."""
+    robot = load(name)
+    q0 = robot.integrate(robot.home(), np.full(robot.nv, 0.3))
+    start = robot.state(0.0, q0, np.zeros(robot.nv)).position(robot.end_effector)
+    gains = Gains.from_frequency(5.0)
+    task = FramePosition(robot, robot.end_effector, Hold(start[:2]), gains, axes="xy")
+    run = simulate(Controller(robot, [task]), q0, duration=0.01)
+    assert run.meta["columns"]["tau"]["unit"] == efforts

@@ -18,4 +18,5 @@ from .readings import chosen_rows as chosen_rows
 from .saving import save_figures as save_figures
 from .style import new_figure as new_figure
 from .style import styled as styled
+from .style import use_style as use_style
 from .task_errors import draw_task_errors as draw_task_errors

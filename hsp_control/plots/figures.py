@@ -1,6 +1,7 @@
 """Whole figures: the paper's five panels, and what explains a run."""
 
 import textwrap
+from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,6 +12,7 @@ from hsp_control.plots.conditioning import draw_manipulability, draw_singular_va
 from hsp_control.plots.frames import columns_for, draw_frames, draw_superimposed
 from hsp_control.plots.joints import draw_efforts, draw_joint_positions
 from hsp_control.plots.legends import plain
+from hsp_control.plots.lines import mark_frames
 from hsp_control.plots.null_space import (
     draw_distances,
     draw_field_terms,
@@ -31,18 +33,21 @@ def paper_figure(
     *,
     absolute: bool = True,
     frames: int = 8,
-    times: list[float] | None = None,
+    times: Sequence[float] | None = None,
+    title: str | None = None,
 ) -> Figure:
     """Return the paper's five panels of one run.
 
     (a) the end effector's path, (b) the joints, (c) manipulability, (d) selected frames
-    and (e) the frames together.
+    and (e) the frames together. The frames are numbered, and their numbers stand above
+    (b) and (c) at their times.
 
     Args:
         rollout: The log.
         absolute: Draw absolute angles where the literature on the robot does.
         frames: How many frames, evenly over the run.
         times: When to take frames [s], instead.
+        title: What to write above; None: the run's own title.
 
     Raises:
         PlotError: If the log has no row, or no frame is asked for.
@@ -53,7 +58,7 @@ def paper_figure(
         raise PlotError("no frames are asked for; needs at least 1")
     with styled():
         figure = new_figure(11.0, 7.6)
-        _entitle(figure, rollout)
+        _entitle(figure, rollout, title)
         halves = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.05))
         upper, lower = halves.ravel()
         grid = upper.add_gridspec(1, 3, width_ratios=(0.85, 1.0, 1.0))
@@ -73,7 +78,10 @@ def paper_figure(
         draw_superimposed(e, rollout, rows)
         e.set_anchor("N")
         together.suptitle("(e)  Frames together", **_HEADING)
-        _letter([a, b, c], ["End effector", "Joints", "Manipulability"])
+        titles = ["End effector", "Joints", "Manipulability"]
+        _letter([a, b, c], titles, pad=18.0)  # room for the frames' numbers
+        for over_time in (b, c):
+            mark_frames(over_time, rollout.t[rows])
     return figure
 
 
@@ -112,18 +120,19 @@ def diagnostics_figure(rollout: Rollout) -> Figure:
     return figure
 
 
-def _letter(axes: list[Axes], titles: list[str]) -> None:
+def _letter(axes: list[Axes], titles: list[str], pad: float | None = None) -> None:
+    y = None if pad is None else 1.0  # else titles give way to ticks, each by itself
     for letter, one, title in zip("abcdefgh", axes, titles, strict=False):
-        one.set_title(f"({letter})  {title}")
+        one.set_title(f"({letter})  {title}", y=y, pad=pad)
 
 
-def _entitle(figure: Figure, rollout: Rollout) -> None:
+def _entitle(figure: Figure, rollout: Rollout, title: str | None = None) -> None:
     """Write the title, and what the run was, at the foot."""
     meta, config = rollout.meta, rollout.config or {}
     robot, field = meta["robot"]["name"], meta.get("field", "")
-    named = (config.get("title"), meta.get("title"), meta.get("name"))
-    title = next(filter(None, named), f"{robot}, field: {field}")
-    figure.suptitle(plain(textwrap.fill(str(title), 100)))
+    named = (title, config.get("title"), meta.get("title"), meta.get("name"))
+    shown = next(filter(None, named), f"{robot}, field: {field}")
+    figure.suptitle(plain(textwrap.fill(str(shown), 100)))
     version = meta.get("versions", {}).get("hsp_control", "")
     parts = [f"robot {robot}", f"field {field}", f"metric {meta.get('metric', '')}"]
     parts += [f"hsp_control {version}"] if version else []

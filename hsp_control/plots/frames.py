@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.patheffects import withStroke
 
 from hsp_control import palette
 from hsp_control.arrays import Array
@@ -47,7 +48,7 @@ def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> N
 
 
 def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> None:
-    """Draw a strip of frames; axes that are left over are switched off.
+    """Draw a strip of numbered frames; axes that are left over are switched off.
 
     Args:
         axes: One for each row, in reading order.
@@ -57,17 +58,21 @@ def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> 
     for place, one in enumerate(axes):
         if place < len(rows):
             draw_frame(one, rollout, rows[place], key=False)
+            one.set_title(str(place + 1), loc="right", fontsize=8.5, pad=3.0)
         else:
             one.set_axis_off()
 
 
-def draw_superimposed(axes: Axes, rollout: Rollout, rows: Sequence[int]) -> None:
+def draw_superimposed(
+    axes: Axes, rollout: Rollout, rows: Sequence[int], *, numbered: bool = True
+) -> None:
     """Draw the robot at all rows in one picture, the later the darker.
 
     Args:
         axes: The axes.
         rollout: The log.
         rows: The rows.
+        numbered: Number them at their ends; not where all ends are at one place.
     """
     scene, tree = _Scene.of(rollout), parents(rollout)
     _draw_paths(axes, scene.view, rollout, 2.2)
@@ -84,6 +89,8 @@ def draw_superimposed(axes: Axes, rollout: Rollout, rows: Sequence[int]) -> None
         points = rollout["skeleton"][row]
         zorder = 3.0 + 0.2 * place
         draw_arm(axes, scene.view, points, tree, link=link, joint=joint, zorder=zorder)
+        if numbered:
+            _number(axes, scene.view, points, tree, place + 1)
     scene.finish(axes, shadows=False, key=True)
     if end > start:
         _time_bar(axes, start, end, times.tolist())
@@ -154,6 +161,29 @@ class _Scene(NamedTuple):
         origin = self.view.rows.T @ corner
         draw_directions(axes, self.view, origin, length)
         return np.array([origin, origin - 0.3 * length * self.view.rows[1]])
+
+
+def _number(
+    axes: Axes, view: View, points: Array, tree: Sequence[int], number: int
+) -> None:
+    """Write a frame's number beyond the last point, along the link that leads there."""
+    (x, y), (x0, y0) = (view.project(points[k]) for k in (-1, tree[-1]))
+    along = np.array([float(x - x0), float(y - y0)])
+    length = float(np.linalg.norm(along))
+    offset = along / length if length > 0.0 else np.array([0.0, 1.0])
+    axes.annotate(
+        str(number),
+        (float(x), float(y)),
+        xytext=tuple(8.0 * offset),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=7.5,
+        fontweight="bold",
+        color=palette.INK,
+        zorder=9.0,
+        path_effects=[withStroke(linewidth=2.0, foreground=palette.PAPER)],
+    )
 
 
 def _draw_paths(axes: Axes, view: View, rollout: Rollout, width: float) -> None:

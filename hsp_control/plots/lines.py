@@ -88,3 +88,19 @@ def mark_damped(axes: Axes, rollout: Rollout) -> None:
             linewidth=0.8,
             label="law bounded near a singularity" if start == edges[0] else None,
         )
+
+
+def mark_frames(axes: Axes, times: Array) -> None:
+    """Number the times of frames, 1 and on, along the upper edge of curves over time.
+
+    Args:
+        axes: The axes.
+        times: When the frames were taken [s].
+    """
+    upper = axes.secondary_xaxis("top")
+    few = len(times) <= MOST
+    upper.set_xticks(
+        times, labels=[str(k + 1) if few else "" for k in range(len(times))]
+    )
+    upper.tick_params(length=2.0, pad=1.0, labelsize=7.0, labelcolor=palette.MUTED)
+    upper.spines["top"].set_visible(False)

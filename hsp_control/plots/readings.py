@@ -1,6 +1,7 @@
 """What a log says, in the form in which a person would plot it."""
 
 import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -127,7 +128,7 @@ def column_unit(rollout: Rollout, name: str) -> str:
 
 
 def chosen_rows(
-    rollout: Rollout, count: int = 8, times: list[float] | None = None
+    rollout: Rollout, count: int = 8, times: Sequence[float] | None = None
 ) -> list[int]:
     """Return the rows of movie frames, in order and each once.
 

@@ -5,6 +5,7 @@ Nothing here needs a display: figures own an Agg canvas and pyplot is never impo
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from typing import Any
 
 import matplotlib as mpl
@@ -66,6 +67,9 @@ STYLE: dict[str, Any] = {
     "ytick.minor.size": 1.5,
 }
 
+NOTEBOOK_DPI = 100.0
+"""Dots per inch of pictures in notebooks; they are stored there as text."""
+
 
 @contextmanager
 def styled() -> Iterator[None]:
@@ -74,11 +78,26 @@ def styled() -> Iterator[None]:
         yield
 
 
+def use_style() -> None:
+    """Make `STYLE` matplotlib's own from here on: for a notebook's or script's top.
+
+    Figures made with pyplot then look like the package's.
+    """
+    mpl.rcParams.update(STYLE)  # type: ignore[arg-type]  # any str may be a key
+
+
 class StyledFigure(Figure):
     """A figure that is drawn in the style, wherever it is saved or shown.
 
     Matplotlib makes ticks when they are first drawn, with the parameters of then.
+    In a notebook it shows itself as the value of a cell.
     """
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture: how a notebook shows what pyplot does not know of."""
+        picture = BytesIO()
+        self.savefig(picture, format="png", dpi=NOTEBOOK_DPI)
+        return picture.getvalue()
 
     def draw(self, renderer: RendererBase) -> None:
         """Draw in the style."""

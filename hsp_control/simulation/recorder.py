@@ -19,6 +19,8 @@ from hsp_control.scene import Obstacle, Scene
 from hsp_control.simulation.rollout import FORMAT, Rollout
 from hsp_control.version import __version__
 
+_EFFORT_UNITS = {"rad": "N·m", "m": "N"}
+
 
 class Recorder:
     """Columns for a known number of rows; only whole rows count."""
@@ -31,9 +33,9 @@ class Recorder:
         self._columns: dict[str, Array] = {}
         self._meaning: dict[str, dict[str, str]] = {}
         robot = controller.robot
-        nv, joint_unit = robot.nv, " or ".join(dict.fromkeys(robot.units))
-        effort_unit = joint_unit.replace("rad", "N·m").replace("or m", "or N")
-        effort_unit = "N" if joint_unit == "m" else effort_unit
+        nv, units = robot.nv, dict.fromkeys(robot.units)
+        joint_unit = " or ".join(units)
+        effort_unit = " or ".join(_EFFORT_UNITS[unit] for unit in units)
 
         def column(name: str, shape: tuple[int, ...], unit: str, meaning: str) -> None:
             self._columns[name] = np.zeros((rows, *shape))

@@ -2,7 +2,7 @@
 
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
@@ -11,6 +11,7 @@ import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import LogError
+from hsp_control.robot import Robot, RobotState
 from hsp_control.suggest import did_you_mean, listing
 
 FORMAT = "hsp_control rollout 1"
@@ -79,6 +80,24 @@ class Rollout:
     def config(self) -> dict[str, Any] | None:
         """The resolved configuration that the run came from, if it came from one."""
         return self.meta.get("config")
+
+    def measure(self, robot: Robot, function: Callable[[RobotState], Any]) -> Array:
+        """Return a function of the state at every row, shape (N, ...).
+
+        For what the run did not log: ``run.measure(robot, cost.value)``, or
+        ``run.measure(robot, lambda state: state.position("panda_link4"))``.
+
+        Args:
+            robot: The run's robot.
+            function: What to compute of a state: a number or an array.
+
+        Raises:
+            ShapeError: If the run is of another robot.
+        """
+        state = RobotState(robot)
+        rows = zip(self.t.tolist(), self.q, self.v, strict=True)
+        # The state's arrays move on with it: np.array copies.
+        return np.array([np.array(function(state.update(*row))) for row in rows])
 
     def save(self, path: str | Path) -> Path:
         """Write one ``.npz`` that NumPy alone reads, without pickles.
