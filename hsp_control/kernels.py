@@ -8,6 +8,7 @@ debugging and coverage.
 
 import hashlib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -41,3 +42,26 @@ def kernel(function: Function) -> Function:
     function.__qualname__ += f"_{_PACKAGE_STATE}"
     compiled = numba.njit(cache=True, error_model="numpy")(function)
     return cast("Function", compiled)
+
+
+def bind(
+    function: Callable[..., Any], *arguments: Any, free: tuple[Any, ...] = ()
+) -> Callable[..., Any]:
+    """Return a call of a kernel with these very arguments, decided once.
+
+    Each call of a compiled function looks its arguments' types up anew, which costs as
+    much again as handing them over: 0.2 of 0.4 µs for eight arrays. Arrays that stay
+    have types that stay.
+
+    Args:
+        function: The kernel.
+        arguments: Its first arguments. Arrays are followed, numbers stay as they are.
+        free: Numbers of the types that the last arguments will have, which are left to
+            the call.
+    """
+    if not hasattr(function, "overloads"):  # uncompiled
+        return partial(function, *arguments)
+    compiled = cast("Any", function)
+    types = tuple(numba.typeof(argument) for argument in (*arguments, *free))
+    compiled.compile(types)
+    return partial(compiled.overloads[types].entry_point, *arguments)

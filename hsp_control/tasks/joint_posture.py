@@ -79,7 +79,8 @@ class JointPosture(Task):
 
     def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
         """Return one row a joint; see `Task.evaluate`."""
-        out = self._out(out)
+        if out is None:
+            out = TaskSample.allocate(self.rows, self.robot.nv)
         desired = self._desired(state.t)
         difference = self.robot.difference(state.q, desired)
         out.jacobian[:] = 0.0
