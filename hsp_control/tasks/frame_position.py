@@ -54,9 +54,7 @@ class FramePosition(FrameTask):
         letters = "".join(axes)
         if not letters or len(set(letters)) < len(letters) or set(letters) - set("xyz"):
             raise TaskError(f"axes {letters!r}: name distinct axes among x, y and z")
-        super().__init__(
-            robot, frame, len(letters), gains, name or named_after(frame)
-        )
+        super().__init__(robot, frame, len(letters), gains, name or named_after(frame))
         if trajectory.dimension != self.rows:
             raise TaskError(
                 f"task {self.name!r} tracks the axes {letters!r}; its trajectory has "

@@ -73,7 +73,8 @@ class Blend(Trajectory):
         out = self._output(out)
         if t >= self.start_time:
             self.trajectory.sample(t, out)
-        _blend(self.start_time, self.duration, self._begin, *out, float(t))
+        if t < self.start_time + self.duration:
+            _blend(self.start_time, self.duration, self._begin, *out, float(t))
         return out
 
     def follow(self, out: TrajectorySample) -> Follower:

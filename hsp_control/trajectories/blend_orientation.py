@@ -102,7 +102,8 @@ class BlendOrientation(OrientationTrajectory):
             out = OrientationSample.allocate()
         if t >= self.start_time:
             self.trajectory.sample(t, out)
-        _blend(*self._parameters(), *out, float(t))
+        if t < self.start_time + self.duration:
+            _blend(*self._parameters(), *out, float(t))
         return out
 
     def follow(self, out: OrientationSample) -> Follower:
