@@ -27,6 +27,13 @@ class Cost(NullSpaceField):
 
     _bound: tuple[MetricSample, int, FieldSample, Callable[[], bool]] | None = None
 
+    def __init_subclass__(cls, **arguments: Any) -> None:
+        """Let a gradient or a rate that is overridden count, also of a ready cost."""
+        super().__init_subclass__(**arguments)
+        own = vars(cls)
+        if "differentiate" not in own and {"gradient", "gradient_rate"} & own.keys():
+            cls.differentiate = Cost.differentiate  # type: ignore[method-assign]
+
     @abstractmethod
     def value(self, state: RobotState) -> float:
         """Return f(q, t); it may not depend on the velocity."""

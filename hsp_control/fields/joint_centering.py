@@ -94,7 +94,7 @@ def check_weights(weights: Any, size: int, name: str) -> Array:
     Raises:
         FieldError: If there are not as many, or one is negative or not finite.
     """
-    array = np.asarray(weights, dtype=float)
+    array = np.array(weights, dtype=float)
     if array.ndim == 0:
         array = np.full(size, float(array))
     if array.shape != (size,):

@@ -18,6 +18,19 @@ def stay(t: float) -> None:
     """Follow what does not move: its sample has been written already."""
 
 
+def follow_all(*followers: Follower) -> Follower:
+    """Return what calls followers in turn; those that `stay` are left out."""
+    moving = [follower for follower in followers if follower is not stay]
+    if len(moving) < 2:
+        return moving[0] if moving else stay
+
+    def follower(t: float) -> None:
+        for each in moving:
+            each(t)
+
+    return follower
+
+
 def follow_by(sampler: Callable[[float, Any], Any], out: Any) -> Follower:
     """Return the follower of anything that has a ``sample(t, out)``."""
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import TrajectoryError
-from hsp_control.trajectories.following import Follower, follow_by, stay
+from hsp_control.trajectories.following import Follower, follow_all, follow_by
 from hsp_control.trajectories.immutable import Immutable
 from hsp_control.trajectories.orientation import (
     OrientationSample,
@@ -105,17 +105,7 @@ class ComposedPose(PoseTrajectory):
 
     def follow(self, out: PoseSample) -> Follower:
         """Return a function of time that brings ``out`` up to a time."""
-        parts = (
+        return follow_all(
             self.position.follow(out.position),
             self.orientation.follow(out.orientation),
         )
-        moving = [follower for follower in parts if follower is not stay]
-        if len(moving) < 2:
-            return moving[0] if moving else stay
-        first, second = moving
-
-        def follower(t: float) -> None:
-            first(t)
-            second(t)
-
-        return follower
