@@ -62,6 +62,7 @@ def bind(
     if not hasattr(function, "overloads"):  # uncompiled
         return partial(function, *arguments)
     compiled = cast("Any", function)
-    types = tuple(numba.typeof(argument) for argument in (*arguments, *free))
+    typeof = cast("Callable[[Any], Any]", numba.typeof)
+    types = tuple(typeof(argument) for argument in (*arguments, *free))
     compiled.compile(types)
     return partial(compiled.overloads[types].entry_point, *arguments)

@@ -261,11 +261,12 @@ class RobotState:
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
         """
         robot, own_q, own_v = self.robot, self.q, self.v
+        t = float(t)
         try:
             taken = (
                 q.shape == own_q.shape
                 and v.shape == own_v.shape
-                and _take(float(t), q, v, own_q, own_v, self._unit_blocks)
+                and _take(t, q, v, own_q, own_v, self._unit_blocks)
             )
         except AttributeError:  # lists are welcome, too
             taken = False
@@ -276,7 +277,7 @@ class RobotState:
             if not np.isfinite(t):
                 raise NonFiniteError(f"time t is {t}; needs a finite number of seconds")
             own_q[:], own_v[:] = q, v
-        self.t = float(t)
+        self.t = t
         self._stamp += 1
         pin.computeJointJacobiansTimeVariation(robot.model, self.data, own_q, own_v)
         return self

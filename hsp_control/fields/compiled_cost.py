@@ -20,7 +20,9 @@ class CompiledCost(Cost):
     def __init__(self, robot: Robot, name: str) -> None:
         """Keep the robot and the name, allocate."""
         super().__init__(robot, name)
-        self._forget()
+        self._own = np.zeros(robot.nv), np.zeros(robot.nv)
+        self._asked: tuple[RobotState, Derivatives] | None = None
+        self._into: tuple[RobotState, Array, Array, Derivatives] | None = None
 
     @abstractmethod
     def _bind(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
@@ -59,12 +61,6 @@ class CompiledCost(Cost):
             self._asked = state, self._bind(state, *self._own)
         return self._asked[1]
 
-    def _forget(self) -> None:
-        self._own = np.zeros(self.robot.nv), np.zeros(self.robot.nv)
-        self._asked: tuple[RobotState, Derivatives] | None = None
-        self._into: tuple[RobotState, Array, Array, Derivatives] | None = None
-
     def __getstate__(self) -> dict[str, Any]:
         """Return all but what is bound to a state's memory."""
-        bound = {"_own": self._own, "_asked": None, "_into": None}
-        return super().__getstate__() | bound
+        return super().__getstate__() | {"_asked": None, "_into": None}

@@ -87,7 +87,7 @@ def _inverse_condition(
             )
             slope[i, j] = 2.0 * phi * inner
             slope_rate[i, j] = 2.0 * (phi_dot * inner + phi * inner_dot)
-    return -phi
+    return float(-phi)
 
 
 @kernel

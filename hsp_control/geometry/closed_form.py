@@ -26,7 +26,6 @@ from hsp_control.geometry.signed_distance import (
     SEGMENT,
     direction,
     distance_to_solid,
-    dot,
     nearest_on_segments,
     nearest_rates,
 )
@@ -52,6 +51,9 @@ def has_closed_form(first: LinkShape, second: LinkShape | Obstacle) -> bool:
         return True
     ball = isinstance(first.geometry, coal.Sphere)
     return ball and isinstance(second.shape, Box | Cylinder | HalfSpace)
+
+
+_Derived = tuple[RobotState, Array, Array, Array, Array, Callable[[], Any]]
 
 
 class ClosedForm:
@@ -99,13 +101,12 @@ class ClosedForm:
             self._kinds[len(links) + k] = kind, -1 - k, 0, 0
         self._columns = np.concatenate(columns)
         self._freedoms = np.concatenate(freedoms)
-        self._segments: Indices = used[self._kinds[used, 0] == SEGMENT]
-        self._ends = np.zeros((len(rows), 2, 3))
+        self._used: Indices = used[self._kinds[used, 0] == SEGMENT]
+        self._segments = np.zeros((len(rows), 2, 3))
         self._cores = np.zeros((len(pairs), 3, 3))
         self._scratch = np.zeros((40, 3))
         self._measured: tuple[RobotState, Array, Callable[[], Any]] | None = None
-        self._derived: tuple[RobotState, tuple[Array, ...], Callable[[], Any]] | None
-        self._derived = None
+        self._derived: _Derived | None = None
 
     def measure(self, state: RobotState, distances: Array) -> None:
         """Write the distances, each in its place."""
@@ -119,10 +120,10 @@ class ClosedForm:
                 self._motion,
                 self._kinds,
                 self._sizes,
-                self._segments,
+                self._used,
                 self._pairs,
                 self._places,
-                self._ends,
+                self._segments,
                 self._cores,
                 self._scratch,
                 distances,
@@ -144,21 +145,23 @@ class ClosedForm:
         gradient: Array,
         rate: Array,
     ) -> None:
-        """Add Σ b'(d_k) ∇d_k and its exact rate, after `measure` at the same state.
+        """Write Σ b'(d_k) ∇d_k and its exact rate, after `measure` at the same state.
 
         Args:
             state: The robot's state.
             slopes: b' of all pairs of the `Proximity`.
             bends: b'' of them.
-            gradient: Is added to, shape (nv,).
-            rate: Is added to, shape (nv,).
+            gradient: Where to write, shape (nv,).
+            rate: Where to write, shape (nv,).
         """
-        arrays = slopes, bends, gradient, rate
         bound = self._derived
         if (
             bound is None
             or bound[0] is not state
-            or any(a is not b for a, b in zip(bound[1], arrays, strict=True))
+            or bound[1] is not slopes
+            or bound[2] is not bends
+            or bound[3] is not gradient
+            or bound[4] is not rate
         ):
             world = state.world
             differentiate = bind(
@@ -173,21 +176,24 @@ class ClosedForm:
                 self._freedoms,
                 self._pairs,
                 self._places,
-                self._ends,
+                self._segments,
                 self._scratch,
-                *arrays,
+                slopes,
+                bends,
+                gradient,
+                rate,
             )
-            self._derived = bound = state, arrays, differentiate
-        bound[2]()
+            self._derived = bound = state, slopes, bends, gradient, rate, differentiate
+        bound[5]()
 
 
 def _link(link: LinkShape) -> list[float]:
-    """Return a link's segment in its joint's frame, and its radius."""
+    """Return a link's segment in its joint's frame (start, axis), and its radius."""
     half = getattr(link.geometry, "halfLength", 0.0)
     axis = half * link.placement.rotation[:, 2]
     center = link.placement.translation
     radius = getattr(link.geometry, "radius", 0.0)
-    return [*(center - axis), *(center + axis), radius]
+    return [*(center - axis), *(2.0 * axis), radius]
 
 
 def _obstacle(shape: Shape) -> tuple[int, list[float]]:
@@ -196,7 +202,7 @@ def _obstacle(shape: Shape) -> tuple[int, list[float]]:
         return SEGMENT, [0.0] * 6 + [shape.radius]
     if isinstance(shape, Capsule):
         half = 0.5 * shape.length
-        return SEGMENT, [0.0, 0.0, -half, 0.0, 0.0, half, shape.radius]
+        return SEGMENT, [0.0, 0.0, -half, 0.0, 0.0, shape.length, shape.radius]
     if isinstance(shape, Box):
         return BOX, [*(0.5 * edge for edge in shape.size), 0.0, 0.0, 0.0, 0.0]
     if isinstance(shape, Cylinder):
@@ -211,53 +217,56 @@ def _measure(
     motion: Array,
     kinds: Indices,
     sizes: Array,
-    segments: Indices,
+    used: Indices,
     pairs: Indices,
     places: Indices,
-    ends: Array,
+    segments: Array,
     cores: Array,
     scratch: Array,
     distances: Array,
 ) -> None:
     """Bring all segments into the world, write distances and (x, y, n) of each pair."""
-    for k in range(segments.shape[0]):
-        i = segments[k]
-        joint = kinds[i, 1]
-        for end in range(2):
-            for a in range(3):
-                total = 0.0
-                for b in range(3):
-                    if joint >= 0:  # Pinocchio's rotations lie column by column
-                        total += placements[joint, 3 * b + a] * sizes[i, 3 * end + b]
-                    else:
-                        total += motion[-1 - joint, 3 * a + b] * sizes[i, 3 * end + b]
-                if joint >= 0:
-                    ends[i, end, a] = placements[joint, 9 + a] + total
-                else:
-                    ends[i, end, a] = motion[-1 - joint, 9 + a] + total
-    e, f, local, H = scratch[0], scratch[1], scratch[2], scratch[3:6]
+    for k in range(used.shape[0]):
+        i = used[k]
+        _place(placements, motion, sizes, i, kinds[i, 1], segments)
+    local, H = scratch[0], scratch[1:4]
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
-        x, y, n = cores[k, 0], cores[k, 1], cores[k, 2]
-        first, second = ends[i], ends[j]
+        core = cores[k]
         if kinds[j, 0] == SEGMENT:
+            s, t, _, _ = nearest_on_segments(segments, i, j)
             for a in range(3):
-                e[a] = first[1, a] - first[0, a]
-                f[a] = second[1, a] - second[0, a]
-            s, t, _, _ = nearest_on_segments(first[0], e, second[0], f)
-            for a in range(3):
-                x[a] = first[0, a] + s * e[a]
-                y[a] = second[0, a] + t * f[a]
-            apart = direction(x, y, n) - sizes[i, 6] - sizes[j, 6]
+                core[0, a] = segments[i, 0, a] + s * segments[i, 1, a]
+                core[1, a] = segments[j, 0, a] + t * segments[j, 1, a]
+            distances[places[k]] = direction(core) - sizes[i, 6] - sizes[j, 6]
         else:
-            apart = _to_solid(
-                kinds[j, 0], sizes[j], motion[-1 - kinds[j, 1]], first[0], local, H, n
-            )
+            x, n, moving = segments[i, 0], core[2], motion[-1 - kinds[j, 1]]
+            apart = _to_solid(kinds[j, 0], sizes[j], moving, x, local, H, n)
             for a in range(3):
-                x[a] = first[0, a]
-                y[a] = x[a] - apart * n[a]
-            apart -= sizes[i, 6]
-        distances[places[k]] = apart
+                core[0, a] = x[a]
+                core[1, a] = x[a] - apart * n[a]
+            distances[places[k]] = apart - sizes[i, 6]
+
+
+@kernel
+def _place(
+    placements: Array, motion: Array, sizes: Array, i: int, joint: int, segments: Array
+) -> None:
+    """Write a segment's start and axis in the world; a ball has no axis."""
+    for a in range(3):
+        start = axis = 0.0
+        if joint >= 0:  # Pinocchio's rotations lie column by column
+            for b in range(3):
+                start += placements[joint, 3 * b + a] * sizes[i, b]
+                axis += placements[joint, 3 * b + a] * sizes[i, 3 + b]
+            start += placements[joint, 9 + a]
+        else:
+            for b in range(3):
+                start += motion[-1 - joint, 3 * a + b] * sizes[i, b]
+                axis += motion[-1 - joint, 3 * a + b] * sizes[i, 3 + b]
+            start += motion[-1 - joint, 9 + a]
+        segments[i, 0, a] = start
+        segments[i, 1, a] = axis
 
 
 @kernel
@@ -295,45 +304,41 @@ def _differentiate(
     freedoms: Indices,
     pairs: Indices,
     places: Indices,
-    ends: Array,
+    segments: Array,
     scratch: Array,
     slopes: Array,
     bends: Array,
     gradient: Array,
     rate: Array,
 ) -> None:
-    """Add Σ b' ∇d and Σ (b'' d' ∇d + b' (∇d)'); pairs out of influence cost nothing."""
-    x, x_dot, y, y_dot = scratch[0], scratch[1], scratch[2], scratch[3]
-    n, n_dot = scratch[4], scratch[5]
+    """Write Σ b' ∇d and Σ (b'' d' ∇d + b' (∇d)'); far pairs cost nothing."""
+    for p in range(gradient.shape[0]):
+        gradient[p] = rate[p] = 0.0
+    core, core_dot = scratch[0:3], scratch[3:6]  # x, y and n
+    x, y, n, x_dot, y_dot, n_dot = (
+        scratch[0],
+        scratch[1],
+        scratch[2],
+        scratch[3],
+        scratch[4],
+        scratch[5],
+    )
     ours, theirs = scratch[6:8], scratch[8:10]  # twists at the world's origin
+    work = scratch[10:]
     for k in range(pairs.shape[0]):
         slope, bend = slopes[places[k]], bends[places[k]]
         if slope == 0.0 and bend == 0.0:
             continue
         i, j = pairs[k, 0], pairs[k, 1]
-        _twist(J, v, motion, kinds[i], columns, freedoms, ours)
-        _twist(J, v, motion, kinds[j], columns, freedoms, theirs)
-        work = scratch[10:]
+        _twist(J, v, motion, kinds, i, columns, freedoms, ours)
+        _twist(J, v, motion, kinds, j, columns, freedoms, theirs)
         if kinds[j, 0] == SEGMENT:
-            _between_segments(
-                ends[i], ours, ends[j], theirs, work, x, x_dot, y, y_dot, n, n_dot
-            )
+            _between_segments(segments, i, j, ours, theirs, work, core, core_dot)
         else:
-            size, motion_j = sizes[j], motion[-1 - kinds[j, 1]]
-            center, kind = ends[i, 0], kinds[j, 0]
+            size, moving = sizes[j], motion[-1 - kinds[j, 1]]
+            center, kind = segments[i, 0], kinds[j, 0]
             _to_moving_solid(
-                kind,
-                size,
-                motion_j,
-                center,
-                ours,
-                theirs,
-                work,
-                x,
-                x_dot,
-                y_dot,
-                n,
-                n_dot,
+                kind, size, moving, center, ours, theirs, work, core, core_dot
             )
         nearing = 0.0
         for a in range(3):
@@ -345,7 +350,8 @@ def _differentiate(
         _push(
             J,
             J_dot,
-            kinds[i],
+            kinds,
+            i,
             columns,
             freedoms,
             x,
@@ -362,7 +368,8 @@ def _differentiate(
             _push(
                 J,
                 J_dot,
-                kinds[j],
+                kinds,
+                j,
                 columns,
                 freedoms,
                 y,
@@ -380,7 +387,8 @@ def _twist(
     J: Array,
     v: Array,
     motion: Array,
-    kind: Indices,
+    kinds: Indices,
+    i: int,
     columns: Indices,
     freedoms: Indices,
     twist: Array,
@@ -388,12 +396,12 @@ def _twist(
     """Write the velocity of the point at the world's origin, and the angular one."""
     for a in range(3):
         twist[0, a] = twist[1, a] = 0.0
-    for p in range(kind[2], kind[3]):
+    for p in range(kinds[i, 2], kinds[i, 3]):
         for a in range(3):
             twist[0, a] += J[a, columns[p]] * v[freedoms[p]]
             twist[1, a] += J[3 + a, columns[p]] * v[freedoms[p]]
-    if kind[1] < 0:
-        own = motion[-1 - kind[1]]
+    if kinds[i, 1] < 0:
+        own = motion[-1 - kinds[i, 1]]
         for a in range(3):
             twist[1, a] = own[15 + a]
         cross(own[9:12], twist[1], twist[0])
@@ -411,51 +419,40 @@ def _velocity(twist: Array, x: Array, out: Array) -> None:
 
 @kernel
 def _between_segments(
-    first: Array,
+    segments: Array,
+    i: int,
+    j: int,
     ours: Array,
-    second: Array,
     theirs: Array,
     work: Array,
-    x: Array,
-    x_dot: Array,
-    y: Array,
-    y_dot: Array,
-    n: Array,
-    n_dot: Array,
+    core: Array,
+    core_dot: Array,
 ) -> None:
     """Write the nearest points and the normal, with their rates."""
-    a, b = first[0], second[0]
-    e, f, a_dot, b_dot, e_dot, f_dot = (
-        work[0],
-        work[1],
-        work[2],
-        work[3],
-        work[4],
-        work[5],
-    )
+    a, e, b, f = segments[i, 0], segments[i, 1], segments[j, 0], segments[j, 1]
+    a_dot, e_dot, b_dot, f_dot = work[0], work[1], work[2], work[3]
     _velocity(ours, a, a_dot)
     _velocity(theirs, b, b_dot)
-    for c in range(3):
-        e[c] = first[1, c] - a[c]
-        f[c] = second[1, c] - b[c]
     cross(ours[1], e, e_dot)
     cross(theirs[1], f, f_dot)
-    s, t, s_free, t_free = nearest_on_segments(a, e, b, f)
+    s, t, s_free, t_free = nearest_on_segments(segments, i, j)
     s_dot, t_dot = nearest_rates(
         a, a_dot, e, e_dot, b, b_dot, f, f_dot, s, t, s_free, t_free
     )
     for c in range(3):
-        x[c] = a[c] + s * e[c]
-        y[c] = b[c] + t * f[c]
-        x_dot[c] = a_dot[c] + s * e_dot[c] + s_dot * e[c]
-        y_dot[c] = b_dot[c] + t * f_dot[c] + t_dot * f[c]
-    distance = direction(x, y, n)
-    for c in range(3):
-        n_dot[c] = 0.0
+        core[0, c] = a[c] + s * e[c]
+        core[1, c] = b[c] + t * f[c]
+        core_dot[0, c] = a_dot[c] + s * e_dot[c] + s_dot * e[c]
+        core_dot[1, c] = b_dot[c] + t * f_dot[c] + t_dot * f[c]
+        core_dot[2, c] = 0.0
+    distance = direction(core)
     if distance > 0.0:
-        along = dot(n, x_dot) - dot(n, y_dot)
+        along = 0.0
         for c in range(3):
-            n_dot[c] = (x_dot[c] - y_dot[c] - along * n[c]) / distance
+            along += core[2, c] * (core_dot[0, c] - core_dot[1, c])
+        for c in range(3):
+            change = core_dot[0, c] - core_dot[1, c] - along * core[2, c]
+            core_dot[2, c] = change / distance
 
 
 @kernel
@@ -467,11 +464,8 @@ def _to_moving_solid(
     ours: Array,
     theirs: Array,
     work: Array,
-    x: Array,
-    x_dot: Array,
-    y_dot: Array,
-    n: Array,
-    n_dot: Array,
+    core: Array,
+    core_dot: Array,
 ) -> None:
     """Write the ball's centre, the solid's velocity there and the normal, with rates.
 
@@ -479,12 +473,13 @@ def _to_moving_solid(
     y') with y' the velocity of the solid's own point at x.
     """
     local, bent, H = work[0], work[1], work[2:5]
+    n, x_dot, y_dot, n_dot = core[2], core_dot[0], core_dot[1], core_dot[2]
     _to_solid(kind, size, motion, center, local, H, n)
     _velocity(ours, center, x_dot)
     _velocity(theirs, center, y_dot)
     R = motion[:9].reshape(3, 3)
     for a in range(3):
-        x[a] = center[a]
+        core[0, a] = center[a]
         local[a] = x_dot[a] - y_dot[a]
     rotate_back(R, local, local)
     rotate(H, local, bent)
@@ -498,7 +493,8 @@ def _to_moving_solid(
 def _push(
     J: Array,
     J_dot: Array,
-    kind: Indices,
+    kinds: Indices,
+    i: int,
     columns: Indices,
     freedoms: Indices,
     x: Array,
@@ -516,9 +512,12 @@ def _push(
     cross(x, force_dot, turned)
     for a in range(3):
         moment_dot[a] += turned[a]
-    for p in range(kind[2], kind[3]):
-        c, i = columns[p], freedoms[p]
+    for p in range(kinds[i, 2], kinds[i, 3]):
+        c = columns[p]
+        change = change_dot = 0.0
         for a in range(3):
-            gradient[i] += J[a, c] * force[a] + J[3 + a, c] * moment[a]
-            rate[i] += J_dot[a, c] * force[a] + J_dot[3 + a, c] * moment[a]
-            rate[i] += J[a, c] * force_dot[a] + J[3 + a, c] * moment_dot[a]
+            change += J[a, c] * force[a] + J[3 + a, c] * moment[a]
+            change_dot += J_dot[a, c] * force[a] + J_dot[3 + a, c] * moment[a]
+            change_dot += J[a, c] * force_dot[a] + J[3 + a, c] * moment_dot[a]
+        gradient[freedoms[p]] += change
+        rate[freedoms[p]] += change_dot

@@ -24,22 +24,32 @@ def dot(a: Array, b: Array) -> float:
 
 @kernel
 def nearest_on_segments(
-    a: Array, e: Array, b: Array, f: Array
+    segments: Array, i: int, j: int
 ) -> tuple[float, float, bool, bool]:
     """Return (s, t) of the nearest points a + s e and b + t f, and which are free.
 
     A free one is inside its segment, where the nearest point slides; the other is at an
     end (Ericson, Real-Time Collision Detection, 2005, 5.1.9).
+
+    Args:
+        segments: Each one's start and axis, shape (k, 2, 3).
+        i: Which is (a, e).
+        j: Which is (b, f).
     """
-    ee, ff, ef = dot(e, e), dot(f, f), dot(e, f)
-    er = e[0] * (a[0] - b[0]) + e[1] * (a[1] - b[1]) + e[2] * (a[2] - b[2])
-    fr = f[0] * (a[0] - b[0]) + f[1] * (a[1] - b[1]) + f[2] * (a[2] - b[2])
+    ee = ff = ef = er = fr = 0.0
+    for c in range(3):
+        e, f = segments[i, 1, c], segments[j, 1, c]
+        r = segments[i, 0, c] - segments[j, 0, c]
+        ee += e * e
+        ff += f * f
+        ef += e * f
+        er += e * r
+        fr += f * r
     s = t = 0.0
     if ff > 0.0:
-        if ee > 0.0:
-            square = ee * ff - ef * ef
-            if square > _PARALLEL * ee * ff:
-                s = min(max((ef * fr - er * ff) / square, 0.0), 1.0)
+        square = ee * ff - ef * ef
+        if square > _PARALLEL * ee * ff:
+            s = min(max((ef * fr - er * ff) / square, 0.0), 1.0)
         t = (ef * s + fr) / ff
     if ee > 0.0 and not 0.0 < t < 1.0:
         t = min(max(t, 0.0), 1.0)
@@ -108,8 +118,8 @@ def distance_to_solid(kind: int, size: Array, x: Array, n: Array, H: Array) -> f
         n[2] = 1.0
         return float(x[2])
     if kind == BOX:
-        return _box(size, x, n, H)
-    return _cylinder(size, x, n, H)
+        return float(_box(size, x, n, H))
+    return float(_cylinder(size, x, n, H))
 
 
 @kernel
@@ -125,7 +135,7 @@ def _box(size: Array, x: Array, n: Array, H: Array) -> float:
             square += beyond * beyond
     if deepest <= 0.0:  # inside: to the nearest face
         n[nearest] = 1.0 if x[nearest] > 0.0 else -1.0
-        return deepest
+        return float(deepest)
     distance = sqrt(square)
     for i in range(3):
         n[i] /= distance
@@ -151,10 +161,10 @@ def _cylinder(size: Array, x: Array, n: Array, H: Array) -> float:
             distance, bend = side, 1.0 / r
         else:
             n[2] = up
-            return end
+            return float(end)
     elif side <= 0.0:
         n[2] = up
-        return end
+        return float(end)
     elif end <= 0.0:
         n[0], n[1] = c, s
         distance, bend = side, 1.0 / r
@@ -176,21 +186,26 @@ def _cylinder(size: Array, x: Array, n: Array, H: Array) -> float:
     H[0, 1] -= bend * s * c
     H[1, 0] -= bend * s * c
     H[1, 1] += bend * c * c
-    return distance
+    return float(distance)
 
 
 @kernel
-def direction(first: Array, second: Array, n: Array) -> float:
-    """Write the unit vector from the second point to the first; return the distance.
+def direction(points: Array) -> float:
+    """Return the distance of two points, write the unit vector from second to first.
 
     Where they meet there is none; z stands for it, so that nothing becomes infinite.
+
+    Args:
+        points: Rows x, y and, written, n = (x - y)/|x - y|, shape (3, 3).
     """
-    for i in range(3):
-        n[i] = first[i] - second[i]
-    distance = sqrt(dot(n, n))
+    square = 0.0
+    for c in range(3):
+        points[2, c] = points[0, c] - points[1, c]
+        square += points[2, c] * points[2, c]
+    distance = sqrt(square)
     if distance < _MEETING:
-        n[0], n[1], n[2] = 0.0, 0.0, 1.0
+        points[2, 0], points[2, 1], points[2, 2] = 0.0, 0.0, 1.0
         return 0.0
-    for i in range(3):
-        n[i] /= distance
+    for c in range(3):
+        points[2, c] /= distance
     return distance
