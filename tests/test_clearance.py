@@ -54,6 +54,7 @@ from hsp_control.fields.barrier import CORE, barrier
 from hsp_control.geometry import LinkShape, Proximity, link_shapes, self_pairs
 from hsp_control.geometry.capsule_fit import enclosing_capsule
 from hsp_control.metrics import MetricSample
+from hsp_control.plants.integrators import Integrator
 from hsp_control.resources import bundled_robots
 from hsp_control.shapes import (
     Box,
@@ -66,7 +67,6 @@ from hsp_control.shapes import (
     Shape,
     Sphere,
 )
-from hsp_control.simulation import Integrator
 from hsp_control.trajectories import (
     Hold,
     HoldOrientation,
