@@ -122,11 +122,11 @@ SERIES: dict[str, Callable[[], Iterator[Point]]] = {
 
 
 def chain(n: int) -> hsp.Robot:
-    """Return an arm of n joints that turn about x, y and z by turns, 2 m long."""
+    """Return an arm of n joints that turn about z, x and y by turns, 2 m long."""
     length = 2.0 / n
     text = '<robot name="chain"><link name="link0"/>'
     for k in range(1, n + 1):
-        axis = ("0 0 1", "0 1 0", "1 0 0")[k % 3]
+        axis = ("0 1 0", "0 0 1", "1 0 0")[k % 3]
         text += (
             f'<joint name="joint{k}" type="revolute"><parent link="link{k - 1}"/>'
             f'<child link="link{k}"/><origin xyz="0 0 {length}"/><axis xyz="{axis}"/>'
@@ -163,7 +163,14 @@ def beside_tsid(robot: hsp.Robot, frames: list[str]) -> dict[str, Compute]:
         for frame, path in zip(frames, paths, strict=True)
     ]
     posture = TargetPosture(robot, bent(robot))
-    law = Law(hsp.Controller(robot, positions, posture, null_space_gain=10.0))
+    controller = hsp.Controller(
+        robot,
+        positions,
+        posture,
+        null_space_gain=10.0,
+        singularity_threshold=0.01,  # what is compared is the law away from them
+    )
+    law = Law(controller)
     found: dict[str, Compute] = {"this law": law}
     with suppress(ImportError):
         found["TSID"] = tsid_positions(robot, frames, paths)
