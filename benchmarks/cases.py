@@ -4,7 +4,9 @@ Every controller gets the same numbers, and the same field g in the form that it
 take: see `Case.posture_acceleration`.
 """
 
+import copy
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -46,6 +48,7 @@ class Case:
     null_space_gain: float = 10.0
     posture_rate: float = 1.0
     clearance_weight: float = 0.3
+    frame: str = FRAME
     robot: hsp.Robot = field(init=False)
 
     def __post_init__(self) -> None:
@@ -76,6 +79,7 @@ class Case:
         self._sample = FieldSample.allocate(robot.nv)
         self._state = hsp.RobotState(robot)
         self._pose = PoseSample.allocate()
+        self._follow = self.trajectory.follow(self._pose)
 
     # -- what the peers track ---------------------------------------------------------
 
@@ -101,7 +105,8 @@ class Case:
 
     def desired(self, t: float) -> PoseSample:
         """Return the hand's pose at a time, with both rates; overwritten each call."""
-        return self.trajectory.sample(t, self._pose)
+        self._follow(t)
+        return self._pose
 
     def repulsion(self, t: float, q: Array) -> Array:
         """Return the obstacle's part of g, shape (nv,), zeros without one [rad/s]."""
@@ -124,6 +129,27 @@ class Case:
         """Return K_N (g - v) + g' with this package's exact rate of the whole field."""
         sample = self._evaluate(self._state.update(t, q, v))
         return self.null_space_gain * (sample.g - v) + sample.g_dot
+
+    def save(self, path: Path, states: list[tuple[float, Array, Array]]) -> None:
+        """Write the case for an environment that this package does not run in."""
+        times = np.arange(round(self.duration / self.period) + 1) * self.period
+        poses = [copy.deepcopy(self.desired(t)) for t in times]
+        np.savez(
+            path,
+            urdf=str(self.robot.source.urdf),
+            frame=self.frame,
+            rows=self.rows,
+            period=self.period,
+            settled=self.settled,
+            q0=self.q0,
+            gains=[self.kp, self.kv, self.posture_kp, self.posture_kv],
+            position=np.stack([np.stack(pose.position) for pose in poses]),
+            rotation=np.stack([pose.orientation.rotation for pose in poses]),
+            turning=np.stack([np.stack(pose.orientation[1:]) for pose in poses]),
+            times=[t for t, _, _ in states],
+            q=[q for _, q, _ in states],
+            v=[v for _, _, v in states],
+        )
 
     # -- what is measured -------------------------------------------------------------
 

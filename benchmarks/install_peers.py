@@ -19,6 +19,8 @@ ROOT = Path(__file__).resolve().parent.parent
 HOME = Path(sys.prefix)
 WHEELS = HOME / "wheels"
 
+PLACO_HOME, PLACO = ROOT / ".venv-placo", "placo==0.10.2"
+
 PIN = ["pin==4.1.0", "libpinocchio==4.1.0", "cmeel-eigen==3.4.1"]
 PINK = ["pin-pink==4.4.0", "daqp==0.11.0", "proxsuite==0.8.0", "quadprog==0.1.14"]
 # What building needs and the wheels do not bring: CMake files, headers, `wheel pack`.
@@ -27,6 +29,7 @@ BUILD += ["cmake<4", "cmeel", "wheel"]
 CHECKS = {
     "pink": "import pink, qpsolvers; print(pink.__version__)",
     # It is not enough that TSID imports: the wheel on PyPI aborts on the first robot.
+    "placo": "import placo, importlib.metadata as m; print(m.version('placo'))",
     "tsid": (
         "import pinocchio as pin, tsid; m = pin.buildSampleModelManipulator(); "
         "tsid.RobotWrapper(m, tsid.FIXED_BASE_SYSTEM, False); print('1.10.0')"
@@ -77,6 +80,17 @@ def install_tsid() -> None:
         pip("install", "--quiet", "--no-deps", "--force-reinstall", str(wheel))
 
 
+def install_placo() -> None:
+    """Install placo into an environment of its own: it needs pin 3.8."""
+    if not PLACO_HOME.joinpath("bin", "python").exists():
+        # Debian's Python has no ensurepip: this environment's pip fills that one.
+        run(sys.executable, "-m", "venv", "--without-pip", str(PLACO_HOME))
+    pip(
+        "--python", str(PLACO_HOME / "bin" / "python"), "install", "--quiet", PLACO,
+        PIP_CONSTRAINT="", PIP_BUILD_CONSTRAINT="",
+    )  # fmt: skip
+
+
 def main() -> None:
     """Install everything that installs; keep a record of what did not."""
     print("Installing this checkout into", HOME, flush=True)
@@ -84,13 +98,15 @@ def main() -> None:
     installers: dict[str, Callable[[], None]] = {
         "pink": install_pink,
         "tsid": install_tsid,
+        "placo": install_placo,
     }
     report = {}
     for name, install in installers.items():
         print(f"Installing {name} ...", flush=True)
         try:
             install()
-            version = run(sys.executable, "-c", CHECKS[name])
+            home = PLACO_HOME if name == "placo" else HOME
+            version = run(str(home / "bin" / "python"), "-c", CHECKS[name])
             report[name] = {"version": version.splitlines()[-1]}
         except RuntimeError as error:
             print(f"  {name} does not install: {error}", flush=True)

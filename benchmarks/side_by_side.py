@@ -8,32 +8,34 @@ writes them to docs/side_by_side.md. A peer that is not installed is a row that 
 """
 
 import argparse
-import gc
 import importlib
 import json
 import os
 import platform
+import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from cases import FRAME, Case
 from controllers import operational_space, this_law
+from many_tasks import humanoid, two_arms
+from timing import Compute, State, ratios, spread, step_times
 
 import hsp_control as hsp
 from hsp_control.arrays import Array
 from hsp_control.fields import Manipulability
 
-Compute = Callable[[float, Array, Array], Array]
 Make = Callable[[Case], Compute]
 
 ROOT = Path(__file__).resolve().parent.parent
+KHATIB = "operational space (NumPy)"
 TRACKS = 0.02  # a controller whose rms error is larger is not timed [m]
 STEP = 2.5e-4  # the simulator's fourth-order step [s]
 EVERY = 4  # control periods between two measurements
@@ -54,7 +56,7 @@ def peers() -> tuple[dict[str, Make], dict[str, tuple[str, Make]], dict[str, str
         law: (law, partial(_this_law, name="centering")),
         "this law, manipulability": (law, partial(_this_law, name="manipulability")),
         "this law, one obstacle (capsules)": (law, partial(_this_law, name="obstacle")),
-        "operational space (NumPy)": (khatib, operational_space.make),
+        KHATIB: (khatib, operational_space.make),
     }
     missing: dict[str, str] = {}
     if tsid := _module("tsid_peer", missing):
@@ -196,49 +198,125 @@ def row(name: str, run: Run) -> str:
 # --------------------------------------------------------------------------- timing
 
 
-def step_times(
+def case_times(
     case: Case, timed: dict[str, Make], rounds: int, block: int
-) -> dict[str, Array]:
-    """Return the median time of a step [s] in each round, shape (rounds,).
-
-    Every round gives each controller the same block of consecutive states, in turn and
-    in an order that rotates, so that what else the machine does hits all alike.
-    """
+) -> tuple[dict[str, Array], list[State]]:
+    """Return the controllers' step times [s] along the law's path, and that path."""
     path = close_loop(case, this_law.make).states
     controllers = {name: make(case) for name, make in timed.items()}
-    for compute in controllers.values():
-        for t, q, v in path[:20]:
-            compute(t, q, v)
-    names = list(controllers)
-    times = {name: np.zeros(rounds) for name in names}
-    gc.collect()
-    gc.disable()
-    for k in range(rounds):
-        states = path[20 + k * block : 20 + (k + 1) * block]
-        for name in names[k % len(names) :] + names[: k % len(names)]:
-            compute, taken = controllers[name], np.zeros(block)
-            for i, (t, q, v) in enumerate(states):
-                begin = perf_counter_ns()
-                compute(t, q, v)
-                taken[i] = perf_counter_ns() - begin
-            times[name][k] = 1e-9 * np.median(taken)
-    gc.enable()
-    return times
+    return step_times(controllers, path, rounds, block), path
 
 
-def timing_table(times: dict[str, Array]) -> str:
+def timing_table(times: dict[str, Array], extra: str = "") -> str:
     """Return a table of ratios, each with the quartiles over the rounds."""
-    references = [n for n in ("TSID", "pink (quadprog) + RNEA") if n in times]
+    references = [n for n in REFERENCES if n in times]
     lines = "| controller | " + "".join(f"{n} = 1 | " for n in references) + "µs |\n"
     lines += "|---|" + (len(references) + 1) * "--:|" + "\n"
     for name, taken in times.items():
-        cells = []
-        for reference in references:
-            low, middle, high = np.quantile(taken / times[reference], [0.25, 0.5, 0.75])
-            cells.append(f"{middle:.2f} ({low:.2f} to {high:.2f})")
-        cells.append(f"{1e6 * np.median(taken):.0f}")
+        cells = [spread(ratios(times, name, reference)) for reference in references]
+        cells.append(f"{1e6 * np.median(taken):.1f}")
         lines += f"| {name} | " + " | ".join(cells) + " |\n"
-    return lines
+    return lines + extra
+
+
+REFERENCES = ("TSID", "pink (quadprog) + RNEA")
+
+
+def placo_row(
+    case: Case, times: dict[str, Array], path: list[State], rounds: int, block: int
+) -> str:
+    """Return placo's line, timed where it can run beside the controller that both run.
+
+    Its ratio to that controller there, times that controller's ratio here.
+    """
+    python = ROOT / ".venv-placo" / "bin" / "python"
+    record = Path(sys.prefix) / "peers.json"
+    known = json.loads(record.read_text()) if record.exists() else {}
+    name, rest = "placo, over the operational space", len(REFERENCES) * " |" + "\n"
+    if not python.exists() or "failed" in known.get("placo", {}):
+        reason = known.get("placo", {}).get("failed", "no .venv-placo: make bench")
+        return f"| placo | not installed: {reason} |{rest}"
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "case.npz"
+        case.save(file, path)
+        script = ROOT / "benchmarks" / "placo_side.py"
+        done = subprocess.run(
+            [str(python), str(script), str(file), str(rounds), str(block)],
+            capture_output=True,
+            text=True,
+            env=os.environ | {"PYTHONPATH": str(ROOT / "benchmarks")},
+        )
+    if done.returncode:
+        reason = (done.stderr.strip().splitlines() or [""])[-1]
+        return f"| placo | failed: {reason} |{rest}"
+    result = json.loads(done.stdout.splitlines()[-1])
+    if result["rms"]["placo"] > TRACKS:
+        error = 1e3 * result["rms"]["placo"]
+        return f"| placo | does not track: {error:.0f} mm |{rest}"
+    cells = []
+    for reference in REFERENCES:
+        if reference in times:
+            bridge = np.median(times[KHATIB] / times[reference])
+            there = np.quantile(result["ratio"], [0.25, 0.5, 0.75])
+            cells.append(spread(bridge * there))
+    cells.append(f"{result['microseconds']:.1f}")
+    return f"| {name} (pin {result['pin']}) | " + " | ".join(cells) + " |\n"
+
+
+def larger_robots(rounds: int, block: int, say: Callable[[str], None]) -> list[str]:
+    """Time this law beside TSID on larger robots; return the README's lines."""
+    say("## Larger robots, several poses at once\n\n")
+    say("| problem | this law, rms [mm] | TSID, rms [mm] | this law / TSID | µs |\n")
+    say("|---|--:|--:|--:|--:|\n")
+    summary = []
+    for make in (two_arms, humanoid):
+        problem = make()
+        compute = {"law": problem.law(), "TSID": problem.tsid()}
+        runs = {name: problem.run(c, 2.0) for name, c in compute.items()}
+        errors = {name: rms for name, (rms, _) in runs.items()}
+        line = (
+            f"| {problem.name} | {1e3 * errors['law']:.2g} | {1e3 * errors['TSID']:.2g}"
+        )
+        if max(errors.values()) > TRACKS:
+            say(f"{line} | not timed: does not track | |\n")
+            continue
+        times = step_times(compute, runs["law"][1], rounds, block)
+        quartiles = ratios(times, "law", "TSID")
+        say(f"{line} | {spread(quartiles)} | {1e6 * np.median(times['law']):.0f} |\n")
+        summary.append(f"| {problem.name} | {spread(quartiles)} | |\n")
+    say("\nA pose for each frame, posture beside it; settings as for the Panda.\n\n")
+    return summary
+
+
+def summarise(times: dict[int, dict[str, Array]], larger: list[str]) -> None:
+    """Write the README's table, between its two marks."""
+    if "TSID" not in times[6]:
+        return
+    lines = (
+        "| one control step, this law | TSID = 1 | pink + RNEA = 1 |\n|---|--:|--:|\n"
+    )
+    for rows, what in ((6, "Panda, pose"), (3, "Panda, position")):
+        for name, field_name in OWN.items():
+            cells = [
+                spread(ratios(times[rows], name, r)) if r in times[rows] else ""
+                for r in REFERENCES
+            ]
+            lines += f"| {what}, {field_name} | " + " | ".join(cells) + " |\n"
+    readme = ROOT / "README.md"
+    text = readme.read_text()
+    head, rest = text.split(MARKS[0] + "\n", 1)
+    _, tail = rest.split(MARKS[1], 1)
+    readme.write_text(
+        head + MARKS[0] + "\n" + lines + "".join(larger) + MARKS[1] + tail
+    )
+
+
+MARKS = ("<!-- make bench: begin -->", "<!-- make bench: end -->")
+OWN = {
+    "this law": "joint centering",
+    "this law, manipulability": "manipulability",
+    "this law, one obstacle (capsules)": "one moving obstacle",
+}
 
 
 # ----------------------------------------------------------------------------- main
@@ -302,19 +380,31 @@ def main() -> None:
         say("\n")
 
     span = 0.001 * (options.rounds * options.block + 20)
+    measured: dict[int, dict[str, Array]] = {}
     for rows, title in ((6, "Pose (6 rows)"), (3, "Position (3 rows)")):
         say(f"## {title}: time of a step\n\n")
         case = Case(rows=rows, obstacle=False, duration=span)
         chosen = {n: make for n, (run, make) in timed.items() if run in tracked[rows]}
-        say(timing_table(step_times(case, chosen, options.rounds, options.block)))
+        times, path = case_times(case, chosen, options.rounds, options.block)
+        measured[rows] = times
+        placo = ""
+        if KHATIB in times:
+            placo = placo_row(case, times, path, options.rounds, options.block)
+        say(timing_table(times, placo))
         say(
             f"\nMedians of {options.rounds} interleaved rounds of {options.block} "
             "steps, one process, quartiles in brackets; each step takes (t, q, v) and "
             "returns an effort. Unless a row says otherwise: hand task, posture or "
-            "centering, no obstacle. "
-            "The ball is within the field's influence for a part of its row's rounds: "
-            "there g' is a difference of two gradients, hence the upper quartile.\n\n"
+            "centering, no obstacle. The ball is within the field's influence for a "
+            "part of its row's rounds, hence the upper quartile. placo runs in an "
+            "environment of its own; its ratio is the product of its ratio to the "
+            "operational space there and of that one's ratio here.\n\n"
         )
+    larger: list[str] = []
+    if "tsid" not in missing and not options.only:
+        larger = larger_robots(options.rounds, options.block, say)
+    if not options.only:
+        summarise(measured, larger)
     say(
         f"Python {platform.python_version()}, {os.cpu_count()} cores, hsp_control "
         f"{hsp.__version__}, numpy {np.__version__}. Only ratios carry over to another "

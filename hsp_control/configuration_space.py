@@ -1,6 +1,7 @@
 """The space that configurations live in: a manifold, with tangent vectors (nv,)."""
 
 from collections.abc import Mapping, Sequence
+from math import atan2
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pinocchio as pin
 
 from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import ConfigurationError, NonFiniteError, ShapeError
+from hsp_control.kernels import kernel
 from hsp_control.loading import moving_joints
 
 
@@ -23,6 +25,8 @@ class ConfigurationSpace:
         joint_names: Their names.
         freedom_names: A name for each freedom, ``root_joint.x`` where a joint has many.
         units: The unit of each freedom, ``rad`` or ``m``.
+        single_joints: Of each joint with one freedom the place of that freedom, and
+            where it begins in q and how many numbers it has there, shape (k, 3).
         unit_blocks: (start, size) of every quaternion and (cos, sin) pair in q.
         flat: Whether every joint has one freedom, so that δ' = v holds globally.
         mimics: Whether some joints follow others.
@@ -43,6 +47,10 @@ class ConfigurationSpace:
         self.joint_names: tuple[str, ...] = tuple(self.joints)
         self.freedom_names: tuple[str, ...] = _freedom_names(self.joints)
         self.units: tuple[str, ...] = _units(self.joints)
+        self.single_joints: Indices = np.array(
+            [(j.idx_v, j.idx_q, j.nq) for j in self.joints.values() if j.nv == 1],
+            dtype=np.int64,
+        ).reshape(-1, 3)
         self.unit_blocks: tuple[tuple[int, int], ...] = _unit_blocks(self.joints)
         self.flat: bool = all(joint.nv == 1 for joint in self.joints.values())
         self.mimics: bool = model.nvExtended != model.nv
@@ -235,3 +243,24 @@ def _check_vector(
             f"{what}[{bad[0]}] is {array[bad[0]]}; needs finite numbers"
         )
     return array
+
+
+@kernel
+def joint_displacements(
+    q: Array, reference: Array, single_joints: Indices, out: Array
+) -> None:
+    """Write q ⊖ reference for joints of one freedom, within ±π for continuous ones.
+
+    Args:
+        q: Configuration, shape (nq,).
+        reference: The other configuration, shape (nq,).
+        single_joints: See `ConfigurationSpace`, shape (k, 3).
+        out: Displacements, shape (nv,); entries of other joints are left alone.
+    """
+    for k in range(single_joints.shape[0]):
+        i, at, size = single_joints[k, 0], single_joints[k, 1], single_joints[k, 2]
+        if size == 1:
+            out[i] = q[at] - reference[at]
+        else:  # (cos, sin)
+            c, s, c_ref, s_ref = q[at], q[at + 1], reference[at], reference[at + 1]
+            out[i] = atan2(s * c_ref - c * s_ref, c * c_ref + s * s_ref)

@@ -1,10 +1,11 @@
-"""Where a frame is and how it moves: its Jacobian, exact rate and drift."""
+"""Where joints and frames are and how they move: Jacobians, exact rates and drift."""
 
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.arrays import Array, Indices
-from hsp_control.kernels import kernel
+from hsp_control.exceptions import ModelError
+from hsp_control.kernels import bind, kernel
 
 
 class FrameKinematics:
@@ -20,8 +21,7 @@ class FrameKinematics:
     """
 
     __slots__ = (
-        "_columns",
-        "_freedoms",
+        "_compute",
         "_id",
         "_stamp",
         "drift",
@@ -32,8 +32,8 @@ class FrameKinematics:
         "velocity",
     )
 
-    def __init__(self, model: pin.Model, data: pin.Data, index: int) -> None:
-        """Allocate; `RobotState.frame` fills it."""
+    def __init__(self, model: pin.Model, data: pin.Data, v: Array, index: int) -> None:
+        """Allocate; `RobotState.frame` fills it, with ``v`` for the velocity."""
         nv = model.nv
         self.rotation: Array = data.oMf[index].rotation  # views: they follow the data
         self.position: Array = data.oMf[index].translation
@@ -43,8 +43,17 @@ class FrameKinematics:
         self.drift: Array = np.zeros(6)
         self._id = index
         self._stamp = -1
-        self._columns, self._freedoms = joint_support(
-            model, model.frames[index].parentJoint
+        self._compute = bind(
+            frame_kinematics,
+            data.J,
+            data.dJ,
+            self.position,
+            v,
+            *joint_support(model, model.frames[index].parentJoint),
+            self.jacobian,
+            self.jacobian_dot,
+            self.velocity,
+            self.drift,
         )
 
 
@@ -130,3 +139,27 @@ def joint_support(model: pin.Model, joint: int) -> tuple[Indices, Indices]:
         columns.extend(range(part.idx_vExtended, part.idx_vExtended + width))
         freedoms.extend(range(part.idx_v, part.idx_v + width))
     return np.array(columns, dtype=np.int64), np.array(freedoms, dtype=np.int64)
+
+
+def joint_placements(data: pin.Data) -> Array:
+    """Return where all joints are, a view that follows the data, shape (njoints, 12).
+
+    A row is R, column by column, and then the origin: Pinocchio's own placements, which
+    lie one after the other in memory.
+
+    Raises:
+        ModelError: If they do not, in a Pinocchio that is not known yet.
+    """
+    first, address = data.oMi[0].rotation, "__array_interface__"
+    turns = [getattr(M.rotation, address)["data"][0] for M in data.oMi]
+    origins = [getattr(M.translation, address)["data"][0] for M in data.oMi]
+    strides = set(np.diff(turns))
+    offsets = {b - a for a, b in zip(turns, origins, strict=True)}
+    if len(strides) > 1 or offsets != {9 * 8} or first.strides != (8, 24):
+        raise ModelError(
+            f"Pinocchio {pin.__version__} lays placements out in an unknown way; "
+            "use 4.1, or ask for support of this one"
+        )
+    return np.lib.stride_tricks.as_strided(
+        first.T.reshape(9), (len(turns), 12), (strides.pop() if strides else 96, 8)
+    )

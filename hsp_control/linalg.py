@@ -69,6 +69,43 @@ def solve_lower_transposed(L: Array, x: Array) -> None:
 
 
 @kernel
+def solve_columns(L: Array, X: Array) -> None:
+    """Overwrite X by (L Lᵀ)⁻¹ X, row by row, in the order that they lie in memory."""
+    m, n = X.shape
+    for i in range(m):
+        for k in range(i):
+            for j in range(n):
+                X[i, j] -= L[i, k] * X[k, j]
+        for j in range(n):
+            X[i, j] /= L[i, i]
+    for r in range(m):
+        i = m - 1 - r
+        for k in range(i + 1, m):
+            for j in range(n):
+                X[i, j] -= L[k, i] * X[k, j]
+        for j in range(n):
+            X[i, j] /= L[i, i]
+
+
+@kernel
+def gram(A: Array, B: Array, symmetric: bool, out: Array) -> None:
+    """Write A Bᵀ, or A Bᵀ + B Aᵀ."""
+    m, n = A.shape
+    for i in range(m):
+        for k in range(m):
+            total = 0.0
+            for j in range(n):
+                total += A[i, j] * B[k, j]
+            out[i, k] = total
+    if symmetric:
+        for i in range(m):
+            out[i, i] *= 2.0
+            for k in range(i):
+                out[i, k] += out[k, i]
+                out[k, i] = out[i, k]
+
+
+@kernel
 def orthonormalise(B: Array, Q: Array, R: Array) -> None:
     """Write the thin factors B = Q R of an n × m matrix with n ≥ m.
 

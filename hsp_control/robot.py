@@ -5,7 +5,7 @@ This is the only module that asks Pinocchio for kinematics and dynamics.
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import pinocchio as pin
@@ -23,7 +23,7 @@ from hsp_control.exceptions import (
 from hsp_control.kernels import kernel
 from hsp_control.kinematics import (
     FrameKinematics,
-    frame_kinematics,
+    joint_placements,
     mass_matrix_difference,
 )
 from hsp_control.loading import (
@@ -242,8 +242,7 @@ class RobotState:
         self.q: Array = robot.neutral()
         self.v: Array = np.zeros(robot.nv)
         self.data: pin.Data = robot.model.createData()
-        self._J: Array = self.data.J  # views: they follow the data
-        self._J_dot: Array = self.data.dJ
+        self._world: WorldKinematics | None = None
         self._unit_blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
         self._frames: dict[str, FrameKinematics] = {}
         self._stamp = 0
@@ -261,21 +260,26 @@ class RobotState:
             NonFiniteError: If t, q or v holds a NaN or an infinity.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
         """
-        robot = self.robot
-        if (
-            getattr(q, "shape", None) != (robot.nq,)
-            or getattr(v, "shape", None) != (robot.nv,)
-            or not _take(float(t), q, v, self.q, self.v, self._unit_blocks)
-        ):
+        robot, own_q, own_v = self.robot, self.q, self.v
+        t = float(t)
+        try:
+            taken = (
+                q.shape == own_q.shape
+                and v.shape == own_v.shape
+                and _take(t, q, v, own_q, own_v, self._unit_blocks)
+            )
+        except AttributeError:  # lists are welcome, too
+            taken = False
+        if not taken:
             # Off the hot path: find out what is wrong, and say it.
             q = robot.check_configuration(q)
             v = robot.check_tangent(v, "velocity v")
             if not np.isfinite(t):
                 raise NonFiniteError(f"time t is {t}; needs a finite number of seconds")
-            self.q[:], self.v[:] = q, v
-        self.t = float(t)
+            own_q[:], own_v[:] = q, v
+        self.t = t
         self._stamp += 1
-        pin.computeJointJacobiansTimeVariation(robot.model, self.data, self.q, self.v)
+        pin.computeJointJacobiansTimeVariation(robot.model, self.data, own_q, own_v)
         return self
 
     def frame(self, name: str) -> FrameKinematics:
@@ -287,22 +291,11 @@ class RobotState:
         frame = self._frames.get(name)
         if frame is None:
             index = self.robot.frame_id(name)
-            frame = FrameKinematics(self.robot.model, self.data, index)
+            frame = FrameKinematics(self.robot.model, self.data, self.v, index)
             self._frames[name] = frame
         if frame._stamp != self._stamp:
             pin.updateFramePlacement(self.robot.model, self.data, frame._id)
-            frame_kinematics(
-                self._J,
-                self._J_dot,
-                frame.position,
-                self.v,
-                frame._columns,
-                frame._freedoms,
-                frame.jacobian,
-                frame.jacobian_dot,
-                frame.velocity,
-                frame.drift,
-            )
+            frame._compute()
             frame._stamp = self._stamp
         return frame
 
@@ -363,9 +356,13 @@ class RobotState:
         return self._stamp
 
     @property
-    def world_jacobian(self) -> Array:
-        """Pinocchio's joint Jacobian at the world's origin, see `joint_support`."""
-        return self._J
+    def world(self) -> "WorldKinematics":
+        """All joints seen from the world's origin; the arrays follow the state."""
+        if self._world is None:
+            self._world = WorldKinematics(
+                joint_placements(self.data), self.data.J, self.data.dJ, self.v
+            )
+        return self._world
 
     def displaced(self, dt: float, displacement: Array) -> "RobotState":
         """Return the state at (t + dt, q ⊕ displacement) with the same velocity.
@@ -381,6 +378,23 @@ class RobotState:
     def ahead(self, dt: float) -> "RobotState":
         """Return the companion state at (t + dt, q ⊕ v dt), the flow of v."""
         return self.displaced(dt, self.v * dt)
+
+
+class WorldKinematics(NamedTuple):
+    """All joints seen from the world's origin: what distances are computed from.
+
+    Attributes:
+        placements: Where they are, shape (njoints, 12), see `joint_placements`.
+        jacobian: Their columns at the world's origin, shape (6, nv_extended), see
+            `joint_support`.
+        jacobian_dot: Its time derivative, of the same shape.
+        v: The velocity, shape (nv,).
+    """
+
+    placements: Array
+    jacobian: Array
+    jacobian_dot: Array
+    v: Array
 
 
 @kernel

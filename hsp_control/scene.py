@@ -5,14 +5,18 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 import pinocchio as pin
 
+from hsp_control.arrays import Array
 from hsp_control.exceptions import SceneError
 from hsp_control.shapes import Shape
 from hsp_control.suggest import did_you_mean, listing
 from hsp_control.trajectories import (
     HoldOrientation,
+    OrientationSample,
     OrientationTrajectory,
     Trajectory,
+    TrajectorySample,
 )
+from hsp_control.trajectories.following import Follower, follow_all
 
 
 class Obstacle:
@@ -51,6 +55,18 @@ class Obstacle:
         """Return its placement in the world at time t [s]."""
         rotation = self.orientation.sample(t).rotation
         return pin.SE3(rotation, self.center.sample(t).position)
+
+    def follow(self, motion: Array) -> Follower:
+        """Return a function of time [s] that keeps an array at the obstacle's motion.
+
+        See `Trajectory.follow`.
+
+        Args:
+            motion: R row by row, c, c' and ω, shape (18,).
+        """
+        center = TrajectorySample(motion[9:12], motion[12:15], np.zeros(3))
+        turn = OrientationSample(motion[:9].reshape(3, 3), motion[15:18], np.zeros(3))
+        return follow_all(self.center.follow(center), self.orientation.follow(turn))
 
 
 class Scene(Mapping[str, Obstacle]):

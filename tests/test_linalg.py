@@ -343,6 +343,8 @@ def arguments(name: str) -> tuple[Any, ...]:
         "cholesky": (spd, np.zeros((6, 6))),
         "solve_lower": (triangular(6), normal(17, 6)),
         "solve_lower_transposed": (triangular(6), normal(17, 6)),
+        "solve_columns": (triangular(6), normal(21, 6, n)),
+        "gram": (J, J_dot, True, np.zeros((m, m))),
         "orthonormalise": (deficient, np.zeros((7, 5)), np.zeros((5, 5))),
         "invert_upper": (triangular(6).T.copy(), np.zeros((6, 6))),
         "orthogonalise_columns": (deficient.copy(), np.zeros((5, 5))),

@@ -7,21 +7,24 @@ J'v, which many implementations leave out. Plain NumPy.
 """
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
-from cases import FRAME, Case
 
-from hsp_control.arrays import Array
+if TYPE_CHECKING:  # it also runs where this package does not: see placo_side.py
+    from cases import Case
+
+    from hsp_control.arrays import Array
 
 
-def make(case: Case) -> Callable[[float, Array, Array], Array]:
+def make(case: "Case") -> "Callable[[float, Array, Array], Array]":
     """Return the controller."""
     model, rows = case.robot.model, case.rows
-    data, frame = model.createData(), model.getFrameId(FRAME)
+    data, frame = model.createData(), model.getFrameId(case.frame)
     axes = pin.LOCAL_WORLD_ALIGNED
 
-    def compute(t: float, q: Array, v: Array) -> Array:
+    def compute(t: float, q: "Array", v: "Array") -> "Array":
         pin.computeAllTerms(model, data, q, v)
         pin.updateFramePlacements(model, data)
         M, N, pose = data.M, data.nle, data.oMf[frame]

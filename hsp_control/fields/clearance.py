@@ -10,6 +10,7 @@ from hsp_control.exceptions import FieldError
 from hsp_control.fields.barrier import barrier
 from hsp_control.fields.cost import Cost
 from hsp_control.geometry import LinkShape, Proximity, Proxy, link_shapes, self_pairs
+from hsp_control.kernels import bind
 from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle
 from hsp_control.suggest import did_you_mean, listing
@@ -18,9 +19,11 @@ from hsp_control.suggest import did_you_mean, listing
 class Clearance(Cost):
     """f = Σ b(d_k) over pairs of shapes, b a barrier that is zero beyond its influence.
 
-    The gradient comes from the witness points. Its rate is a central difference of that
-    exact gradient along the flow, so that it holds the obstacles' own velocity and the
-    sliding of the witness points: freezing them would cost up to half of it.
+    The gradient comes from the witness points, its rate from their motion, which holds
+    the obstacles' own velocity and the sliding of the witness points: freezing them
+    would cost up to half of it. It is exact for balls, capsules, boxes, cylinders and
+    planes; for meshes, hulls and clouds it is a central difference of the gradient
+    along the flow.
 
     Where the nearest features are flat or parallel and slide over each other, the
     gradient of a distance jumps. Between links and obstacles it does not: capsules meet
@@ -39,18 +42,23 @@ class Clearance(Cost):
         Raises:
             FieldError: If the influence is not a positive length.
         """
-        super().__init__(proximity.robot, name)
+        robot = proximity.robot
+        super().__init__(robot, name)
         if not 0.0 < influence < np.inf:
             raise FieldError(f"field {name!r}: influence {influence} must be positive")
         self.proximity = proximity
         self.influence = float(influence)
         self._slopes = np.zeros(len(proximity.pairs))
         self._bends = np.zeros(len(proximity.pairs))
+        self._barrier = bind(
+            barrier, proximity.distances, self.influence, self._slopes, self._bends
+        )
+        self._own = np.zeros(robot.nv), np.zeros(robot.nv)
 
     def value(self, state: RobotState) -> float:
         """Return f."""
-        distances = self.proximity.measure(state)
-        return float(barrier(distances, self.influence, self._slopes, self._bends))
+        self.proximity.measure(state)
+        return float(self._barrier())
 
     def gradient(self, state: RobotState) -> Array:
         """Return Σ b'(d_k) ∇d_k."""
@@ -58,13 +66,34 @@ class Clearance(Cost):
         return self.proximity.gradient(state, self._slopes)
 
     def gradient_rate(self, state: RobotState) -> Array:
-        """Return the gradient's rate along the flow; exactly zero out of influence.
+        """Return the gradient's rate along the flow; exactly zero out of influence."""
+        Clearance.differentiate(self, state, *self._own)
+        return self._own[1].copy()
 
-        There the gradient is zero in a whole neighbourhood, so nothing is differenced.
-        """
-        if self.proximity.measure(state).min() > self.influence:
-            return np.zeros(self.robot.nv)
-        return rate_along_flow(self.gradient, state)
+    def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
+        """Write ∇f and (∇f)', shape (nv,) each."""
+        self.value(state)
+        gradient.fill(0.0)
+        rate.fill(0.0)
+        proximity, slopes = self.proximity, self._slopes
+        if proximity.formulas is not None:
+            proximity.formulas.differentiate(state, slopes, self._bends, gradient, rate)
+        others = proximity.others
+        # Out of influence the gradient is zero in a whole neighbourhood.
+        if others is not None and slopes[others.places].any():
+            others.add_gradient(state, slopes, gradient)
+            rate += rate_along_flow(self._gradient_of_others, state)
+
+    def _gradient_of_others(self, state: RobotState) -> Array:
+        """Return the gradient of the pairs that have no formula."""
+        others = self.proximity.others
+        assert others is not None
+        distances, slopes, bends = np.full((3, len(self._slopes)), np.inf)
+        others.measure(state, distances)
+        barrier(distances, self.influence, slopes, bends)
+        gradient = np.zeros(self.robot.nv)
+        others.add_gradient(state, slopes, gradient)
+        return gradient
 
     def least_distance(self, state: RobotState) -> float:
         """Return the least distance of all pairs [m]."""

@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from hsp_control.arrays import Array
 from hsp_control.differences import gradient, rate_along_flow
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.field import FieldSample, NullSpaceField
-from hsp_control.kernels import kernel
+from hsp_control.kernels import bind, kernel
 from hsp_control.metrics import MetricSample
 from hsp_control.metrics.metric import VARYING, raise_covector
 from hsp_control.robot import Robot, RobotState
@@ -24,6 +25,15 @@ class Cost(NullSpaceField):
     out is computed by differences, exact to about 1e-9.
     """
 
+    _bound: tuple[MetricSample, int, FieldSample, Callable[[], bool]] | None = None
+
+    def __init_subclass__(cls, **arguments: Any) -> None:
+        """Let a gradient or a rate that is overridden count, also of a ready cost."""
+        super().__init_subclass__(**arguments)
+        own = vars(cls)
+        if "differentiate" not in own and {"gradient", "gradient_rate"} & own.keys():
+            cls.differentiate = Cost.differentiate  # type: ignore[method-assign]
+
     @abstractmethod
     def value(self, state: RobotState) -> float:
         """Return f(q, t); it may not depend on the velocity."""
@@ -36,6 +46,15 @@ class Cost(NullSpaceField):
         """Return (∇f)' = ∇²f v + ∂∇f/∂t, shape (nv,)."""
         return rate_along_flow(self.gradient, state)
 
+    def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
+        """Write ∇f and (∇f)', shape (nv,) each, where both are wanted.
+
+        Raises:
+            FieldError: If either is not nv numbers.
+        """
+        gradient[:] = self._tangent(self.gradient(state), "gradient")
+        rate[:] = self._tangent(self.gradient_rate(state), "gradient rate")
+
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
@@ -44,15 +63,31 @@ class Cost(NullSpaceField):
         Raises:
             FieldError: If the gradient or its rate is not nv finite numbers.
         """
-        out.g[:] = self._tangent(self.gradient(state), "gradient")
-        out.g_dot[:] = self._tangent(self.gradient_rate(state), "gradient rate")
-        if not _descend(metric.L, metric.W_dot, form, out.g, out.g_dot):
+        self.differentiate(state, out.g, out.g_dot)
+        bound = self._bound
+        if (
+            bound is None
+            or bound[0] is not metric
+            or bound[1] != form
+            or bound[2] is not out
+        ):
+            self._bound = bound = (
+                metric,
+                form,
+                out,
+                bind(_descend, metric.L, metric.W_dot, form, out.g, out.g_dot),
+            )
+        if not bound[3]():
             raise FieldError(
                 f"cost {self.name!r} has the gradient {self.gradient(state)!r} and the "
                 f"gradient rate {self.gradient_rate(state)!r} at t = {state.t:.6g} s; "
                 "needs finite numbers"
             )
         return out
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but what is bound to another's memory."""
+        return self.__dict__ | {"_bound": None}
 
     def _tangent(self, value: Array, what: str) -> Array:
         try:

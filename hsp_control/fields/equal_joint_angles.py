@@ -1,17 +1,19 @@
 """The paper's posture cost: neighbouring joints bend by the same angle."""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from math import pi
 
 import numpy as np
 
-from hsp_control.arrays import Array
+from hsp_control.arrays import Array, Indices
+from hsp_control.configuration_space import joint_displacements
 from hsp_control.exceptions import FieldError
-from hsp_control.fields.cost import Cost
+from hsp_control.fields.compiled_cost import CompiledCost, Derivatives
+from hsp_control.kernels import bind, kernel
 from hsp_control.robot import Robot, RobotState
 
 
-class EqualJointAngles(Cost):
+class EqualJointAngles(CompiledCost):
     """f = weight · Σ (q_{k+1} - q_k)² over consecutive named joints.
 
     The paper's third simulation has weight 5 and the planar arm's joints 2 and 3,
@@ -49,25 +51,49 @@ class EqualJointAngles(Cost):
         if any(where.stop - where.start != 1 for where in slices):
             raise FieldError(f"field {name!r}: each joint needs exactly one freedom")
         indices = [where.start for where in slices]
-        # d = D q, one row for each pair of neighbours.
-        self._D = np.zeros((len(joints) - 1, robot.nv))
-        for row, (first, second) in enumerate(pairwise(indices)):
-            self._D[row, first], self._D[row, second] = -1.0, 1.0
+        self._chain: Indices = np.array(indices, dtype=np.int64)
         self.weight = float(weight)
 
-    def value(self, state: RobotState) -> float:
-        """Return f."""
-        d = self._differences(state)
-        return float(self.weight * d @ d)
+    def _bind(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        robot = self.robot
+        return bind(
+            _equal_angles,
+            state.q,
+            state.v,
+            robot.neutral(),
+            robot.single_joints,
+            self._chain,
+            self.weight,
+            np.zeros(robot.nv),
+            gradient,
+            rate,
+        )
 
-    def gradient(self, state: RobotState) -> Array:
-        """Return 2 weight Dᵀd."""
-        return 2.0 * self.weight * (self._differences(state) @ self._D)
 
-    def gradient_rate(self, state: RobotState) -> Array:
-        """Return 2 weight DᵀD v."""
-        return 2.0 * self.weight * ((self._D @ state.v) @ self._D)
-
-    def _differences(self, state: RobotState) -> Array:
-        d = self._D @ self.robot.joint_positions(state.q)
-        return (d + np.pi) % (2.0 * np.pi) - np.pi
+@kernel
+def _equal_angles(
+    q: Array,
+    v: Array,
+    neutral: Array,
+    single_joints: Indices,
+    chain: Indices,
+    weight: float,
+    angles: Array,
+    gradient: Array,
+    rate: Array,
+) -> float:
+    """Write ∇f and (∇f)' for d_k = q_{k+1} - q_k within ±π, and return f."""
+    joint_displacements(q, neutral, single_joints, angles)
+    for i in range(v.shape[0]):
+        gradient[i] = rate[i] = 0.0
+    f = 0.0
+    for k in range(chain.shape[0] - 1):
+        i, j = chain[k], chain[k + 1]
+        d = (angles[j] - angles[i] + pi) % (2.0 * pi) - pi
+        slope, slope_dot = 2.0 * weight * d, 2.0 * weight * (v[j] - v[i])
+        gradient[i] -= slope
+        gradient[j] += slope
+        rate[i] -= slope_dot
+        rate[j] += slope_dot
+        f += weight * d * d
+    return f

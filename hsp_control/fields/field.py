@@ -1,15 +1,16 @@
 """What a null-space field is: a joint velocity g(q, t) for self-motion to reach."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from numbers import Real
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.weight import Product, Weight, as_weight
+from hsp_control.kernels import bind, kernel
 from hsp_control.metrics import MetricSample
 from hsp_control.robot import Robot, RobotState
 
@@ -114,28 +115,60 @@ class WeightedSum(NullSpaceField):
         super().__init__(robot, " + ".join(field.name for _, field in flat))
         self.terms: tuple[tuple[Weight, NullSpaceField], ...] = tuple(flat)
         self.samples = tuple(FieldSample.allocate(robot.nv) for _ in flat)
+        self._bound: tuple[FieldSample, list[_Term]] | None = None
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
         """Write the weighted sums of g and g'."""
-        out.g[:] = 0.0
-        out.g_dot[:] = 0.0
-        for (weight, field), sample in zip(self.terms, self.samples, strict=True):
+        bound = self._bound
+        if bound is None or bound[0] is not out:
+            self._bound = bound = out, self._bind(out)
+        for weight, field, sample, add in bound[1]:
             w, w_dot = weight.sample(state)
             field.evaluate(state, metric, form, sample)
-            sample.g_dot[:] *= w
-            sample.g_dot[:] += w_dot * sample.g
-            sample.g[:] *= w
-            out.g[:] += sample.g
-            out.g_dot[:] += sample.g_dot
+            add(w, w_dot)
         return out
+
+    def _bind(self, out: FieldSample) -> "list[_Term]":
+        return [
+            (weight, field, sample, bind(_add, k == 0, *sample, *out, free=(1.0, 1.0)))
+            for k, ((weight, field), sample) in enumerate(
+                zip(self.terms, self.samples, strict=True)
+            )
+        ]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but what is bound to another's memory."""
+        return self.__dict__ | {"_bound": None}
 
     def value(self, state: RobotState) -> float:
         """Return the weighted sum of the terms' values."""
         return sum(
             weight.sample(state)[0] * field.value(state) for weight, field in self.terms
         )
+
+
+_Term = tuple[Weight, NullSpaceField, FieldSample, Callable[[float, float], Any]]
+"""A weight, its field, what the field writes and what then adds it to the sum."""
+
+
+@kernel
+def _add(
+    first: bool,
+    g: Array,
+    g_dot: Array,
+    sum_g: Array,
+    sum_g_dot: Array,
+    w: float,
+    w_dot: float,
+) -> None:
+    """Weight a sample, and add it to the sum, which the first one begins."""
+    for i in range(g.shape[0]):
+        g_dot[i] = w * g_dot[i] + w_dot * g[i]
+        g[i] *= w
+        sum_g[i] = g[i] if first else sum_g[i] + g[i]
+        sum_g_dot[i] = g_dot[i] if first else sum_g_dot[i] + g_dot[i]
 
 
 def _flattened(

@@ -15,14 +15,16 @@ in O(n), without the kinematic Hessian; and since J' is known exactly, so is the
 """
 
 from abc import abstractmethod
-from typing import Literal, NamedTuple
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import FieldError
-from hsp_control.fields.cost import Cost
-from hsp_control.kernels import kernel
+from hsp_control.fields.compiled_cost import CompiledCost, Derivatives
+from hsp_control.kernels import bind, kernel
 from hsp_control.robot import Robot, RobotState
 
 Rows = Literal["position", "orientation", "pose"]
@@ -43,7 +45,7 @@ class JacobianTerms(NamedTuple):
     slope_rate: Array
 
 
-class JacobianCost(Cost):
+class JacobianCost(CompiledCost):
     """f = φ(J) for rows of one frame's Jacobian; write `terms`.
 
     Attributes:
@@ -98,60 +100,123 @@ class JacobianCost(Cost):
                 f"field {name!r}: {len(kept)} rows of frame {frame!r}, which only "
                 f"{len(self._freedoms)} freedoms move; they are singular everywhere"
             )
-        self._B, self._B_dot = np.zeros((6, robot.nv)), np.zeros((6, robot.nv))
-        self._at: tuple[RobotState, int] | None = None
-        self._derivatives = (np.zeros(0), np.zeros(0))
-        self._sums = np.zeros((4, len(self._freedoms) + 1, 3))
 
     @abstractmethod
     def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
         """Return φ, ∂φ/∂J and its rate for the selected rows, shape (k, nv)."""
 
-    def value(self, state: RobotState) -> float:
-        """Return f."""
-        return self._terms(state).value
+    def _bind_terms(
+        self, J: Array, J_dot: Array, slope: Array, slope_rate: Array
+    ) -> Derivatives:
+        """Return what writes ∂φ/∂J and its rate and returns φ."""
 
-    def gradient(self, state: RobotState) -> Array:
-        """Return ∇f, exact."""
-        return self._gradient_and_rate(state)[0]
+        def write() -> float:
+            value, slope[:], slope_rate[:] = self.terms(J, J_dot)
+            return value
 
-    def gradient_rate(self, state: RobotState) -> Array:
-        """Return (∇f)', exact."""
-        return self._gradient_and_rate(state)[1]
+        return write
 
-    def _terms(self, state: RobotState) -> JacobianTerms:
-        frame = state.frame(self.frame)
-        scale = self._scale[:, None]
-        return self.terms(
-            frame.jacobian[self._selected] * scale,
-            frame.jacobian_dot[self._selected] * scale,
-        )
-
-    def _gradient_and_rate(self, state: RobotState) -> tuple[Array, Array]:
-        """Return ∇f and (∇f)', which share their sums, computed once per state."""
-        if self._at == (state, state.stamp):
-            return self._derivatives
-        frame = state.frame(self.frame)
-        _, slope, slope_rate = self._terms(state)
-        scale = self._scale[:, None]
-        self._B[self._selected] = slope * scale
-        self._B_dot[self._selected] = slope_rate * scale
-        gradient, rate = np.zeros(self.robot.nv), np.zeros(self.robot.nv)
-        chain_gradient(
+    def _bind(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        frame, nv = state.frame(self.frame), self.robot.nv
+        J, J_dot, slope, slope_rate = np.zeros((4, len(self._selected), nv))
+        rows = self._selected, self._scale
+        select = bind(_select, frame.jacobian, frame.jacobian_dot, *rows, J, J_dot)
+        terms = self._bind_terms(J, J_dot, slope, slope_rate)
+        raise_slope = bind(
+            _raise_slope,
             frame.jacobian,
             frame.jacobian_dot,
-            self._B,
-            self._B_dot,
+            slope,
+            slope_rate,
+            *rows,
+            np.zeros((2, 6, nv)),
             self._freedoms,
             self._first,
-            self._sums,
+            np.zeros((4, len(self._freedoms) + 1, 3)),
             gradient,
             rate,
         )
-        for kept in (gradient, rate):
-            kept.flags.writeable = False
-        self._at, self._derivatives = (state, state.stamp), (gradient, rate)
-        return self._derivatives
+        bring = partial(state.frame, self.frame)
+        return partial(_in_turn, bring, select, terms, raise_slope)
+
+
+class CompiledJacobianCost(JacobianCost):
+    """A Jacobian's cost whose terms come from one kernel: write `_kernel`."""
+
+    @abstractmethod
+    def _kernel(self) -> tuple[Callable[..., float], tuple[Any, ...]]:
+        """Return the kernel and its first arguments.
+
+        The others are J, J', ∂φ/∂J and its rate, all of the shape (k, nv), and scratch
+        of the shape (8, k, nv).
+        """
+
+    def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
+        """Return f, its slope and rate."""
+        slope, slope_rate = np.zeros_like(J), np.zeros_like(J)
+        value = self._bind_terms(J, J_dot, slope, slope_rate)()
+        return JacobianTerms(value, slope, slope_rate)
+
+    def _bind_terms(
+        self, J: Array, J_dot: Array, slope: Array, slope_rate: Array
+    ) -> Derivatives:
+        function, parameters = self._kernel()
+        scratch = np.zeros((8, *J.shape))
+        return bind(function, *parameters, J, J_dot, slope, slope_rate, scratch)
+
+
+def _in_turn(
+    bring: Callable[[], Any],
+    select: Callable[[], Any],
+    terms: Derivatives,
+    raise_slope: Callable[[], Any],
+) -> float:
+    bring()
+    select()
+    value = terms()
+    raise_slope()
+    return value
+
+
+@kernel
+def _select(
+    J_frame: Array,
+    J_frame_dot: Array,
+    selected: Indices,
+    scale: Array,
+    J: Array,
+    J_dot: Array,
+) -> None:
+    """Write the selected rows, scaled."""
+    for k in range(J.shape[0]):
+        for j in range(J.shape[1]):
+            J[k, j] = scale[k] * J_frame[selected[k], j]
+            J_dot[k, j] = scale[k] * J_frame_dot[selected[k], j]
+
+
+@kernel
+def _raise_slope(
+    J: Array,
+    J_dot: Array,
+    slope: Array,
+    slope_rate: Array,
+    selected: Indices,
+    scale: Array,
+    B: Array,
+    freedoms: Indices,
+    first: Indices,
+    sums: Array,
+    gradient: Array,
+    rate: Array,
+) -> None:
+    """Write the gradient and its rate from the slope of the selected, scaled rows."""
+    for k in range(slope.shape[0]):
+        for j in range(slope.shape[1]):
+            B[0, selected[k], j] = scale[k] * slope[k, j]
+            B[1, selected[k], j] = scale[k] * slope_rate[k, j]
+    for i in range(gradient.shape[0]):
+        gradient[i] = rate[i] = 0.0
+    chain_gradient(J, J_dot, B[0], B[1], freedoms, first, sums, gradient, rate)
 
 
 @kernel

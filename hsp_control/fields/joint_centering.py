@@ -4,13 +4,14 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array
+from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import FieldError
-from hsp_control.fields.cost import Cost
+from hsp_control.fields.compiled_cost import CompiledCost, Derivatives
+from hsp_control.kernels import bind, kernel
 from hsp_control.robot import Robot, RobotState
 
 
-class JointCentering(Cost):
+class JointCentering(CompiledCost):
     """f = ½ Σ w_i ((q_i - m_i)/r_i)², m_i and r_i the middle and half of the range.
 
     Joints without limits, continuous ones and a floating root are left free. After
@@ -33,33 +34,58 @@ class JointCentering(Cost):
         super().__init__(robot, name)
         w = check_weights(weights, robot.nv, name)
         lower, upper = robot.position_limits()
-        limited = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
-        if not limited.any():
+        self._limited = limited_joints(robot)
+        if not self._limited.size:
             raise FieldError(
                 f"field {name!r}: no joint of {robot.name} has limits, so none has a "
                 "middle; use a target posture instead"
             )
-        # Away from here the limits are infinite, and inf - inf is no number.
-        low, high = lower[limited], upper[limited]
-        self._middle, self._stiffness = np.zeros(robot.nv), np.zeros(robot.nv)
-        self._middle[limited] = 0.5 * (low + high)
-        self._stiffness[limited] = w[limited] / (0.5 * (high - low)) ** 2
+        freedoms = self._limited[:, 0]
+        low, high = lower[freedoms], upper[freedoms]
+        self._middle = 0.5 * (low + high)
+        self._stiffness = w[freedoms] / (0.5 * (high - low)) ** 2
 
-    def value(self, state: RobotState) -> float:
-        """Return f."""
-        away = self._away(state)
-        return float(0.5 * self._stiffness @ away**2)
+    def _bind(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        return bind(
+            _centering,
+            state.q,
+            state.v,
+            self._limited,
+            self._middle,
+            self._stiffness,
+            gradient,
+            rate,
+        )
 
-    def gradient(self, state: RobotState) -> Array:
-        """Return w_i (q_i - m_i)/r_i²."""
-        return self._stiffness * self._away(state)
 
-    def gradient_rate(self, state: RobotState) -> Array:
-        """Return w_i v_i/r_i²."""
-        return self._stiffness * state.v
+def limited_joints(robot: Robot) -> Indices:
+    """Return each limited joint's place in a velocity and in q, shape (k, 2)."""
+    lower, upper = robot.position_limits()
+    limited = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
+    return robot.single_joints[limited[robot.single_joints[:, 0]], :2].copy()
 
-    def _away(self, state: RobotState) -> Array:
-        return self.robot.joint_positions(state.q) - self._middle
+
+@kernel
+def _centering(
+    q: Array,
+    v: Array,
+    limited: Indices,
+    middle: Array,
+    stiffness: Array,
+    gradient: Array,
+    rate: Array,
+) -> float:
+    """Write k_i (q_i - m_i) and k_i v_i, and return f; k_i = w_i/r_i²."""
+    for i in range(v.shape[0]):
+        gradient[i] = rate[i] = 0.0
+    f = 0.0
+    for k in range(limited.shape[0]):
+        i, at = limited[k, 0], limited[k, 1]
+        away = q[at] - middle[k]
+        gradient[i] = stiffness[k] * away
+        rate[i] = stiffness[k] * v[i]
+        f += 0.5 * stiffness[k] * away * away
+    return f
 
 
 def check_weights(weights: Any, size: int, name: str) -> Array:
@@ -68,7 +94,7 @@ def check_weights(weights: Any, size: int, name: str) -> Array:
     Raises:
         FieldError: If there are not as many, or one is negative or not finite.
     """
-    array = np.asarray(weights, dtype=float)
+    array = np.array(weights, dtype=float)
     if array.ndim == 0:
         array = np.full(size, float(array))
     if array.shape != (size,):

@@ -2,17 +2,16 @@
 
 from typing import Any
 
-import numpy as np
-
-from hsp_control.arrays import Array
+from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import FieldError
-from hsp_control.fields.barrier import barrier
-from hsp_control.fields.cost import Cost
-from hsp_control.fields.joint_centering import check_weights
+from hsp_control.fields.barrier import barrier_at
+from hsp_control.fields.compiled_cost import CompiledCost, Derivatives
+from hsp_control.fields.joint_centering import check_weights, limited_joints
+from hsp_control.kernels import bind, kernel
 from hsp_control.robot import Robot, RobotState
 
 
-class LimitBarrier(Cost):
+class LimitBarrier(CompiledCost):
     """f = Σ w_i (b(q_i - lower_i) + b(upper_i - q_i)), zero in the middle of the range.
 
     b is the barrier of `hsp_control.fields.barrier`; it begins at a fraction of half
@@ -45,46 +44,52 @@ class LimitBarrier(Cost):
             raise FieldError(f"field {name!r}: zone {zone} must be within (0, 1]")
         w = check_weights(weights, robot.nv, name)
         lower, upper = robot.position_limits()
-        limited = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
-        if not limited.any():
+        self._limited = limited_joints(robot)
+        if not self._limited.size:
             raise FieldError(f"field {name!r}: no joint of {robot.name} has limits")
-        self._limited = np.flatnonzero(limited)
-        self._weights = w[limited]
-        self._lower, self._upper = lower[limited], upper[limited]
+        freedoms = self._limited[:, 0]
+        self._weights = w[freedoms]
+        self._lower, self._upper = lower[freedoms], upper[freedoms]
         # Distances are measured in units of the zone: the barrier begins at 1.
         self._unit = 0.5 * zone * (self._upper - self._lower)
-        count = len(self._limited)
-        self._slopes, self._bends = np.zeros((2, count)), np.zeros((2, count))
 
-    def value(self, state: RobotState) -> float:
-        """Return f."""
-        total = 0.0
-        for side, distance in enumerate(self._distances(state)):
-            for k in range(len(distance)):
-                total += self._weights[k] * barrier(
-                    distance[k : k + 1],
-                    1.0,
-                    self._slopes[side, k : k + 1],
-                    self._bends[side, k : k + 1],
-                )
-        return total
+    def _bind(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        return bind(
+            _limit_barrier,
+            state.q,
+            state.v,
+            self._limited,
+            self._lower,
+            self._upper,
+            self._unit,
+            self._weights,
+            gradient,
+            rate,
+        )
 
-    def gradient(self, state: RobotState) -> Array:
-        """Return ∇f."""
-        self.value(state)
-        result = np.zeros(self.robot.nv)
-        slope = (self._slopes[0] - self._slopes[1]) / self._unit
-        result[self._limited] = self._weights * slope
-        return result
 
-    def gradient_rate(self, state: RobotState) -> Array:
-        """Return ∇²f v, exact."""
-        self.value(state)
-        result = np.zeros(self.robot.nv)
-        bend = (self._bends[0] + self._bends[1]) / self._unit**2
-        result[self._limited] = self._weights * bend * state.v[self._limited]
-        return result
-
-    def _distances(self, state: RobotState) -> tuple[Array, Array]:
-        q = self.robot.joint_positions(state.q)[self._limited]
-        return (q - self._lower) / self._unit, (self._upper - q) / self._unit
+@kernel
+def _limit_barrier(
+    q: Array,
+    v: Array,
+    limited: Indices,
+    lower: Array,
+    upper: Array,
+    unit: Array,
+    weights: Array,
+    gradient: Array,
+    rate: Array,
+) -> float:
+    """Write ∇f and ∇²f v, and return f."""
+    for i in range(v.shape[0]):
+        gradient[i] = rate[i] = 0.0
+    f = 0.0
+    for k in range(limited.shape[0]):
+        i, at = limited[k, 0], limited[k, 1]
+        below, slope_below, bend_below = barrier_at((q[at] - lower[k]) / unit[k])
+        above, slope_above, bend_above = barrier_at((upper[k] - q[at]) / unit[k])
+        f += weights[k] * (below + above)
+        gradient[i] = weights[k] * (slope_below - slope_above) / unit[k]
+        bend = (bend_below + bend_above) / (unit[k] * unit[k])
+        rate[i] = weights[k] * bend * v[i]
+    return f

@@ -6,13 +6,14 @@ import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import FieldError
-from hsp_control.fields.cost import Cost
+from hsp_control.fields.compiled_cost import CompiledCost, Derivatives
+from hsp_control.kernels import bind, kernel
 from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle
 from hsp_control.trajectories import TrajectorySample
 
 
-class PointDistance(Cost):
+class PointDistance(CompiledCost):
     """f = weight · Σ 1/d_k², d_k from the origin of frame k to the obstacle's centre.
 
     The paper's fourth simulation: joints two and three of the planar arm and a moving
@@ -60,48 +61,74 @@ class PointDistance(Cost):
             float(np.linalg.norm(state.position(frame) - c)) for frame in self.frames
         )
 
-    def value(self, state: RobotState) -> float:
-        """Return f."""
-        c = self.obstacle.center.sample(state.t, self._center).position
-        total = 0.0
-        for frame in self.frames:
-            total += self.weight / self._square(frame, state.position(frame) - c)
-        return total
-
-    def gradient(self, state: RobotState) -> Array:
-        """Return -2 weight Σ Jᵀr/d⁴ with r from the centre to the frame."""
-        c = self.obstacle.center.sample(state.t, self._center).position
-        result = np.zeros(self.robot.nv)
+    def _bind(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        center = TrajectorySample.allocate(3)
+        follow = self.obstacle.center.follow(center)
+        pushes = []
         for name in self.frames:
             frame = state.frame(name)
-            r = frame.position - c
-            result += frame.jacobian[:3].T @ r / self._square(name, r) ** 2
-        return -2.0 * self.weight * result
-
-    def gradient_rate(self, state: RobotState) -> Array:
-        """Return -2 weight Σ (J'ᵀr + Jᵀr' - 4 (r·r'/d²) Jᵀr)/d⁴ with r' = Jv - c'."""
-        c, c_dot, _ = self.obstacle.center.sample(state.t, self._center)
-        result = np.zeros(self.robot.nv)
-        for name in self.frames:
-            frame = state.frame(name)
-            J, J_dot = frame.jacobian[:3], frame.jacobian_dot[:3]
-            r = frame.position - c
-            r_dot = frame.velocity[:3] - c_dot
-            square = self._square(name, r)
-            bent = r_dot - 4.0 * float(r @ r_dot) / square * r
-            result += (J_dot.T @ r + J.T @ bent) / square**2
-        return -2.0 * self.weight * result
-
-    def _square(self, frame: str, r: Array) -> float:
-        """Return d².
-
-        Raises:
-            FieldError: If it is 0, where the cost is infinite.
-        """
-        square = float(r @ r)
-        if square < 1e-24:  # a distance of 1e-12 m
-            raise FieldError(
-                f"field {self.name!r}: frame {frame!r} is at the centre of obstacle "
-                f"{self.obstacle.name!r}, where the cost is infinite"
+            push = bind(
+                _push,
+                frame.jacobian,
+                frame.jacobian_dot,
+                frame.position,
+                frame.velocity,
+                center.position,
+                center.velocity,
+                self.weight,
+                gradient,
+                rate,
             )
+            pushes.append((name, push))
+
+        def derivatives() -> float:
+            follow(state.t)
+            gradient.fill(0.0)
+            rate.fill(0.0)
+            total = 0.0
+            for name, push in pushes:
+                state.frame(name)
+                square = push()
+                if square < 1e-24:  # a distance of 1e-12 m
+                    raise FieldError(
+                        f"field {self.name!r}: frame {name!r} is at the centre of "
+                        f"obstacle {self.obstacle.name!r}, where the cost is infinite"
+                    )
+                total += self.weight / square
+            return total
+
+        return derivatives
+
+
+@kernel
+def _push(
+    J: Array,
+    J_dot: Array,
+    position: Array,
+    velocity: Array,
+    center: Array,
+    center_velocity: Array,
+    weight: float,
+    gradient: Array,
+    rate: Array,
+) -> float:
+    """Add one frame's part to ∇f and (∇f)', and return d².
+
+    With r from the centre to the frame and r' = J v - c' they are -2 weight Jᵀr/d⁴ and
+    -2 weight (J'ᵀr + Jᵀr' - 4 (r·r'/d²) Jᵀr)/d⁴.
+    """
+    square = nearing = 0.0
+    for a in range(3):
+        r, r_dot = position[a] - center[a], velocity[a] - center_velocity[a]
+        square += r * r
+        nearing += r * r_dot
+    if square == 0.0:
         return square
+    scale = -2.0 * weight / (square * square)
+    for i in range(gradient.shape[0]):
+        for a in range(3):
+            r, r_dot = position[a] - center[a], velocity[a] - center_velocity[a]
+            bent = r_dot - 4.0 * nearing / square * r
+            gradient[i] += scale * J[a, i] * r
+            rate[i] += scale * (J_dot[a, i] * r + J[a, i] * bent)
+    return square

@@ -1,17 +1,18 @@
 """Draw the joints towards a posture."""
 
+from math import cos, sin
 from typing import Any
 
-import numpy as np
-
-from hsp_control.arrays import Array
+from hsp_control.arrays import Array, Indices
+from hsp_control.configuration_space import joint_displacements
 from hsp_control.exceptions import FieldError
-from hsp_control.fields.cost import Cost
+from hsp_control.fields.compiled_cost import CompiledCost, Derivatives
 from hsp_control.fields.joint_centering import check_weights
+from hsp_control.kernels import bind, kernel
 from hsp_control.robot import Robot, RobotState
 
 
-class TargetPosture(Cost):
+class TargetPosture(CompiledCost):
     """f = Σ w_i ½d_i², d = q ⊖ target; Σ w_i (1 - cos d_i) for continuous joints.
 
     The second form agrees with the first to fourth order and is smooth all the way
@@ -41,31 +42,46 @@ class TargetPosture(Cost):
         """
         super().__init__(robot, name)
         self.target = robot.check_configuration(target).copy()
-        single = np.zeros(robot.nv, dtype=bool)
-        self._round = np.zeros(robot.nv, dtype=bool)
-        for joint in robot.joints.values():
-            if joint.nv == 1:
-                single[joint.idx_v] = True
-                self._round[joint.idx_v] = joint.nq == 2
-        self._weights = np.where(single, check_weights(weights, robot.nv, name), 0.0)
-        if not self._weights.any():
+        self._weights = check_weights(weights, robot.nv, name)
+        if not self._weights[robot.single_joints[:, 0]].any():
             raise FieldError(f"field {name!r}: every weight is 0")
 
-    def value(self, state: RobotState) -> float:
-        """Return f."""
-        d = self._away(state)
-        terms = np.where(self._round, 1.0 - np.cos(d), 0.5 * d**2)
-        return float(self._weights @ terms)
+    def _bind(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        return bind(
+            _posture,
+            state.q,
+            state.v,
+            self.target,
+            self.robot.single_joints,
+            self._weights,
+            gradient,
+            rate,
+        )
 
-    def gradient(self, state: RobotState) -> Array:
-        """Return w_i d_i, or w_i sin d_i."""
-        d = self._away(state)
-        return self._weights * np.where(self._round, np.sin(d), d)
 
-    def gradient_rate(self, state: RobotState) -> Array:
-        """Return w_i v_i, or w_i cos d_i v_i."""
-        slope = np.where(self._round, np.cos(self._away(state)), 1.0)
-        return self._weights * slope * state.v
-
-    def _away(self, state: RobotState) -> Array:
-        return self.robot.difference(self.target, state.q)
+@kernel
+def _posture(
+    q: Array,
+    v: Array,
+    target: Array,
+    single_joints: Indices,
+    weights: Array,
+    gradient: Array,
+    rate: Array,
+) -> float:
+    """Write w_i d_i and w_i v_i, or w_i sin d_i and w_i cos d_i v_i; return f."""
+    for i in range(v.shape[0]):
+        gradient[i] = rate[i] = 0.0
+    joint_displacements(q, target, single_joints, gradient)
+    f = 0.0
+    for k in range(single_joints.shape[0]):
+        i, d = single_joints[k, 0], gradient[single_joints[k, 0]]
+        if single_joints[k, 2] == 1:
+            f += 0.5 * weights[i] * d * d
+            gradient[i] = weights[i] * d
+            rate[i] = weights[i] * v[i]
+        else:
+            f += weights[i] * (1.0 - cos(d))
+            gradient[i] = weights[i] * sin(d)
+            rate[i] = weights[i] * cos(d) * v[i]
+    return f

@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.fields import FieldSample
-from hsp_control.kernels import kernel
+from hsp_control.kernels import kernel, uncompiled
 from hsp_control.metrics import MetricSample
 from hsp_control.tasks import TaskSample
 
@@ -57,7 +57,7 @@ class Problem:
     def __init__(self, rows: int, nv: int, gain: Array) -> None:
         """Allocate for a number of rows and of freedoms."""
         self.block: Array = np.zeros(block_size(rows, nv))
-        views = parts(self.block, rows, nv)
+        views = uncompiled(parts)(self.block, rows, nv)
         self.task = TaskSample(*views[:5])
         self.field = FieldSample(*views[5:7])
         self.metric = MetricSample(*views[7:10])

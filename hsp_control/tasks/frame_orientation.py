@@ -1,9 +1,13 @@
 """A frame's orientation follows a trajectory on SO(3), with an exactly linear error."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
+from hsp_control.kernels import bind, kernel
+from hsp_control.kinematics import FrameKinematics
 from hsp_control.linalg import multiply
 from hsp_control.robot import Robot, RobotState
 from hsp_control.rotations import (
@@ -17,12 +21,17 @@ from hsp_control.rotations import (
     rotate,
     rotate_back,
 )
+from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample, named_after, track
+from hsp_control.tasks.task import TaskSample, copy_rows, named_after, track
 from hsp_control.trajectories import OrientationSample, OrientationTrajectory
+from hsp_control.trajectories.following import Follower
+
+ORIENTATION_SCRATCH = 12
+"""Rows of three numbers that `orientation_error` and its sister work on."""
 
 
-class FrameOrientation(Task):
+class FrameOrientation(FrameTask):
     """Orientation of a frame in the world.
 
     The error is e = -log(R_dᵀ R), in the desired frame: rotation vector [rad], exact up
@@ -56,34 +65,27 @@ class FrameOrientation(Task):
             TaskError: If the robot has fewer than three freedoms.
             GainError: If the gains do not fit.
         """
-        robot.frame_id(frame)
-        super().__init__(robot, 3, gains, name or f"{named_after(frame)}_orientation")
-        self.frame = frame
+        name = name or f"{named_after(frame)}_orientation"
+        super().__init__(robot, frame, 3, gains, name)
         self.trajectory = trajectory
-        self._desired = OrientationSample.allocate()
-        self._scratch = np.zeros((8, 3))
-        self._matrices = np.zeros((3, 3, 3))
 
-    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
-        """Return the three angular rows; see `Task.evaluate`."""
-        out = self._out(out)
-        frame = state.frame(self.frame)
-        desired = self.trajectory.sample(state.t, self._desired)
-        out.jacobian[:] = frame.jacobian[3:]
-        out.jacobian_dot[:] = frame.jacobian_dot[3:]
-        track_orientation(
+    def _bind(
+        self, frame: FrameKinematics, out: TaskSample
+    ) -> tuple[Follower, Callable[[], Any]]:
+        desired = OrientationSample.allocate()
+        write = bind(
+            _frame_orientation,
+            frame.jacobian,
+            frame.jacobian_dot,
             frame.rotation,
             frame.velocity[3:],
             *desired,
             self.Kp,
             self.Kv,
-            self._scratch,
-            self._matrices,
-            out.error,
-            out.error_rate,
-            out.acceleration,
+            np.zeros((ORIENTATION_SCRATCH, 3)),
+            *out,
         )
-        return out
+        return self.trajectory.follow(desired), write
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return w_d [rad/s]."""
@@ -105,7 +107,6 @@ def orientation_error(
     R_d: Array,
     w_d: Array,
     scratch: Array,
-    matrices: Array,
     e: Array,
     e_dot: Array,
 ) -> None:
@@ -116,12 +117,11 @@ def orientation_error(
         w: Angular velocity, world axes, shape (3,).
         R_d: Desired orientation, shape (3, 3).
         w_d: Desired angular velocity, world axes, shape (3,).
-        scratch: Shape (≥ 2, 3).
-        matrices: Shape (≥ 1, 3, 3).
+        scratch: Shape (ORIENTATION_SCRATCH, 3).
         e: Error, shape (3,).
         e_dot: Its rate, shape (3,).
     """
-    E, w_tilde, y = matrices[0], scratch[0], scratch[1]
+    w_tilde, y, E = scratch[0], scratch[1], scratch[6:9]
     compose_back(R_d, R, E)
     log3(E, y)
     for i in range(3):
@@ -142,29 +142,32 @@ def orientation_acceleration(
     w_d_dot: Array,
     e: Array,
     e_dot: Array,
-    e_ddot: Array,
     scratch: Array,
-    matrices: Array,
     out: Array,
 ) -> None:
-    """Write the angular acceleration, world axes, that gives the error e'' as asked.
+    """Turn a wanted -e'' into the angular acceleration, world axes, that gives it.
 
     w̃ = Jexp(y) y' gives w̃' = Jexp y'' + Jexp' y'; the desired frame's own motion adds
     the transport term: w' = R w̃' - w × w_d + w_d'.
+
+    Args:
+        R: World ← frame, shape (3, 3).
+        w: Angular velocity, world axes, shape (3,).
+        w_d: Desired angular velocity, world axes, shape (3,).
+        w_d_dot: Desired angular acceleration, world axes, shape (3,).
+        e: Error, shape (3,).
+        e_dot: Its rate, shape (3,).
+        scratch: Shape (ORIENTATION_SCRATCH, 3).
+        out: -e'' = y'', overwritten by w', shape (3,).
     """
-    y, y_dot, y_ddot, turned, bent = (
-        scratch[0],
-        scratch[1],
-        scratch[2],
-        scratch[3],
-        scratch[4],
-    )
+    y, y_dot, turned, bent = scratch[0], scratch[1], scratch[2], scratch[3]
     for i in range(3):
-        y[i], y_dot[i], y_ddot[i] = -e[i], -e_dot[i], -e_ddot[i]
-    jexp3(y, matrices[0])
-    jexp3_dot(y, y_dot, matrices[1])
-    multiply(matrices[0], y_ddot, turned)
-    multiply(matrices[1], y_dot, bent)
+        y[i], y_dot[i] = -e[i], -e_dot[i]
+    J_exp, J_exp_dot = scratch[6:9], scratch[9:12]
+    jexp3(y, J_exp)
+    jexp3_dot(y, y_dot, J_exp_dot)
+    multiply(J_exp, out, turned)
+    multiply(J_exp_dot, y_dot, bent)
     for i in range(3):
         turned[i] += bent[i]
     rotate(R, turned, out)
@@ -174,7 +177,9 @@ def orientation_acceleration(
 
 
 @kernel
-def track_orientation(
+def _frame_orientation(
+    J_frame: Array,
+    J_frame_dot: Array,
     R: Array,
     w: Array,
     R_d: Array,
@@ -183,19 +188,16 @@ def track_orientation(
     Kp: Array,
     Kv: Array,
     scratch: Array,
-    matrices: Array,
+    J: Array,
+    J_dot: Array,
     e: Array,
     e_dot: Array,
     a_x: Array,
 ) -> None:
-    """Write e, e' and the angular acceleration for which e'' = -Kv e' - Kp e."""
-    orientation_error(R, w, R_d, w_d, scratch, matrices, e, e_dot)
-    wanted, zero = scratch[6], scratch[7]
+    """Write the sample: the angular acceleration for which e'' = -Kv e' - Kp e."""
+    copy_rows(J_frame, J_frame_dot, 3, J, J_dot)
+    orientation_error(R, w, R_d, w_d, scratch, e, e_dot)
     for i in range(3):
-        zero[i] = 0.0
-    track(zero, Kp, Kv, e, e_dot, wanted)
-    for i in range(3):
-        wanted[i] = -wanted[i]
-    orientation_acceleration(
-        R, w, w_d, w_d_dot, e, e_dot, wanted, scratch, matrices, a_x
-    )
+        a_x[i] = 0.0
+    track(a_x, Kp, Kv, e, e_dot, a_x)
+    orientation_acceleration(R, w, w_d, w_d_dot, e, e_dot, scratch, a_x)

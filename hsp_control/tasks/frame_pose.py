@@ -1,21 +1,28 @@
 """A frame follows a trajectory in space: its origin and its orientation together."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
+from hsp_control.kernels import bind, kernel
+from hsp_control.kinematics import FrameKinematics
 from hsp_control.robot import Robot, RobotState
 from hsp_control.rotations import quaternion_from_rotation
 from hsp_control.tasks.frame_orientation import (
+    ORIENTATION_SCRATCH,
     orientation_acceleration,
     orientation_error,
 )
+from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample, named_after, track
+from hsp_control.tasks.task import TaskSample, copy_rows, named_after, track
 from hsp_control.trajectories import PoseSample, PoseTrajectory
+from hsp_control.trajectories.following import Follower
 
 
-class FramePose(Task):
+class FramePose(FrameTask):
     """Pose of a frame: the origin in the world [m], then -log(R_dᵀ R) [rad].
 
     Position in world axes beside orientation keeps both errors decoupled and exactly
@@ -49,36 +56,27 @@ class FramePose(Task):
             TaskError: If the robot has fewer than six freedoms.
             GainError: If the gains do not fit.
         """
-        robot.frame_id(frame)
-        super().__init__(robot, 6, gains, name or named_after(frame))
-        self.frame = frame
+        super().__init__(robot, frame, 6, gains, name or named_after(frame))
         self.trajectory = trajectory
-        self._desired = PoseSample.allocate()
-        self._scratch = np.zeros((8, 3))
-        self._matrices = np.zeros((3, 3, 3))
-        self._wanted = np.zeros(6)
 
-    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
-        """Return the six rows; see `Task.evaluate`."""
-        out = self._out(out)
-        frame = state.frame(self.frame)
-        desired = self.trajectory.sample(state.t, self._desired)
-        pose_error_equation(
+    def _bind(
+        self, frame: FrameKinematics, out: TaskSample
+    ) -> tuple[Follower, Callable[[], Any]]:
+        desired = np.zeros((8, 3))
+        write = bind(
+            pose_error_equation,
             frame.jacobian,
             frame.jacobian_dot,
             frame.rotation,
             frame.position,
             frame.velocity,
-            *desired.position,
-            *desired.orientation,
+            desired,
             self.Kp,
             self.Kv,
-            self._wanted,
-            self._scratch,
-            self._matrices,
+            np.zeros((ORIENTATION_SCRATCH, 3)),
             *out,
         )
-        return out
+        return self.trajectory.follow(PoseSample.over(desired)), write
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' and w_d [m/s, rad/s]."""
@@ -109,36 +107,28 @@ def pose_error_equation(
     R: Array,
     position: Array,
     velocity: Array,
-    x_d: Array,
-    x_d_dot: Array,
-    x_d_ddot: Array,
-    R_d: Array,
-    w_d: Array,
-    w_d_dot: Array,
+    desired: Array,
     Kp: Array,
     Kv: Array,
-    wanted: Array,
     scratch: Array,
-    matrices: Array,
     J: Array,
     J_dot: Array,
     e: Array,
     e_dot: Array,
     a_x: Array,
 ) -> None:
-    """Write the sample; the gains may couple position and orientation."""
-    J[:, :] = J_frame
-    J_dot[:, :] = J_frame_dot
+    """Write the sample; the gains may couple position and orientation.
+
+    The reference's rows are x, x', x'', R (three), ω, ω', see `PoseSample.over`.
+    """
+    copy_rows(J_frame, J_frame_dot, 0, J, J_dot)
     for i in range(3):
-        e[i] = x_d[i] - position[i]
-        e_dot[i] = x_d_dot[i] - velocity[i]
-        wanted[i] = x_d_ddot[i]
-        wanted[3 + i] = 0.0
-    w = velocity[3:]
-    orientation_error(R, w, R_d, w_d, scratch, matrices, e[3:], e_dot[3:])
-    track(wanted, Kp, Kv, e, e_dot, a_x)
-    for i in range(3):
-        wanted[3 + i] = -a_x[3 + i]
-    orientation_acceleration(
-        R, w, w_d, w_d_dot, e[3:], e_dot[3:], wanted[3:], scratch, matrices, a_x[3:]
-    )
+        e[i] = desired[0, i] - position[i]
+        e_dot[i] = desired[1, i] - velocity[i]
+        a_x[i] = desired[2, i]
+        a_x[3 + i] = 0.0
+    R_d, w_d, w_d_dot = desired[3:6], desired[6], desired[7]
+    w, angle, angle_dot, turning = velocity[3:], e[3:], e_dot[3:], a_x[3:]
+    orientation_error(R, w, R_d, w_d, scratch, angle, angle_dot)
+    track(a_x, Kp, Kv, e, e_dot, a_x)
+    orientation_acceleration(R, w, w_d, w_d_dot, angle, angle_dot, scratch, turning)

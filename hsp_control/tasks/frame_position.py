@@ -1,19 +1,23 @@
 """A frame's origin follows a trajectory, along all world axes or some of them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import TaskError
-from hsp_control.kernels import kernel
+from hsp_control.kernels import bind, kernel
+from hsp_control.kinematics import FrameKinematics
 from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample, named_after, track
+from hsp_control.tasks.task import TaskSample, named_after, track
 from hsp_control.trajectories import Trajectory, TrajectorySample
+from hsp_control.trajectories.following import Follower
 
 
-class FramePosition(Task):
+class FramePosition(FrameTask):
     """Position of a frame's origin in the world: e = x_d - x, exactly linear.
 
     Attributes:
@@ -47,28 +51,25 @@ class FramePosition(Task):
                 has another dimension.
             GainError: If the gains do not fit.
         """
-        robot.frame_id(frame)
         letters = "".join(axes)
         if not letters or len(set(letters)) < len(letters) or set(letters) - set("xyz"):
             raise TaskError(f"axes {letters!r}: name distinct axes among x, y and z")
-        super().__init__(robot, len(letters), gains, name or named_after(frame))
+        super().__init__(robot, frame, len(letters), gains, name or named_after(frame))
         if trajectory.dimension != self.rows:
             raise TaskError(
                 f"task {self.name!r} tracks the axes {letters!r}; its trajectory has "
                 f"dimension {trajectory.dimension}, needs {self.rows}"
             )
-        self.frame = frame
         self.axes = letters
         self.trajectory = trajectory
         self._axes = np.array(["xyz".index(a) for a in letters], dtype=np.int64)
-        self._desired = TrajectorySample.allocate(self.rows)
 
-    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
-        """Return the rows of the tracked axes; see `Task.evaluate`."""
-        out = self._out(out)
-        frame = state.frame(self.frame)
-        desired = self.trajectory.sample(state.t, self._desired)
-        _frame_position(
+    def _bind(
+        self, frame: FrameKinematics, out: TaskSample
+    ) -> tuple[Follower, Callable[[], Any]]:
+        desired = TrajectorySample.allocate(self.rows)
+        write = bind(
+            _frame_position,
             self._axes,
             frame.jacobian,
             frame.jacobian_dot,
@@ -79,7 +80,7 @@ class FramePosition(Task):
             self.Kv,
             *out,
         )
-        return out
+        return self.trajectory.follow(desired), write
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' [m/s]."""
@@ -112,8 +113,9 @@ def _frame_position(
     """Write the sample; a_x = x_d'' + Kv e' + Kp e."""
     for k in range(axes.shape[0]):
         i = axes[k]
-        J[k, :] = J_frame[i, :]
-        J_dot[k, :] = J_frame_dot[i, :]
+        for j in range(J.shape[1]):
+            J[k, j] = J_frame[i, j]
+            J_dot[k, j] = J_frame_dot[i, j]
         e[k] = x_d[k] - position[i]
         e_dot[k] = x_d_dot[k] - velocity[i]
     track(x_d_ddot, Kp, Kv, e, e_dot, a_x)

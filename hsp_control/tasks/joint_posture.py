@@ -1,16 +1,20 @@
 """Joints follow a posture that may move."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from math import atan2, cos, sin
 from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array
+from hsp_control.arrays import Array, Indices
+from hsp_control.configuration_space import joint_displacements
 from hsp_control.exceptions import TaskError
+from hsp_control.kernels import bind, kernel
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import Task, TaskSample, track
 from hsp_control.trajectories import Trajectory, TrajectorySample
+from hsp_control.trajectories.following import Follower, stay
 
 
 class JointPosture(Task):
@@ -75,31 +79,57 @@ class JointPosture(Task):
         self.displacement = displacement
         self._indices = np.array(indices, dtype=np.int64)
         self._moved = np.zeros(robot.nv)
+        # The rows of `single_joints` that are held, in the order of the task's.
+        place = {int(row[0]): row for row in robot.single_joints}
+        self._rows: Indices = np.array([place[i] for i in indices], dtype=np.int64)
         self._sample = TrajectorySample.allocate(self.rows)
+        self._follow = self._follower()
+        self._bound: tuple[RobotState, TaskSample, Callable[[], Any]] | None = None
 
     def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
         """Return one row a joint; see `Task.evaluate`."""
-        out = self._out(out)
-        desired = self._desired(state.t)
-        difference = self.robot.difference(state.q, desired)
-        out.jacobian[:] = 0.0
-        out.jacobian[np.arange(self.rows), self._indices] = 1.0
-        out.jacobian_dot[:] = 0.0
-        out.error[:] = difference[self._indices]
-        out.error_rate[:] = self._sample.velocity - state.v[self._indices]
-        track(
-            self._sample.acceleration,
+        if out is None:
+            out = TaskSample.allocate(self.rows, self.robot.nv)
+        bound = self._bound
+        if bound is None or bound[0] is not state or bound[1] is not out:
+            self._bound = bound = state, out, self._bind(state, out)
+        self._follow(state.t)
+        bound[2]()
+        return out
+
+    def _bind(self, state: RobotState, out: TaskSample) -> Callable[[], Any]:
+        return bind(
+            _joint_posture,
+            state.q,
+            state.v,
+            self._reference,
+            self._rows,
+            *self._sample,
             self.Kp,
             self.Kv,
-            out.error,
-            out.error_rate,
-            out.acceleration,
+            np.zeros(self.robot.nv),
+            *out,
         )
-        return out
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but what is bound to memory."""
+        return {k: x for k, x in self.__dict__.items() if k != "_follow"} | {
+            "_bound": None
+        }
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        """Follow anew."""
+        self.__dict__.update(kept)
+        self._follow = self._follower()
+
+    def _follower(self) -> Follower:
+        if self.displacement is None:
+            return stay
+        return self.displacement.follow(self._sample)
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return the joints' desired rates [rad/s or m/s]."""
-        self._desired(state.t)
+        self._follow(state.t)
         return self._sample.velocity.copy()
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
@@ -111,6 +141,38 @@ class JointPosture(Task):
     def _desired(self, t: float) -> Array:
         if self.displacement is None:
             return self._reference
-        self.displacement.sample(t, self._sample)
+        self._follow(t)
         self._moved[self._indices] = self._sample.position
         return self.robot.integrate(self._reference, self._moved)
+
+
+@kernel
+def _joint_posture(
+    q: Array,
+    v: Array,
+    reference: Array,
+    held: Indices,
+    moved: Array,
+    moved_dot: Array,
+    moved_ddot: Array,
+    Kp: Array,
+    Kv: Array,
+    away: Array,
+    J: Array,
+    J_dot: Array,
+    e: Array,
+    e_dot: Array,
+    a_x: Array,
+) -> None:
+    """Write the sample: e = moved - (q ⊖ reference), the short way round."""
+    joint_displacements(q, reference, held, away)
+    for k in range(held.shape[0]):
+        for j in range(J.shape[1]):
+            J[k, j] = J_dot[k, j] = 0.0
+        i = held[k, 0]
+        J[k, i] = 1.0
+        e[k] = moved[k] - away[i]
+        if held[k, 2] == 2:
+            e[k] = atan2(sin(e[k]), cos(e[k]))
+        e_dot[k] = moved_dot[k] - v[i]
+    track(moved_ddot, Kp, Kv, e, e_dot, a_x)

@@ -1,24 +1,28 @@
 """An axis of a frame points along a direction that may move: a task on the sphere."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import TaskError
-from hsp_control.kernels import kernel
+from hsp_control.kernels import bind, kernel
+from hsp_control.kinematics import FrameKinematics
 from hsp_control.robot import Robot, RobotState
 from hsp_control.rotations import cross, rotate, rotate_back
+from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample, named_after, track
+from hsp_control.tasks.task import TaskSample, named_after, track
 from hsp_control.trajectories import OrientationSample, OrientationTrajectory
+from hsp_control.trajectories.following import Follower
 
 NEAREST_TO_ANTIPODE = 0.02
 """Below this 1 + cos(angle) the coordinates are held from blowing up (168 degrees)."""
 
 
-class Pointing(Task):
+class Pointing(FrameTask):
     """Pointing axis: two rows, the turn about the axis itself is free.
 
     The error is e = -(n_x, n_y)/(1 + n_z), the stereographic coordinates of the axis
@@ -57,27 +61,24 @@ class Pointing(Task):
             TaskError: If the axis has no direction.
             GainError: If the gains do not fit.
         """
-        robot.frame_id(frame)
-        super().__init__(robot, 2, gains, name or f"{named_after(frame)}_pointing")
+        name = name or f"{named_after(frame)}_pointing"
+        super().__init__(robot, frame, 2, gains, name)
         vector = np.asarray(axis, dtype=float)
         if vector.shape != (3,) or not 0.0 < np.linalg.norm(vector) < np.inf:
             raise TaskError(f"axis {list(axis)} is not a direction: needs 3 numbers")
-        self.frame = frame
         self.axis: Array = vector / np.linalg.norm(vector)
         self.trajectory = trajectory
         # Two directions across the axis, right-handed with it: the rows of the task.
         across = np.linalg.svd(self.axis[None, :])[2][1:]
         across[1] *= np.sign(np.linalg.det(np.vstack([across, self.axis])))
         self._across = across.copy()
-        self._desired = OrientationSample.allocate()
-        self._scratch = np.zeros((14, 3))
 
-    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
-        """Return the two angular rows across the axis; see `Task.evaluate`."""
-        out = self._out(out)
-        frame = state.frame(self.frame)
-        desired = self.trajectory.sample(state.t, self._desired)
-        _pointing(
+    def _bind(
+        self, frame: FrameKinematics, out: TaskSample
+    ) -> tuple[Follower, Callable[[], Any]]:
+        desired = OrientationSample.allocate()
+        write = bind(
+            _pointing,
             self.axis,
             self._across,
             frame.jacobian,
@@ -87,10 +88,10 @@ class Pointing(Task):
             *desired,
             self.Kp,
             self.Kv,
-            self._scratch,
+            np.zeros((14, 3)),
             *out,
         )
-        return out
+        return self.trajectory.follow(desired), write
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return the components of w_d across the axis [rad/s]."""

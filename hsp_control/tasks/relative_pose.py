@@ -9,6 +9,7 @@ from hsp_control.exceptions import TaskError
 from hsp_control.kernels import kernel
 from hsp_control.robot import Robot, RobotState
 from hsp_control.rotations import quaternion_from_rotation
+from hsp_control.tasks.frame_orientation import ORIENTATION_SCRATCH
 from hsp_control.tasks.frame_pose import pose_error_equation
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import Task, TaskSample, named_after
@@ -78,7 +79,6 @@ class RelativePose(Task):
         self.frame = frame
         self.reference = reference
         self.trajectory = trajectory
-        self._desired = PoseSample.allocate()
         nv = robot.nv
         self._relative = Relative(
             np.zeros((6, nv)),
@@ -87,24 +87,17 @@ class RelativePose(Task):
             np.zeros(3),
             np.zeros(6),
         )
-        self._scratch = np.zeros((8, 3))
-        self._matrices = np.zeros((3, 3, 3))
-        self._wanted = np.zeros(6)
+        desired = np.zeros((8, 3))
+        self._follow = trajectory.follow(PoseSample.over(desired))
+        self._desired = desired
+        self._scratch = np.zeros((ORIENTATION_SCRATCH, 3))
 
     def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
         """Return the six rows; see `Task.evaluate`."""
         out = self._out(out)
-        desired = self.trajectory.sample(state.t, self._desired)
+        self._follow(state.t)
         pose_error_equation(
-            *self._seen(state),
-            *desired.position,
-            *desired.orientation,
-            self.Kp,
-            self.Kv,
-            self._wanted,
-            self._scratch,
-            self._matrices,
-            *out,
+            *self._seen(state), self._desired, self.Kp, self.Kv, self._scratch, *out
         )
         return out
 

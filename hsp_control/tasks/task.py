@@ -110,10 +110,21 @@ def named_after(frame: str) -> str:
 
 
 @kernel
+def copy_rows(
+    J_frame: Array, J_frame_dot: Array, first: int, J: Array, J_dot: Array
+) -> None:
+    """Write J and J', which are rows of the frame's from ``first`` on."""
+    for i in range(J.shape[0]):
+        for j in range(J.shape[1]):
+            J[i, j] = J_frame[first + i, j]
+            J_dot[i, j] = J_frame_dot[first + i, j]
+
+
+@kernel
 def track(
     feed_forward: Array, Kp: Array, Kv: Array, e: Array, e_dot: Array, out: Array
 ) -> None:
-    """Write feed_forward + Kv e' + Kp e."""
+    """Write feed_forward + Kv e' + Kp e; ``out`` may be ``feed_forward``."""
     for i in range(e.shape[0]):
         total = feed_forward[i]
         for j in range(e.shape[0]):

@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
+from hsp_control.kernels import bind, kernel
 from hsp_control.trajectories import checks
+from hsp_control.trajectories.following import Follower, follow_blended
 from hsp_control.trajectories.timing import smooth_step
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
@@ -70,28 +71,37 @@ class Blend(Trajectory):
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
         """Return the point at time t; see `Trajectory.sample`."""
         out = self._output(out)
-        elapsed = t - self.start_time
-        if elapsed < 0.0:
-            out.position[:] = self.start
-            out.velocity.fill(0.0)
-            out.acceleration.fill(0.0)
-            return out
-        self.trajectory.sample(t, out)
-        if elapsed < self.duration:
-            _blend(elapsed, self.duration, self._begin, *out)
+        if t >= self.start_time:
+            self.trajectory.sample(t, out)
+        if t < self.start_time + self.duration:
+            _blend(self.start_time, self.duration, self._begin, *out, float(t))
         return out
+
+    def follow(self, out: TrajectorySample) -> Follower:
+        """Return the follower; see `Trajectory.follow`."""
+        start, end = self.start_time, self.start_time + self.duration
+        blend = bind(_blend, start, self.duration, self._begin, *out, free=(0.0,))
+        return follow_blended(self.trajectory, out, blend, start, end)
 
 
 @kernel
 def _blend(
-    elapsed: float,
+    start_time: float,
     duration: float,
     begin: Array,
     position: Array,
     velocity: Array,
     acceleration: Array,
+    t: float,
 ) -> None:
     """Blend the sample of x_d with the straight line of ``begin``, in place."""
+    elapsed = t - start_time
+    if elapsed < 0.0:
+        for i in range(position.size):
+            position[i], velocity[i], acceleration[i] = begin[0, i], 0.0, 0.0
+        return
+    if elapsed >= duration:
+        return
     s, s_dot, s_ddot = smooth_step(elapsed, 0.0, duration)
     for i in range(position.size):
         x, v = begin[0, i] + elapsed * begin[1, i], begin[1, i]

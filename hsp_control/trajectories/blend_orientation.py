@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
+from hsp_control.kernels import bind, kernel
 from hsp_control.rotations import (
     compose_back,
     cross,
@@ -16,6 +16,7 @@ from hsp_control.rotations import (
     turn,
 )
 from hsp_control.trajectories import checks
+from hsp_control.trajectories.following import Follower, follow_blended
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
@@ -99,33 +100,48 @@ class BlendOrientation(OrientationTrajectory):
         """Return the orientation at time t; see `OrientationTrajectory.sample`."""
         if out is None:
             out = OrientationSample.allocate()
-        elapsed = t - self.start_time
-        if elapsed < 0.0:
-            out.rotation[:] = self.start
-            out.angular_velocity.fill(0.0)
-            out.angular_acceleration.fill(0.0)
-            return out
-        self.trajectory.sample(t, out)
-        if elapsed < self.duration:
-            work = np.empty((11, 3))
-            _blend(elapsed, self.duration, self._coefficients, work, *out)
+        if t >= self.start_time:
+            self.trajectory.sample(t, out)
+        if t < self.start_time + self.duration:
+            _blend(*self._parameters(), *out, float(t))
         return out
+
+    def follow(self, out: OrientationSample) -> Follower:
+        """Return the follower; see `Trajectory.follow`."""
+        blend = bind(_blend, *self._parameters(), *out, free=(0.0,))
+        end = self.start_time + self.duration
+        return follow_blended(self.trajectory, out, blend, self.start_time, end)
+
+    def _parameters(self) -> tuple[float, float, Array, Array, Array]:
+        work = np.empty((11, 3))
+        return self.start_time, self.duration, self.start, self._coefficients, work
 
 
 @kernel
 def _blend(
-    elapsed: float,
+    start_time: float,
     duration: float,
+    start: Array,
     coefficients: Array,
     work: Array,
     rotation: Array,
     velocity: Array,
     acceleration: Array,
+    t: float,
 ) -> None:
     """Turn the sample of R_d on by exp(y), in place.
 
     ω = ω_d + R w and ω' = ω_d' + ω x R w + R w', where w = Jexp y' in the body frame.
     """
+    elapsed = t - start_time
+    if elapsed < 0.0:
+        for i in range(3):
+            velocity[i] = acceleration[i] = 0.0
+            for j in range(3):
+                rotation[i, j] = start[i, j]
+        return
+    if elapsed >= duration:
+        return
     y, y_dot, y_ddot = work[0], work[1], work[2]
     w, w_dot = work[3], work[4]
     J, J_dot = work[5:8], work[8:11]

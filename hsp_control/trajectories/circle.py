@@ -9,10 +9,11 @@ from hsp_control.arrays import Array
 from hsp_control.exceptions import TrajectoryError
 from hsp_control.kernels import kernel
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+from hsp_control.trajectories.following import Compiled, Kernel
+from hsp_control.trajectories.trajectory import Trajectory
 
 
-class Circle(Trajectory):
+class Circle(Compiled, Trajectory):
     """x(t) = c + r (cos θ u1 + sin θ u2), θ = ω t + θ0, for all t.
 
     The paper's (1 + cos 3t, 1 + sin 3t) is ``Circle([1, 1], 1, 3)``.
@@ -63,12 +64,8 @@ class Circle(Trajectory):
         """The number n of coordinates."""
         return len(self.center)
 
-    def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
-        """Return the point at time t; see `Trajectory.sample`."""
-        out = self._output(out)
-        angle = self.angular_rate * t + self.phase
-        _circle(angle, self.angular_rate, self.center, self._arms, *out)
-        return out
+    def _kernel(self) -> Kernel:
+        return _circle, (self.angular_rate, self.phase, self.center, self._arms)
 
 
 def _plane(
@@ -117,15 +114,16 @@ def _across(normal: Array, start: ArrayLike | None) -> Array:
 
 @kernel
 def _circle(
-    angle: float,
     rate: float,
+    phase: float,
     center: Array,
     arms: Array,
     position: Array,
     velocity: Array,
     acceleration: Array,
+    t: float,
 ) -> None:
-    cosine, sine = cos(angle), sin(angle)
+    cosine, sine = cos(rate * t + phase), sin(rate * t + phase)
     for i in range(center.size):
         outward = cosine * arms[0, i] + sine * arms[1, i]
         forward = cosine * arms[1, i] - sine * arms[0, i]

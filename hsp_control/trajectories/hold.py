@@ -3,6 +3,7 @@
 from numpy.typing import ArrayLike
 
 from hsp_control.trajectories import checks
+from hsp_control.trajectories.following import Follower, stay
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
@@ -31,3 +32,8 @@ class Hold(Trajectory):
         out.velocity.fill(0.0)
         out.acceleration.fill(0.0)
         return out
+
+    def follow(self, out: TrajectorySample) -> Follower:
+        """Write ``out`` once and for all; see `Trajectory.follow`."""
+        self.sample(0.0, out)
+        return stay

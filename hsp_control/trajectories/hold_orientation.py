@@ -3,6 +3,7 @@
 from numpy.typing import ArrayLike
 
 from hsp_control.trajectories import checks
+from hsp_control.trajectories.following import Follower, stay
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
@@ -32,3 +33,8 @@ class HoldOrientation(OrientationTrajectory):
         out.angular_velocity.fill(0.0)
         out.angular_acceleration.fill(0.0)
         return out
+
+    def follow(self, out: OrientationSample) -> Follower:
+        """Write ``out`` once and for all; see `Trajectory.follow`."""
+        self.sample(0.0, out)
+        return stay

@@ -8,10 +8,11 @@ from numpy.typing import ArrayLike
 from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+from hsp_control.trajectories.following import Compiled, Kernel
+from hsp_control.trajectories.trajectory import Trajectory
 
 
-class Lissajous(Trajectory):
+class Lissajous(Compiled, Trajectory):
     """x_i(t) = c_i + a_i sin(ω_i t + φ_i), for all t.
 
     Attributes:
@@ -54,16 +55,13 @@ class Lissajous(Trajectory):
         """The number n of coordinates."""
         return len(self.center)
 
-    def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
-        """Return the point at time t; see `Trajectory.sample`."""
-        out = self._output(out)
-        _lissajous(float(t), self._parameters, *out)
-        return out
+    def _kernel(self) -> Kernel:
+        return _lissajous, (self._parameters,)
 
 
 @kernel
 def _lissajous(
-    t: float, parameters: Array, position: Array, velocity: Array, acceleration: Array
+    parameters: Array, position: Array, velocity: Array, acceleration: Array, t: float
 ) -> None:
     for i in range(position.size):
         center, amplitude = parameters[0, i], parameters[1, i]

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.arrays import Array
+from hsp_control.trajectories.following import Follower, follow_by
 from hsp_control.trajectories.immutable import Immutable
 
 
@@ -48,3 +49,14 @@ class OrientationTrajectory(Immutable, ABC):
         Returns:
             ``out``, or the new sample.
         """
+
+    def follow(self, out: OrientationSample) -> Follower:
+        """Return a function of time that brings ``out`` up to a time.
+
+        See `Trajectory.follow`.
+        """
+        return follow_by(self.sample, out)
+
+    def _output(self, out: OrientationSample | None) -> OrientationSample:
+        """Return ``out``, or a new sample."""
+        return OrientationSample.allocate() if out is None else out

@@ -9,14 +9,12 @@ from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
 from hsp_control.rotations import compose_back, log3, rotate, turn
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.orientation import (
-    OrientationSample,
-    OrientationTrajectory,
-)
+from hsp_control.trajectories.following import Compiled, Kernel
+from hsp_control.trajectories.orientation import OrientationTrajectory
 from hsp_control.trajectories.timing import smooth_step
 
 
-class OrientationPath(OrientationTrajectory):
+class OrientationPath(Compiled, OrientationTrajectory):
     """R(t) = exp(s a_i) R_i between times t_i and t_{i+1}, s the `smooth_step`.
 
     a_i = R_i log(R_iᵀ R_{i+1}) is the shortest turn to the next waypoint, in the world
@@ -51,25 +49,19 @@ class OrientationPath(OrientationTrajectory):
             rotate(R[i], a, a)
         self._turns = turns
 
-    def sample(
-        self, t: float, out: OrientationSample | None = None
-    ) -> OrientationSample:
-        """Return the orientation at time t; see `OrientationTrajectory.sample`."""
-        if out is None:
-            out = OrientationSample.allocate()
-        _path(float(t), self.times, self.rotations, self._turns, *out)
-        return out
+    def _kernel(self) -> Kernel:
+        return _path, (self.times, self.rotations, self._turns)
 
 
 @kernel
 def _path(
-    t: float,
     times: Array,
     rotations: Array,
     turns: Array,
     rotation: Array,
     velocity: Array,
     acceleration: Array,
+    t: float,
 ) -> None:
     last = times.size - 1
     i = 0

@@ -6,11 +6,12 @@ from numpy.typing import ArrayLike
 from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
 from hsp_control.trajectories import checks
+from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.polynomial import horner
-from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+from hsp_control.trajectories.trajectory import Trajectory
 
 
-class PiecewisePolynomial(Trajectory):
+class PiecewisePolynomial(Compiled, Trajectory):
     """x(t) = Σ_k c_ik u^k with u = (t - t_i) / (t_{i+1} - t_i) between t_i and t_{i+1}.
 
     Before the first knot and after the last one the point is held exactly; how smooth
@@ -48,22 +49,19 @@ class PiecewisePolynomial(Trajectory):
         """The number n of coordinates."""
         return len(self.waypoints[0])
 
-    def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
-        """Return the point at time t; see `Trajectory.sample`."""
-        out = self._output(out)
-        _evaluate(float(t), self.times, self.waypoints, self._coefficients, *out)
-        return out
+    def _kernel(self) -> Kernel:
+        return _evaluate, (self.times, self.waypoints, self._coefficients)
 
 
 @kernel
 def _evaluate(
-    t: float,
     times: Array,
     waypoints: Array,
     coefficients: Array,
     position: Array,
     velocity: Array,
     acceleration: Array,
+    t: float,
 ) -> None:
     last = times.size - 1
     if t <= times[0] or t >= times[last]:

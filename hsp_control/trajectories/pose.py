@@ -3,7 +3,11 @@
 from abc import ABC, abstractmethod
 from typing import NamedTuple
 
+import numpy as np
+
+from hsp_control.arrays import Array
 from hsp_control.exceptions import TrajectoryError
+from hsp_control.trajectories.following import Follower, follow_all, follow_by
 from hsp_control.trajectories.immutable import Immutable
 from hsp_control.trajectories.orientation import (
     OrientationSample,
@@ -23,7 +27,15 @@ class PoseSample(NamedTuple):
     @classmethod
     def allocate(cls) -> "PoseSample":
         """Return a sample at the identity, to be written into."""
-        return cls(TrajectorySample.allocate(3), OrientationSample.allocate())
+        return cls.over(np.vstack([np.zeros((3, 3)), np.eye(3), np.zeros((2, 3))]))
+
+    @classmethod
+    def over(cls, memory: Array) -> "PoseSample":
+        """Return a sample that is one array of shape (8, 3): x, x', x'', R, ω, ω'."""
+        return cls(
+            TrajectorySample(memory[0], memory[1], memory[2]),
+            OrientationSample(memory[3:6], memory[6], memory[7]),
+        )
 
 
 class PoseTrajectory(Immutable, ABC):
@@ -43,6 +55,18 @@ class PoseTrajectory(Immutable, ABC):
         Returns:
             ``out``, or the new sample.
         """
+
+    def follow(self, out: PoseSample) -> Follower:
+        """Return a function of time that brings ``out`` up to a time.
+
+        See `Trajectory.follow`.
+        """
+
+        def sampler(t: float, own: tuple[Array, ...]) -> tuple[Array, ...]:
+            sample = self.sample(t, out)
+            return own if sample is out else (*sample.position, *sample.orientation)
+
+        return follow_by(sampler, (*out.position, *out.orientation))
 
 
 class ComposedPose(PoseTrajectory):
@@ -78,3 +102,10 @@ class ComposedPose(PoseTrajectory):
         self.position.sample(t, out.position)
         self.orientation.sample(t, out.orientation)
         return out
+
+    def follow(self, out: PoseSample) -> Follower:
+        """Return a function of time that brings ``out`` up to a time."""
+        return follow_all(
+            self.position.follow(out.position),
+            self.orientation.follow(out.orientation),
+        )

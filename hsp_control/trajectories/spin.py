@@ -6,13 +6,11 @@ from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
 from hsp_control.rotations import turn
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.orientation import (
-    OrientationSample,
-    OrientationTrajectory,
-)
+from hsp_control.trajectories.following import Compiled, Kernel
+from hsp_control.trajectories.orientation import OrientationTrajectory
 
 
-class Spin(OrientationTrajectory):
+class Spin(Compiled, OrientationTrajectory):
     """R(t) = exp(t ω) R0 with ω = rate · axis, for all t.
 
     Attributes:
@@ -36,24 +34,18 @@ class Spin(OrientationTrajectory):
         self.rate = checks.number(rate, "rate")
         self._angular_velocity = self.rate * self.axis
 
-    def sample(
-        self, t: float, out: OrientationSample | None = None
-    ) -> OrientationSample:
-        """Return the orientation at time t; see `OrientationTrajectory.sample`."""
-        if out is None:
-            out = OrientationSample.allocate()
-        _spin(float(t), self._angular_velocity, self.rotation, *out)
-        return out
+    def _kernel(self) -> Kernel:
+        return _spin, (self._angular_velocity, self.rotation)
 
 
 @kernel
 def _spin(
-    t: float,
     omega: Array,
     start: Array,
     rotation: Array,
     velocity: Array,
     acceleration: Array,
+    t: float,
 ) -> None:
     turn(start, omega, t, rotation)
     for i in range(3):

@@ -7,6 +7,7 @@ import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import ShapeError
+from hsp_control.trajectories.following import Follower, follow_by
 from hsp_control.trajectories.immutable import Immutable
 
 
@@ -53,6 +54,14 @@ class Trajectory(Immutable, ABC):
         Returns:
             ``out``, or the new sample.
         """
+
+    def follow(self, out: TrajectorySample) -> Follower:
+        """Return a function of time that brings ``out`` up to a time, as `sample` does.
+
+        For those who sample again and again: what does not change is decided here.
+        From now on nobody else may write into ``out``.
+        """
+        return follow_by(self.sample, out)
 
     def _output(self, out: TrajectorySample | None) -> TrajectorySample:
         """Return ``out`` if it fits, or a new sample.

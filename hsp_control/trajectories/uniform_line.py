@@ -5,10 +5,11 @@ from numpy.typing import ArrayLike
 from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+from hsp_control.trajectories.following import Compiled, Kernel
+from hsp_control.trajectories.trajectory import Trajectory
 
 
-class UniformLine(Trajectory):
+class UniformLine(Compiled, Trajectory):
     """x(t) = x0 + t v, for all t; `Line` is the one that starts and stops.
 
     Attributes:
@@ -28,21 +29,18 @@ class UniformLine(Trajectory):
         """The number n of coordinates."""
         return len(self.start)
 
-    def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
-        """Return the point at time t; see `Trajectory.sample`."""
-        out = self._output(out)
-        _line(float(t), self.start, self.velocity, *out)
-        return out
+    def _kernel(self) -> Kernel:
+        return _line, (self.start, self.velocity)
 
 
 @kernel
 def _line(
-    t: float,
     start: Array,
     constant_velocity: Array,
     position: Array,
     velocity: Array,
     acceleration: Array,
+    t: float,
 ) -> None:
     for i in range(position.size):
         position[i] = start[i] + t * constant_velocity[i]

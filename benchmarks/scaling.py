@@ -1,0 +1,375 @@
+"""How a step's cost grows with joints, tasks, fields and obstacles, TSID's beside it.
+
+    make bench          or          .venv-peers/bin/python benchmarks/scaling.py
+
+Each point is a median over interleaved rounds on one robot state after the other;
+t = a + b n^p is fitted to each series. Writes docs/speed.md and its figure. To add a
+series, write a function that yields (n, controllers) and name it in SERIES.
+"""
+
+import argparse
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import curve_fit
+from timing import Compute, State, step_times
+
+import hsp_control as hsp
+from hsp_control.arrays import Array
+from hsp_control.fields import (
+    InverseCondition,
+    JointCentering,
+    LimitBarrier,
+    Manipulability,
+    ObstacleClearance,
+    Rest,
+    TargetPosture,
+    Transmission,
+)
+from hsp_control.plots import new_figure, styled
+from hsp_control.shapes import Sphere
+from hsp_control.trajectories import TrajectorySample
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCUMENT, FIGURE = ROOT / "docs" / "speed.md", ROOT / "docs" / "figures" / "scaling.png"
+GAINS = hsp.Gains.from_frequency(10.0)
+HAND = "panda_tcp"
+
+Point = tuple[int, hsp.Robot, dict[str, Compute]]
+
+
+@dataclass
+class Law:
+    """This law, as a user would call it."""
+
+    controller: hsp.Controller
+
+    def __post_init__(self) -> None:
+        """Make the state that all steps share."""
+        self.state = hsp.RobotState(self.controller.robot)
+
+    def __call__(self, t: float, q: Array, v: Array) -> Array:
+        """Return the effort."""
+        return self.controller.compute(self.state.update(t, q, v)).tau
+
+
+# ------------------------------------------------------------------------- the series
+
+
+def joints() -> Iterator[Point]:
+    """A position of the tip of chains of ever more joints, posture beside it."""
+    for n in (3, 5, 7, 10, 14, 20, 28, 40):
+        robot = chain(n)
+        yield n, robot, beside_tsid(robot, [f"link{n}"])
+
+
+def tasks() -> Iterator[Point]:
+    """Ever more positions of a chain of 40 joints, three rows each."""
+    robot = chain(40)
+    for n in range(1, 7):
+        yield n, robot, beside_tsid(robot, [f"link{40 - 6 * k}" for k in range(n)])
+
+
+def fields() -> Iterator[Point]:
+    """A Panda's pose, and ever more fields."""
+    robot = hsp.Robot.load("panda")
+    ready: list[hsp.NullSpaceField] = [
+        JointCentering(robot),
+        LimitBarrier(robot),
+        TargetPosture(robot, robot.home()),
+        Manipulability(robot, HAND),
+        InverseCondition(robot, HAND),
+        Transmission(robot, HAND, [0.0, 0.0, 1.0]),
+    ]
+    for n in range(len(ready) + 1):
+        field: hsp.NullSpaceField = Rest(robot)
+        if n:
+            field = sum(ready[1:n], start=1.0 * ready[0])
+        yield n, robot, {"this law": Law(panda_pose(robot, field))}
+
+
+def obstacles() -> Iterator[Point]:
+    """A Panda's pose among ever more balls that move, one in five of them near."""
+    robot, rng = hsp.Robot.load("panda"), np.random.default_rng(0)
+    balls = []
+    for k in range(50):
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        away = 0.55 if k % 5 == 0 else 1.2
+        center = [away * np.cos(angle), away * np.sin(angle), rng.uniform(0.2, 0.9)]
+        path = hsp.Circle(center, 0.05, 1.0, normal=[0.0, 0.0, 1.0])
+        balls.append(hsp.Obstacle(f"ball{k}", Sphere(0.1), path))
+    posture = TargetPosture(robot, robot.home())
+    for n in (0, 1, 2, 5, 10, 20, 35, 50):
+        field: hsp.NullSpaceField = posture
+        if n:
+            field = posture + 0.05 * ObstacleClearance(robot, balls[:n])
+        yield n, robot, {"this law": Law(panda_pose(robot, field))}
+
+
+SERIES: dict[str, Callable[[], Iterator[Point]]] = {
+    "joints": joints,
+    "tasks": tasks,
+    "fields": fields,
+    "obstacles": obstacles,
+}
+
+
+# ---------------------------------------------------------------- robots, controllers
+
+
+def chain(n: int) -> hsp.Robot:
+    """Return an arm of n joints that turn about z, x and y by turns, 2 m long."""
+    length = 2.0 / n
+    text = '<robot name="chain"><link name="link0"/>'
+    for k in range(1, n + 1):
+        axis = ("0 1 0", "0 0 1", "1 0 0")[k % 3]
+        text += (
+            f'<joint name="joint{k}" type="revolute"><parent link="link{k - 1}"/>'
+            f'<child link="link{k}"/><origin xyz="0 0 {length}"/><axis xyz="{axis}"/>'
+            '<limit lower="-2.9" upper="2.9" effort="500" velocity="5"/></joint>'
+            f'<link name="link{k}"><inertial><mass value="{8.0 / n}"/>'
+            f'<origin xyz="0 0 {0.5 * length}"/><inertia ixx="0.02" iyy="0.02" '
+            'izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / f"chain{n}.urdf"
+        file.write_text(text + "</robot>")
+        return hsp.Robot.load(file)
+
+
+def bent(robot: hsp.Robot) -> Array:
+    """Return a posture far from singular."""
+    return robot.integrate(robot.neutral(), 0.3 * np.ones(robot.nv))
+
+
+def circles(robot: hsp.Robot, frames: list[str]) -> list[hsp.Circle]:
+    """Return a small circle through where each frame is."""
+    state = robot.state(0.0, bent(robot), np.zeros(robot.nv))
+    return [
+        hsp.Circle(state.position(frame), 0.05, 2.0, normal=[0.0, 0.0, 1.0])
+        for frame in frames
+    ]
+
+
+def beside_tsid(robot: hsp.Robot, frames: list[str]) -> dict[str, Compute]:
+    """Return this law and, where it is installed, TSID on positions of frames."""
+    paths = circles(robot, frames)
+    positions = [
+        hsp.FramePosition(robot, frame, path, GAINS)
+        for frame, path in zip(frames, paths, strict=True)
+    ]
+    posture = TargetPosture(robot, bent(robot))
+    controller = hsp.Controller(
+        robot,
+        positions,
+        posture,
+        null_space_gain=10.0,
+        singularity_threshold=0.01,  # what is compared is the law away from them
+    )
+    law = Law(controller)
+    found: dict[str, Compute] = {"this law": law}
+    with suppress(ImportError):
+        found["TSID"] = tsid_positions(robot, frames, paths)
+    return found
+
+
+def tsid_positions(
+    robot: hsp.Robot, frames: list[str], paths: list[hsp.Circle]
+) -> Compute:
+    """Return TSID: a masked pose task for each frame, posture, effort bounds."""
+    import tsid
+
+    model, nv, zero = robot.model, robot.nv, np.zeros(robot.nv)
+    wrapper = tsid.RobotWrapper(model, tsid.FIXED_BASE_SYSTEM, False)
+    problem = tsid.InverseDynamicsFormulationAccForce("tsid", wrapper, False)
+    problem.computeProblemData(0.0, bent(robot), zero)
+    positions, samples, wanted, followers = [], [], [], []
+    for frame, path in zip(frames, paths, strict=True):
+        task = tsid.TaskSE3Equality(frame, wrapper, frame)
+        task.useLocalFrame(False)
+        task.setKp(100.0 * np.ones(6))
+        task.setKd(20.0 * np.ones(6))
+        task.setMask(np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
+        problem.addMotionTask(task, 1.0, 1, 0.0)
+        positions.append(task)
+        samples.append(tsid.TrajectorySample(12, 6))
+        wanted.append(TrajectorySample.allocate(3))
+        followers.append(path.follow(wanted[-1]))
+    posture = tsid.TaskJointPosture("posture", wrapper)
+    posture.setKp(10.0 * np.ones(nv))
+    posture.setKd(11.0 * np.ones(nv))
+    problem.addMotionTask(posture, 1e-3, 1, 0.0)
+    bounds = tsid.TaskActuationBounds("effort", wrapper)
+    bounds.setBounds(-500.0 * np.ones(nv), 500.0 * np.ones(nv))
+    problem.addActuationTask(bounds, 1.0, 0, 0.0)
+    solver = tsid.SolverHQuadProgFast("qp")
+    solver.resize(problem.nVar, problem.nEq, problem.nIn)
+    still = tsid.TrajectorySample(nv)
+    still.value(bent(robot))
+    still.derivative(zero)
+    place = np.concatenate([np.zeros(3), np.eye(3).ravel()])
+    rate, rate_dot = np.zeros(6), np.zeros(6)
+
+    def compute(t: float, q: Array, v: Array) -> Array:
+        for task, sample, out, follow in zip(
+            positions, samples, wanted, followers, strict=True
+        ):
+            follow(t)
+            place[:3], rate[:3], rate_dot[:3] = out
+            sample.value(place)
+            sample.derivative(rate)
+            sample.second_derivative(rate_dot)
+            task.setReference(sample)
+        posture.setReference(still)
+        solution = solver.solve(problem.computeProblemData(t, q, v))
+        if solution.status != 0:
+            raise RuntimeError(f"TSID found no solution at t = {t:.4f} s")
+        return problem.getActuatorForces(solution)
+
+    compute.kept = (wrapper, positions, posture, bounds)  # type: ignore[attr-defined]
+    return compute
+
+
+def panda_pose(robot: hsp.Robot, field: hsp.NullSpaceField) -> hsp.Controller:
+    """Return the law for a pose of the hand and a field."""
+    frame = robot.state(0.0, robot.home(), np.zeros(robot.nv)).frame(HAND)
+    pose = hsp.ComposedPose(
+        hsp.Circle(frame.position, 0.05, 2.0, normal=[0.0, 0.0, 1.0]),
+        hsp.HoldOrientation(frame.rotation),
+    )
+    task = hsp.FramePose(robot, HAND, pose, GAINS)
+    return hsp.Controller(robot, [task], field, null_space_gain=10.0)
+
+
+# --------------------------------------------------------------------------- measuring
+
+
+def states(robot: hsp.Robot, count: int) -> list[State]:
+    """Return random states about the robot's home or bent posture."""
+    rng = np.random.default_rng(1)
+    start = bent(robot) if robot.name.startswith("chain") else robot.home()
+    return [
+        (
+            1e-3 * k,
+            robot.integrate(start, 0.05 * rng.standard_normal(robot.nv)),
+            0.1 * rng.standard_normal(robot.nv),
+        )
+        for k in range(count)
+    ]
+
+
+def measure(
+    series: Callable[[], Iterator[Point]], rounds: int, block: int
+) -> dict[str, Array]:
+    """Return for each controller rows of n, median, lower and upper quartile [µs]."""
+    found: dict[str, list[tuple[float, ...]]] = {}
+    for n, robot, controllers in series():
+        path = states(robot, 5 * block)
+        times = step_times(controllers, path, rounds, block, warm_up=block)
+        for name, taken in times.items():
+            low, middle, high = 1e6 * np.quantile(taken, [0.25, 0.5, 0.75])
+            found.setdefault(name, []).append((n, middle, low, high))
+            print(f"  {n:3d}  {name}: {middle:.1f} us", flush=True)
+    return {name: np.array(rows) for name, rows in found.items()}
+
+
+def growth(rows: Array) -> tuple[float, float, float]:
+    """Return a, b and p of the fitted t = a + b n^p."""
+    n, t = rows[:, 0], rows[:, 1]
+    start = (t[0], max((t[-1] - t[0]) / n[-1], 1e-3), 1.0)
+    bounds = ([0.0, 0.0, 0.3], [np.inf, np.inf, 3.0])
+    (a, b, p), _ = curve_fit(_growth, n, t, start, bounds=bounds, sigma=t)
+    return float(a), float(b), float(p)
+
+
+def _growth(n: Array, a: float, b: float, p: float) -> Array:
+    return a + b * n**p
+
+
+# ---------------------------------------------------------------------------- writing
+
+TEXT = """\
+# How the cost of a step grows
+
+Written by `make bench` (`benchmarks/scaling.py`); do not edit.
+
+One `RobotState.update` and one `Controller.compute` [µs], medians over {rounds}
+interleaved rounds of {block} steps on one core, and the fitted t = a + b nᵖ. Ratios
+carry over to another machine, microseconds do not.
+
+![Time of a step against joints, tasks, fields and obstacles](figures/scaling.png)
+
+"""
+ABOUT = {
+    "joints": "A position task (3 rows) at the tip of a chain, posture beside it",
+    "tasks": "Positions of a chain of 40 joints, 3 rows each, posture beside them",
+    "fields": "A Panda's pose; centering, limit barrier, posture, manipulability, "
+    "inverse condition and transmission, in this order",
+    "obstacles": "A Panda's pose, posture, and moving balls against its 12 capsules",
+}
+
+
+def table(what: str, found: dict[str, Array]) -> str:
+    """Return a series as a table with its fits."""
+    first = next(iter(found.values()))
+    head = "".join(f" {n:.0f} |" for n in first[:, 0])
+    text = f"## {what.capitalize()}\n\n{ABOUT.get(what, '')}.\n\n| |{head} fit |\n|---|"
+    text += (len(first) + 1) * "--:|" + "\n"
+    for name, rows in found.items():
+        a, b, p = growth(rows)
+        cells = "".join(f" {t:.1f} |" for t in rows[:, 1])
+        text += f"| {name} |{cells} {a:.1f} + {b:.2g} n^{p:.2f} |\n"
+    if len(found) == 2:
+        ratio = found["this law"][:, 1] / found["TSID"][:, 1]
+        text += "| ratio |" + "".join(f" {r:.2f} |" for r in ratio) + " |\n"
+    return text + "\n"
+
+
+def draw(everything: dict[str, dict[str, Array]]) -> None:
+    """Write the figure: one panel a series."""
+    with styled():
+        figure = new_figure(2.6 * len(everything), 2.6)
+        panels = figure.subplots(1, len(everything), squeeze=False)[0]
+        for axes, (what, found) in zip(panels, everything.items(), strict=True):
+            for name, rows in found.items():
+                (line,) = axes.plot(rows[:, 0], rows[:, 1], "o", ms=3.5)
+                n = np.linspace(rows[0, 0], rows[-1, 0], 100)
+                a, b, p = growth(rows)
+                label = f"{name}: ∝ n$^{{{p:.1f}}}$"
+                curve = a + b * n**p
+                axes.plot(n, curve, color=line.get_color(), lw=1.2, label=label)
+                axes.fill_between(
+                    rows[:, 0],
+                    rows[:, 2],
+                    rows[:, 3],
+                    color=line.get_color(),
+                    alpha=0.2,
+                )
+            axes.set(xlabel=what, ylim=(0.0, None))
+            axes.legend(loc="upper left")
+        panels[0].set_ylabel("one step [µs]")
+        figure.savefig(FIGURE, dpi=130)
+
+
+def main() -> None:
+    """Measure every series, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=21, help="rounds of timing")
+    parser.add_argument("--block", type=int, default=100, help="steps in a round")
+    options = parser.parse_args()
+    everything = {}
+    for what, series in SERIES.items():
+        print(what, flush=True)
+        everything[what] = measure(series, options.rounds, options.block)
+    text = TEXT.format(rounds=options.rounds, block=options.block)
+    tables = [table(what, found) for what, found in everything.items()]
+    DOCUMENT.write_text(text + "".join(tables))
+    draw(everything)
+
+
+if __name__ == "__main__":
+    main()

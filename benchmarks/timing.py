@@ -1,0 +1,55 @@
+"""Interleaved timing: what else the machine does shall hit all controllers alike."""
+
+import gc
+from collections.abc import Callable, Sequence
+from time import perf_counter_ns
+from typing import Any
+
+import numpy as np
+
+State = tuple[float, Any, Any]
+Compute = Callable[[float, Any, Any], Any]
+
+
+def step_times(
+    controllers: dict[str, Compute],
+    states: Sequence[State],
+    rounds: int,
+    block: int,
+    warm_up: int = 20,
+) -> dict[str, Any]:
+    """Return the median time of a step [s] in each round, shape (rounds,).
+
+    Every round gives each controller the same block of consecutive states, in turn and
+    in an order that rotates.
+    """
+    for compute in controllers.values():
+        for t, q, v in states[:warm_up]:
+            compute(t, q, v)
+    names = list(controllers)
+    times = {name: np.zeros(rounds) for name in names}
+    gc.collect()
+    gc.disable()
+    for k in range(rounds):
+        begin = warm_up + (k * block) % (len(states) - warm_up - block + 1)
+        chosen = states[begin : begin + block]
+        for name in names[k % len(names) :] + names[: k % len(names)]:
+            compute, taken = controllers[name], np.zeros(block)
+            for i, (t, q, v) in enumerate(chosen):
+                started = perf_counter_ns()
+                compute(t, q, v)
+                taken[i] = perf_counter_ns() - started
+            times[name][k] = 1e-9 * np.median(taken)
+    gc.enable()
+    return times
+
+
+def ratios(times: dict[str, Any], name: str, reference: str) -> Any:
+    """Return the quartiles of the rounds' ratios, shape (3,)."""
+    return np.quantile(times[name] / times[reference], [0.25, 0.5, 0.75])
+
+
+def spread(quartiles: Any) -> str:
+    """Return a median with its quartiles as a table shows them."""
+    low, middle, high = quartiles
+    return f"{middle:.2f} ({low:.2f} to {high:.2f})"

@@ -1,0 +1,128 @@
+"""Distances of pairs that have no formula: meshes, hulls, clouds (by Coal)."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.arrays import Array, Indices
+from hsp_control.geometry.links import LinkShape
+from hsp_control.kernels import kernel
+from hsp_control.kinematics import joint_support
+from hsp_control.robot import Robot, RobotState
+from hsp_control.scene import Obstacle
+
+GJK_TOLERANCE = 1e-10
+"""Coal's own is 1e-6, too coarse for the rates of gradients."""
+
+
+class ByCoal:
+    """Distances of such pairs at one state, and sums of their gradients."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        links: Sequence[LinkShape],
+        obstacles: Sequence[Obstacle],
+        pairs: Indices,
+        places: Indices,
+    ) -> None:
+        """Prepare; see `ClosedForm` for the arguments."""
+        self._robot, self._obstacles = robot, tuple(obstacles)
+        self._first_obstacle = len(links)
+        self._pairs, self.places = pairs, places
+        self._geometry = pin.GeometryModel()
+        for i, link in enumerate(links):
+            self._add(f"link {i}", link.joint, link.placement, link.geometry)
+        for obstacle in obstacles:
+            shape = obstacle.shape.geometry()
+            self._add(obstacle.name, 0, obstacle.placement(0.0), shape)
+        for first, second in pairs.tolist():
+            self._geometry.addCollisionPair(pin.CollisionPair(first, second))
+        self._data = pin.GeometryData(self._geometry)
+        for request in self._data.distanceRequests:
+            request.gjk_tolerance = GJK_TOLERANCE
+            request.epa_tolerance = GJK_TOLERANCE
+        self._results = list(self._data.distanceResults)  # references: they follow
+        self._reversed = frozenset(
+            k
+            for k, second in enumerate(pairs[:, 1].tolist())
+            if second >= len(links) and obstacles[second - len(links)].shape.reversed
+        )
+        joints = [link.joint for link in links] + [0] * len(obstacles)
+        support = {joint: joint_support(robot.model, joint) for joint in set(joints)}
+        self._supports = [
+            (*support[joints[first]], *support[joints[second]])
+            for first, second in pairs.tolist()
+        ]
+
+    def measure(self, state: RobotState, distances: Array) -> None:
+        """Write the distances, each in its place."""
+        items = self._geometry.geometryObjects
+        for index, obstacle in enumerate(self._obstacles, start=self._first_obstacle):
+            items[index].placement = obstacle.placement(state.t)
+        pin.updateGeometryPlacements(
+            self._robot.model, state.data, self._geometry, self._data
+        )
+        pin.computeDistances(self._geometry, self._data)
+        distances[self.places] = [result.min_distance for result in self._results]
+
+    def witness(self, k: int) -> tuple[Array, Array, Array]:
+        """Return the points on both shapes, and the normal from first to second.
+
+        Read when asked for: few pairs are near enough.
+        """
+        result = self._results[k]
+        first, second = result.getNearestPoint1(), result.getNearestPoint2()
+        if k in self._reversed:
+            return second, first, -result.normal
+        return first, second, result.normal
+
+    def add_gradient(self, state: RobotState, slopes: Array, gradient: Array) -> None:
+        """Add Σ b'(d_k) ∇d_k, after `measure` at the same state.
+
+        Args:
+            state: The robot's state.
+            slopes: b' of all pairs of the `Proximity`; those of slope 0 cost nothing.
+            gradient: Is added to, shape (nv,).
+        """
+        own = slopes[self.places]
+        J = state.world.jacobian
+        for k in np.flatnonzero(own).tolist():
+            columns, freedoms, columns2, freedoms2 = self._supports[k]
+            first, second, normal = self.witness(k)
+            force = -own[k] * normal
+            _push(J, columns, freedoms, first, force, gradient)
+            if len(columns2):
+                _push(J, columns2, freedoms2, second, -force, gradient)
+
+    def _add(self, name: str, joint: int, placement: pin.SE3, geometry: Any) -> None:
+        self._geometry.addGeometryObject(
+            pin.GeometryObject(name, joint, placement, geometry)
+        )
+
+
+@kernel
+def _push(
+    J_world: Array,
+    columns: Indices,
+    freedoms: Indices,
+    point: Array,
+    force: Array,
+    out: Array,
+) -> None:
+    """Add J(point)ᵀ force, J the linear Jacobian of a point of the supporting joint."""
+    mx = point[1] * force[2] - point[2] * force[1]
+    my = point[2] * force[0] - point[0] * force[2]
+    mz = point[0] * force[1] - point[1] * force[0]
+    for k in range(columns.shape[0]):
+        c = columns[k]
+        out[freedoms[k]] += (
+            J_world[0, c] * force[0]
+            + J_world[1, c] * force[1]
+            + J_world[2, c] * force[2]
+            + J_world[3, c] * mx
+            + J_world[4, c] * my
+            + J_world[5, c] * mz
+        )

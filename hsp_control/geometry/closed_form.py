@@ -1,0 +1,523 @@
+"""Pairs whose distance is a formula, with its gradient's exact rate, by kernels.
+
+A link is a ball or a capsule: a segment that its joint carries, grown by a radius. The
+other is such a link, an obstacle that is one, or, before a ball, a solid.
+
+With x and y the nearest points of the two cores and n = (x - y)/|x - y|,
+
+    ∇d = J_xᵀ n - J_yᵀ n,    d' = n · (x' - y'),
+
+x' and y' with the nearest points' own sliding. The column (l, w) of a joint at the
+world's origin gives l·n + w·(x × n), whose rate is a matter of the product rule.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import coal
+import numpy as np
+
+from hsp_control.arrays import Array, Indices
+from hsp_control.geometry.links import LinkShape
+from hsp_control.geometry.signed_distance import (
+    BOX,
+    CYLINDER,
+    HALF_SPACE,
+    SEGMENT,
+    direction,
+    distance_to_solid,
+    nearest_on_segments,
+    nearest_rates,
+)
+from hsp_control.kernels import bind, kernel
+from hsp_control.kinematics import joint_support
+from hsp_control.robot import Robot, RobotState
+from hsp_control.rotations import cross, rotate, rotate_back
+from hsp_control.scene import Obstacle
+from hsp_control.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
+from hsp_control.trajectories.following import Follower, stay
+
+MOTION = 18
+"""Numbers that say how an obstacle is and moves: R, c, c', ω; see `Obstacle.follow`."""
+
+
+def has_closed_form(first: LinkShape, second: LinkShape | Obstacle) -> bool:
+    """Return whether the distance of a link to another thing is a formula."""
+    if not isinstance(first.geometry, coal.Sphere | coal.Capsule):
+        return False
+    if isinstance(second, LinkShape):
+        return isinstance(second.geometry, coal.Sphere | coal.Capsule)
+    if isinstance(second.shape, Sphere | Capsule):
+        return True
+    ball = isinstance(first.geometry, coal.Sphere)
+    return ball and isinstance(second.shape, Box | Cylinder | HalfSpace)
+
+
+_Derived = tuple[RobotState, Array, Array, Array, Array, Callable[[], Any]]
+
+
+class ClosedForm:
+    """Distances of such pairs at one state, and sums of their gradients."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        links: Sequence[LinkShape],
+        obstacles: Sequence[Obstacle],
+        pairs: Indices,
+        places: Indices,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            robot: The robot.
+            links: Shapes of its links.
+            obstacles: Obstacles.
+            pairs: Indices into links followed by obstacles, shape (k, 2).
+            places: Where each pair stands among all of a `Proximity`, shape (k,).
+        """
+        self._pairs, self._places = pairs, places
+        used = np.unique(pairs)
+        self._motion = np.zeros((len(obstacles), MOTION))
+        followers = [
+            obstacle.follow(self._motion[k])
+            for k, obstacle in enumerate(obstacles)
+            if len(links) + k in used
+        ]
+        self._moving: list[Follower] = [f for f in followers if f is not stay]
+        solids = [_obstacle(obstacle.shape) for obstacle in obstacles]
+        rows = [_link(link) for link in links] + [row for _, row in solids]
+        self._sizes = np.array(rows).reshape(-1, 7)
+        supports = {i: joint_support(robot.model, i) for i in {x.joint for x in links}}
+        self._kinds: Indices = np.zeros((len(rows), 4), dtype=np.int64)
+        columns, freedoms, end = [], [], 0
+        for i, link in enumerate(links):
+            own_columns, own_freedoms = supports[link.joint]
+            columns.append(own_columns)
+            freedoms.append(own_freedoms)
+            self._kinds[i] = SEGMENT, link.joint, end, end + len(own_columns)
+            end += len(own_columns)
+        for k, (kind, _) in enumerate(solids):
+            self._kinds[len(links) + k] = kind, -1 - k, 0, 0
+        self._columns = np.concatenate(columns)
+        self._freedoms = np.concatenate(freedoms)
+        self._used: Indices = used[self._kinds[used, 0] == SEGMENT]
+        self._segments = np.zeros((len(rows), 2, 3))
+        self._cores = np.zeros((len(pairs), 3, 3))
+        self._scratch = np.zeros((40, 3))
+        self._measured: tuple[RobotState, Array, Callable[[], Any]] | None = None
+        self._derived: _Derived | None = None
+
+    def measure(self, state: RobotState, distances: Array) -> None:
+        """Write the distances, each in its place."""
+        for follower in self._moving:
+            follower(state.t)
+        bound = self._measured
+        if bound is None or bound[0] is not state or bound[1] is not distances:
+            measure = bind(
+                _measure,
+                state.world.placements,
+                self._motion,
+                self._kinds,
+                self._sizes,
+                self._used,
+                self._pairs,
+                self._places,
+                self._segments,
+                self._cores,
+                self._scratch,
+                distances,
+            )
+            self._measured = bound = state, distances, measure
+        bound[2]()
+
+    def witness(self, k: int) -> tuple[Array, Array, Array]:
+        """Return the points on both shapes, and the normal from first to second."""
+        x, y, n = self._cores[k]
+        first, second = self._sizes[self._pairs[k], 6]
+        return x - first * n, y + second * n, -n
+
+    def differentiate(
+        self,
+        state: RobotState,
+        slopes: Array,
+        bends: Array,
+        gradient: Array,
+        rate: Array,
+    ) -> None:
+        """Write Σ b'(d_k) ∇d_k and its exact rate, after `measure` at the same state.
+
+        Args:
+            state: The robot's state.
+            slopes: b' of all pairs of the `Proximity`.
+            bends: b'' of them.
+            gradient: Where to write, shape (nv,).
+            rate: Where to write, shape (nv,).
+        """
+        bound = self._derived
+        if (
+            bound is None
+            or bound[0] is not state
+            or bound[1] is not slopes
+            or bound[2] is not bends
+            or bound[3] is not gradient
+            or bound[4] is not rate
+        ):
+            world = state.world
+            differentiate = bind(
+                _differentiate,
+                world.jacobian,
+                world.jacobian_dot,
+                world.v,
+                self._motion,
+                self._kinds,
+                self._sizes,
+                self._columns,
+                self._freedoms,
+                self._pairs,
+                self._places,
+                self._segments,
+                self._scratch,
+                slopes,
+                bends,
+                gradient,
+                rate,
+            )
+            self._derived = bound = state, slopes, bends, gradient, rate, differentiate
+        bound[5]()
+
+
+def _link(link: LinkShape) -> list[float]:
+    """Return a link's segment in its joint's frame (start, axis), and its radius."""
+    half = getattr(link.geometry, "halfLength", 0.0)
+    axis = half * link.placement.rotation[:, 2]
+    center = link.placement.translation
+    radius = getattr(link.geometry, "radius", 0.0)
+    return [*(center - axis), *(2.0 * axis), radius]
+
+
+def _obstacle(shape: Shape) -> tuple[int, list[float]]:
+    """Return an obstacle's kind and, in its own frame, its segment or size."""
+    if isinstance(shape, Sphere):
+        return SEGMENT, [0.0] * 6 + [shape.radius]
+    if isinstance(shape, Capsule):
+        half = 0.5 * shape.length
+        return SEGMENT, [0.0, 0.0, -half, 0.0, 0.0, shape.length, shape.radius]
+    if isinstance(shape, Box):
+        return BOX, [*(0.5 * edge for edge in shape.size), 0.0, 0.0, 0.0, 0.0]
+    if isinstance(shape, Cylinder):
+        size = [shape.radius, shape.radius, 0.5 * shape.length]
+        return CYLINDER, [*size, 0.0, 0.0, 0.0, 0.0]
+    return HALF_SPACE, [0.0] * 7
+
+
+@kernel
+def _measure(
+    placements: Array,
+    motion: Array,
+    kinds: Indices,
+    sizes: Array,
+    used: Indices,
+    pairs: Indices,
+    places: Indices,
+    segments: Array,
+    cores: Array,
+    scratch: Array,
+    distances: Array,
+) -> None:
+    """Bring all segments into the world, write distances and (x, y, n) of each pair."""
+    for k in range(used.shape[0]):
+        i = used[k]
+        _place(placements, motion, sizes, i, kinds[i, 1], segments)
+    local, H = scratch[0], scratch[1:4]
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        core = cores[k]
+        if kinds[j, 0] == SEGMENT:
+            s, t, _, _ = nearest_on_segments(segments, i, j)
+            for a in range(3):
+                core[0, a] = segments[i, 0, a] + s * segments[i, 1, a]
+                core[1, a] = segments[j, 0, a] + t * segments[j, 1, a]
+            distances[places[k]] = direction(core) - sizes[i, 6] - sizes[j, 6]
+        else:
+            x, n, moving = segments[i, 0], core[2], motion[-1 - kinds[j, 1]]
+            apart = _to_solid(kinds[j, 0], sizes[j], moving, x, local, H, n)
+            for a in range(3):
+                core[0, a] = x[a]
+                core[1, a] = x[a] - apart * n[a]
+            distances[places[k]] = apart - sizes[i, 6]
+
+
+@kernel
+def _place(
+    placements: Array, motion: Array, sizes: Array, i: int, joint: int, segments: Array
+) -> None:
+    """Write a segment's start and axis in the world; a ball has no axis."""
+    for a in range(3):
+        start = axis = 0.0
+        if joint >= 0:  # Pinocchio's rotations lie column by column
+            for b in range(3):
+                start += placements[joint, 3 * b + a] * sizes[i, b]
+                axis += placements[joint, 3 * b + a] * sizes[i, 3 + b]
+            start += placements[joint, 9 + a]
+        else:
+            for b in range(3):
+                start += motion[-1 - joint, 3 * a + b] * sizes[i, b]
+                axis += motion[-1 - joint, 3 * a + b] * sizes[i, 3 + b]
+            start += motion[-1 - joint, 9 + a]
+        segments[i, 0, a] = start
+        segments[i, 1, a] = axis
+
+
+@kernel
+def _to_solid(
+    kind: int,
+    size: Array,
+    motion: Array,
+    x: Array,
+    local: Array,
+    H: Array,
+    n: Array,
+) -> float:
+    """Return the distance of a point in the world to a solid, write its world normal.
+
+    H is written in the solid's own axes.
+    """
+    R = motion[:9].reshape(3, 3)
+    for a in range(3):
+        local[a] = x[a] - motion[9 + a]
+    rotate_back(R, local, local)
+    apart = distance_to_solid(kind, size, local, n, H)
+    rotate(R, n, n)
+    return apart
+
+
+@kernel
+def _differentiate(
+    J: Array,
+    J_dot: Array,
+    v: Array,
+    motion: Array,
+    kinds: Indices,
+    sizes: Array,
+    columns: Indices,
+    freedoms: Indices,
+    pairs: Indices,
+    places: Indices,
+    segments: Array,
+    scratch: Array,
+    slopes: Array,
+    bends: Array,
+    gradient: Array,
+    rate: Array,
+) -> None:
+    """Write Σ b' ∇d and Σ (b'' d' ∇d + b' (∇d)'); far pairs cost nothing."""
+    for p in range(gradient.shape[0]):
+        gradient[p] = rate[p] = 0.0
+    core, core_dot = scratch[0:3], scratch[3:6]  # x, y and n
+    x, y, n, x_dot, y_dot, n_dot = (
+        scratch[0],
+        scratch[1],
+        scratch[2],
+        scratch[3],
+        scratch[4],
+        scratch[5],
+    )
+    ours, theirs = scratch[6:8], scratch[8:10]  # twists at the world's origin
+    work = scratch[10:]
+    for k in range(pairs.shape[0]):
+        slope, bend = slopes[places[k]], bends[places[k]]
+        if slope == 0.0 and bend == 0.0:
+            continue
+        i, j = pairs[k, 0], pairs[k, 1]
+        _twist(J, v, motion, kinds, i, columns, freedoms, ours)
+        _twist(J, v, motion, kinds, j, columns, freedoms, theirs)
+        if kinds[j, 0] == SEGMENT:
+            _between_segments(segments, i, j, ours, theirs, work, core, core_dot)
+        else:
+            size, moving = sizes[j], motion[-1 - kinds[j, 1]]
+            center, kind = segments[i, 0], kinds[j, 0]
+            _to_moving_solid(
+                kind, size, moving, center, ours, theirs, work, core, core_dot
+            )
+        nearing = 0.0
+        for a in range(3):
+            nearing += n[a] * (x_dot[a] - y_dot[a])
+        # The force b' n and its rate, on one and, the other way round, on the other.
+        for a in range(3):
+            n_dot[a] = slope * n_dot[a] + bend * nearing * n[a]
+            n[a] *= slope
+        _push(
+            J,
+            J_dot,
+            kinds,
+            i,
+            columns,
+            freedoms,
+            x,
+            x_dot,
+            n,
+            n_dot,
+            work,
+            gradient,
+            rate,
+        )
+        if kinds[j, 1] >= 0:
+            for a in range(3):
+                n[a], n_dot[a] = -n[a], -n_dot[a]
+            _push(
+                J,
+                J_dot,
+                kinds,
+                j,
+                columns,
+                freedoms,
+                y,
+                y_dot,
+                n,
+                n_dot,
+                work,
+                gradient,
+                rate,
+            )
+
+
+@kernel
+def _twist(
+    J: Array,
+    v: Array,
+    motion: Array,
+    kinds: Indices,
+    i: int,
+    columns: Indices,
+    freedoms: Indices,
+    twist: Array,
+) -> None:
+    """Write the velocity of the point at the world's origin, and the angular one."""
+    for a in range(3):
+        twist[0, a] = twist[1, a] = 0.0
+    for p in range(kinds[i, 2], kinds[i, 3]):
+        for a in range(3):
+            twist[0, a] += J[a, columns[p]] * v[freedoms[p]]
+            twist[1, a] += J[3 + a, columns[p]] * v[freedoms[p]]
+    if kinds[i, 1] < 0:
+        own = motion[-1 - kinds[i, 1]]
+        for a in range(3):
+            twist[1, a] = own[15 + a]
+        cross(own[9:12], twist[1], twist[0])
+        for a in range(3):
+            twist[0, a] += own[12 + a]
+
+
+@kernel
+def _velocity(twist: Array, x: Array, out: Array) -> None:
+    """Write the velocity of the body's point that is at x."""
+    cross(twist[1], x, out)
+    for a in range(3):
+        out[a] += twist[0, a]
+
+
+@kernel
+def _between_segments(
+    segments: Array,
+    i: int,
+    j: int,
+    ours: Array,
+    theirs: Array,
+    work: Array,
+    core: Array,
+    core_dot: Array,
+) -> None:
+    """Write the nearest points and the normal, with their rates."""
+    a, e, b, f = segments[i, 0], segments[i, 1], segments[j, 0], segments[j, 1]
+    a_dot, e_dot, b_dot, f_dot = work[0], work[1], work[2], work[3]
+    _velocity(ours, a, a_dot)
+    _velocity(theirs, b, b_dot)
+    cross(ours[1], e, e_dot)
+    cross(theirs[1], f, f_dot)
+    s, t, s_free, t_free = nearest_on_segments(segments, i, j)
+    s_dot, t_dot = nearest_rates(
+        a, a_dot, e, e_dot, b, b_dot, f, f_dot, s, t, s_free, t_free
+    )
+    for c in range(3):
+        core[0, c] = a[c] + s * e[c]
+        core[1, c] = b[c] + t * f[c]
+        core_dot[0, c] = a_dot[c] + s * e_dot[c] + s_dot * e[c]
+        core_dot[1, c] = b_dot[c] + t * f_dot[c] + t_dot * f[c]
+        core_dot[2, c] = 0.0
+    distance = direction(core)
+    if distance > 0.0:
+        along = 0.0
+        for c in range(3):
+            along += core[2, c] * (core_dot[0, c] - core_dot[1, c])
+        for c in range(3):
+            change = core_dot[0, c] - core_dot[1, c] - along * core[2, c]
+            core_dot[2, c] = change / distance
+
+
+@kernel
+def _to_moving_solid(
+    kind: int,
+    size: Array,
+    motion: Array,
+    center: Array,
+    ours: Array,
+    theirs: Array,
+    work: Array,
+    core: Array,
+    core_dot: Array,
+) -> None:
+    """Write the ball's centre, the solid's velocity there and the normal, with rates.
+
+    In the solid's axes the normal is ∇D of the point, so that n' = ω × n + R H Rᵀ(x' -
+    y') with y' the velocity of the solid's own point at x.
+    """
+    local, bent, H = work[0], work[1], work[2:5]
+    n, x_dot, y_dot, n_dot = core[2], core_dot[0], core_dot[1], core_dot[2]
+    _to_solid(kind, size, motion, center, local, H, n)
+    _velocity(ours, center, x_dot)
+    _velocity(theirs, center, y_dot)
+    R = motion[:9].reshape(3, 3)
+    for a in range(3):
+        core[0, a] = center[a]
+        local[a] = x_dot[a] - y_dot[a]
+    rotate_back(R, local, local)
+    rotate(H, local, bent)
+    rotate(R, bent, bent)
+    cross(theirs[1], n, n_dot)
+    for a in range(3):
+        n_dot[a] += bent[a]
+
+
+@kernel
+def _push(
+    J: Array,
+    J_dot: Array,
+    kinds: Indices,
+    i: int,
+    columns: Indices,
+    freedoms: Indices,
+    x: Array,
+    x_dot: Array,
+    force: Array,
+    force_dot: Array,
+    work: Array,
+    gradient: Array,
+    rate: Array,
+) -> None:
+    """Add J(x)ᵀ force and its rate, J the linear Jacobian of a point of a link."""
+    moment, moment_dot, turned = work[0], work[1], work[2]
+    cross(x, force, moment)
+    cross(x_dot, force, moment_dot)
+    cross(x, force_dot, turned)
+    for a in range(3):
+        moment_dot[a] += turned[a]
+    for p in range(kinds[i, 2], kinds[i, 3]):
+        c = columns[p]
+        change = change_dot = 0.0
+        for a in range(3):
+            change += J[a, c] * force[a] + J[3 + a, c] * moment[a]
+            change_dot += J_dot[a, c] * force[a] + J_dot[3 + a, c] * moment[a]
+            change_dot += J[a, c] * force_dot[a] + J[3 + a, c] * moment_dot[a]
+        gradient[freedoms[p]] += change
+        rate[freedoms[p]] += change_dot
