@@ -36,6 +36,7 @@ from .fields import Uncontrolled as Uncontrolled
 from .fields import VectorField as VectorField
 from .fields import WeightedSum as WeightedSum
 from .limits import Limits as Limits
+from .limits import MinimumDistance as MinimumDistance
 from .loading import ToolFrame as ToolFrame
 from .metrics import ConstantMetric as ConstantMetric
 from .metrics import IdentityMetric as IdentityMetric

@@ -19,10 +19,15 @@ from hsp_control import (
     JointCentering,
     JointPosture,
     Limits,
+    Lissajous,
+    MinimumDistance,
+    Obstacle,
+    ObstacleClearance,
     Rk4,
     Robot,
     RobotState,
     Rollout,
+    Sphere,
     simulate,
 )
 from hsp_control.actuation import EXACT, LIMITED
@@ -329,3 +334,79 @@ def test_hold_with_limits_is_still_the_paper() -> None:
     task = FramePosition(robot, "panda_tcp", Hold(here), Gains.from_frequency(10.0))
     rollout = run(Controller(robot, [task], limits=Limits(robot)), robot.home(), 0.2)
     assert not rollout["status"].any()
+
+
+# --- distances -----------------------------------------------------------------------
+
+
+def swinging() -> Obstacle:
+    """Return a ball that comes into the arm's elbow and goes again."""
+    robot = panda()
+    elbow = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_link4")
+    center = elbow + np.array([0.0, 0.35, 0.0])
+    path = Lissajous(center, [0.0, 0.28, 0.0], [1.0, 2.0, 1.0], [0.0, 3.14, 0.0])
+    return Obstacle("ball", Sphere(0.08), path)
+
+
+def elbow(limits: Limits | None) -> Controller:
+    robot = panda()
+    here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
+    task = FramePosition(
+        robot, "panda_tcp", Hold(here), Gains.from_frequency(10.0), name="hand"
+    )
+    return Controller(
+        robot, [task], JointCentering(robot), null_space_gain=6.0, limits=limits
+    )
+
+
+def test_distance_rows_are_its_second_derivative() -> None:
+    """∇d·a + drift = d'' along q ⊕ (s v + ½ s² a) at t + s, by differences."""
+    robot = panda()
+    proximity = ObstacleClearance(robot, [swinging()]).proximity
+    limit = MinimumDistance(proximity, 0.02)
+    rng = np.random.default_rng(2)
+    q, v, a = robot.home(), 0.3 * rng.standard_normal(7), rng.standard_normal(7)
+    state = robot.state(0.4, q, v)
+    A, b = limit.rows(state, 10.0)
+
+    def distances(s: float) -> Array:
+        there = robot.integrate(q, s * v + 0.5 * s * s * a)
+        return proximity.measure(robot.state(0.4 + s, there, v)).copy()
+
+    h = 1e-3
+    near, d = distances(0.0) - 0.02, distances(0.0)
+    rate = (distances(h) - distances(-h)) / (2.0 * h)
+    second = (distances(h) - 2.0 * d + distances(-h)) / h**2
+    barrier = second + 20.0 * rate + 100.0 * near
+    chosen = np.flatnonzero(near + 0.5 * np.minimum(rate, 0.0) < 0.2)
+    assert len(chosen) == len(A) > 0
+    np.testing.assert_allclose(A @ a - b, barrier[chosen], rtol=0, atol=1e-3)
+
+
+def test_things_stay_apart() -> None:
+    """A ball swings into the elbow: without the limit it hits, with it it does not."""
+    robot = panda()
+    proximity = ObstacleClearance(robot, [swinging()]).proximity
+    least: dict[bool, float] = {}
+    for limited in (False, True):
+        limits = Limits(robot, distances=[MinimumDistance(proximity, 0.02)])
+        rollout = run(elbow(limits if limited else None), robot.home(), 1.6)
+        least[limited] = min(
+            float(proximity.measure(robot.state(t, q, v)).min())
+            for t, q, v in zip(rollout.t, rollout["q"], rollout["v"], strict=True)
+        )
+        error = np.abs(rollout["task.hand.error"]).max()
+        assert error < 1e-4  # the elbow gives way, the hand stays
+    assert least[False] < 0.0
+    assert least[True] > 0.02 - 1e-3
+
+
+def test_start_too_near() -> None:
+    robot = panda()
+    ball = Obstacle("ball", Sphere(0.1), Hold([0.3, 0.0, 0.5]))
+    proximity = ObstacleClearance(robot, [ball]).proximity
+    limits = Limits(robot, distances=[MinimumDistance(proximity, 0.05)])
+    with pytest.raises(LimitError, match=r"to ball are .* must be at least 0.05 m"):
+        limits.check_start(robot.home(), np.zeros(7))
+    with pytest.raises(LimitError, match="least distance is -1"):
+        MinimumDistance(proximity, -1.0)

@@ -12,11 +12,12 @@ the order of their priority. The rows are affine in (δ, f):
     base        (M a + N - F f)_base = 0                          no motor pushes there
     contacts    J_c δ = 0, f within friction cones
     motion      bounds on a from position, velocity and acceleration limits
+    distances   ∇d·a ≥ what the barriers of least distances ask for
 
 Where a* violates no row it is the optimum, and nothing is solved. ``law.md`` §5, §6.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +36,7 @@ from hsp_control.robot import Robot, RobotState
 _FORCE_COST = 1e-6
 """Of forces in robot weights squared, beside accelerations: it decides what nothing
 else does. With 1e-8 and less the solver takes Talos' programmes for infeasible."""
-_ORDER = {"contacts": 1e3, "motion": 1.0}
+_ORDER = {"contacts": 1e3, "distances": 30.0, "motion": 1.0}
 """What yields last has the greatest cost, where limits contradict each other."""
 _INDIFFERENT = 1e-4
 """Cost of all else, while the least violation is looked for."""
@@ -140,7 +141,8 @@ class Actuation:
             support.update(state)
             forces = support.least_norm(self.base, wanted[self.base])
             tau = wanted - support.map @ forces
-        moves = self._moves(state, a)
+        apart = self._apart(state)
+        moves = self._moves(state, a) and bool((apart.A @ a >= apart.lower).all())
         if moves and support.bears(forces) and self._within_efforts(tau):
             tau[self.base] = 0.0
             return Delivered(tau, a, forces, EXACT, 0.0)
@@ -148,7 +150,7 @@ class Actuation:
             shared = self._redistribute(wanted, forces, support)
             if shared is not None:
                 return self._finish(wanted, a, shared, support, REDISTRIBUTED, 0.0)
-        return self._limit(state, wanted, a, forces, resolution, support)
+        return self._limit(state, wanted, a, forces, resolution, support, apart)
 
     def _moves(self, state: RobotState, a: Array) -> bool:
         """Write the bounds on the acceleration; return whether a is within them."""
@@ -168,6 +170,17 @@ class Actuation:
             self._greatest,
         )
         return bool((a >= self._least).all() and (a <= self._greatest).all())
+
+    def _apart(self, state: RobotState) -> Rows:
+        """Return the rows that keep distances, A a ≥ lower."""
+        limits = self.limits
+        parts = [(np.zeros((0, state.robot.nv)), np.zeros(0))]
+        if limits is not None:
+            parts += [each.rows(state, limits.bandwidth) for each in limits.distances]
+        lower = np.concatenate([b for _, b in parts])
+        return Rows(
+            np.vstack([A for A, _ in parts]), lower, np.full(len(lower), np.inf)
+        )
 
     def _within_efforts(self, tau: Array) -> bool:
         motors = self._motors
@@ -198,6 +211,7 @@ class Actuation:
         forces: Array,
         resolution: Resolution,
         support: Support,
+        apart: Rows,
     ) -> Delivered:
         """Return the acceleration nearest to the law's that the limits permit."""
         n, p, scale = len(a), support.size, self._weight
@@ -222,11 +236,15 @@ class Actuation:
             (self._least - a)[bounded],
             (self._greatest - a)[bounded],
         )
-        x = solve(H, f, stacked(*hard, contacts, motion))
+        distances = Rows(
+            np.pad(apart.A, ((0, 0), (0, p))), apart.lower - apart.A @ a, apart.upper
+        )
+        soft = {"contacts": contacts, "distances": distances, "motion": motion}
+        x = solve(H, f, stacked(*hard, *soft.values()))
         status, relaxation = LIMITED, 0.0
         if x is None:
-            contacts, motion, relaxation = _relax(stacked(*hard), contacts, motion)
-            x = solve(H, f, stacked(*hard, contacts, motion))
+            widened, relaxation = _relax(stacked(*hard), soft)
+            x = solve(H, f, stacked(*hard, widened))
             status = RELAXED
         if x is None:  # beyond what the solver can do: still no effort beyond limits
             tau = np.clip(wanted - support.map @ forces, self._low, self._high)
@@ -298,30 +316,27 @@ def _padded(rows: Rows, before: int, after: int) -> Rows:
     return rows._replace(A=np.pad(rows.A, ((0, 0), (before, after))))
 
 
-def _relax(hard: Rows, contacts: Rows, motion: Rows) -> tuple[Rows, Rows, float]:
-    """Return rows widened by the least violation that the hard rows leave possible.
+def _relax(hard: Rows, soft: Mapping[str, Rows]) -> tuple[Rows, float]:
+    """Return soft rows widened by the least violation that the hard rows leave.
 
-    Joints pass their bounds before contacts move, and neither more than is needed.
+    Joints pass their bounds before things come too near, and before contacts move; none
+    of them more than is needed.
     """
-    soft = stacked(contacts, motion)
-    n, s = hard.A.shape[1], len(soft.A)
-    cost = np.full(s, _ORDER["motion"])
-    cost[: len(contacts.A)] = _ORDER["contacts"]
+    rows = stacked(*soft.values())
+    n, s = hard.A.shape[1], len(rows.A)
+    cost = np.concatenate(
+        [np.full(len(some.A), _ORDER[kind]) for kind, some in soft.items()]
+    )
     H = np.diag(np.concatenate([np.full(n, _INDIFFERENT), cost]))
-    rows = stacked(_padded(hard, 0, s), Rows(np.hstack([soft.A, np.eye(s)]), *soft[1:]))
-    x = solve(H, np.zeros(n + s), rows)
+    softened = Rows(np.hstack([rows.A, np.eye(s)]), rows.lower, rows.upper)
+    x = solve(H, np.zeros(n + s), stacked(_padded(hard, 0, s), softened))
     if x is None:
-        return contacts, motion, np.inf
-    reached = soft.A @ x[:n]
+        return rows, np.inf
+    reached = rows.A @ x[:n]
     slack = 1e-7 * (1.0 + np.abs(reached))
     widened = Rows(
-        soft.A,
-        np.minimum(soft.lower, reached - slack),
-        np.maximum(soft.upper, reached + slack),
+        rows.A,
+        np.minimum(rows.lower, reached - slack),
+        np.maximum(rows.upper, reached + slack),
     )
-    k = len(contacts.A)
-    return (
-        Rows(*(part[:k] for part in widened)),
-        Rows(*(part[k:] for part in widened)),
-        float(np.abs(x[n:]).max(initial=0.0)),
-    )
+    return widened, float(np.abs(x[n:]).max(initial=0.0))

@@ -11,8 +11,10 @@ from hsp_control.config.models import limits as l
 from hsp_control.config.models.tasks import AnyTask, ScheduleModel
 from hsp_control.contacts import BallContact, Contact, PointContact, SurfaceContact
 from hsp_control.exceptions import ContactError
-from hsp_control.limits import Limits
+from hsp_control.fields import Clearance, ObstacleClearance, SelfClearance
+from hsp_control.limits import Limits, MinimumDistance
 from hsp_control.robot import Robot
+from hsp_control.scene import Scene
 from hsp_control.schedules import Schedule
 from hsp_control.tasks import Task
 
@@ -96,11 +98,15 @@ def _surface(
 
 
 def build_limits(
-    document: Document, model: l.LimitsModel | None, robot: Robot
+    document: Document, model: l.LimitsModel | None, robot: Robot, scene: Scene
 ) -> Limits | None:
     """Return the limits, if there are any."""
     if model is None:
         return None
+    distances = []
+    for k, each in enumerate(model.distances):
+        with document.at("limits", "distances", k):
+            distances.append(_distance(each, robot, scene))
     position: Any = {"robot": "robot", "none": None}.get(str(model.position))
     if isinstance(model.position, l.PositionRangeModel):
         position = (model.position.lower, model.position.upper)
@@ -115,8 +121,20 @@ def build_limits(
             position=position,
             position_margin=model.position_margin,
             velocity_margin=model.velocity_margin,
+            distances=distances,
             bandwidth=model.bandwidth,
         )
+
+
+def _distance(model: l.AnyDistance, robot: Robot, scene: Scene) -> MinimumDistance:
+    field: Clearance
+    if isinstance(model, l.SelfDistanceModel):
+        field = SelfClearance(robot)
+    else:
+        names = list(scene) if model.obstacles is None else model.obstacles
+        obstacles = [scene[name] for name in names]
+        field = ObstacleClearance(robot, obstacles, links=model.links)
+    return MinimumDistance(field.proximity, model.least)
 
 
 def _greatest(model: l.Greatest, own: Array) -> Any:

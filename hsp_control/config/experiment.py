@@ -152,7 +152,7 @@ def build(document: Document) -> Experiment:
     field = build_fields(document, scenario.null_space.fields, start, scene)
     with document.at("base"):
         check_support(robot, contacts, scenario.base)
-    limits = build_limits(document, scenario.limits, robot)
+    limits = build_limits(document, scenario.limits, robot, scene)
     schedules = build_schedules(document, scenario.tasks)
     with document.at("null_space"):
         controller = Controller(

@@ -1,11 +1,13 @@
 """What a robot's motors and joints allow: efforts, their rate, and joint motion."""
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import LimitError
+from hsp_control.limits.minimum_distance import MinimumDistance
 from hsp_control.robot import Robot
 
 Default = Literal["robot"]
@@ -23,8 +25,9 @@ class Limits:
         velocity        a ≤ 2α (v_max - v)
         acceleration    a ≤ a_max
 
-    and alike from below. A bound that cannot be kept yields to those above it in this
-    list, and all of them to the effort.
+    and alike from below; distances have barriers of their own, see `MinimumDistance`.
+    Where limits contradict each other, acceleration yields to velocity, velocity to
+    position, position to distance, and all of them to the effort.
 
     Attributes:
         robot: The robot.
@@ -38,6 +41,7 @@ class Limits:
         guarded_lower: The position that the barriers keep, within its margin.
         guarded_upper: The position that the barriers keep, within its margin.
         bandwidth: α of the barriers [1/s].
+        distances: What must keep how far apart.
     """
 
     def __init__(
@@ -51,6 +55,7 @@ class Limits:
         position: tuple[Any, Any] | Default | None = "robot",
         position_margin: float = 0.005,
         velocity_margin: float = 0.02,
+        distances: Sequence[MinimumDistance] = (),
         bandwidth: float = 10.0,
     ) -> None:
         """Set the limits; each is a number, one per freedom, or None for no limit.
@@ -66,6 +71,7 @@ class Limits:
                 with efforts held for a period a barrier lets the motion reach the
                 acceleration's error over α² beyond it.
             velocity_margin: How far inside its limits a speed is kept, as a part of it.
+            distances: What must keep how far apart.
             bandwidth: α [1/s]. 5 to 20 is what a motor follows: faster barriers ask at
                 the last moment for more than the effort's rate can give.
 
@@ -116,9 +122,12 @@ class Limits:
         if not 0.0 < bandwidth < np.inf:
             raise LimitError(f"bandwidth is {bandwidth}; must be positive")
         self.bandwidth = float(bandwidth)
+        self.distances = tuple(distances)
+        if any(each.proximity.robot is not robot for each in self.distances):
+            raise LimitError("a least distance was built for another robot object")
 
     def check_start(self, q: Array, v: Array) -> None:
-        """Refuse a start outside the limits.
+        """Refuse a start outside the limits; distances are at t = 0.
 
         Args:
             q: Configuration, shape (nq,).
@@ -136,6 +145,8 @@ class Limits:
                 f"the start is outside the limits: {names[i]} is at {positions[i]:.6g},"
                 f" its limits are {self.lower[i]:.6g} to {self.upper[i]:.6g}"
             )
+        for each in self.distances:
+            each.check_start(self.robot.state(0.0, q, v))
         fast = np.flatnonzero(np.abs(v) > self.velocity)
         if fast.size:
             i = fast[0]

@@ -26,6 +26,31 @@ class PositionRangeModel(Model):
     """Greatest position of every freedom [rad or m]."""
 
 
+class ObstacleDistanceModel(Model):
+    """How far links stay from obstacles."""
+
+    type: Literal["obstacles"]
+    least: NonNegative = 0.02
+    """The least distance [m]."""
+    obstacles: list[str] | None = None
+    """Names of the obstacles; all by default."""
+    links: list[str] | None = None
+    """Names of the links; all that move by default."""
+
+
+class SelfDistanceModel(Model):
+    """How far links stay from each other."""
+
+    type: Literal["self"]
+    least: NonNegative = 0.01
+    """The least distance [m]."""
+
+
+AnyDistance = Annotated[
+    ObstacleDistanceModel | SelfDistanceModel, Field(discriminator="type")
+]
+
+
 class LimitsModel(Model):
     """Limits that the controller keeps; the robot's own unless told otherwise."""
 
@@ -43,5 +68,7 @@ class LimitsModel(Model):
     """How far inside its limits a position is kept [rad or m]."""
     velocity_margin: Annotated[Number, Field(ge=0.0, lt=1.0)] = 0.02
     """How far inside its limits a speed is kept, as a part of it."""
+    distances: Annotated[list[AnyDistance], Field(default_factory=list)]
+    """What must keep how far apart."""
     bandwidth: Positive = 10.0
     """Of the barriers before position and velocity limits [1/s]."""
