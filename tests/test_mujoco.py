@@ -1,5 +1,6 @@
 """MuJoCo as a plant: the same mechanics as Pinocchio's, and a ground to stand on."""
 
+import pickle
 import re
 import sys
 from collections.abc import Sequence
@@ -94,7 +95,7 @@ def test_mass_matrix_and_bias_agree_with_pinocchio(name: str) -> None:
         bias = T.T @ (plant.data.qfrc_bias + full @ T_rate @ v)
         np.testing.assert_allclose(bias, N, rtol=0, atol=1e-9 * np.abs(N).max())
         tau = rng.normal(size=robot.nv)
-        plant.conventions.effort_to_mujoco(q, tau, f := np.zeros(plant.model.nv))
+        plant.conventions.effort_to_mujoco(q, tau, f := np.ones(plant.model.nv))
         np.testing.assert_allclose(T.T @ f, tau, rtol=0, atol=1e-12)
 
 
@@ -303,18 +304,23 @@ def ball(radius: float = 0.1) -> Robot:
 
 
 def test_a_contact_force_is_the_grounds_on_the_robot_about_the_frame() -> None:
-    """A block at rest, carried off its frame's origin: f = m g, moment = r × f."""
+    """A block at rest under a frame beside it: f = m g, moment = r × f."""
     robot = ball()
-    shape = ContactShape("body", Box((0.2, 0.2, 0.2)))
+    aside = pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.2]))
+    kind = pin.FrameType.OP_FRAME
+    robot.model.addFrame(pin.Frame("aside", 1, 0, aside, kind))
+    robot = Robot(robot.model, robot.source)
+    shape = ContactShape("aside", Box((0.2, 0.2, 0.2)), (-0.5, 0.0, -0.2))
     plant = MujocoPlant(robot, contacts=[shape], ground=Ground(height=1.0))
     q = np.array([0.0, 0.0, 1.1, 0.0, 0.0, 0.0, 1.0])
     plant.reset(0.0, q, np.zeros(6))
     q, v = plant.advance(0.0, 1.0, np.zeros(6))
     readings = plant.readings(1.0, q, v, np.zeros(6))
-    force, moment = (readings[f"contact.body.{k}"].value for k in ("force", "moment"))
-    np.testing.assert_allclose(force, [0.0, 0.0, 2.0 * 9.81], rtol=0, atol=1e-3)
-    np.testing.assert_allclose(moment, np.zeros(3), rtol=0, atol=1e-3)
-    assert readings["contact.body.force"].unit == "N"
+    force, moment = (readings[f"contact.aside.{k}"].value for k in ("force", "moment"))
+    weight = 2.0 * 9.81
+    np.testing.assert_allclose(force, [0.0, 0.0, weight], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(moment, [0.0, 0.5 * weight, 0.0], rtol=0, atol=1e-3)
+    assert readings["contact.aside.force"].unit == "N"
 
 
 @pytest.mark.parametrize(("mu", "slides"), [(0.3, True), (0.7, False)])
@@ -376,7 +382,7 @@ def test_reading_contacts_changes_nothing() -> None:
         x, v = q, np.zeros(18)
         for k in range(100):
             if looks:
-                plant.readings(0.001 * k, x, v, np.zeros(18))
+                plant.readings(0.001 * k, x, v, springs)
             x, v = plant.advance(0.001 * k, 0.001 * (k + 1), np.zeros(18))
         ends.append(np.concatenate([x, v]))
     np.testing.assert_array_equal(*ends)
@@ -470,8 +476,11 @@ def test_a_foot_that_cannot_touch_is_refused(tmp_path: Path) -> None:
         MujocoPlant(robot, contacts=[ContactShape("base", Sphere(0.1))])
 
 
-def test_a_motion_that_diverges_is_an_error() -> None:
+def test_a_motion_that_diverges_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """And it leaves no file behind, as MuJoCo does by default."""
+    monkeypatch.chdir(tmp_path)
     robot = load("panda")
     plant = MujocoPlant(robot)
     plant.reset(0.0, robot.home(), np.zeros(7))
@@ -479,3 +488,24 @@ def test_a_motion_that_diverges_is_an_error() -> None:
         SimulationError, match=r"^the motion diverged before t = 0.01 s"
     ):
         plant.advance(0.0, 0.01, np.full(7, 1e14))
+    assert not list(tmp_path.iterdir())
+
+
+def test_its_clock_begins_where_it_is_told() -> None:
+    plant = MujocoPlant(load("panda"))
+    plant.reset(3.0, plant.robot.home(), np.zeros(7))
+    plant.advance(3.0, 3.5, np.zeros(7))
+    assert plant.data.time == pytest.approx(3.5)
+
+
+def test_it_is_carried_to_another_process_with_its_state() -> None:
+    plant = MujocoPlant(load("panda"))
+    plant.reset(0.0, plant.robot.home(), np.zeros(7))
+    plant.advance(0.0, 0.1, np.zeros(7))
+    copy = pickle.loads(pickle.dumps(plant))
+    for ours, theirs in zip(
+        plant.advance(0.1, 0.2, np.ones(7)),
+        copy.advance(0.1, 0.2, np.ones(7)),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(ours, theirs)

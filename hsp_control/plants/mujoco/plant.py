@@ -69,7 +69,7 @@ class MujocoPlant(SampledPlant):
             FrameNotFoundError: If a contact's frame does not exist.
         """
         super().__init__(robot)
-        self._mujoco = _import_mujoco()
+        mujoco = _import_mujoco()
         if not 0.0 < timestep < np.inf:
             raise SimulationError(f"mujoco: timestep is {timestep}; must be positive")
         if integrator not in get_args(MujocoIntegrator):
@@ -101,11 +101,11 @@ class MujocoPlant(SampledPlant):
             ground=self.ground,
         )
         try:
-            self.model: Any = self._mujoco.MjModel.from_xml_string(self.mjcf)
+            self.model: Any = mujoco.MjModel.from_xml_string(self.mjcf)
         except ValueError as error:
             reason = str(error).strip().splitlines()[0]
             raise SimulationError(f"MuJoCo refuses {robot.name}: {reason}") from error
-        self.data: Any = self._mujoco.MjData(self.model)
+        self.data: Any = mujoco.MjData(self.model)
         names = [name for joint in joints for name in joint.mujoco_names]
         at = [self.model.joint(name) for name in names]
         self.conventions = Conventions(
@@ -154,11 +154,8 @@ class MujocoPlant(SampledPlant):
         """Return each contact's force and moment at a true state under an effort."""
         if not self.contacts:
             return {}
-        data = self.data
-        kept = data.qacc_warmstart.copy()  # to log must not change what comes
-        self.conventions.effort_to_mujoco(q, tau, data.qfrc_applied)
-        self._mujoco.mj_forward(self.model, data)
-        data.qacc_warmstart[:] = kept
+        self.conventions.effort_to_mujoco(q, tau, self.data.qfrc_applied)
+        self._mujoco.mj_forward(self.model, self.data)
         found: dict[str, Reading] = {}
         for name, wrench in self._wrenches(q).items():
             found[f"contact.{name}.force"] = Reading(
@@ -198,6 +195,11 @@ class MujocoPlant(SampledPlant):
             "friction": described(self.friction),
             "pushes": described(self.pushes.pushes),
         }
+
+    @property
+    def _mujoco(self) -> Any:
+        """The module; a plant that kept it could not be pickled."""
+        return importlib.import_module("mujoco")
 
     def _wrenches(self, q: Array) -> dict[str, Array]:
         """Return each contact's wrench about its frame's origin, in world axes."""
