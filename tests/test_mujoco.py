@@ -48,6 +48,8 @@ OTHERS = {
 def load(name: str) -> Robot:
     if name in bundled_robots():
         return Robot.load(name)
+    if name == "zoo":
+        return zoo()
     pytest.importorskip("example_robot_data")
     if name == "placed":  # a floating robot whose root does not stand at the origin
         whole = pin.Model()
@@ -56,6 +58,27 @@ def load(name: str) -> Robot:
         whole = pin.appendModel(whole, load_model(source), 0, place)
         return Robot(whole, source)
     return Robot.load(name, root=OTHERS[name])  # type: ignore[arg-type]
+
+
+def zoo() -> Robot:
+    """Return a robot with a joint of every kind that MuJoCo has too."""
+    model, parent = pin.Model(), 0
+    axis = np.array([0.6, 0.0, 0.8])
+    for joint in (
+        pin.JointModelPlanar(),
+        pin.JointModelPrismaticUnaligned(axis),
+        pin.JointModelSpherical(),
+        pin.JointModelRevoluteUnaligned(axis),
+        pin.JointModelRUBY(),
+        pin.JointModelPY(),
+    ):
+        place = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.5, 1.0), np.array([0.1, 0.2, 0.3]))
+        name = joint.shortname()
+        parent = model.addJoint(parent, joint, place, name)
+        body = pin.Inertia.FromEllipsoid(1.0, 0.1, 0.2, 0.3)
+        model.appendBodyToJoint(parent, body, place)
+        model.addFrame(pin.Frame(name, parent, 0, place, pin.FrameType.BODY))
+    return Robot(model, find_robot("planar3r"))
 
 
 def velocity_map(plant: MujocoPlant, q: Array) -> Array:
@@ -71,7 +94,7 @@ def random_state(robot: Robot, rng: np.random.Generator) -> tuple[Array, Array]:
     return robot.random_configuration(rng), rng.normal(size=robot.nv)
 
 
-@pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS, "placed"])
+@pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS, "placed", "zoo"])
 def test_mass_matrix_and_bias_agree_with_pinocchio(name: str) -> None:
     """M = TᵀM'T and N = Tᵀ(N' + M'T'v), T' by differences; power is kept."""
     robot = load(name)
@@ -99,7 +122,7 @@ def test_mass_matrix_and_bias_agree_with_pinocchio(name: str) -> None:
         np.testing.assert_allclose(T.T @ f, tau, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS, "placed"])
+@pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS, "placed", "zoo"])
 def test_states_go_there_and_back(name: str) -> None:
     robot = load(name)
     plant = MujocoPlant(robot)
@@ -112,7 +135,9 @@ def test_states_go_there_and_back(name: str) -> None:
         assert np.abs(v - v_back).max() < 1e-13
 
 
-@pytest.mark.parametrize("name", [*bundled_robots(), "tiago_no_hand", "go2", "placed"])
+@pytest.mark.parametrize(
+    "name", [*bundled_robots(), "tiago_no_hand", "go2", "placed", "zoo"]
+)
 def test_a_free_motion_is_pinocchios(name: str) -> None:
     """0.05 s of falling, RK4 against DOP853: the equations of motion are the same."""
     robot = load(name)
@@ -461,6 +486,57 @@ BARE = """<robot name="bare">
     </inertial>
   </link>
 </robot>"""
+
+
+def test_two_shapes_of_one_frame_share_its_force() -> None:
+    """A foot of two balls, 0.1 and 0.3 m from the weight: one force, one moment."""
+    robot = ball()
+    contacts = [
+        ContactShape("body", Sphere(0.05), (x, y, 0.0))
+        for x, y in ((-0.1, 0.1), (-0.1, -0.1), (0.3, 0.0))
+    ]
+    plant = MujocoPlant(robot, contacts=contacts)
+    q = np.array([0.0, 0.0, 0.05, 0.0, 0.0, 0.0, 1.0])
+    plant.reset(0.0, q, np.zeros(6))
+    q, v = plant.advance(0.0, 1.0, np.zeros(6))
+    readings = plant.readings(1.0, q, v, np.zeros(6))
+    assert set(readings) == {"contact.body.force", "contact.body.moment"}
+    force, moment = (readings[f"contact.body.{k}"].value for k in ("force", "moment"))
+    np.testing.assert_allclose(force, [0.0, 0.0, 2.0 * 9.81], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(moment, np.zeros(3), rtol=0, atol=1e-3)
+
+
+def test_the_ground_answers_a_push() -> None:
+    push = Push("body", (0.0, 0.0, -10.0), duration=5.0)
+    contact = ContactShape("body", Box((0.2, 0.2, 0.2)))
+    plant = MujocoPlant(ball(), contacts=[contact], pushes=[push])
+    plant.reset(0.0, np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]), np.zeros(6))
+    q, v = plant.advance(0.0, 1.0, np.zeros(6))
+    force = plant.readings(1.0, q, v, np.zeros(6))["contact.body.force"].value
+    expected = [0.0, 0.0, 2.0 * 9.81 + 10.0]
+    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-3)
+
+
+def test_clearance_is_of_contacts() -> None:
+    with pytest.raises(
+        SimulationError, match=r"^panda has no contacts with the ground"
+    ):
+        MujocoPlant(load("panda")).clearance(load("panda").home())
+
+
+def test_a_base_that_turns_is_pushed_in_its_own_axes() -> None:
+    """A planar root that turns through 1.2 rad while an effort is held."""
+    robot = zoo()
+    q = robot.neutral()
+    v = np.eye(robot.nv)[2] * 4.0
+    tau = np.eye(robot.nv)[0] * 10.0
+    exact = Dop853(1e-12, 1e-12).advance(
+        robot, lambda t, q, v: robot.forward_dynamics(q, v, tau), 0.0, 0.3, q, v
+    )
+    plant = MujocoPlant(robot, timestep=2.5e-4, integrator="RK4")
+    plant.reset(0.0, q, v)
+    _, found = plant.advance(0.0, 0.3, tau)
+    np.testing.assert_allclose(found, exact[1], rtol=0, atol=2e-2)
 
 
 def test_a_foot_that_cannot_touch_is_refused(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import SimulationError
+from hsp_control.plants.contact_readings import contact_readings
 from hsp_control.plants.describing import described
 from hsp_control.plants.floating import FloatingRoots
 from hsp_control.plants.plant import ContinuousPlant, Reading
@@ -115,16 +116,7 @@ class ContactPlant(ContinuousPlant):
         self, t: float, q: Array, v: Array, tau: Array
     ) -> Mapping[str, Reading]:
         """Return the force and moment of every contact, zero while it is off."""
-        _, wrenches = self._solve(t, q, v, tau)
-        found: dict[str, Reading] = {}
-        for name, wrench in wrenches.items():
-            found[f"contact.{name}.force"] = Reading(
-                wrench[:3], "N", "of the world on the robot, in the world's axes"
-            )
-            found[f"contact.{name}.moment"] = Reading(
-                wrench[3:], "N·m", "of the world about the frame's origin"
-            )
-        return found
+        return contact_readings(self._solve(t, q, v, tau)[1])
 
     def describe(self) -> dict[str, Any]:
         """Return its contacts and pushes."""

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import SimulationError
+from hsp_control.plants.contact_readings import contact_readings
 from hsp_control.plants.describing import described
 from hsp_control.plants.floating import FloatingRoots
 from hsp_control.plants.friction import JointFriction
@@ -87,8 +88,8 @@ class MujocoPlant(SampledPlant):
         touching: dict[str, str] = {}
         for contact in self.contacts:
             joint = robot.model.frames[robot.frame_id(contact.frame)].parentJoint
-            for k, geom in enumerate(geoms_of(robot, contact)):
-                name = f"{contact.frame}/{k}"
+            for geom in geoms_of(robot, contact):
+                name = f"{contact.frame}/{len(touching)}"
                 geoms.setdefault(joint, []).append((name, geom))
                 touching[name] = contact.frame
         self.mjcf = write_mjcf(
@@ -139,7 +140,8 @@ class MujocoPlant(SampledPlant):
         steps = number_of_steps(end - t, self.timestep)
         h = self.model.opt.timestep = (end - t) / steps
         q, v = self.conventions.from_mujoco(data.qpos, data.qvel)
-        at_once = steps if not self.pushes.act(t, end) else 1
+        steady = self.conventions.steady and not self.pushes.act(t, end)
+        at_once = steps if steady else 1
         for k in range(0, steps, at_once):
             effort = motors + self.pushes.effort(t + (k + 0.5) * h, q)
             self.conventions.effort_to_mujoco(q, effort, data.qfrc_applied)
@@ -154,23 +156,21 @@ class MujocoPlant(SampledPlant):
         """Return each contact's force and moment at a true state under an effort."""
         if not self.contacts:
             return {}
-        self.conventions.effort_to_mujoco(q, tau, self.data.qfrc_applied)
+        effort = self._roots.without(t, tau) + self.pushes.effort(t, q)
+        self.conventions.effort_to_mujoco(q, effort, self.data.qfrc_applied)
         self._mujoco.mj_forward(self.model, self.data)
-        found: dict[str, Reading] = {}
-        for name, wrench in self._wrenches(q).items():
-            found[f"contact.{name}.force"] = Reading(
-                wrench[:3], "N", "of the ground on the robot, in the world"
-            )
-            found[f"contact.{name}.moment"] = Reading(
-                wrench[3:], "N·m", "of the ground about the frame's origin"
-            )
-        return found
+        return contact_readings(self._wrenches(q))
 
     def clearance(self, q: Array) -> float:
         """Return how far the nearest contact is above the ground [m], negative below.
 
         A robot that shall start on its feet is lowered by that much.
+
+        Raises:
+            SimulationError: If there are no contacts.
         """
+        if not self.contacts:
+            raise SimulationError(f"{self.robot.name} has no contacts with the ground")
         probe = self._mujoco.MjData(self.model)
         rest = np.zeros(self.robot.nv)
         self.conventions.to_mujoco(q, rest, probe.qpos, probe.qvel)
