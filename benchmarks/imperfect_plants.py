@@ -57,7 +57,9 @@ effort commanded in `tau` and the one that acted in `applied.tau`; errors are th
 the true state. What the plant's bodies were is in the log's `meta`, key `plant`.
 
 Feet touch MuJoCo's ground where `contacts` names them, on a stated shape or on the
-link's own collision geometry, and report `contact.<frame>.force` and `.moment`:
+link's own collision geometry, and report `contact.<frame>.force` and `.moment`. A mesh
+with a flat sole becomes its box, another its capsule; `plant.clearance(q)` says by how
+much to lower a robot so that it starts on its feet:
 
 ```yaml
 robot: {name: panda}
