@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import SimulationError
@@ -136,16 +135,17 @@ class ContactPlant(ContinuousPlant):
         if self.pushes.act(t, t):
             effort = effort + self.pushes.effort(t, q)
         M = np.triu(state.mass_matrix)
-        factor = cho_factor(M, lower=False)
-        free = cho_solve(factor, effort - state.nonlinear_effects)
+        M += np.triu(M, 1).T
+        push = effort - state.nonlinear_effects
         holding = [contact for contact in self.contacts if contact.holds(t)]
         wrenches = {contact.frame: np.zeros(6) for contact in self.contacts}
         if not holding:
-            return free, wrenches
+            return np.asarray(np.linalg.solve(M, push)), wrenches
         frames = [(state.frame(c.frame), c.rows) for c in holding]
         J = np.vstack([frame.jacobian[:rows] for frame, rows in frames])
         drift = np.concatenate([frame.drift[:rows] for frame, rows in frames])
-        response = cho_solve(factor, J.T)
+        answers = np.linalg.solve(M, np.column_stack([push, J.T]))
+        free, response = answers[:, 0], answers[:, 1:]
         missing = -drift - self.damping * (J @ v) - J @ free
         multipliers = _least_norm(J @ response, missing)
         start = 0
