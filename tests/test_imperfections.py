@@ -125,6 +125,12 @@ def test_random_inertias_are_possible_ones_within_their_bounds(name: str) -> Non
     assert np.ptp(ratios) > 0.05
     assert 0.8 <= min(ratios) <= max(ratios) <= 1.2
     third = changed(robot, [RandomInertias(mass=0.2, seed=4)])
+    for before, after in zip(robot.model.inertias, third.model.inertias, strict=True):
+        if before.mass > 0.0:  # another mass alone: another density
+            density = after.mass / before.mass
+            np.testing.assert_allclose(
+                after.inertia, density * before.inertia, rtol=1e-9, atol=1e-15
+            )
     assert third.model.inertias[2] != other.model.inertias[2]
 
 
@@ -402,6 +408,18 @@ def test_a_drive_that_loses_efforts() -> None:
         assert effort in (k, found[k - 1] if k else 0.0)
         lost += effort != k
     assert 0.25 < lost / 2000 < 0.35
+
+
+def test_what_a_drive_remembers_is_its_own() -> None:
+    """A controller writes into the same array at every step."""
+    for drive in (DroppedPeriods(0.5), EffortDelay(1)):
+        drive.reset(load("panda"))
+        shared, found = np.zeros(7), []
+        for k in range(20):
+            shared[:] = k
+            found.append(float(drive.apply(shared)[0]))
+        assert all(effort <= k for k, effort in enumerate(found))
+        assert any(effort < k for k, effort in enumerate(found))
 
 
 class Spy(SampledPlant):

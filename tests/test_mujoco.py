@@ -1,5 +1,6 @@
 """MuJoCo as a plant: the same mechanics as Pinocchio's, and a ground to stand on."""
 
+import pickle
 import re
 import sys
 from collections.abc import Sequence
@@ -47,6 +48,8 @@ OTHERS = {
 def load(name: str) -> Robot:
     if name in bundled_robots():
         return Robot.load(name)
+    if name == "zoo":
+        return zoo()
     pytest.importorskip("example_robot_data")
     if name == "placed":  # a floating robot whose root does not stand at the origin
         whole = pin.Model()
@@ -55,6 +58,27 @@ def load(name: str) -> Robot:
         whole = pin.appendModel(whole, load_model(source), 0, place)
         return Robot(whole, source)
     return Robot.load(name, root=OTHERS[name])  # type: ignore[arg-type]
+
+
+def zoo() -> Robot:
+    """Return a robot with a joint of every kind that MuJoCo has too."""
+    model, parent = pin.Model(), 0
+    axis = np.array([0.6, 0.0, 0.8])
+    for joint in (
+        pin.JointModelPlanar(),
+        pin.JointModelPrismaticUnaligned(axis),
+        pin.JointModelSpherical(),
+        pin.JointModelRevoluteUnaligned(axis),
+        pin.JointModelRUBY(),
+        pin.JointModelPY(),
+    ):
+        place = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.5, 1.0), np.array([0.1, 0.2, 0.3]))
+        name = joint.shortname()
+        parent = model.addJoint(parent, joint, place, name)
+        body = pin.Inertia.FromEllipsoid(1.0, 0.1, 0.2, 0.3)
+        model.appendBodyToJoint(parent, body, place)
+        model.addFrame(pin.Frame(name, parent, 0, place, pin.FrameType.BODY))
+    return Robot(model, find_robot("planar3r"))
 
 
 def velocity_map(plant: MujocoPlant, q: Array) -> Array:
@@ -70,7 +94,7 @@ def random_state(robot: Robot, rng: np.random.Generator) -> tuple[Array, Array]:
     return robot.random_configuration(rng), rng.normal(size=robot.nv)
 
 
-@pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS, "placed"])
+@pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS, "placed", "zoo"])
 def test_mass_matrix_and_bias_agree_with_pinocchio(name: str) -> None:
     """M = TᵀM'T and N = Tᵀ(N' + M'T'v), T' by differences; power is kept."""
     robot = load(name)
@@ -94,11 +118,11 @@ def test_mass_matrix_and_bias_agree_with_pinocchio(name: str) -> None:
         bias = T.T @ (plant.data.qfrc_bias + full @ T_rate @ v)
         np.testing.assert_allclose(bias, N, rtol=0, atol=1e-9 * np.abs(N).max())
         tau = rng.normal(size=robot.nv)
-        plant.conventions.effort_to_mujoco(q, tau, f := np.zeros(plant.model.nv))
+        plant.conventions.effort_to_mujoco(q, tau, f := np.ones(plant.model.nv))
         np.testing.assert_allclose(T.T @ f, tau, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS, "placed"])
+@pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS, "placed", "zoo"])
 def test_states_go_there_and_back(name: str) -> None:
     robot = load(name)
     plant = MujocoPlant(robot)
@@ -111,7 +135,9 @@ def test_states_go_there_and_back(name: str) -> None:
         assert np.abs(v - v_back).max() < 1e-13
 
 
-@pytest.mark.parametrize("name", [*bundled_robots(), "tiago_no_hand", "go2", "placed"])
+@pytest.mark.parametrize(
+    "name", [*bundled_robots(), "tiago_no_hand", "go2", "placed", "zoo"]
+)
 def test_a_free_motion_is_pinocchios(name: str) -> None:
     """0.05 s of falling, RK4 against DOP853: the equations of motion are the same."""
     robot = load(name)
@@ -305,20 +331,25 @@ def ball(radius: float = 0.1) -> Robot:
 
 
 def test_a_contact_force_is_the_grounds_on_the_robot_about_the_frame() -> None:
-    """A block at rest, carried off its frame's origin: f = m g, moment = r × f."""
+    """A block at rest under a frame beside it: f = m g, moment = r × f."""
     robot = ball()
-    shape = ContactShape("body", Box((0.2, 0.2, 0.2)))
+    aside = pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.2]))
+    kind = pin.FrameType.OP_FRAME
+    robot.model.addFrame(pin.Frame("aside", 1, 0, aside, kind))
+    robot = Robot(robot.model, robot.source)
+    shape = ContactShape("aside", Box((0.2, 0.2, 0.2)), (-0.5, 0.0, -0.2))
     plant = MujocoPlant(robot, contacts=[shape], ground=Ground(height=1.0))
     q = np.array([0.0, 0.0, 1.1, 0.0, 0.0, 0.0, 1.0])
     plant.reset(0.0, q, np.zeros(6))
     q, v = plant.advance(0.0, 1.0, np.zeros(6))
     readings = plant.readings(1.0, q, v, np.zeros(6))
     force, moment = (
-        readings[f"plant.contact.body.{k}"].value for k in ("force", "moment")
+        readings[f"plant.contact.aside.{k}"].value for k in ("force", "moment")
     )
-    np.testing.assert_allclose(force, [0.0, 0.0, 2.0 * 9.81], rtol=0, atol=1e-3)
-    np.testing.assert_allclose(moment, np.zeros(3), rtol=0, atol=1e-3)
-    assert readings["plant.contact.body.force"].unit == "N"
+    weight = 2.0 * 9.81
+    np.testing.assert_allclose(force, [0.0, 0.0, weight], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(moment, [0.0, 0.5 * weight, 0.0], rtol=0, atol=1e-3)
+    assert readings["plant.contact.aside.force"].unit == "N"
 
 
 @pytest.mark.parametrize(("mu", "slides"), [(0.3, True), (0.7, False)])
@@ -380,7 +411,7 @@ def test_reading_contacts_changes_nothing() -> None:
         x, v = q, np.zeros(18)
         for k in range(100):
             if looks:
-                plant.readings(0.001 * k, x, v, np.zeros(18))
+                plant.readings(0.001 * k, x, v, springs)
             x, v = plant.advance(0.001 * k, 0.001 * (k + 1), np.zeros(18))
         ends.append(np.concatenate([x, v]))
     np.testing.assert_array_equal(*ends)
@@ -461,6 +492,59 @@ BARE = """<robot name="bare">
 </robot>"""
 
 
+def test_two_shapes_of_one_frame_share_its_force() -> None:
+    """A foot of two balls, 0.1 and 0.3 m from the weight: one force, one moment."""
+    robot = ball()
+    contacts = [
+        ContactShape("body", Sphere(0.05), (x, y, 0.0))
+        for x, y in ((-0.1, 0.1), (-0.1, -0.1), (0.3, 0.0))
+    ]
+    plant = MujocoPlant(robot, contacts=contacts)
+    q = np.array([0.0, 0.0, 0.05, 0.0, 0.0, 0.0, 1.0])
+    plant.reset(0.0, q, np.zeros(6))
+    q, v = plant.advance(0.0, 1.0, np.zeros(6))
+    readings = plant.readings(1.0, q, v, np.zeros(6))
+    assert set(readings) == {"plant.contact.body.force", "plant.contact.body.moment"}
+    force, moment = (
+        readings[f"plant.contact.body.{k}"].value for k in ("force", "moment")
+    )
+    np.testing.assert_allclose(force, [0.0, 0.0, 2.0 * 9.81], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(moment, np.zeros(3), rtol=0, atol=1e-3)
+
+
+def test_the_ground_answers_a_push() -> None:
+    push = Push("body", (0.0, 0.0, -10.0), duration=5.0)
+    contact = ContactShape("body", Box((0.2, 0.2, 0.2)))
+    plant = MujocoPlant(ball(), contacts=[contact], pushes=[push])
+    plant.reset(0.0, np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]), np.zeros(6))
+    q, v = plant.advance(0.0, 1.0, np.zeros(6))
+    force = plant.readings(1.0, q, v, np.zeros(6))["plant.contact.body.force"].value
+    expected = [0.0, 0.0, 2.0 * 9.81 + 10.0]
+    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-3)
+
+
+def test_clearance_is_of_contacts() -> None:
+    with pytest.raises(
+        SimulationError, match=r"^panda has no contacts with the ground"
+    ):
+        MujocoPlant(load("panda")).clearance(load("panda").home())
+
+
+def test_a_base_that_turns_is_pushed_in_its_own_axes() -> None:
+    """A planar root that turns through 1.2 rad while an effort is held."""
+    robot = zoo()
+    q = robot.neutral()
+    v = np.eye(robot.nv)[2] * 4.0
+    tau = np.eye(robot.nv)[0] * 10.0
+    exact = Dop853(1e-12, 1e-12).advance(
+        robot, lambda t, q, v: robot.forward_dynamics(q, v, tau), 0.0, 0.3, q, v
+    )
+    plant = MujocoPlant(robot, timestep=2.5e-4, integrator="RK4")
+    plant.reset(0.0, q, v)
+    _, found = plant.advance(0.0, 0.3, tau)
+    np.testing.assert_allclose(found, exact[1], rtol=0, atol=2e-2)
+
+
 def test_a_foot_that_cannot_touch_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bare.urdf").write_text(BARE)
     robot = Robot.load(tmp_path / "bare.urdf")
@@ -474,8 +558,11 @@ def test_a_foot_that_cannot_touch_is_refused(tmp_path: Path) -> None:
         MujocoPlant(robot, contacts=[ContactShape("base", Sphere(0.1))])
 
 
-def test_a_motion_that_diverges_is_an_error() -> None:
+def test_a_motion_that_diverges_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """And it leaves no file behind, as MuJoCo does by default."""
+    monkeypatch.chdir(tmp_path)
     robot = load("panda")
     plant = MujocoPlant(robot)
     plant.reset(0.0, robot.home(), np.zeros(7))
@@ -483,3 +570,24 @@ def test_a_motion_that_diverges_is_an_error() -> None:
         SimulationError, match=r"^the motion diverged before t = 0.01 s"
     ):
         plant.advance(0.0, 0.01, np.full(7, 1e14))
+    assert not list(tmp_path.iterdir())
+
+
+def test_its_clock_begins_where_it_is_told() -> None:
+    plant = MujocoPlant(load("panda"))
+    plant.reset(3.0, plant.robot.home(), np.zeros(7))
+    plant.advance(3.0, 3.5, np.zeros(7))
+    assert plant.data.time == pytest.approx(3.5)
+
+
+def test_it_is_carried_to_another_process_with_its_state() -> None:
+    plant = MujocoPlant(load("panda"))
+    plant.reset(0.0, plant.robot.home(), np.zeros(7))
+    plant.advance(0.0, 0.1, np.zeros(7))
+    copy = pickle.loads(pickle.dumps(plant))
+    for ours, theirs in zip(
+        plant.advance(0.1, 0.2, np.ones(7)),
+        copy.advance(0.1, 0.2, np.ones(7)),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(ours, theirs)

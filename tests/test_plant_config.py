@@ -1,10 +1,12 @@
 """Plants from YAML: the configurations on another engine, and every imperfection."""
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.exceptions import HspControlError
@@ -166,6 +168,17 @@ def test_another_description_of_the_robot_as_the_plant(tmp_path: Path) -> None:
     assert experiment.run().meta["config"]["plant"]["robot"]["name"] == str(
         tmp_path / "real.urdf"
     )
+
+
+def test_the_page_s_configurations_run() -> None:
+    pytest.importorskip("mujoco")
+    page = Path(__file__).parents[1] / "docs" / "plants.md"
+    text = page.read_text(encoding="utf-8")
+    blocks = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert len(blocks) == 2
+    for block in blocks:
+        experiment = load_experiment(yaml.safe_load(block), "simulation.duration=0.02")
+        assert experiment.run().status == "completed"
 
 
 def test_feet_from_yaml() -> None:

@@ -1175,6 +1175,7 @@ def test_a_sampled_plant_is_reset_once_then_measured_and_moved_every_period() ->
     run = run_sampled(plant)
     kinds = [call[0] for call in plant.calls]
     assert kinds == ["reset", *["measure", "advance"] * 8, "measure"]
+    assert plant.calls[0] == ("reset", 1.0)
     times = [call[1] for call in plant.calls if call[0] == "measure"]
     np.testing.assert_allclose(times, 1.0 + 0.005 * np.arange(9), rtol=0, atol=1e-12)
     for call in (call for call in plant.calls if call[0] == "advance"):

@@ -66,6 +66,7 @@ def check(options: argparse.Namespace) -> int:
             f"{type(task).__name__}, {task.rows} rows, |e| = {error:.3g} at the start",
         )
     table.add_row("null space", f"{robot.nv - rows} freedoms, {controller.field.name}")
+    table.add_row("plant", experiment.plant.describe()["type"])
     values = ", ".join(f"{value:.3g}" for value in diagnostics.singular_values)
     table.add_row("singular values", f"{values} at the start")
     table.add_row("largest effort", f"{np.abs(output.tau).max():.3g} at the start")

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import SimulationError
+from hsp_control.plants.contact_readings import contact_readings
 from hsp_control.plants.describing import described
 from hsp_control.plants.floating import FloatingRoots
 from hsp_control.plants.plant import ContinuousPlant, Reading
@@ -115,16 +115,7 @@ class ContactPlant(ContinuousPlant):
         self, t: float, q: Array, v: Array, tau: Array
     ) -> Mapping[str, Reading]:
         """Return the force and moment of every contact, zero while it is off."""
-        _, wrenches = self._solve(t, q, v, tau)
-        found: dict[str, Reading] = {}
-        for name, wrench in wrenches.items():
-            found[f"plant.contact.{name}.force"] = Reading(
-                wrench[:3], "N", "of the world on the robot, in the world's axes"
-            )
-            found[f"plant.contact.{name}.moment"] = Reading(
-                wrench[3:], "N·m", "of the world about the frame's origin"
-            )
-        return found
+        return contact_readings(self._solve(t, q, v, tau)[1])
 
     def describe(self) -> dict[str, Any]:
         """Return its contacts and pushes."""
@@ -144,16 +135,17 @@ class ContactPlant(ContinuousPlant):
         if self.pushes.act(t, t):
             effort = effort + self.pushes.effort(t, q)
         M = np.triu(state.mass_matrix)
-        factor = cho_factor(M, lower=False)
-        free = cho_solve(factor, effort - state.nonlinear_effects)
+        M += np.triu(M, 1).T
+        push = effort - state.nonlinear_effects
         holding = [contact for contact in self.contacts if contact.holds(t)]
         wrenches = {contact.frame: np.zeros(6) for contact in self.contacts}
         if not holding:
-            return free, wrenches
+            return np.asarray(np.linalg.solve(M, push)), wrenches
         frames = [(state.frame(c.frame), c.rows) for c in holding]
         J = np.vstack([frame.jacobian[:rows] for frame, rows in frames])
         drift = np.concatenate([frame.drift[:rows] for frame, rows in frames])
-        response = cho_solve(factor, J.T)
+        answers = np.linalg.solve(M, np.column_stack([push, J.T]))
+        free, response = answers[:, 0], answers[:, 1:]
         missing = -drift - self.damping * (J @ v) - J @ free
         multipliers = _least_norm(J @ response, missing)
         start = 0

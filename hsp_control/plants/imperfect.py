@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from hsp_control.arrays import Array
 from hsp_control.plants.describing import described
 from hsp_control.plants.drives import Drive
@@ -32,7 +34,7 @@ class ImperfectPlant(SampledPlant):
         super().__init__(plant.robot)
         self.plant = plant
         self.sensors, self.drives = tuple(sensors), tuple(drives)
-        self._measured = plant.robot.neutral(), plant.robot.neutral()
+        self._measured = plant.robot.neutral(), np.zeros(plant.robot.nv)
         self._applied: Array | None = None
 
     def reset(self, t: float, q: Array, v: Array) -> None:

@@ -139,6 +139,11 @@ class Conventions:
     In formulas qvel = T(q) v. T is a permutation, with a rotation for a planar or
     free-flyer root and a column that is repeated for joints that mimic; so power is
     tau · v = f · qvel for qfrc = f that solves tau = Tᵀ f.
+
+    Attributes:
+        robot: The robot.
+        steady: Whether f does not change as the robot moves under the same tau, which
+            has nothing for a free-flyer root.
     """
 
     def __init__(
@@ -150,6 +155,7 @@ class Conventions:
     ) -> None:
         """Take where MuJoCo keeps each of its joints' numbers, by name."""
         self.robot = robot
+        self.steady = all(j.kind != PLANAR for j in joints)
         plain = [j for j in joints if j.kind in (HINGE, SLIDE)]
         own = [j for j in plain if j.leader is None]
         self._q = np.array([j.q for j in own], dtype=int)

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import SimulationError
+from hsp_control.plants.contact_readings import contact_readings
 from hsp_control.plants.describing import described
 from hsp_control.plants.floating import FloatingRoots
 from hsp_control.plants.friction import JointFriction
@@ -69,7 +70,7 @@ class MujocoPlant(SampledPlant):
             FrameNotFoundError: If a contact's frame does not exist.
         """
         super().__init__(robot)
-        self._mujoco = _import_mujoco()
+        mujoco = _import_mujoco()
         if not 0.0 < timestep < np.inf:
             raise SimulationError(f"mujoco: timestep is {timestep}; must be positive")
         if integrator not in get_args(MujocoIntegrator):
@@ -87,8 +88,8 @@ class MujocoPlant(SampledPlant):
         touching: dict[str, str] = {}
         for contact in self.contacts:
             joint = robot.model.frames[robot.frame_id(contact.frame)].parentJoint
-            for k, geom in enumerate(geoms_of(robot, contact)):
-                name = f"{contact.frame}/{k}"
+            for geom in geoms_of(robot, contact):
+                name = f"{contact.frame}/{len(touching)}"
                 geoms.setdefault(joint, []).append((name, geom))
                 touching[name] = contact.frame
         self.mjcf = write_mjcf(
@@ -101,11 +102,11 @@ class MujocoPlant(SampledPlant):
             ground=self.ground,
         )
         try:
-            self.model: Any = self._mujoco.MjModel.from_xml_string(self.mjcf)
+            self.model: Any = mujoco.MjModel.from_xml_string(self.mjcf)
         except ValueError as error:
             reason = str(error).strip().splitlines()[0]
             raise SimulationError(f"MuJoCo refuses {robot.name}: {reason}") from error
-        self.data: Any = self._mujoco.MjData(self.model)
+        self.data: Any = mujoco.MjData(self.model)
         names = [name for joint in joints for name in joint.mujoco_names]
         at = [self.model.joint(name) for name in names]
         self.conventions = Conventions(
@@ -139,7 +140,8 @@ class MujocoPlant(SampledPlant):
         steps = number_of_steps(end - t, self.timestep)
         h = self.model.opt.timestep = (end - t) / steps
         q, v = self.conventions.from_mujoco(data.qpos, data.qvel)
-        at_once = steps if not self.pushes.act(t, end) else 1
+        steady = self.conventions.steady and not self.pushes.act(t, end)
+        at_once = steps if steady else 1
         for k in range(0, steps, at_once):
             effort = motors + self.pushes.effort(t + (k + 0.5) * h, q)
             self.conventions.effort_to_mujoco(q, effort, data.qfrc_applied)
@@ -154,26 +156,21 @@ class MujocoPlant(SampledPlant):
         """Return each contact's force and moment at a true state under an effort."""
         if not self.contacts:
             return {}
-        data = self.data
-        kept = data.qacc_warmstart.copy()  # to log must not change what comes
-        self.conventions.effort_to_mujoco(q, tau, data.qfrc_applied)
-        self._mujoco.mj_forward(self.model, data)
-        data.qacc_warmstart[:] = kept
-        found: dict[str, Reading] = {}
-        for name, wrench in self._wrenches(q).items():
-            found[f"plant.contact.{name}.force"] = Reading(
-                wrench[:3], "N", "of the ground on the robot, in the world"
-            )
-            found[f"plant.contact.{name}.moment"] = Reading(
-                wrench[3:], "N·m", "of the ground about the frame's origin"
-            )
-        return found
+        effort = self._roots.without(t, tau) + self.pushes.effort(t, q)
+        self.conventions.effort_to_mujoco(q, effort, self.data.qfrc_applied)
+        self._mujoco.mj_forward(self.model, self.data)
+        return contact_readings(self._wrenches(q))
 
     def clearance(self, q: Array) -> float:
         """Return how far the nearest contact is above the ground [m], negative below.
 
         A robot that shall start on its feet is lowered by that much.
+
+        Raises:
+            SimulationError: If there are no contacts.
         """
+        if not self.contacts:
+            raise SimulationError(f"{self.robot.name} has no contacts with the ground")
         probe = self._mujoco.MjData(self.model)
         rest = np.zeros(self.robot.nv)
         self.conventions.to_mujoco(q, rest, probe.qpos, probe.qvel)
@@ -198,6 +195,11 @@ class MujocoPlant(SampledPlant):
             "friction": described(self.friction),
             "pushes": described(self.pushes.pushes),
         }
+
+    @property
+    def _mujoco(self) -> Any:
+        """The module; a plant that kept it could not be pickled."""
+        return importlib.import_module("mujoco")
 
     def _wrenches(self, q: Array) -> dict[str, Array]:
         """Return each contact's wrench about its frame's origin, in world axes."""
