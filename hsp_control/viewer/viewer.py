@@ -1,6 +1,6 @@
 """The viewer: a robot, what surrounds it and what it did, in a browser."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from types import TracebackType
 from typing import Any, Self
 
@@ -8,21 +8,20 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.arrays import Array
+from hsp_control.controller import Controller
 from hsp_control.exceptions import ViewerError
 from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Scene
 from hsp_control.simulation import Rollout
-from hsp_control.viewer import browser, obstacle_drawing, playback, rollout_drawing
+from hsp_control.viewer import browser, run_drawing
 from hsp_control.viewer.camera import look_at
-from hsp_control.viewer.commands import delete, set_caption, set_time
-from hsp_control.viewer.moments import configuration_between, moment
+from hsp_control.viewer.clip import no_clip, set_clip
+from hsp_control.viewer.commands import Command, seek, set_caption, set_time
 from hsp_control.viewer.obstacle_drawing import ObstacleDrawing
-from hsp_control.viewer.playback import Playback
 from hsp_control.viewer.robot_drawing import RobotDrawing
-from hsp_control.viewer.rollout_drawing import RolloutDrawing
+from hsp_control.viewer.run_drawing import RunDrawing
 from hsp_control.viewer.server import Server
 from hsp_control.viewer.stage import draw_stage, in_sight, scene_size
-from hsp_control.viewer.surroundings import Surroundings
 from hsp_control.viewer.transport import Transport
 
 
@@ -62,6 +61,7 @@ class Viewer:
         self._camera, self._target = camera, target
         self._drawing = RobotDrawing(robot)
         self._data = robot.model.createData()
+        self._obstacles: ObstacleDrawing | None = None
         self.transport = Server(port) if transport is None else transport
         try:
             self.transport.send(self._drawing.draw())
@@ -77,43 +77,25 @@ class Viewer:
         """The page's address; None where there is no page."""
         return self.transport.url
 
-    def draw_scene(self, scene: Rollout | Scene) -> None:
-        """Show a run's paths, targets and obstacles, or a scene's obstacles.
+    def draw_scene(
+        self, scene: Rollout | Scene, *, controller: Controller | None = None
+    ) -> None:
+        """Show a run, at rest at its start, or a scene's obstacles.
 
         Replaces what was shown before, fits the stage, and places the camera.
+
+        Args:
+            scene: The run or the scene.
+            controller: Of a run: see `play`.
 
         Raises:
             ViewerError: If the run is not this robot's or is empty, or if the server
                 has ended.
         """
-        around: Surroundings
         if isinstance(scene, Rollout):
-            self._check(scene)
-            around = RolloutDrawing(scene)
-            start, q, name = float(scene.t[0]), scene.q[0], scene.meta.get("title")
+            self._draw_run(scene, controller)
         else:
-            around = ObstacleDrawing(scene)
-            start, q, name = 0.0, self.robot.home(), None
-        placements = self._placements(q)
-        moving = around.points()
-        if not len(moving):
-            moving = self._drawing.points(placements)
-        subject = np.vstack([moving, self._drawing.stand()])
-        points = in_sight(subject, around.obstacle_points())
-        self.transport.send(
-            [
-                delete(obstacle_drawing.ROOT),
-                delete(rollout_drawing.ROOT),
-                *draw_stage(points, floor=min(0.0, float(subject[:, 2].min()))),
-                *around.draw(scene_size(points)),
-                *around.move(start),
-                *self._drawing.move(placements),
-                look_at(self.robot, points, self._camera, self._target),
-                set_caption(str(name or self.robot.name), around.legend()),
-                set_time(""),
-            ]
-        )
-        self._scene, self._around = scene, around
+            self._draw_obstacles(scene)
 
     def show(self, state: RobotState | Any) -> None:
         """Show the robot in a state, or at a configuration of shape (nq,).
@@ -126,41 +108,41 @@ class Viewer:
             NonFiniteError: If it holds a NaN or an infinity.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
         """
+        around: list[Command] = []
         if isinstance(state, RobotState):
-            self._show(state.t, state.data.oMi)
+            placements = state.data.oMi
+            around = self._around(state.t)
         else:
-            q = self.robot.check_configuration(state)
-            self.transport.send(self._drawing.move(self._placements(q)))
+            placements = self._placements(self.robot.check_configuration(state))
+        self.transport.send([*around, *self._drawing.move(placements)])
 
     def play(
-        self, rollout: Rollout, *, speed: float = 1.0, loop: bool = False
-    ) -> Playback:
-        """Play a run in real time; frames that come too late are left out.
+        self,
+        rollout: Rollout,
+        *,
+        speed: float = 1.0,
+        loop: bool = False,
+        controller: Controller | None = None,
+    ) -> None:
+        """Have the page play a run, and return at once, whether anyone looks or not.
 
-        Returns when the run is over, whether anyone looks or not. What is returned, and
-        a line in the log if it was not smooth, tells how it went.
+        The page has the run then: pausing, speed and going to a time are its own.
 
         Args:
             rollout: The run.
             speed: Seconds of the run shown in one second.
-            loop: Play it again and again, until interrupted.
+            loop: Play it again and again.
+            controller: What controlled the run; shows what the log's columns alone do
+                not tell, such as shortest distances and self-motion.
 
         Raises:
             ViewerError: If the run is not this robot's or is empty, the speed is not
                 positive, or the server has ended.
         """
-        if rollout is not self._scene:
-            self.draw_scene(rollout)
-
-        def draw(time: float) -> None:
-            q = configuration_between(self.robot, rollout.q, moment(rollout.t, time))
-            self._show(time, self._placements(q))
-
-        start, end = float(rollout.t[0]), float(rollout.t[-1])
-        while True:
-            played = playback.play(draw, start, end, speed)
-            if not loop or end <= start:
-                return played
+        if not 0.0 < speed < float("inf"):
+            raise ViewerError(f"speed {speed} must be positive")
+        run = self._draw_run(rollout, controller)
+        self.transport.send(set_clip(run.clip(), play=True, loop=loop, speed=speed))
 
     def wait_for_browser(self, timeout: float) -> bool:
         """Wait until a page shows everything [s]; return whether one does.
@@ -185,14 +167,61 @@ class Viewer:
     ) -> None:
         self.close()
 
-    def _show(self, time: float, placements: Any) -> None:
+    def _draw_run(self, rollout: Rollout, controller: Controller | None) -> RunDrawing:
+        self._check(rollout)
+        run = RunDrawing(self._drawing, rollout, controller=controller)
+        self._obstacles = None
+        self._stage(
+            run.points(),
+            run.obstacle_points(),
+            run.draw,
+            str(rollout.meta.get("title") or self.robot.name),
+            run.legend(),
+        )
+        self.transport.send(set_clip(run.clip()))
+        return run
+
+    def _draw_obstacles(self, scene: Scene) -> None:
+        placements = self._placements(self.robot.home())
+        obstacles = ObstacleDrawing(scene)
+        self._obstacles = obstacles
+        self._stage(
+            self._drawing.points(placements),
+            obstacles.obstacle_points(),
+            obstacles.draw,
+            self.robot.name,
+            obstacles.legend(),
+        )
+        still = [*no_clip(), *obstacles.move(0.0), *self._drawing.move(placements)]
+        self.transport.send(still)
+
+    def _stage(
+        self,
+        moving: Array,
+        others: Array,
+        draw: Callable[[float], Iterable[Command]],
+        title: str,
+        legend: list[tuple[str, str]],
+    ) -> None:
+        """Clear the stage, fit it to points of the robot and others, and draw on it."""
+        subject = np.vstack([moving, self._drawing.stand()])
+        points = in_sight(subject, others)
         self.transport.send(
             [
-                *self._drawing.move(placements),
-                *self._around.move(time),
-                set_time(f"t = {time:.2f} s"),
+                *run_drawing.clear(),
+                *draw_stage(points, floor=min(0.0, float(subject[:, 2].min()))),
+                *draw(scene_size(points)),
+                look_at(self.robot, points, self._camera, self._target),
+                set_caption(title, legend),
+                set_time(""),
             ]
         )
+
+    def _around(self, time: float) -> list[Command]:
+        """Return what moves all but the robot to where it is at a time [s]."""
+        if self._obstacles is None:
+            return [seek(time)]
+        return [*self._obstacles.move(time), set_time(f"t = {time:.2f} s")]
 
     def _placements(self, q: Array) -> Any:
         """Return where all joints are in the world."""

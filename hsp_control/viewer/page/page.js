@@ -7,7 +7,11 @@ const meshcat = viewer.handle_command.bind(viewer);
 // Our own lights, floor and grid come with the scene; they fit the robot.
 for (const name of ["Lights", "Grid", "Axes"]) viewer.delete_path([name]);
 
-const words = {camera, caption, time, length, ask, set_object};
+const player = new Player(viewer);
+new Controls(player, document.body);
+
+const words = {camera, caption, time, status, trail, trail_more, clip, still, seek, ask, set_object,
+               nothing() {}};
 viewer.handle_command = (command) => {
   if (Array.isArray(command)) command.forEach(viewer.handle_command);
   else (words[command.type] ?? meshcat)(command);
@@ -68,16 +72,34 @@ function caption({title, legend}) {
   }));
 }
 
+// The clock of a scene that is shown from outside, step by step.
 function time({text}) { document.querySelector("#caption .time").textContent = text; }
 
-// Draw a tube up to a fraction of its rings.
-function length({path, fraction}) {
-  node(path).traverse(({geometry}) => {
-    const size = geometry?.userData.segment;
-    if (!size) return;
-    const segments = geometry.index.count / size;
-    geometry.setDrawRange(0, size * Math.round(fraction * segments));
-  });
+// What the program behind the page is doing.
+function status({text}) {
+  const line = document.querySelector("#caption .status");
+  line.textContent = text;
+  line.hidden = !text;
+}
+
+function trail(command) {
+  viewer.set_object(command.path.split("/").filter(Boolean), trailMesh(command));
+}
+
+function trail_more({path, points}) { extendTrail(node(path), points); }
+
+// A clip, or what comes after the last one's end.
+function clip(command) {
+  if (command.begins) player.load(command, command.keep);
+  else player.extend(command);
+}
+
+// Take the clip away: the scene is shown from outside from now on.
+function still() { player.unload(); }
+
+function seek({time}) {
+  player.pause();
+  player.seek(time);
 }
 
 // Answer once all that came before is drawn.

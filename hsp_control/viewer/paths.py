@@ -1,0 +1,80 @@
+"""Where tasks wanted the robot and where it was, as trails in space."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hsp_control.arrays import Array
+from hsp_control.viewer.appearance import (
+    ACTUAL,
+    DESIRED,
+    DESIRED_WIDENING,
+    PATH_RADIUS,
+)
+from hsp_control.viewer.clip import Track
+from hsp_control.viewer.commands import Command, set_trail
+from hsp_control.viewer.element import element
+from hsp_control.viewer.motion import Motion
+from hsp_control.viewer.surfaces import color_number
+from hsp_control.viewer.targets import read_targets
+
+_MOST_RINGS = 1500
+
+
+class Paths:
+    """The desired path as a sleeve, the actual one within it, as far as it has come."""
+
+    def __init__(self, motion: Motion, root: str, color: str = ACTUAL) -> None:
+        """Read where the tasks' points were and should have been.
+
+        Args:
+            motion: The run.
+            root: The layer's node.
+            color: The actual path's.
+        """
+        self._root = root
+        self._color = color
+        rows = _ring_rows(len(motion.times))
+        self._ring_times = motion.times[rows]
+        self._paths = {
+            target.name: (target.desired[rows], target.actual[rows])
+            for target in read_targets(motion.rows)
+            if target.desired is not None
+        }
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield what puts it into a scene of some size [m]."""
+        radius = PATH_RADIUS * size
+        actual, desired = color_number(self._color), color_number(DESIRED)
+        for name, (wanted, was) in self._paths.items():
+            if np.ptp(wanted, axis=0).max() >= radius:  # else: the target shows where
+                wide = DESIRED_WIDENING * radius
+                path = self._path(name, "desired")
+                yield set_trail(path, wanted, wide, desired, sleeve=True)
+            if np.ptp(was, axis=0).max() >= radius:
+                yield set_trail(self._path(name, "actual"), was, radius, actual)
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield how it moves along the run."""
+        rings = np.arange(len(self._ring_times), dtype=float)[:, None]
+        for name in self._paths:
+            path = self._path(name, "actual")
+            yield Track(path, "length", self._ring_times, rings)
+
+    def legend(self) -> list[tuple[str, str]]:
+        """Return names and colours."""
+        if not self._paths:
+            return []
+        return [("desired path", DESIRED), ("actual path", self._color)]
+
+    def points(self) -> Array:
+        """Return points of the desired paths [m], shape (K, 3)."""
+        wanted = [desired for desired, _ in self._paths.values()]
+        return np.concatenate([np.zeros((0, 3)), *wanted])
+
+    def _path(self, name: str, kind: str) -> str:
+        return f"{self._root}/{element(name)}/{kind}"
+
+
+def _ring_rows(count: int) -> Array:
+    return np.linspace(0, count - 1, min(count, _MOST_RINGS)).round().astype(int)

@@ -1,0 +1,106 @@
+"""A run in the scene: its robot's motion, and the layers that explain it."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from hsp_control.arrays import Array
+from hsp_control.controller import Controller
+from hsp_control.simulation import Rollout
+from hsp_control.viewer.clip import Clip, Track
+from hsp_control.viewer.commands import Command, delete, set_property
+from hsp_control.viewer.layer import Layer
+from hsp_control.viewer.motion import FINEST, Motion, motion_of
+from hsp_control.viewer.obstacle_layer import ObstacleLayer
+from hsp_control.viewer.paths import Paths
+from hsp_control.viewer.robot_drawing import RobotDrawing
+from hsp_control.viewer.target_marks import TargetMarks
+
+LAYERS = ("paths", "targets", "obstacles")
+"""What can be switched, as nodes of the scene tree and in a configuration."""
+
+
+class RunDrawing:
+    """What a log tells, in layers.
+
+    Attributes:
+        motion: The rows that are drawn.
+        layers: The layers by name.
+    """
+
+    def __init__(
+        self,
+        drawing: RobotDrawing,
+        rollout: Rollout,
+        *,
+        controller: Controller | None = None,
+        root: str = "",
+        shown: Mapping[str, bool] | None = None,
+        finest: float = FINEST,
+    ) -> None:
+        """Read the log.
+
+        Args:
+            drawing: The robot in the scene.
+            rollout: The log.
+            controller: What controlled the robot; without it, layers that need more
+                than the log's columns are left out.
+            root: The node that holds all of it.
+            shown: Whether each layer is shown at first; those not named are.
+            finest: Least time between two rows that are drawn [s].
+        """
+        self.motion: Motion = motion_of(drawing.robot, rollout, finest)
+        self._drawing = drawing
+        self._root = root
+        self._shown = dict.fromkeys(LAYERS, True) | dict(shown or {})
+        motion = self.motion
+        self._paths = Paths(motion, f"{root}/paths")
+        self._obstacles = ObstacleLayer(motion, f"{root}/obstacles")
+        self.layers: dict[str, Layer] = {
+            "paths": self._paths,
+            "targets": TargetMarks(motion, f"{root}/targets"),
+            "obstacles": self._obstacles,
+        }
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield what puts the layers into a scene of some size [m]."""
+        for name, layer in self.layers.items():
+            yield from layer.draw(size)
+            if not self._shown[name]:
+                yield set_property(f"{self._root}/{name}", "visible", False)
+
+    def clip(self) -> Clip:
+        """Return how everything moves."""
+        times = self.motion.times
+        return Clip(float(times[0]), float(times[-1]), list(self.tracks(self.motion)))
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield how everything moves along the run, or along a part of it."""
+        yield from self._drawing.tracks(motion)
+        for layer in self.layers.values():
+            yield from layer.tracks(motion)
+
+    def points(self) -> Array:
+        """Return where robot and targets are in the run [m], shape (K, 3)."""
+        rows = self.motion.rows
+        skeleton = rows["skeleton"] if "skeleton" in rows else np.zeros((0, 3))
+        return np.concatenate([skeleton.reshape(-1, 3), self._paths.points()])
+
+    def obstacle_points(self) -> Array:
+        """Return points that enclose the obstacles in the run [m], shape (K, 3)."""
+        return self._obstacles.points()
+
+    def legend(self) -> list[tuple[str, str]]:
+        """Return names and colours of what is shown."""
+        return [
+            entry
+            for name, layer in self.layers.items()
+            if self._shown[name]
+            for entry in layer.legend()
+        ]
+
+
+def clear(root: str = "") -> Iterator[Command]:
+    """Yield what takes all layers away."""
+    for name in LAYERS:
+        yield delete(f"{root}/{name}")
