@@ -75,6 +75,8 @@ function divide(mesh, parts) {
 // Pinocchio's z is up, three.js's y.
 function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
 
+const BAR = 0.1;  // the share of the picture's height that is left to the player's bar
+
 // Look at a target, from an eye or, along a direction, from where all balls are seen.
 function camera({target, eye, direction, up, points, radius, field_of_view}) {
   const center = vector(target);
@@ -83,13 +85,13 @@ function camera({target, eye, direction, up, points, radius, field_of_view}) {
   const distance = eye ? toEye.length() : 0;
   toEye.normalize();
   const tall = Math.tan(field_of_view * Math.PI / 360);
-  const wide = tall * (window.innerWidth / window.innerHeight || 1.5);
+  const wide = tall * (viewer.dom_element.offsetWidth / window.innerHeight || 1.5);
   const right = vector(up).cross(toEye).normalize();
   const above = toEye.clone().cross(right);
   const needed = (point) => {
     const offset = vector(point).sub(center);
     const x = Math.abs(offset.dot(right)) + radius, y = Math.abs(offset.dot(above)) + radius;
-    return offset.dot(toEye) + Math.max(x / wide, y / tall);
+    return offset.dot(toEye) + Math.max(x / wide, y / (tall * (1 - BAR)));
   };
   const away = distance || Math.max(...points.map(needed));
   const lens = viewer.camera;
@@ -98,6 +100,8 @@ function camera({target, eye, direction, up, points, radius, field_of_view}) {
   lens.far = away * 100;
   lens.up.copy(vector(up));
   lens.position.copy(center).addScaledVector(toEye, away);
+  lens.setViewOffset(1, 1, 0, BAR / 2, 1, 1);
+  viewer.set_3d_pane_size();
   viewer.controls.dispose();
   viewer.set_camera(lens);  // new controls, that orbit about the new up
   viewer.controls.target.copy(center);
@@ -119,9 +123,7 @@ function time({text}) { document.querySelector("#caption .time").textContent = t
 
 // What the program behind the page is doing.
 function status({text}) {
-  const line = document.querySelector("#caption .status");
-  line.textContent = text;
-  line.hidden = !text;
+  document.querySelector("#caption .status").textContent = text;
 }
 
 function trail(command) {
