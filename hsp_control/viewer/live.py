@@ -2,6 +2,7 @@
 
 import logging
 import time
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,10 @@ from hsp_control.viewer.viewer import Viewer
 
 PERIOD = 0.1
 """Least time between two messages to the page [s]."""
+LONGEST = 1.0
+"""Most time between two messages [s]."""
+LATELY = 2.0
+"""Over which time the pace is measured [s]."""
 SHARE = 0.03
 """Of the computing time, what drawing may take."""
 _PREVIEWED = 60
@@ -56,22 +61,28 @@ class LiveView:
         self._sent = 0  # rows of the run
         self._pieces = 0
         self._cost = 0.0  # s a row that is drawn
-        self._begin = self._next = time.perf_counter()
+        self._next = 0.0
+        self._marks: deque[tuple[float, float]] = deque()  # (computed at, time of run)
+        self._begin: float | None = None
         self._size = viewer.set_stage(self._run, experiment.scenario.title)
 
     def on_row(self, recorder: Recorder) -> None:
         """Send what has been computed since last time, if it is time again."""
         now = time.perf_counter()
+        if self._begin is None:
+            self._begin = now
         if now < self._next:
             return
+        # Not the clock's time: other processes, such as the browser, take that.
+        before = time.thread_time()
         try:
-            self._send(recorder, now)
+            self._send(Rollout(recorder.rows(self._sent), self._meta), now)
         except ViewerError as error:
             _log.warning("%s; the run goes on unseen", error)
             self._next = float("inf")
             return
-        took = time.perf_counter() - now
-        self._next = now + max(PERIOD, took / SHARE)
+        took = time.thread_time() - before
+        self._next = now + min(max(PERIOD, took / SHARE), LONGEST)
 
     def finish(self, rollout: Rollout) -> None:
         """Have the page go on with the whole run, drawn in full.
@@ -79,7 +90,7 @@ class LiveView:
         Raises:
             ViewerError: If the server has ended.
         """
-        elapsed = time.perf_counter() - self._begin
+        elapsed = time.perf_counter() - (self._begin or 0.0)
         rate = (rollout.t[-1] - rollout.t[0]) / max(elapsed, 1e-9)
         self._viewer.replace_run(
             rollout,
@@ -88,20 +99,25 @@ class LiveView:
             status=f"computed at {_shown(rate)} × real time",
         )
 
-    def _send(self, recorder: Recorder, now: float) -> None:
-        robot = self._experiment.robot
-        rows = Rollout(recorder.rows(self._sent), self._meta)
-        elapsed = now - self._begin
-        rate = float(rows.t[-1]) / max(elapsed, 1e-9)
+    def _send(self, rows: Rollout, now: float) -> None:
+        rate = self._rate(now, float(rows.t[-1]))
         # Rows a second of computing, times their cost, are the share.
         finest = max(COARSEST, rate * self._cost / SHARE)
-        motion = motion_of(robot, rows, finest, coarsest=np.inf)
-        commands = self._commands(motion, rate)
-        self._viewer.transport.send(commands)
-        spent = time.perf_counter() - now
-        self._cost = spent / len(motion.times)
+        before = time.thread_time()
+        motion = motion_of(self._experiment.robot, rows, finest, coarsest=np.inf)
+        self._viewer.transport.send(self._commands(motion, rate))
+        self._cost = (time.thread_time() - before) / len(motion.times)
         self._sent += len(rows)
         self._pieces += 1
+
+    def _rate(self, now: float, computed: float) -> float:
+        """Return the seconds of the run that were computed in a second, lately."""
+        marks = self._marks
+        marks.append((now, computed))
+        while len(marks) > 2 and marks[1][0] < now - LATELY:
+            marks.popleft()
+        then, before = marks[0]
+        return (computed - before) / (now - then) if now > then else 0.0
 
     def _commands(self, motion: Motion, rate: float) -> list[Any]:
         first = not self._pieces
@@ -117,8 +133,10 @@ class LiveView:
             if first
             else [extend_clip(clip, self._pieces)]
         )
-        status = set_status(f"computing at {_shown(rate)} × real time")
-        return [*self._paths.extend(motion), *said, status]
+        grown = self._paths.extend(motion)
+        if not rate:
+            return [*grown, *said]
+        return [*grown, *said, set_status(f"computing at {_shown(rate)} × real time")]
 
 
 def _preview(experiment: Experiment) -> Rollout:
