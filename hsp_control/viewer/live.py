@@ -52,7 +52,7 @@ class LiveView:
         robot, controller = experiment.robot, experiment.controller
         motion = motion_of(robot, preview)
         shown = viewer.view.show.model_dump()
-        layers = all_layers(robot, motion, controller)
+        layers = all_layers(robot, motion, controller, dark=viewer.dark)
         self._paths = GrowingPaths(motion, "/paths")
         layers["paths"] = self._paths
         # What nobody sees need not be computed now.
