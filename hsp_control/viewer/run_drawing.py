@@ -67,8 +67,10 @@ def all_layers(
         layers |= {
             "influence": Influence(field, obstacles.shapes, f"{root}/influence"),
             "distances": Distances(controller, f"{root}/distances", ink),
-            "self_motion": SelfMotion(controller, motion, f"{root}/self_motion"),
         }
+        if "field.g" in motion.rows:
+            arrows = SelfMotion(controller, motion, f"{root}/self_motion")
+            layers["self_motion"] = arrows
     return layers
 
 
