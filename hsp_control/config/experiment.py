@@ -33,6 +33,7 @@ from hsp_control.resources import bundled_configs
 from hsp_control.robot import Robot
 from hsp_control.scene import Scene
 from hsp_control.simulation import Rollout, simulate
+from hsp_control.simulation.recorder import Recorder
 from hsp_control.suggest import did_you_mean, listing
 
 
@@ -62,8 +63,12 @@ class Experiment:
     integrator: Integrator
     plant: Plant
 
-    def run(self, on_progress: Callable[[float], None] | None = None) -> Rollout:
-        """Simulate it; see `simulate` for what is raised and kept."""
+    def run(
+        self,
+        on_progress: Callable[[float], None] | None = None,
+        on_row: Callable[[Recorder], None] | None = None,
+    ) -> Rollout:
+        """Simulate it; see `simulate` for the arguments, what is raised and kept."""
         settings = self.scenario.simulation
         return simulate(
             self.controller,
@@ -76,6 +81,7 @@ class Experiment:
             plant=self.plant,
             scene=self.scene,
             on_progress=on_progress,
+            on_row=on_row,
             meta={
                 "name": self.name,
                 "title": self.scenario.title,

@@ -7,7 +7,7 @@ from hsp_control.plants.plant import Reading
 
 
 def contact_readings(wrenches: Mapping[str, Array]) -> dict[str, Reading]:
-    """Return ``contact.<name>.force`` and ``.moment`` for each contact.
+    """Return ``plant.contact.<name>.force`` and ``.moment`` for each contact.
 
     Args:
         wrenches: Of the world on the robot, in the world's axes, the moment about the
@@ -17,6 +17,6 @@ def contact_readings(wrenches: Mapping[str, Array]) -> dict[str, Reading]:
     for name, wrench in wrenches.items():
         force = Reading(wrench[:3], "N", "of the world on the robot, in world axes")
         moment = Reading(wrench[3:], "N·m", "the same, about the frame's origin")
-        readings[f"contact.{name}.force"] = force
-        readings[f"contact.{name}.moment"] = moment
+        readings[f"plant.contact.{name}.force"] = force
+        readings[f"plant.contact.{name}.moment"] = moment
     return readings

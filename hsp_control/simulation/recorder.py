@@ -178,6 +178,10 @@ class Recorder:
             ratios = tangential[loaded] / (contact.friction * local[loaded, 2])
             used[self._rows] = ratios.max(initial=0.0)
 
+    def rows(self, start: int) -> dict[str, Array]:
+        """Return the columns from a row on, as far as they have come; no copies."""
+        return {name: a[start : self._rows] for name, a in self._columns.items()}
+
     def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
         """Return the rows recorded so far as a rollout."""
         controller, robot = self._controller, self._controller.robot
@@ -207,6 +211,7 @@ class Recorder:
                         "rows": task.rows,
                         "level": controller.level_of(task.name),
                         "axes": getattr(task, "axes", None),
+                        "frame": getattr(task, "frame", None),
                     }
                     for task in controller.tasks
                 },

@@ -12,7 +12,7 @@ from hsp_control.viewer.kept import key_of
 
 Json = dict[str, Any]
 
-CAMERA, CAPTION = "/camera", "/caption"
+CAMERA, CAPTION, CLIP = "/camera", "/caption", "/clip"
 
 
 class Command(NamedTuple):
@@ -49,9 +49,46 @@ def set_property(path: str, name: str, value: Any) -> Command:
     return _command("set_property", path, name, property=name, value=value)
 
 
-def set_length(path: str, fraction: float) -> Command:
-    """Show only the first part of a path's tube, a fraction from 0 to 1."""
-    return _command("length", path, "length", fraction=float(fraction))
+def set_ghost(path: str, color: str, opacity: float) -> Command:
+    """Make all that is at a node and below it a ghost, tinted in ``#RRGGBB``."""
+    return _command("ghost", path, "ghost", color=color, opacity=float(opacity))
+
+
+def set_trail(
+    path: str,
+    points: Array,
+    radius: float,
+    color: int,
+    *,
+    opacity: float = 1.0,
+    sleeve: bool = False,
+) -> Command:
+    """Put a path in space at a node, in place of what was there.
+
+    Args:
+        path: The node.
+        points: The path [m], shape (N, 3).
+        radius: Half its thickness [m].
+        color: Its colour as three.js's number, the same in any light.
+        opacity: 1 solid, 0 invisible.
+        sleeve: Show only the far half, seen from within: it never hides what it holds.
+    """
+    return _command(
+        "trail",
+        path,
+        "object",
+        points=typed_array(points, np.float32),
+        radius=float(radius),
+        color=color,
+        opacity=float(opacity),
+        sleeve=sleeve,
+    )
+
+
+def extend_trail(path: str, points: Array, number: int) -> Command:
+    """Add points (N, 3) to a path's end; ``number`` counts how often that was done."""
+    more = typed_array(points, np.float32)
+    return _command("trail_more", path, f"more {number}", points=more)
 
 
 def delete(path: str) -> Command:
@@ -64,10 +101,20 @@ def set_camera(**view: Any) -> Command:
     return _command("camera", CAMERA, "camera", **view)
 
 
-def set_caption(title: str, legend: list[tuple[str, str]]) -> Command:
-    """Set the words beside the scene: a title, and names with their colours."""
+def set_caption(
+    title: str, legend: list[tuple[str, str]], *, dark: bool = False
+) -> Command:
+    """Set the words beside the scene: a title, and names with their colours.
+
+    Args:
+        title: The title.
+        legend: Names and colours ``#RRGGBB``.
+        dark: Whether they stand on a dark background.
+    """
     entries = [{"name": name, "color": color} for name, color in legend]
-    return _command("caption", CAPTION, "caption", title=title, legend=entries)
+    return _command(
+        "caption", CAPTION, "caption", title=title, legend=entries, dark=dark
+    )
 
 
 def set_time(text: str) -> Command:
@@ -75,9 +122,38 @@ def set_time(text: str) -> Command:
     return _command("time", CAPTION, "time", text=text)
 
 
+def set_status(text: str) -> Command:
+    """Say beside the scene what the program is doing; empty for nothing."""
+    return _command("status", CAPTION, "status", text=text)
+
+
+def clip_command(kind: str, what: str, **fields: Any) -> Command:
+    """Return a word about the clip: see `hsp_control.viewer.clip`."""
+    return _command(kind, CLIP, what, **fields)
+
+
+def forget_clip() -> Command:
+    """Forget the clip and all that extended it, to make room for another or for none.
+
+    A page that shows it goes on showing it until it is told what comes instead.
+    """
+    packed = umsgpack.packb({"type": "nothing", "path": CLIP})
+    return Command(CLIP, key_of(CLIP, "nothing"), packed, deletes=True)
+
+
+def seek(time: float) -> Command:
+    """Have the page's player rest and show a time of its clip [s]."""
+    return clip_command("seek", "seek", time=float(time))
+
+
 def typed_array(values: Any, dtype: type[np.generic]) -> umsgpack.Ext:
     """Return numbers as one of JavaScript's typed arrays."""
-    kinds: dict[Any, int] = {np.uint8: 0x12, np.uint32: 0x16, np.float32: 0x17}
+    kinds: dict[Any, int] = {
+        np.uint8: 0x12,
+        np.uint32: 0x16,
+        np.float32: 0x17,
+        np.float64: 0x18,
+    }
     return umsgpack.Ext(kinds[dtype], np.ascontiguousarray(values, dtype).tobytes())
 
 

@@ -10,6 +10,7 @@ from hsp_control.scene import Scene
 from hsp_control.shapes import Shape
 from hsp_control.viewer.appearance import OBSTACLE
 from hsp_control.viewer.commands import Command, set_object, set_transform
+from hsp_control.viewer.element import element
 from hsp_control.viewer.obstacle_shapes import obstacle
 
 ROOT = "/obstacles"
@@ -75,4 +76,4 @@ class ObstacleDrawing:
 
 
 def _path(name: str) -> str:
-    return f"{ROOT}/{name.replace('/', '_')}"
+    return f"{ROOT}/{element(name)}"

@@ -27,6 +27,7 @@ ADDRESS = "127.0.0.1"
 PORTS = (*range(7000, 7100), 0)  # 0: any that is free
 TAKEN = "taken"  # what a page answers to each message
 
+_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 _LOOPBACK_NAMES = {"127.0.0.1", "localhost"}
 _CHILD_WATCH = 1.0  # s
 
@@ -164,12 +165,14 @@ def main(meshcat: str, port: int, parent: int) -> NoReturn:
 
 
 async def _serve(meshcat: Path, port: int, parent: int) -> None:
-    own = Path(__file__).parent
     files = {
-        "": ("text/html", (own / "page.html").read_bytes()),
-        "page.js": ("text/javascript", (own / "page.js").read_bytes()),
-        "main.min.js": ("text/javascript", (meshcat / "main.min.js").read_bytes()),
+        file.name: (_TYPES[file.suffix], file.read_bytes())
+        for file in (
+            *(Path(__file__).parent / "page").iterdir(),
+            meshcat / "main.min.js",
+        )
     }
+    files[""] = files.pop("index.html")
     hub = Hub()
     routes: list[Any] = [
         (r"/scene", Page, {"hub": hub}),

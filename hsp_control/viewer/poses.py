@@ -21,3 +21,17 @@ def along(direction: Array) -> Array:
     pose = np.eye(4)
     pose[:3, :3] = turn.toRotationMatrix()
     return pose
+
+
+def quaternions_along(directions: Array) -> Array:
+    """Return the turns of z along directions the shortest way, as (x, y, z, w).
+
+    Args:
+        directions: Shape (N, 3), of any length; of length 0: no turn.
+    """
+    lengths = np.linalg.norm(directions, axis=1, keepdims=True)
+    x, y, z = (directions / np.where(lengths > 0.0, lengths, 1.0)).T
+    turns = np.column_stack([-y, x, np.zeros_like(x), 1.0 + z])
+    sizes = np.linalg.norm(turns, axis=1, keepdims=True)
+    straight_down = np.array([1.0, 0.0, 0.0, 0.0])
+    return np.where(sizes > 1e-9, turns / np.maximum(sizes, 1e-9), straight_down)

@@ -1,7 +1,7 @@
 """The robot in the scene: drawn once, then moved joint by joint."""
 
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -9,14 +9,18 @@ import pinocchio as pin
 from hsp_control.arrays import Array
 from hsp_control.robot import Robot
 from hsp_control.viewer import threejs
+from hsp_control.viewer.clip import Track
 from hsp_control.viewer.commands import Command, Json, set_object, set_transform
+from hsp_control.viewer.element import element
 from hsp_control.viewer.mesh_files import collada_object, mesh_geometry
+from hsp_control.viewer.motion import Motion
 from hsp_control.viewer.poses import moved_to
 from hsp_control.viewer.stand_ins import stand_in
 from hsp_control.viewer.surfaces import material
 from hsp_control.viewer.visuals import Visual, read_visuals
 
 ROOT = "/robot"
+"""Where a robot stands in the scene tree, unless told."""
 
 _log = logging.getLogger(__name__)
 
@@ -28,11 +32,16 @@ class RobotDrawing:
     and drums stand in for it.
     """
 
-    def __init__(self, robot: Robot) -> None:
-        """Find out what there is to show."""
+    def __init__(self, robot: Robot, root: str = ROOT) -> None:
+        """Find out what there is to show.
+
+        Args:
+            robot: The robot.
+            root: Its node.
+        """
         self.robot = robot
         self._visuals = read_visuals(robot)
-        self._nodes = _node_names(robot)
+        self._nodes = [f"{root}/{element(name)}" for name in robot.model.names]
         missing = [v for v in self._visuals if v.kind == "mesh" and v.file is None]
         self._stand_ins = {visual.joint for visual in missing}
         if not self._visuals:
@@ -60,7 +69,7 @@ class RobotDrawing:
             if thing is not None:
                 links.setdefault((visual.joint, visual.link), []).append(thing)
         for (joint, link), things in links.items():
-            path = f"{self._nodes[joint]}/{_element(link)}"
+            path = f"{self._nodes[joint]}/{element(link)}"
             yield set_object(path, threejs.group(things))
 
     def move(self, placements: Sequence[pin.SE3]) -> list[Command]:
@@ -70,6 +79,19 @@ class RobotDrawing:
             for joint, node in enumerate(self._nodes)
             if joint > 0
         ]
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield how the joints move along a run."""
+        joints = range(1, self.robot.model.njoints)
+        poses = np.empty((len(motion.times), len(joints), 7))
+        for row, state in enumerate(motion.states()):
+            placements = state.data.oMi
+            for k, joint in enumerate(joints):
+                poses[row, k] = pin.SE3ToXYZQUAT(placements[joint])
+        for k, joint in enumerate(joints):
+            node = self._nodes[joint]
+            yield Track(node, "position", motion.times, poses[:, k, :3])
+            yield Track(node, "quaternion", motion.times, poses[:, k, 3:])
 
     def points(self, placements: Sequence[pin.SE3]) -> Array:
         """Return points of the robot in the world [m]: joints, frames, shape (K, 3)."""
@@ -127,16 +149,6 @@ def _thing(visual: Visual) -> Json | None:
         "receiveShadow": True,
     }
     return thing
-
-
-def _node_names(robot: Robot) -> list[str]:
-    names = [_element(name) for name in robot.model.names]
-    return [f"{ROOT}/{name}" for name in names]
-
-
-def _element(name: str) -> str:
-    """Return a name as one element of a path."""
-    return name.replace("/", "_") or "_"
 
 
 def _hint(robot: Robot) -> str:

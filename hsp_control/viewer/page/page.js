@@ -1,0 +1,186 @@
+// Meshcat's viewer, told a few more words than it knows: see hsp_control/viewer/commands.py.
+"use strict";
+
+const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+const meshcat = viewer.handle_command.bind(viewer);
+
+// Our own lights, floor and grid come with the scene; they fit the robot.
+for (const name of ["Lights", "Grid", "Axes"]) viewer.delete_path([name]);
+viewer.gui.removeFolder(viewer.animator.folder);  // the player is ours, too
+
+const player = new Player(viewer);
+new Controls(player, document.body);
+
+const words = {camera, caption, time, status, ghost, trail, trail_more, clip, still, seek, ask, set_object,
+               nothing() {}};
+viewer.handle_command = (command) => {
+  if (Array.isArray(command)) command.forEach(viewer.handle_command);
+  else (words[command.type] ?? meshcat)(command);
+  viewer.set_dirty();
+};
+
+function node(path) {
+  return viewer.scene_tree.find(path.split("/").filter((name) => name.length > 0)).object;
+}
+
+// Meshcat merges a mesh file's parts into one geometry, but forgets which triangles of a
+// part have which of its surfaces: those were not drawn. And it gives up on parts of which
+// only some have texture coordinates.
+function set_object(command) {
+  const {BufferGeometry, BufferAttribute} = MeshCat.THREE;
+  const apply = BufferGeometry.prototype.applyMatrix4;
+  const parts = [];
+  BufferGeometry.prototype.applyMatrix4 = function (matrix) {  // called for each part
+    parts.push(this);
+    const {position, uv} = this.attributes;
+    if (!uv) this.setAttribute("uv", new BufferAttribute(new Float32Array(2 * position.count), 2));
+    return apply.call(this, matrix);
+  };
+  try {
+    meshcat(command);
+  } finally {
+    BufferGeometry.prototype.applyMatrix4 = apply;
+  }
+  node(command.path).traverse((object) => {
+    const {geometry, material} = object;
+    if (Array.isArray(material) && material.some(Array.isArray)) divide(object, parts);
+    // Some mesh files have no normals and would be black.
+    if (geometry?.isBufferGeometry && !geometry.attributes.normal) geometry.computeVertexNormals();
+  });
+}
+
+// Tell a merged mesh which triangles have which surface.
+function divide(mesh, parts) {
+  const size = ({attributes}) => attributes.position.count;
+  const number = mesh.material.length;
+  const first = parts.findIndex((_, k) => {
+    const own = parts.slice(k, k + number);
+    return own.length === number
+      && own.reduce((total, part) => total + size(part), 0) === size(mesh.geometry);
+  });
+  if (first < 0) return;
+  mesh.geometry.clearGroups();
+  const surfaces = [];
+  let offset = 0;
+  parts.slice(first, first + number).forEach((part, k) => {
+    const whole = {start: 0, count: size(part), materialIndex: 0};
+    for (const {start, count, materialIndex} of part.groups.length ? part.groups : [whole]) {
+      mesh.geometry.addGroup(offset + start, count, surfaces.length);
+      surfaces.push([mesh.material[k]].flat()[materialIndex]);
+    }
+    offset += size(part);
+  });
+  mesh.material = surfaces;
+}
+
+// Pinocchio's z is up, three.js's y.
+function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
+
+// The shares of the picture's height that are left to the player's bar and to the title.
+const BAR = 0.1, TITLE = 0.06;
+
+// Look at a target, from an eye or, along a direction, from where all balls are seen.
+function camera({target, eye, direction, up, points, radius, field_of_view}) {
+  const center = vector(target);
+  const toEye = vector(eye ?? direction);
+  if (eye) toEye.sub(center);
+  const distance = eye ? toEye.length() : 0;
+  toEye.normalize();
+  const tall = Math.tan(field_of_view * Math.PI / 360);
+  const wide = tall * (viewer.dom_element.offsetWidth / window.innerHeight || 1.5);
+  const right = vector(up).cross(toEye).normalize();
+  const above = toEye.clone().cross(right);
+  const needed = (point) => {
+    const offset = vector(point).sub(center);
+    const x = Math.abs(offset.dot(right)) + radius, y = Math.abs(offset.dot(above)) + radius;
+    return offset.dot(toEye) + Math.max(x / wide, y / (tall * (1 - BAR - TITLE)));
+  };
+  const away = distance || Math.max(...points.map(needed));
+  const lens = viewer.camera;
+  lens.fov = field_of_view;
+  lens.near = away / 100;
+  lens.far = away * 100;
+  lens.up.copy(vector(up));
+  lens.position.copy(center).addScaledVector(toEye, away);
+  lens.setViewOffset(1, 1, 0, (BAR - TITLE) / 2, 1, 1);
+  viewer.set_3d_pane_size();
+  viewer.controls.dispose();
+  viewer.set_camera(lens);  // new controls, that orbit about the new up
+  viewer.controls.target.copy(center);
+}
+
+function caption({title, legend, dark}) {
+  document.title = title;
+  document.body.classList.toggle("dark", dark);
+  document.querySelector("#caption h1").textContent = title;
+  document.querySelector("#caption ul").replaceChildren(...legend.map(({name, color}) => {
+    const entry = document.createElement("li");
+    entry.textContent = name;
+    entry.style.setProperty("--color", color);
+    return entry;
+  }));
+}
+
+// Tint all that is at a node, and let what is behind it shine through.
+function ghost({path, color, opacity}) {
+  const tint = new MeshCat.THREE.Color(color);
+  eachMaterial(node(path), (material) => {
+    material.color?.lerp(tint, 0.6);
+    // Where it coincides with what is solid, it lies behind.
+    const behind = {polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 8};
+    Object.assign(material, {opacity, transparent: true, needsUpdate: true, ...behind});
+  });
+  node(path).traverse((thing) => { thing.castShadow = false; });
+}
+
+// The clock of a scene that is shown from outside, step by step.
+function time({text}) { document.querySelector("#caption .time").textContent = text; }
+
+// What the program behind the page is doing.
+function status({text}) {
+  document.querySelector("#caption .status").textContent = text;
+}
+
+function trail(command) {
+  viewer.set_object(command.path.split("/").filter(Boolean), trailMesh(command));
+}
+
+function trail_more({path, points}) { extendTrail(node(path), points); }
+
+// A clip, or what comes after the last one's end.
+function clip(command) {
+  if (command.begins) player.load(command, command.keep);
+  else player.extend(command);
+}
+
+// Take the clip away: the scene is shown from outside from now on.
+function still() { player.unload(); }
+
+function seek({time}) {
+  player.pause();
+  player.seek(time);
+}
+
+// Answer once all that came before is drawn.
+function ask({number}) {
+  viewer.render();
+  viewer.connection.send(String(number));
+}
+
+// Follow the server; when it ends, wait for the next one at the same address.
+function connect(again = false) {
+  const address = new URL("scene", location.href);
+  address.protocol = address.protocol.replace("http", "ws");
+  const socket = new WebSocket(address);
+  socket.binaryType = "arraybuffer";
+  viewer.connection = socket;
+  socket.onopen = () => { if (again) location.reload(); };
+  socket.onmessage = ({data}) => {
+    viewer.handle_command_bytearray(new Uint8Array(data));
+    socket.send("taken");  // only then comes the next: nothing out of date waits in between
+  };
+  socket.onclose = () => {
+    document.getElementById("lost").hidden = false;
+    setTimeout(connect, 1000, true);
+  };
+}
