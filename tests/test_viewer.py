@@ -24,6 +24,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import umsgpack
+from hsp_control.viewer.tube import tube
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
 from hsp_control import Obstacle, Robot, Rollout, Scene, load_experiment
@@ -54,7 +55,6 @@ from hsp_control.viewer.kept import Kept, key_of
 from hsp_control.viewer.records import DELETE, SET, Decoder, Record, encode
 from hsp_control.viewer.server import Server
 from hsp_control.viewer.threejs import _Y_TO_Z
-from hsp_control.viewer.tube import tube
 
 MOVING = "paper/4_moving_obstacle"
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -744,7 +744,7 @@ def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_server_that_cannot_start_says_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server, "_meshcat_page", lambda: tmp_path)
+    monkeypatch.setattr(server, "meshcat_page", lambda: tmp_path)
     with pytest.raises(ViewerError, match=r"cannot start: .*main\.min\.js"):
         Server()
     monkeypatch.setattr(server.sys, "executable", "/bin/false")
