@@ -18,7 +18,8 @@ CURVE_BOUND = 1 / 500
 """How far a curve may be from the log, over the height of its plot."""
 _FLOOR, _TOP = 1e-17, 1e-6
 """What counts as rounding, and what a logarithmic axis of errors reaches at least."""
-_MOST = 14
+_MOST, _NAMED = 14, 7
+"""Of more than 14 curves, only the 7 that vary most are shown."""
 
 
 class Series(NamedTuple):
@@ -149,7 +150,8 @@ def _null_space(rollout: Rollout) -> Iterator[Series]:
 
 def _lines(values: Array, names: Sequence[str]) -> list[Series]:
     """Return a curve a column; of very many, those that vary most."""
-    order = np.argsort(-np.ptp(values, axis=0), kind="stable")[:_MOST]
+    count = len(names) if len(names) <= _MOST else _NAMED
+    order = np.argsort(-np.ptp(values, axis=0), kind="stable")[:count]
     return [
         Series(
             names[column],
@@ -168,8 +170,14 @@ def _packed(panel: Panel, times: Array, arrays: ArrayTable) -> Json:
     bound = CURVE_BOUND * (high - low)
     curves = []
     for series, values in zip(panel.series, every, strict=True):
-        shown = np.log10(np.maximum(values, 10.0**low)) if panel.logarithmic else values
-        shown = np.nan_to_num(shown, nan=low, posinf=high, neginf=low)[:, None]
+        shown = values
+        if panel.logarithmic:
+            with np.errstate(divide="ignore"):
+                shown = np.log10(values)
+        # Out of sight all values are the same: a little beyond the edge.
+        edge = high - low
+        shown = np.nan_to_num(shown, nan=low - edge).clip(low - edge, high + edge)
+        shown = shown[:, None]
         step = bound / 8.0
         rounded = step * np.rint(shown / step)
         keys = thin(times, shown, rounded, on_line, distance(bound))

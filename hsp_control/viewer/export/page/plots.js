@@ -39,7 +39,7 @@ class Plot {
   static MARGIN = {left: 50, right: 12, top: 6, bottom: 20};
 
   constructor(plots, parent, panel) {
-    Object.assign(this, {plots, panel});
+    Object.assign(this, {plots, panel, name: `plot-${parent.childElementCount}`});
     const box = document.createElement("section");
     const heading = document.createElement("h2");
     heading.textContent = panel.title;
@@ -109,12 +109,15 @@ class Plot {
     }
     svg("line", {x1: left, x2: left + this.width, y1: top + this.height,
                  y2: top + this.height, stroke: muted}, picture);
+    const inside = svg("clipPath", {id: this.name}, picture);
+    svg("rect", {x: left, y: top - 2, width: this.width, height: this.height + 2}, inside);
     for (const {times, values, color, dashed} of panel.series) {
-      const points = Array.from(times, (time, i) => `${this.x(time).toFixed(1)},${
-        this.y(Math.min(Math.max(values[i], panel.low), panel.high)).toFixed(1)}`);
+      const points = Array.from(times, (time, i) =>
+        `${this.x(time).toFixed(1)},${this.y(values[i]).toFixed(1)}`);
       svg("polyline", {points: points.join(" "), fill: "none", stroke: color,
                        "stroke-width": 1.6, "stroke-linejoin": "round",
-                       "stroke-dasharray": dashed ? "5 3" : "none"}, picture);
+                       "stroke-dasharray": dashed ? "5 3" : "none",
+                       "clip-path": `url(#${this.name})`}, picture);
     }
     this.cursor = svg("g", {class: "cursor"}, picture);
     svg("line", {y1: top, y2: top + this.height, stroke: ink, "stroke-width": 1.2}, this.cursor);
@@ -129,7 +132,8 @@ class Plot {
     this.cursor.dataset.time = time;
     panel.series.forEach((series, i) => {
       const value = valueAt(series, time);
-      this.dots[i].setAttribute("cy", this.y(Math.min(Math.max(value, panel.low), panel.high)));
+      this.dots[i].setAttribute("cy", this.y(value));
+      this.dots[i].style.display = value < panel.low || value > panel.high ? "none" : "";
       this.entries[i].textContent = brief(panel.logarithmic ? 10 ** value : value);
     });
   }
