@@ -16,3 +16,12 @@ PATH_RADIUS = 0.0045
 DESIRED_WIDENING = 2.0
 """How much thicker the desired path is: a sleeve, in which the actual one lies."""
 OBSTACLE_OPACITY = 0.75
+ZONE_OPACITY = 0.13
+DISTANCE = palette.INK
+BAR_RADIUS = 0.003
+"""Of a distance, over the size of the scene."""
+ELLIPSOID, ELLIPSOID_OPACITY = palette.TASK, 0.3
+FIELD, FIELD_OPACITY = palette.FIELD, 0.4
+ARROW_RADIUS = 0.007
+"""Of an arrow's shaft, over the size of the scene."""
+CONTACT = palette.WARNING

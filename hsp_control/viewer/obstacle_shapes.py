@@ -67,16 +67,16 @@ def obstacle(shape: Shape, extent: float) -> Json:
             solid = threejs.plane(extent)
             surface |= {"opacity": 0.3 * OBSTACLE_OPACITY, "side": 2}
         case shapes.PointCloud():
-            solid = _facets(*_cubes(np.asarray(shape.points), shape.resolution))
+            solid = facets(*_cubes(np.asarray(shape.points), shape.resolution))
         case _:
-            solid = _facets(*_triangles(shape.geometry()))
+            solid = facets(*triangles_of(shape.geometry()))
             surface |= {"side": 2}
     thing = threejs.mesh(solid, surface, pose)
     thing["object"]["receiveShadow"] = False  # nor its own, which would show through
     return threejs.group([thing])
 
 
-def _facets(vertices: Array, triangles: Indices) -> Json:
+def facets(vertices: Array, triangles: Indices) -> Json:
     """Return flat triangles, each with vertices and a normal of its own."""
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -96,7 +96,7 @@ def _cubes(points: Array, edge: float) -> tuple[Array, Indices]:
     return vertices.reshape(-1, 3), triangles.reshape(-1, 3)
 
 
-def _triangles(geometry: Any) -> tuple[Array, Indices]:
+def triangles_of(geometry: Any) -> tuple[Array, Indices]:
     """Return vertices (n, 3) and triangles (k, 3) of Coal's mesh or convex hull."""
     if isinstance(geometry, coal.BVHModelBase):
         vertices, count, triangle = (

@@ -9,14 +9,28 @@ from hsp_control.controller import Controller
 from hsp_control.simulation import Rollout
 from hsp_control.viewer.clip import Clip, Track
 from hsp_control.viewer.commands import Command, delete, set_property
+from hsp_control.viewer.contacts import Contacts
+from hsp_control.viewer.distances import Distances
+from hsp_control.viewer.ellipsoid import Ellipsoid
+from hsp_control.viewer.influence import Influence
 from hsp_control.viewer.layer import Layer
 from hsp_control.viewer.motion import FINEST, Motion, motion_of
 from hsp_control.viewer.obstacle_layer import ObstacleLayer
 from hsp_control.viewer.paths import Paths
 from hsp_control.viewer.robot_drawing import RobotDrawing
+from hsp_control.viewer.self_motion import SelfMotion
 from hsp_control.viewer.target_marks import TargetMarks
 
-LAYERS = ("paths", "targets", "obstacles")
+LAYERS = (
+    "paths",
+    "targets",
+    "obstacles",
+    "influence",
+    "distances",
+    "ellipsoid",
+    "self_motion",
+    "contacts",
+)
 """What can be switched, as nodes of the scene tree and in a configuration."""
 
 
@@ -60,7 +74,18 @@ class RunDrawing:
             "paths": self._paths,
             "targets": TargetMarks(motion, f"{root}/targets"),
             "obstacles": self._obstacles,
+            "ellipsoid": Ellipsoid(drawing.robot, controller, f"{root}/ellipsoid"),
+            "contacts": Contacts(drawing.robot, motion, f"{root}/contacts"),
         }
+        if controller is not None:
+            zones = Influence(
+                controller.field, self._obstacles.shapes, f"{root}/influence"
+            )
+            self.layers |= {
+                "influence": zones,
+                "distances": Distances(controller, f"{root}/distances"),
+                "self_motion": SelfMotion(controller, motion, f"{root}/self_motion"),
+            }
 
     def draw(self, size: float) -> Iterator[Command]:
         """Yield what puts the layers into a scene of some size [m]."""

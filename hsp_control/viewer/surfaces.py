@@ -32,6 +32,11 @@ def material(
     return surface
 
 
+def seen_through(surface: Json) -> Json:
+    """Return a surface that nothing hides: what lies within a link can be seen."""
+    return surface | {"transparent": True, "depthTest": False, "depthWrite": False}
+
+
 def paint(color: str, *, inside: bool = False) -> Json:
     """Return a surface of the same colour in any light.
 

@@ -22,16 +22,60 @@ function node(path) {
   return viewer.scene_tree.find(path.split("/").filter((name) => name.length > 0)).object;
 }
 
-// Some mesh files have no normals and would be black.
+// Meshcat merges a mesh file's parts into one geometry, but forgets which triangles of a
+// part have which of its surfaces: those were not drawn. And it gives up on parts of which
+// only some have texture coordinates.
 function set_object(command) {
-  meshcat(command);
-  node(command.path).traverse(({geometry}) => {
+  const {BufferGeometry, BufferAttribute} = MeshCat.THREE;
+  const apply = BufferGeometry.prototype.applyMatrix4;
+  const parts = [];
+  BufferGeometry.prototype.applyMatrix4 = function (matrix) {  // called for each part
+    parts.push(this);
+    const {position, uv} = this.attributes;
+    if (!uv) this.setAttribute("uv", new BufferAttribute(new Float32Array(2 * position.count), 2));
+    return apply.call(this, matrix);
+  };
+  try {
+    meshcat(command);
+  } finally {
+    BufferGeometry.prototype.applyMatrix4 = apply;
+  }
+  node(command.path).traverse((object) => {
+    const {geometry, material} = object;
+    if (Array.isArray(material) && material.some(Array.isArray)) divide(object, parts);
+    // Some mesh files have no normals and would be black.
     if (geometry?.isBufferGeometry && !geometry.attributes.normal) geometry.computeVertexNormals();
   });
 }
 
+// Tell a merged mesh which triangles have which surface.
+function divide(mesh, parts) {
+  const size = ({attributes}) => attributes.position.count;
+  const number = mesh.material.length;
+  const first = parts.findIndex((_, k) => {
+    const own = parts.slice(k, k + number);
+    return own.length === number
+      && own.reduce((total, part) => total + size(part), 0) === size(mesh.geometry);
+  });
+  if (first < 0) return;
+  mesh.geometry.clearGroups();
+  const surfaces = [];
+  let offset = 0;
+  parts.slice(first, first + number).forEach((part, k) => {
+    const whole = {start: 0, count: size(part), materialIndex: 0};
+    for (const {start, count, materialIndex} of part.groups.length ? part.groups : [whole]) {
+      mesh.geometry.addGroup(offset + start, count, surfaces.length);
+      surfaces.push([mesh.material[k]].flat()[materialIndex]);
+    }
+    offset += size(part);
+  });
+  mesh.material = surfaces;
+}
+
 // Pinocchio's z is up, three.js's y.
 function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
+
+const BAR = 0.1;  // the share of the picture's height that is left to the player's bar
 
 // Look at a target, from an eye or, along a direction, from where all balls are seen.
 function camera({target, eye, direction, up, points, radius, field_of_view}) {
@@ -48,7 +92,7 @@ function camera({target, eye, direction, up, points, radius, field_of_view}) {
   const needed = (point) => {
     const offset = vector(point).sub(center);
     const x = Math.abs(offset.dot(right)) + radius, y = Math.abs(offset.dot(above)) + radius;
-    return offset.dot(toEye) + Math.max(x / wide, y / tall);
+    return offset.dot(toEye) + Math.max(x / wide, y / (tall * (1 - BAR)));
   };
   const away = distance || Math.max(...points.map(needed));
   const lens = viewer.camera;
@@ -57,6 +101,8 @@ function camera({target, eye, direction, up, points, radius, field_of_view}) {
   lens.far = away * 100;
   lens.up.copy(vector(up));
   lens.position.copy(center).addScaledVector(toEye, away);
+  lens.setViewOffset(1, 1, 0, BAR / 2, 1, 1);
+  viewer.set_3d_pane_size();
   viewer.controls.dispose();
   viewer.set_camera(lens);  // new controls, that orbit about the new up
   viewer.controls.target.copy(center);
@@ -78,9 +124,7 @@ function time({text}) { document.querySelector("#caption .time").textContent = t
 
 // What the program behind the page is doing.
 function status({text}) {
-  const line = document.querySelector("#caption .status");
-  line.textContent = text;
-  line.hidden = !text;
+  document.querySelector("#caption .status").textContent = text;
 }
 
 function trail(command) {

@@ -1,0 +1,70 @@
+"""Contact forces, where a log has any: arrows at the points of contact."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hsp_control.robot import Robot
+from hsp_control.viewer import threejs
+from hsp_control.viewer.appearance import ARROW_RADIUS, CONTACT
+from hsp_control.viewer.arrows import arrow_tracks, unit_arrow
+from hsp_control.viewer.clip import Track
+from hsp_control.viewer.commands import Command, set_object
+from hsp_control.viewer.element import element
+from hsp_control.viewer.motion import Motion
+from hsp_control.viewer.surfaces import material
+
+_PREFIX, _FORCE, _PLACE = "contact.", ".force", ".position"
+_WEIGHT = 0.5
+"""Length of a force that carries the robot's weight, over the scene's size."""
+_GRAVITY = 9.81  # m/s²
+
+
+class Contacts:
+    """Forces on the robot, of columns ``contact.<name>.position`` and ``.force``."""
+
+    def __init__(self, robot: Robot, motion: Motion, root: str) -> None:
+        """Find the contacts."""
+        self._root = root
+        self._weight = _GRAVITY * sum(inertia.mass for inertia in robot.model.inertias)
+        self._size = 0.0
+        columns = motion.rows.columns
+        self._names = [
+            name
+            for column in columns
+            if column.startswith(_PREFIX) and column.endswith(_FORCE)
+            for name in [column[len(_PREFIX) : -len(_FORCE)]]
+            if f"{_PREFIX}{name}{_PLACE}" in columns
+        ]
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield what puts it into a scene of some size [m]."""
+        self._size = size
+        for name in self._names:
+            surface = material(CONTACT, glow=0.5)
+            arrow = unit_arrow(surface, ARROW_RADIUS * size)
+            yield set_object(self._path(name, "force"), arrow)
+            ball = threejs.mesh(threejs.sphere(1.5 * ARROW_RADIUS * size), surface)
+            yield set_object(self._path(name, "point"), threejs.group([ball]))
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield how it moves along the run; a contact without force is not shown."""
+        times = motion.times
+        for name in self._names:
+            place = motion.rows[f"{_PREFIX}{name}{_PLACE}"]
+            force = motion.rows[f"{_PREFIX}{name}{_FORCE}"]
+            arrows = _WEIGHT * self._size / self._weight * force
+            radius = ARROW_RADIUS * self._size
+            path = self._path(name, "force")
+            yield from arrow_tracks(path, times, place, arrows, radius)
+            touches = np.linalg.norm(force, axis=1) > 0.0
+            yield Track(self._path(name, "point"), "position", times, place)
+            shown = touches.astype(float)[:, None]
+            yield Track(self._path(name, "point"), "visible", times, shown)
+
+    def legend(self) -> list[tuple[str, str]]:
+        """Return names and colours."""
+        return [("contact force", CONTACT)] if self._names else []
+
+    def _path(self, name: str, kind: str) -> str:
+        return f"{self._root}/{element(name)}/{kind}"
