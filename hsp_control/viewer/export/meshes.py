@@ -42,7 +42,7 @@ def read_mesh(thing: Json, owner: str) -> list[Piece]:
         ExportError: If what reads meshes is not installed, or the mesh cannot be read.
     """
     try:
-        import collada  # noqa: F401  # type: ignore[import-untyped]
+        import collada  # noqa: F401
         import trimesh
     except ImportError as error:
         raise ExportError(
@@ -57,7 +57,7 @@ def read_mesh(thing: Json, owner: str) -> list[Piece]:
             scene = trimesh.load_scene(
                 io.BytesIO(content),
                 file_type=thing["format"],
-                resolver=_Resources(thing.get("resources", {})),
+                resolver=_pictures(thing.get("resources", {})),
                 process=False,
             )
             colored = thing["type"] == "_meshfile_object"
@@ -107,12 +107,10 @@ def _color(visual: Any) -> tuple[float, ...]:
     return tuple(float(channel) / 255.0 for channel in sampled)
 
 
-class _Resources:
-    """A mesh's pictures, which came with it as data addresses."""
-
-    def __init__(self, addresses: dict[str, str]) -> None:
-        self._addresses = {PurePath(name).name: a for name, a in addresses.items()}
-
-    def get(self, name: str) -> bytes:
-        address = self._addresses[PurePath(name).name]
-        return base64.b64decode(address.partition(",")[2])
+def _pictures(addresses: dict[str, str]) -> dict[str, bytes]:
+    """Return a mesh's pictures, which came with it as data addresses, by name."""
+    pictures = {}
+    for name, address in addresses.items():
+        content = base64.b64decode(address.partition(",")[2])
+        pictures[name] = pictures[PurePath(name).name] = content
+    return pictures

@@ -35,14 +35,14 @@ def simplify(vertices: Array, triangles: Indices, bound: float) -> Indices:
         raise ExportError(f"lighter meshes need {error.name}: {INSTALL}") from None
     places = np.ascontiguousarray(vertices, np.float32)
     corners = np.ascontiguousarray(triangles.ravel(), np.uint32)
-    for error in _ERRORS:
+    for share in _ERRORS:
         fewer = np.zeros(corners.size, np.uint32)
         count = meshoptimizer.simplify(
             fewer,
             corners,
             places,
             target_index_count=0,
-            target_error=error * bound,
+            target_error=share * bound,
             # Where another piece begins, both must go on meeting.
             options=meshoptimizer.SIMPLIFY_ERROR_ABSOLUTE
             | meshoptimizer.SIMPLIFY_LOCK_BORDER,

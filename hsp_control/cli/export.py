@@ -1,0 +1,93 @@
+"""``hsp export``: a log as a page that plays offline, or as films."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Self
+
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from hsp_control.cli.consoles import errors, out
+from hsp_control.exceptions import ExportError
+from hsp_control.simulation import Rollout
+
+
+def export(options: argparse.Namespace) -> int:
+    """Write every file that is asked for; one that fails does not stop the others."""
+    from hsp_control.viewer import robot_of
+    from hsp_control.viewer.export import FilmStyle, export_film, export_html
+
+    films = [path for path in (options.mp4, options.gif, options.webp) if path]
+    if not options.html and not films:
+        raise ExportError(
+            "nothing to write: name a file with --html, --mp4, --gif or --webp"
+        )
+    for kind in ("mp4", "gif", "webp"):
+        _check_ending(getattr(options, kind), f".{kind}")
+    rollout = Rollout.load(options.log)
+    robot = robot_of(rollout)
+    said: list[str] = []
+
+    def write(path: Path, how: Callable[[], Path]) -> None:
+        try:
+            out.print(f"{_size(how())}: {path}")
+        except ExportError as error:
+            if str(error) not in said:
+                print(f"hsp: {error}", file=sys.stderr)
+            said.append(str(error))
+
+    if options.html:
+        write(options.html, lambda: export_html(rollout, options.html, robot=robot))
+    style = FilmStyle(options.size, options.fps, options.speed, options.plots)
+    for path in films:
+        with _Bar(path.name) as bar:
+            write(
+                path,
+                partial(
+                    export_film,
+                    rollout,
+                    path,
+                    style=style,
+                    robot=robot,
+                    progress=bar.update,
+                ),
+            )
+    return 2 if said else 0
+
+
+class _Bar:
+    """A bar on standard error while a film is taken; none where that is a file."""
+
+    def __init__(self, name: str) -> None:
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:3.0f} %"),
+            TimeRemainingColumn(),
+            console=errors,
+            transient=True,
+            disable=not errors.is_terminal,
+        )
+        self._task = self._progress.add_task(escape(name), total=1.0)
+
+    def update(self, done: float) -> None:
+        self._progress.update(self._task, completed=done)
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(self, *ended: object) -> None:
+        self._progress.stop()
+
+
+def _check_ending(path: Path | None, ending: str) -> None:
+    if path is not None and path.suffix.lower() != ending:
+        raise ExportError(f"--{ending[1:]} {path}: its name must end with {ending}")
+
+
+def _size(file: Path) -> str:
+    return f"{file.stat().st_size / 1e6:.2f} MB"
