@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from hsp_control.exceptions import ExportError
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page, Playwright
+    from playwright.sync_api import Browser, Page
 
 INSTALL_DRIVER = "pip install 'hsp_control[film]'"
 PAGE_TIMEOUT = 120.0
@@ -49,15 +49,11 @@ def find_browser() -> str | None:
 
 
 @contextmanager
-def open_page(file: Path, size: tuple[int, int]) -> Iterator["Page"]:
-    """Open one of our pages in a browser without a window; it rests where it opens.
-
-    Args:
-        file: The page.
-        size: Width and height of the picture [pixels].
+def headless_browser() -> Iterator["Browser"]:
+    """Start a browser without a window.
 
     Raises:
-        ExportError: If playwright or a browser is missing, or the page does not open.
+        ExportError: If playwright or a browser is missing, or the browser fails.
     """
     try:
         from playwright.sync_api import Error, sync_playwright
@@ -65,34 +61,41 @@ def open_page(file: Path, size: tuple[int, int]) -> Iterator["Page"]:
         raise ExportError(
             f"a film is taken with playwright, which is not installed: {INSTALL_DRIVER}"
         ) from None
+    root = ["--no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
     with sync_playwright() as driver:
+        executable = find_browser() or driver.chromium.executable_path
+        if not Path(executable).is_file():
+            wanted = os.environ.get("HSP_BROWSER")
+            missing = f"HSP_BROWSER={wanted} is no program; " if wanted else ""
+            raise ExportError(
+                f"{missing}a film needs Chromium or Chrome, and none is found on the "
+                "path; install one (on Debian: apt-get install chromium; anywhere: "
+                "playwright install chromium), or name it in HSP_BROWSER"
+            )
         try:
-            with _launched(driver) as page:
-                page.set_viewport_size({"width": size[0], "height": size[1]})
-                page.goto(file.resolve().as_uri())
-                page.wait_for_selector(
-                    "body[data-ready]", timeout=1e3 * PAGE_TIMEOUT, state="attached"
-                )
-                yield page
+            browser = driver.chromium.launch(
+                executable_path=executable, args=[*_FLAGS, *root]
+            )
+            try:
+                yield browser
+            finally:
+                browser.close()
         except Error as error:
             reason = str(error).strip().splitlines()[0]
             raise ExportError(f"the browser failed: {reason}") from error
 
 
-@contextmanager
-def _launched(driver: "Playwright") -> Iterator["Page"]:
-    executable = find_browser() or driver.chromium.executable_path
-    if not Path(executable).is_file():
-        wanted = os.environ.get("HSP_BROWSER")
-        missing = f"HSP_BROWSER={wanted} is no program; " if wanted else ""
-        raise ExportError(
-            f"{missing}a film needs Chromium or Chrome, and none is found on the path; "
-            "install one (on Debian: apt-get install chromium; anywhere: playwright "
-            "install chromium), or name it in HSP_BROWSER"
-        )
-    root = ["--no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
-    browser = driver.chromium.launch(executable_path=executable, args=[*_FLAGS, *root])
-    try:
-        yield browser.new_page()
-    finally:
-        browser.close()
+def open_page(browser: "Browser", file: Path, size: tuple[int, int]) -> "Page":
+    """Open one of our pages and wait until it shows its scene.
+
+    Args:
+        browser: See `headless_browser`.
+        file: The page.
+        size: Width and height of the picture [pixels].
+    """
+    page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+    page.goto(file.resolve().as_uri())
+    page.wait_for_selector(
+        "body[data-ready]", timeout=1e3 * PAGE_TIMEOUT, state="attached"
+    )
+    return page

@@ -14,7 +14,7 @@ from hsp_control.exceptions import ExportError
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.suggest import did_you_mean
-from hsp_control.viewer.export.chromium import open_page
+from hsp_control.viewer.export.chromium import headless_browser, open_page
 from hsp_control.viewer.export.encoding import FORMATS, encoder, find_ffmpeg
 from hsp_control.viewer.export.html import export_html
 
@@ -83,12 +83,13 @@ def export_film(
     size = style.size or ((800, 450) if still else (1280, 720))
     frame_rate = style.frame_rate or (20.0 if still else 30.0)
     _check(path, size, frame_rate, style.speed)
-    find_ffmpeg()  # said before the work, not after
-    with TemporaryDirectory() as folder:
+    find_ffmpeg()  # what is missing is said before the work, not after
+    times = frame_times(rollout.t, frame_rate, style.speed)
+    with headless_browser() as browser, TemporaryDirectory() as folder:
         page_file = Path(folder) / "page.html"
         export_html(rollout, page_file, robot=robot, settings=settings)
-        times = frame_times(rollout.t, frame_rate, style.speed)
-        with open_page(page_file, size) as page, encoder(path, frame_rate) as take:
+        with encoder(path, frame_rate) as take:
+            page = open_page(browser, page_file, size)
             camera = _prepare(page, style)
             for number, time in enumerate(times, start=1):
                 take(_picture(page, camera, float(time)))
@@ -120,7 +121,7 @@ def _prepare(page: "Page", style: FilmStyle) -> "CDPSession":
         }""",
         style.plots,
     )
-    page.evaluate(_SHOW, 0.0)  # the plots' and the scene's new sizes are taken
+    page.evaluate(_SHOW, 0.0)  # sizes change only with the next frame
     return page.context.new_cdp_session(page)
 
 

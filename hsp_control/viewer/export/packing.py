@@ -45,7 +45,7 @@ class ArrayTable:
             dtype: What the page makes of them: ``float32`` or ``float64``.
         """
         rows = np.asarray(values, float)
-        rows = rows.reshape(len(rows), -1)
+        rows = rows[:, None] if rows.ndim == 1 else rows
         offset = rows.min(axis=0) if len(rows) else np.zeros(rows.shape[1])
         spread = np.ptp(rows, axis=0) if len(rows) else np.zeros(rows.shape[1])
         steps = np.maximum(step, spread / (_MOST - 1))

@@ -172,7 +172,7 @@ def _packed(panel: Panel, times: Array, arrays: ArrayTable) -> Json:
     for series, values in zip(panel.series, every, strict=True):
         shown = values
         if panel.logarithmic:
-            with np.errstate(divide="ignore"):
+            with np.errstate(divide="ignore", invalid="ignore"):
                 shown = np.log10(values)
         # Out of sight all values are the same: a little beyond the edge.
         edge = high - low
@@ -187,7 +187,7 @@ def _packed(panel: Panel, times: Array, arrays: ArrayTable) -> Json:
                 "color": series.color,
                 "dashed": series.dashed,
                 "times": arrays.numbers(times[keys], CLOCK_STEP, np.float64),
-                "values": arrays.numbers(shown[keys], step),
+                "values": arrays.numbers(rounded[keys], step),
             }
         )
     return {

@@ -84,7 +84,7 @@ def _keyframes(name: str, times: Array, values: Array) -> tuple[Array, Array, fl
     rows = thin(times, values, rounded, how.between, how.deviation)
     if len(rows) > 1 and np.array_equal(rounded[rows], rounded[rows[[0] * len(rows)]]):
         rows = rows[:1]  # it never moves
-    return times[rows], values[rows], how.step
+    return times[rows], rounded[rows], how.step
 
 
 def _fine(values: Array) -> Any:
