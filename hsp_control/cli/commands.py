@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from hsp_control.config import Experiment, json_schema, load_experiment
 from hsp_control.exceptions import SimulationError
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.recorder import Recorder
 from hsp_control.sources import example_robots
 
 
@@ -25,9 +27,14 @@ def run(options: argparse.Namespace) -> int:
     experiment = load_experiment(options.config, *options.overrides)
     log = options.out / f"{experiment.name}.npz"
     log.parent.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
-    status = 0
+    status, screen = 0, None
+    if options.view:
+        from hsp_control.cli.screen import Screen
+
+        screen = Screen.open(experiment, options, _out.print)
+        status = 0 if screen else 2
     try:
-        rollout = _run_with_progress(experiment)
+        rollout = _run_with_progress(experiment, screen.on_row if screen else None)
     except SimulationError as error:
         if not isinstance(error.rollout, Rollout) or not len(error.rollout):
             raise
@@ -39,9 +46,26 @@ def run(options: argparse.Namespace) -> int:
     rollout.save(log)
     _out.print(_summary(rollout))
     _out.print(f"Log: {log}")
-    if options.view and status == 0:
-        _show(experiment, rollout)
+    if screen is not None:
+        screen.finish(rollout)
     return status
+
+
+def view(options: argparse.Namespace) -> int:
+    """Play logs in the browser."""
+    from hsp_control.cli.screen import attend
+    from hsp_control.viewer import view_logs
+
+    with view_logs(
+        options.logs,
+        beside=options.beside,
+        speed=options.speed,
+        loop=options.loop,
+        port=options.port,
+    ) as viewer:
+        _out.print(f"View: {viewer.url}")
+        attend(viewer, opened=options.browser and viewer.open_browser())
+    return 0
 
 
 def check(options: argparse.Namespace) -> int:
@@ -134,22 +158,9 @@ def schema(options: argparse.Namespace) -> int:
     return 0
 
 
-def _show(experiment: Experiment, rollout: Rollout) -> None:
-    """Play a run in the browser; a person closes the view, a script is not kept."""
-    from hsp_control.viewer import view_rollout
-
-    with view_rollout(
-        experiment.robot,
-        rollout,
-        experiment.scenario.view,
-        open_browser=True,
-        announce=lambda address: _out.print(f"View: {address}"),
-    ):
-        if sys.stdin.isatty():
-            input("Press Enter to close the view. ")
-
-
-def _run_with_progress(experiment: Experiment) -> Rollout:
+def _run_with_progress(
+    experiment: Experiment, on_row: Callable[[Recorder], None] | None = None
+) -> Rollout:
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -160,7 +171,7 @@ def _run_with_progress(experiment: Experiment) -> Rollout:
         disable=not _errors.is_terminal,
     ) as progress:
         bar = progress.add_task(experiment.name, total=1.0)
-        return experiment.run(lambda done: progress.update(bar, completed=done))
+        return experiment.run(lambda done: progress.update(bar, completed=done), on_row)
 
 
 def _summary(rollout: Rollout) -> Table:

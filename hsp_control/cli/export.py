@@ -17,8 +17,8 @@ from hsp_control.simulation import Rollout
 
 def export(options: argparse.Namespace) -> int:
     """Write every file that is asked for; one that fails does not stop the others."""
-    from hsp_control.viewer import robot_of
     from hsp_control.viewer.export import FilmStyle, export_film, export_html
+    from hsp_control.viewer.replay import act_of
 
     films = [path for path in (options.mp4, options.gif, options.webp) if path]
     if not options.html and not films:
@@ -28,7 +28,8 @@ def export(options: argparse.Namespace) -> int:
     for kind in ("mp4", "gif", "webp"):
         _check_ending(getattr(options, kind), f".{kind}")
     rollout = Rollout.load(options.log)
-    robot = robot_of(rollout)
+    _, robot, _, controller = act_of(rollout, options.log.name)
+    made = {"robot": robot, "controller": controller}
     said: list[str] = []
 
     def write(path: Path, how: Callable[[], Path]) -> None:
@@ -40,7 +41,7 @@ def export(options: argparse.Namespace) -> int:
             said.append(str(error))
 
     if options.html:
-        write(options.html, lambda: export_html(rollout, options.html, robot=robot))
+        write(options.html, lambda: export_html(rollout, options.html, **made))
     style = FilmStyle(options.size, options.fps, options.speed, options.plots)
     for path in films:
         with _Bar(path.name) as bar:
@@ -51,7 +52,7 @@ def export(options: argparse.Namespace) -> int:
                     rollout,
                     path,
                     style=style,
-                    robot=robot,
+                    **made,
                     progress=bar.update,
                 ),
             )

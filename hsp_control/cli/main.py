@@ -54,11 +54,43 @@ def _parser() -> argparse.ArgumentParser:
         "--view",
         action=argparse.BooleanOptionalAction,
         default=False,
-        help="show the run in a browser when it is done",
+        help="show the run in a browser, while it is computed and after",
     )
+    _add_page(run)
 
     check = _command(commands, "check", "check a configuration without running it")
     _add_configuration(check)
+
+    view = _command(commands, "view", "play logs in a browser, one or several together")
+    view.add_argument(
+        "logs", nargs="+", type=Path, metavar="LOG", help="a log written by hsp run"
+    )
+    where = view.add_mutually_exclusive_group()
+    where.add_argument(
+        "--beside",
+        action="store_true",
+        default=None,
+        help="show several side by side; the default where their robots differ",
+    )
+    where.add_argument(
+        "--overlay",
+        action="store_false",
+        dest="beside",
+        help="show several over each other, all but the first as ghosts",
+    )
+    view.add_argument(
+        "--speed",
+        type=float,
+        metavar="X",
+        help="seconds of motion in one second; default: as the log says",
+    )
+    view.add_argument(
+        "--loop",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="play again and again; default: as the log says",
+    )
+    _add_page(view)
 
     plot = _command(commands, "plot", "draw the figures of a log")
     plot.add_argument("log", type=Path, metavar="LOG", help="a log written by hsp run")
@@ -138,6 +170,21 @@ def _picture_size(text: str) -> tuple[int, int]:
     if not (width.isdigit() and height.isdigit()):
         raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT, as 1280x720")
     return int(width), int(height)
+
+
+def _add_page(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--port",
+        type=int,
+        metavar="N",
+        help="the page's port on this machine; default: the first free one from 7000",
+    )
+    parser.add_argument(
+        "--browser",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="open the page in a browser; its address is printed in any case",
+    )
 
 
 def _add_configuration(parser: argparse.ArgumentParser) -> None:

@@ -30,6 +30,7 @@ from hsp_control.simulation import (
     SemiImplicitEuler,
     simulate,
 )
+from hsp_control.simulation.recorder import Recorder
 from hsp_control.suggest import did_you_mean, listing
 
 
@@ -57,8 +58,12 @@ class Experiment:
     v0: Array
     integrator: Integrator
 
-    def run(self, on_progress: Callable[[float], None] | None = None) -> Rollout:
-        """Simulate it; see `simulate` for what is raised and kept."""
+    def run(
+        self,
+        on_progress: Callable[[float], None] | None = None,
+        on_row: Callable[[Recorder], None] | None = None,
+    ) -> Rollout:
+        """Simulate it; see `simulate` for the arguments, what is raised and kept."""
         settings = self.scenario.simulation
         return simulate(
             self.controller,
@@ -70,6 +75,7 @@ class Experiment:
             integrator=self.integrator,
             scene=self.scene,
             on_progress=on_progress,
+            on_row=on_row,
             meta={
                 "name": self.name,
                 "title": self.scenario.title,

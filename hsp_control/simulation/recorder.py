@@ -111,6 +111,10 @@ class Recorder:
             columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
         self._rows += 1
 
+    def rows(self, start: int) -> dict[str, Array]:
+        """Return the columns from a row on, as far as they have come; no copies."""
+        return {name: a[start : self._rows] for name, a in self._columns.items()}
+
     def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
         """Return the rows recorded so far as a rollout."""
         controller, robot = self._controller, self._controller.robot

@@ -33,6 +33,7 @@ def simulate(
     scene: Scene | None = None,
     start_time: float = 0.0,
     on_progress: Callable[[float], None] | None = None,
+    on_row: Callable[[Recorder], None] | None = None,
     meta: dict[str, Any] | None = None,
 ) -> Rollout:
     """Run the closed loop and return what happened.
@@ -50,6 +51,7 @@ def simulate(
         scene: Obstacles to log.
         start_time: Time of the first row [s].
         on_progress: Called with the fraction done at every row.
+        on_row: Called with the recorder at every row, once that is recorded.
         meta: JSON data to add to the rollout's.
 
     Returns:
@@ -90,6 +92,8 @@ def simulate(
             recorder.record(state.update(t, q, v), controller.compute(state))
             if on_progress is not None:
                 on_progress(row / (rows - 1) if rows > 1 else 1.0)
+            if on_row is not None:
+                on_row(recorder)
             if row == rows - 1:
                 break
             end = start_time + (row + 1) * log_period

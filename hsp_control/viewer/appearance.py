@@ -8,7 +8,8 @@ LINK, JOINT = palette.LINK, palette.JOINT
 AXES = (palette.OBSTACLE, palette.TASK, palette.ACTUAL)
 """x, y and z of a target: as near to red, green and blue as all eyes tell apart."""
 
-SKY, HORIZON = "#FFFFFF", "#E4E9EE"
+HAZE = 0.11
+"""How much darker the horizon is than the sky."""
 GRID = "#8794A1"
 
 PATH_RADIUS = 0.0045
@@ -23,5 +24,5 @@ BAR_RADIUS = 0.003
 ELLIPSOID, ELLIPSOID_OPACITY = palette.TASK, 0.3
 FIELD, FIELD_OPACITY = palette.FIELD, 0.4
 ARROW_RADIUS = 0.007
-"""Of an arrow's shaft, over the size of the scene."""
+"""Of an arrow's shaft, over the robot's size."""
 CONTACT = palette.WARNING

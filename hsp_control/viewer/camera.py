@@ -58,6 +58,25 @@ def look_at(
     )
 
 
+def to_the_right(
+    robot: Robot, eye: Sequence[float] | None, target: Sequence[float] | None
+) -> Array:
+    """Return the level direction to the right in the picture, a unit vector.
+
+    Args:
+        robot: The robot.
+        eye: Where one looks from [m]; None: from where `look_at` would.
+        target: Where one looks at [m]; None: the origin.
+    """
+    direction = _SLANT if (normal := plane_normal(robot)) is None else normal
+    if eye is not None:
+        middle = np.zeros(3) if target is None else np.asarray(target, float)
+        direction = np.asarray(eye, float) - middle
+    right = np.array([-direction[1], direction[0], 0.0])
+    length = float(np.linalg.norm(right))
+    return right / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
+
+
 def plane_normal(robot: Robot) -> Array | None:
     """Return the side from which a planar arm is seen, a unit vector, else None."""
     if any(joint.nv != 1 for joint in list(robot.model.joints)[1:]):

@@ -49,6 +49,11 @@ def set_property(path: str, name: str, value: Any) -> Command:
     return _command("set_property", path, name, property=name, value=value)
 
 
+def set_ghost(path: str, color: str, opacity: float) -> Command:
+    """Make all that is at a node and below it a ghost, tinted in ``#RRGGBB``."""
+    return _command("ghost", path, "ghost", color=color, opacity=float(opacity))
+
+
 def set_trail(
     path: str,
     points: Array,
@@ -96,10 +101,20 @@ def set_camera(**view: Any) -> Command:
     return _command("camera", CAMERA, "camera", **view)
 
 
-def set_caption(title: str, legend: list[tuple[str, str]]) -> Command:
-    """Set the words beside the scene: a title, and names with their colours."""
+def set_caption(
+    title: str, legend: list[tuple[str, str]], *, dark: bool = False
+) -> Command:
+    """Set the words beside the scene: a title, and names with their colours.
+
+    Args:
+        title: The title.
+        legend: Names and colours ``#RRGGBB``.
+        dark: Whether they stand on a dark background.
+    """
     entries = [{"name": name, "color": color} for name, color in legend]
-    return _command("caption", CAPTION, "caption", title=title, legend=entries)
+    return _command(
+        "caption", CAPTION, "caption", title=title, legend=entries, dark=dark
+    )
 
 
 def set_time(text: str) -> Command:

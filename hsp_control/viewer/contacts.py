@@ -16,7 +16,7 @@ from hsp_control.viewer.surfaces import material
 
 _PREFIX, _FORCE, _PLACE = "contact.", ".force", ".position"
 _WEIGHT = 0.5
-"""Length of a force that carries the robot's weight, over the scene's size."""
+"""Length of a force that carries the robot's weight, over the robot's size."""
 _GRAVITY = 9.81  # m/s²
 
 
@@ -27,7 +27,7 @@ class Contacts:
         """Find the contacts."""
         self._root = root
         self._weight = _GRAVITY * sum(inertia.mass for inertia in robot.model.inertias)
-        self._size = 0.0
+        self._size = motion.size
         columns = motion.rows.columns
         self._names = [
             name
@@ -39,13 +39,14 @@ class Contacts:
 
     def draw(self, size: float) -> Iterator[Command]:
         """Yield what puts it into a scene of some size [m]."""
-        self._size = size
         for name in self._names:
             surface = material(CONTACT, glow=0.5)
-            arrow = unit_arrow(surface, ARROW_RADIUS * size)
+            arrow = unit_arrow(surface, ARROW_RADIUS * self._size)
             yield set_object(self._path(name, "force"), arrow)
-            ball = threejs.mesh(threejs.sphere(1.5 * ARROW_RADIUS * size), surface)
-            yield set_object(self._path(name, "point"), threejs.group([ball]))
+            ball = threejs.sphere(1.5 * ARROW_RADIUS * self._size)
+            yield set_object(
+                self._path(name, "point"), threejs.group([threejs.mesh(ball, surface)])
+            )
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
         """Yield how it moves along the run; a contact without force is not shown."""

@@ -79,12 +79,8 @@ def principal_axes(J: Array, last: Array) -> tuple[Array, Array]:
     padded = np.zeros(3)
     padded[: len(lengths)] = lengths
     overlap = last.T @ axes
-    order = list(
-        max(
-            permutations(range(3)),
-            key=lambda order: float(sum(abs(overlap[k, order[k]]) for k in range(3))),
-        )
-    )
+    orders = [list(order) for order in permutations(range(3))]
+    order = max(orders, key=lambda o: float(np.abs(overlap[range(3), o]).sum()))
     axes = axes[:, order] * np.where(overlap[range(3), order] < 0.0, -1.0, 1.0)
     if np.linalg.det(axes) < 0.0:
         axes[:, 2] *= -1.0

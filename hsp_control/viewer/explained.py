@@ -16,8 +16,9 @@ _Term = TypeVar("_Term", bound=NullSpaceField)
 
 def terms(field: NullSpaceField, kind: type[_Term]) -> Iterator[_Term]:
     """Yield the terms of a field that are of a kind."""
-    summed = isinstance(field, WeightedSum)
-    each = [term for _, term in field.terms] if summed else [field]
+    each = [field]
+    if isinstance(field, WeightedSum):
+        each = [term for _, term in field.terms]
     yield from (term for term in each if isinstance(term, kind))
 
 

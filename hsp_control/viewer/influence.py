@@ -103,7 +103,7 @@ def _rounded(points: Array, distance: float) -> Json:
     corners = hull.points[hull.simplices]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     inward = (normals * hull.equations[:, :3]).sum(axis=1) < 0.0
-    triangles = hull.simplices.copy()
+    triangles = hull.simplices.astype(np.int64)
     triangles[inward] = triangles[inward, ::-1]
     return facets(hull.points, triangles)
 

@@ -37,6 +37,16 @@ class Motion(NamedTuple):
         """When [s], shape (N,)."""
         return self.rows.t
 
+    @property
+    def size(self) -> float:
+        """How far the robot reaches along the run, joint to joint [m]."""
+        if "skeleton" in self.rows:
+            points = self.rows["skeleton"].reshape(-1, 3)
+        else:
+            first = next(self.states())
+            points = np.array([place.translation for place in first.data.oMi])
+        return float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+
     def states(self) -> Iterator[RobotState]:
         """Yield the state at each row; the next one overwrites it."""
         state = RobotState(self.robot)
@@ -44,15 +54,21 @@ class Motion(NamedTuple):
             yield state.update(float(t), q, v)
 
 
-def motion_of(robot: Robot, rollout: Rollout, finest: float = FINEST) -> Motion:
+def motion_of(
+    robot: Robot,
+    rollout: Rollout,
+    finest: float = FINEST,
+    coarsest: float = COARSEST,
+) -> Motion:
     """Return a log's rows, thinned or with others in between, as they are drawn.
 
     Args:
         robot: The robot.
         rollout: The log.
         finest: Least time between two rows [s].
+        coarsest: Largest time between two rows [s].
     """
-    times = drawn_times(rollout.t, finest)
+    times = drawn_times(rollout.t, finest, coarsest)
     if len(times) == len(rollout.t) and np.array_equal(times, rollout.t):
         return Motion(robot, rollout)
     kept = np.searchsorted(rollout.t, times)
@@ -89,12 +105,13 @@ def _orientations(rollout: Rollout) -> Iterator[tuple[str, slice]]:
             yield f"task.{task}.actual", where[about["type"]]
 
 
-def drawn_times(times: Array, finest: float) -> Array:
+def drawn_times(times: Array, finest: float, coarsest: float) -> Array:
     """Return which of the times to draw, first and last among them, and others between.
 
     Args:
         times: Ascending [s], shape (N,).
         finest: Least time between two of them [s].
+        coarsest: Largest time between two of them [s].
     """
     kept = [0]
     for row in range(1, len(times)):
@@ -106,7 +123,7 @@ def drawn_times(times: Array, finest: float) -> Array:
         kept[-1 if len(kept) > 1 else len(kept) :] = [last]
     chosen = times[kept]
     gaps = np.diff(chosen)
-    parts = np.ceil(gaps / COARSEST * (1.0 - 1e-6)).astype(int).clip(1)
+    parts = np.ceil(gaps / coarsest * (1.0 - 1e-6)).astype(int).clip(1)
     if (parts == 1).all():
         return np.asarray(chosen)
     filled = [

@@ -12,7 +12,7 @@ from hsp_control.viewer.appearance import (
     PATH_RADIUS,
 )
 from hsp_control.viewer.clip import Track
-from hsp_control.viewer.commands import Command, set_trail
+from hsp_control.viewer.commands import Command, extend_trail, set_trail
 from hsp_control.viewer.element import element
 from hsp_control.viewer.motion import Motion
 from hsp_control.viewer.surfaces import color_number
@@ -24,16 +24,20 @@ _MOST_RINGS = 1500
 class Paths:
     """The desired path as a sleeve, the actual one within it, as far as it has come."""
 
-    def __init__(self, motion: Motion, root: str, color: str = ACTUAL) -> None:
+    def __init__(
+        self, motion: Motion, root: str, color: str = ACTUAL, *, desired: bool = True
+    ) -> None:
         """Read where the tasks' points were and should have been.
 
         Args:
             motion: The run.
             root: The layer's node.
             color: The actual path's.
+            desired: Whether to draw the desired path, too.
         """
         self._root = root
         self._color = color
+        self._desired = desired
         rows = _ring_rows(len(motion.times))
         self._ring_times = motion.times[rows]
         self._paths = {
@@ -47,15 +51,17 @@ class Paths:
         radius = PATH_RADIUS * size
         actual, desired = color_number(self._color), color_number(DESIRED)
         for name, (wanted, was) in self._paths.items():
-            if np.ptp(wanted, axis=0).max() >= radius:  # else: the target shows where
+            # Where it stands still, the target shows where.
+            if self._desired and np.ptp(wanted, axis=0).max() >= radius:
                 wide = DESIRED_WIDENING * radius
                 path = self._path(name, "desired")
                 yield set_trail(path, wanted, wide, desired, sleeve=True)
-            if np.ptp(was, axis=0).max() >= radius:
+            if len(was) and np.ptp(was, axis=0).max() >= radius:
                 yield set_trail(self._path(name, "actual"), was, radius, actual)
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
         """Yield how it moves along the run."""
+        del motion  # a trail knows its own rings' times
         rings = np.arange(len(self._ring_times), dtype=float)[:, None]
         for name in self._paths:
             path = self._path(name, "actual")
@@ -74,6 +80,46 @@ class Paths:
 
     def _path(self, name: str, kind: str) -> str:
         return f"{self._root}/{element(name)}/{kind}"
+
+
+class GrowingPaths(Paths):
+    """Paths of a run that is still computed: the actual one grows."""
+
+    def __init__(self, motion: Motion, root: str) -> None:
+        """Take where the tasks' points will have to be, from a preview.
+
+        Args:
+            motion: The preview: where the robot is in it does not matter.
+            root: The layer's node.
+        """
+        super().__init__(motion, root)
+        self._rings = dict.fromkeys(self._paths, 0)
+        self._pieces = 0
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield what puts it into a scene of some size [m]."""
+        radius = PATH_RADIUS * size
+        for name, (wanted, was) in self._paths.items():
+            self._paths[name] = wanted, was[:0]
+            color = color_number(self._color)
+            yield set_trail(self._path(name, "actual"), was[:0], radius, color)
+        yield from super().draw(size)
+
+    def extend(self, motion: Motion) -> Iterator[Command]:
+        """Yield what makes the actual paths longer by a part of the run."""
+        self._pieces += 1
+        for target in read_targets(motion.rows):
+            if target.name in self._rings:
+                path = self._path(target.name, "actual")
+                yield extend_trail(path, target.actual, self._pieces)
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield how it moves along a part of the run."""
+        count = len(motion.times)
+        for name, before in self._rings.items():
+            rings = np.arange(before, before + count, dtype=float)[:, None]
+            yield Track(self._path(name, "actual"), "length", motion.times, rings)
+            self._rings[name] = before + count
 
 
 def _ring_rows(count: int) -> Array:

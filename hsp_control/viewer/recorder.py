@@ -35,6 +35,9 @@ class Recorder:
         """Return False at once: no page will come."""
         return False
 
+    def wait_until_closed(self) -> None:
+        """Return at once: no page is open."""
+
     def close(self) -> None:
         """Do nothing; what was kept stays."""
 

@@ -1,21 +1,22 @@
-"""From a log to the view: find its robot again, open a viewer, play it."""
+"""From logs to the view: find their robots and controllers again, and play them."""
 
-from collections.abc import Callable
+import logging
+from collections.abc import Sequence
 from pathlib import Path
 
 from hsp_control.config.build_robot import build_robot
 from hsp_control.config.document import Document
-from hsp_control.config.models.view import ViewModel
+from hsp_control.config.experiment import build
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
 from hsp_control.exceptions import HspControlError, ViewerError
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
-from hsp_control.viewer import browser
+from hsp_control.viewer.comparison import Act
 from hsp_control.viewer.transport import Transport
 from hsp_control.viewer.viewer import Viewer
 
-PAGE_TIMEOUT = 15.0  # s
+_log = logging.getLogger(__name__)
 
 
 def robot_of(rollout: Rollout) -> Robot:
@@ -24,61 +25,97 @@ def robot_of(rollout: Rollout) -> Robot:
     Raises:
         ViewerError: If the log holds none, or its robot cannot be found again.
     """
-    name = rollout.meta.get("robot", {}).get("name", "?")
-    if rollout.config is None:
-        raise ViewerError(
-            f"this log was made from Python and does not say how its robot {name!r} "
-            "was built; give the robot, as in Viewer(robot).play(rollout)"
-        )
+    document = _document(rollout)
     try:
-        document = Document(rollout.config, {}, "the log's configuration")
         robot, _ = build_robot(document, validate(document, Scenario), Path())
     except HspControlError as error:
         raise ViewerError(f"the log's robot cannot be found again: {error}") from error
     return robot
 
 
-def view_rollout(
-    robot: Robot,
-    rollout: Rollout,
-    settings: ViewModel | None = None,
+def act_of(rollout: Rollout, name: str) -> Act:
+    """Return a log with its robot and, if that can be built anew, its controller.
+
+    A line in the log says so if it cannot.
+
+    Raises:
+        ViewerError: If the log holds no configuration, or its robot is gone.
+    """
+    try:
+        experiment = build(_document(rollout))
+    except HspControlError as error:
+        robot = robot_of(rollout)
+        _log.warning("%s: only what its columns tell is drawn: %s", name, error)
+        return Act(name, robot, rollout)
+    return Act(name, experiment.robot, rollout, experiment.controller)
+
+
+def view_logs(
+    logs: Sequence[Path],
     *,
-    open_browser: bool = False,
-    announce: Callable[[str], None] | None = None,
+    beside: bool | None = None,
+    speed: float | None = None,
+    loop: bool | None = None,
+    port: int | None = None,
     transport: Transport | None = None,
 ) -> Viewer:
-    """Open a viewer and play a run once; the viewer stays open, at the run's end.
+    """Open a viewer that plays one log, or several together; it stays open.
 
-    Prints nothing. With a browser, it begins when the page shows the scene; without
-    one it does not wait.
+    Camera, speed and what is shown are as the first log's configuration says.
 
     Args:
-        robot: The robot; of a log: see `robot_of`.
-        rollout: The run.
-        settings: Camera and speed; None: as the log's configuration says.
-        open_browser: Open the page in the user's browser.
-        announce: Is told the page's address before playing begins.
+        logs: The files.
+        beside: Of several: see `Viewer.compare`.
+        speed: Seconds of the run shown in one second; None: as the log says.
+        loop: Play it again and again; None: as the log says.
+        port: See `Viewer`.
         transport: See `Viewer`.
 
     Raises:
-        ViewerError: If the view cannot be opened, or the run is not this robot's.
+        LogError: If a log cannot be read.
+        ViewerError: If a log is empty, its robot cannot be found again, or the view
+            cannot be opened.
     """
-    if settings is None:
-        settings = ViewModel.model_validate((rollout.config or {}).get("view", {}))
-    viewer = Viewer(
-        robot,
-        camera=settings.camera,
-        target=settings.target,
-        transport=transport,
-    )
+    acts = [_act(path, name) for path, name in zip(logs, _names(logs), strict=True)]
+    first = acts[0]
+    view = (first.rollout.config or {}).get("view", {})
+    viewer = Viewer(first.robot, port=port, transport=transport, **view)
     try:
-        viewer.draw_scene(rollout)
-        if announce is not None and viewer.url is not None:
-            announce(viewer.url)
-        if open_browser and viewer.url and browser.open_browser(viewer.url):
-            viewer.wait_for_browser(PAGE_TIMEOUT)
-        viewer.play(rollout, speed=settings.speed)
+        if len(acts) == 1:
+            viewer.play(
+                first.rollout, controller=first.controller, speed=speed, loop=loop
+            )
+        else:
+            viewer.compare(acts, beside=beside, speed=speed, loop=loop)
     except BaseException:
         viewer.close()
         raise
     return viewer
+
+
+def _act(path: Path, name: str) -> Act:
+    try:
+        return act_of(Rollout.load(path), name)
+    except ViewerError as error:
+        raise ViewerError(f"{path}: {error}") from error
+
+
+def _document(rollout: Rollout) -> Document:
+    if rollout.config is None:
+        name = rollout.meta.get("robot", {}).get("name", "?")
+        raise ViewerError(
+            f"this log was made from Python and does not say how its robot {name!r} "
+            "was built; give the robot, as in Viewer(robot).play(rollout)"
+        )
+    return Document(rollout.config, {}, "the log's configuration")
+
+
+def _names(logs: Sequence[Path]) -> list[str]:
+    """Return names that tell the logs apart: the files', with folders if they must."""
+    stems = [path.stem for path in logs]
+    if len(set(stems)) == len(stems):
+        return stems
+    full = [str(path.with_suffix("")) for path in logs]
+    if len(set(full)) == len(full):
+        return full
+    return [f"{name} ({k})" for k, name in enumerate(full, start=1)]

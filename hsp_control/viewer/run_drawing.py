@@ -6,7 +6,7 @@ import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller
-from hsp_control.simulation import Rollout
+from hsp_control.robot import Robot
 from hsp_control.viewer.clip import Clip, Track
 from hsp_control.viewer.commands import Command, delete, set_property
 from hsp_control.viewer.contacts import Contacts
@@ -14,7 +14,7 @@ from hsp_control.viewer.distances import Distances
 from hsp_control.viewer.ellipsoid import Ellipsoid
 from hsp_control.viewer.influence import Influence
 from hsp_control.viewer.layer import Layer
-from hsp_control.viewer.motion import FINEST, Motion, motion_of
+from hsp_control.viewer.motion import Motion
 from hsp_control.viewer.obstacle_layer import ObstacleLayer
 from hsp_control.viewer.paths import Paths
 from hsp_control.viewer.robot_drawing import RobotDrawing
@@ -34,6 +34,41 @@ LAYERS = (
 """What can be switched, as nodes of the scene tree and in a configuration."""
 
 
+def all_layers(
+    robot: Robot, motion: Motion, controller: Controller | None, root: str = ""
+) -> dict[str, Layer]:
+    """Return the layers that a log can be drawn in, by name.
+
+    Args:
+        robot: The robot.
+        motion: The run.
+        controller: What controlled the robot; without it, layers that need more than
+            the log's columns are left out.
+        root: The node that holds them.
+    """
+    obstacles = ObstacleLayer(motion, f"{root}/obstacles")
+    layers: dict[str, Layer] = {
+        "paths": Paths(motion, f"{root}/paths"),
+        "targets": TargetMarks(motion, f"{root}/targets"),
+        "obstacles": obstacles,
+        "ellipsoid": Ellipsoid(robot, controller, f"{root}/ellipsoid"),
+        "contacts": Contacts(robot, motion, f"{root}/contacts"),
+    }
+    if controller is not None:
+        field = controller.field
+        layers |= {
+            "influence": Influence(field, obstacles.shapes, f"{root}/influence"),
+            "distances": Distances(controller, f"{root}/distances"),
+            "self_motion": SelfMotion(controller, motion, f"{root}/self_motion"),
+        }
+    return layers
+
+
+def ghost_layers(motion: Motion, color: str, root: str) -> dict[str, Layer]:
+    """Return no more than where the robot went, in a colour."""
+    return {"paths": Paths(motion, f"{root}/paths", color, desired=False)}
+
+
 class RunDrawing:
     """What a log tells, in layers.
 
@@ -45,47 +80,26 @@ class RunDrawing:
     def __init__(
         self,
         drawing: RobotDrawing,
-        rollout: Rollout,
+        motion: Motion,
+        layers: dict[str, Layer],
         *,
-        controller: Controller | None = None,
         root: str = "",
         shown: Mapping[str, bool] | None = None,
-        finest: float = FINEST,
     ) -> None:
-        """Read the log.
+        """Put a run together.
 
         Args:
             drawing: The robot in the scene.
-            rollout: The log.
-            controller: What controlled the robot; without it, layers that need more
-                than the log's columns are left out.
-            root: The node that holds all of it.
+            motion: The run.
+            layers: What to draw beside the robot.
+            root: The node that holds them.
             shown: Whether each layer is shown at first; those not named are.
-            finest: Least time between two rows that are drawn [s].
         """
-        self.motion: Motion = motion_of(drawing.robot, rollout, finest)
+        self.motion = motion
+        self.layers = layers
         self._drawing = drawing
         self._root = root
         self._shown = dict.fromkeys(LAYERS, True) | dict(shown or {})
-        motion = self.motion
-        self._paths = Paths(motion, f"{root}/paths")
-        self._obstacles = ObstacleLayer(motion, f"{root}/obstacles")
-        self.layers: dict[str, Layer] = {
-            "paths": self._paths,
-            "targets": TargetMarks(motion, f"{root}/targets"),
-            "obstacles": self._obstacles,
-            "ellipsoid": Ellipsoid(drawing.robot, controller, f"{root}/ellipsoid"),
-            "contacts": Contacts(drawing.robot, motion, f"{root}/contacts"),
-        }
-        if controller is not None:
-            zones = Influence(
-                controller.field, self._obstacles.shapes, f"{root}/influence"
-            )
-            self.layers |= {
-                "influence": zones,
-                "distances": Distances(controller, f"{root}/distances"),
-                "self_motion": SelfMotion(controller, motion, f"{root}/self_motion"),
-            }
 
     def draw(self, size: float) -> Iterator[Command]:
         """Yield what puts the layers into a scene of some size [m]."""
@@ -109,11 +123,12 @@ class RunDrawing:
         """Return where robot and targets are in the run [m], shape (K, 3)."""
         rows = self.motion.rows
         skeleton = rows["skeleton"] if "skeleton" in rows else np.zeros((0, 3))
-        return np.concatenate([skeleton.reshape(-1, 3), self._paths.points()])
+        paths = Paths(self.motion, "").points()
+        return np.concatenate([skeleton.reshape(-1, 3), paths])
 
     def obstacle_points(self) -> Array:
         """Return points that enclose the obstacles in the run [m], shape (K, 3)."""
-        return self._obstacles.points()
+        return ObstacleLayer(self.motion, "").points()
 
     def legend(self) -> list[tuple[str, str]]:
         """Return names and colours of what is shown."""
@@ -125,7 +140,7 @@ class RunDrawing:
         ]
 
 
-def clear(root: str = "") -> Iterator[Command]:
+def clear() -> Iterator[Command]:
     """Yield what takes all layers away."""
     for name in LAYERS:
-        yield delete(f"{root}/{name}")
+        yield delete(f"/{name}")

@@ -27,7 +27,7 @@ _APART = 0.06
 _WORTH = 0.1
 """What a joint must move, over what the quickest does, to be given an arrow."""
 _LONGEST = 0.6
-"""Of an arrow, over the scene's size."""
+"""Of an arrow, over the robot's size."""
 _WIDENING = 2.2
 
 
@@ -42,9 +42,10 @@ class SelfMotion:
         """Choose joints that move most along the run, and are not all in a place."""
         self._root = root
         self._controller = controller
-        self._radius = self._longest = 0.0
+        self._radius = ARROW_RADIUS * motion.size
+        self._longest = _LONGEST * motion.size
         places, moves, wants = self._measured(motion, slice(1, None))
-        size = float(np.linalg.norm(np.ptp(places.reshape(-1, 3), axis=0)))
+        size = motion.size
         speeds = np.maximum(*(np.linalg.norm(each, axis=2) for each in (moves, wants)))
         self._joints = _chosen(places, speeds.mean(axis=0), _APART * size)
         quick = float(np.quantile(speeds.max(axis=1), 0.9))
@@ -53,7 +54,6 @@ class SelfMotion:
 
     def draw(self, size: float) -> Iterator[Command]:
         """Yield what puts it into a scene of some size [m]."""
-        self._radius, self._longest = ARROW_RADIUS * size, _LONGEST * size
         for joint in self._joints:
             surface = seen_through(material(FIELD, glow=0.5))
             slender = unit_arrow(surface, self._radius)
@@ -114,9 +114,10 @@ def _joint_velocities(state: RobotState, v: Array, data: pin.Data) -> Array:
     model = state.robot.model
     pin.forwardKinematics(model, data, state.q, v)
     axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    return np.array(
-        [pin.getVelocity(model, data, k, axes).linear for k in range(model.njoints)]
-    )
+    velocities: Array = np.empty((model.njoints, 3))
+    for joint in range(model.njoints):
+        velocities[joint] = pin.getVelocity(model, data, joint, axes).linear
+    return velocities
 
 
 def _chosen(places: Array, speeds: Array, apart: float) -> list[int]:

@@ -20,6 +20,7 @@ from hsp_control.viewer.records import ASK, DELETE, SET, Record, encode
 
 START_TIMEOUT = 30.0  # s; it takes 0.2 on an idle machine
 STALL_TIMEOUT = 5.0  # s without progress after which the server counts as dead
+RELOAD_TIMEOUT = 3.0  # s; a page that comes back within it was not closed
 _POLL = 0.05  # s
 
 # The process needs two modules of this package, and none of what the package imports.
@@ -109,16 +110,25 @@ class Server:
         """
         deadline = time.monotonic() + timeout
         self._asked += 1
-        question = encode(Record(ASK, str(self._asked)))
         while True:
-            with self._lock:
-                self._write(question)
-                answer = self._answer(time.monotonic() + STALL_TIMEOUT)
+            answer = self._ask()
             if answer["number"] == self._asked and answer["up_to_date"]:
                 return True
             if time.monotonic() >= deadline:
                 return False
             time.sleep(_POLL)
+
+    def wait_until_closed(self) -> None:
+        """Wait until no page is open any more; one that is loaded again stays open.
+
+        Raises:
+            ViewerError: If the server has ended, or does not answer.
+        """
+        last_seen = time.monotonic()
+        while time.monotonic() < last_seen + RELOAD_TIMEOUT:
+            if self._ask()["pages"]:
+                last_seen = time.monotonic()
+            time.sleep(10 * _POLL)
 
     def close(self) -> None:
         """End the process; again is no error."""
@@ -132,6 +142,12 @@ class Server:
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+
+    def _ask(self) -> dict[str, Any]:
+        """Return how many pages are open, and how many show all before the question."""
+        with self._lock:
+            self._write(encode(Record(ASK, str(self._asked))))
+            return self._answer(time.monotonic() + STALL_TIMEOUT)
 
     def _write(self, data: bytes) -> None:
         pipe = self.process.stdin

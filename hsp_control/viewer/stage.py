@@ -4,9 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hsp_control import palette
 from hsp_control.arrays import Array
+from hsp_control.config.models.view import ViewModel
 from hsp_control.viewer import threejs
-from hsp_control.viewer.appearance import GRID, HORIZON, SKY
+from hsp_control.viewer.appearance import GRID, HAZE
 from hsp_control.viewer.commands import (
     Command,
     Json,
@@ -20,19 +22,29 @@ _LIGHT_FROM = np.array([0.5, -0.45, 1.6])
 _FINE = 1e-3
 
 
-def draw_stage(points: Array, floor: float) -> Iterator[Command]:
+def draw_stage(points: Array, floor: float, view: ViewModel) -> Iterator[Command]:
     """Yield the background, the lights and the floor.
 
     Args:
         points: What stands on the stage [m], shape (K, 3).
         floor: The floor's height [m].
+        view: How it is lit and coloured, and whether there is a grid.
     """
-    yield set_property("/Background", "top_color", _channels(SKY))
-    yield set_property("/Background", "bottom_color", _channels(HORIZON))
+    sky = view.background
+    horizon = palette.blend(sky, palette.INK, HAZE)
+    yield set_property("/Background", "top_color", _channels(sky))
+    yield set_property("/Background", "bottom_color", _channels(horizon))
     center = 0.5 * (points.min(axis=0) + points.max(axis=0))
     size = scene_size(points)
-    yield from _lights(center, size)
+    yield from _lights(center, size, view.light)
     yield from _floor(center, size, floor)
+    yield set_property("/floor/grid", "visible", view.show.grid)
+
+
+def is_dark(color: str) -> bool:
+    """Return whether white is easier to read on ``#RRGGBB`` than black."""
+    red, green, blue = (channel**2.2 for channel in _channels(color))
+    return bool(0.2126 * red + 0.7152 * green + 0.0722 * blue < 0.18)
 
 
 def in_sight(subject: Array, others: Array) -> Array:
@@ -56,9 +68,9 @@ def scene_size(points: Array) -> float:
     return max(float(np.linalg.norm(points - center, axis=1).max()), _FINE)
 
 
-def _lights(center: Array, size: float) -> Iterator[Command]:
-    sky = threejs.light("HemisphereLight", 0.57, groundColor=0xD5DCE2)
-    fill = threejs.light("DirectionalLight", 0.14)
+def _lights(center: Array, size: float, strength: float) -> Iterator[Command]:
+    sky = threejs.light("HemisphereLight", 0.57 * strength, groundColor=0xD5DCE2)
+    fill = threejs.light("DirectionalLight", 0.14 * strength)
     back = np.array([-_LIGHT_FROM[0], 1.2 * abs(_LIGHT_FROM[1]), 0.6])
     yield set_object("/lights/sky", threejs.group([sky]))
     yield set_object("/lights/fill", threejs.group([fill]))
@@ -68,7 +80,7 @@ def _lights(center: Array, size: float) -> Iterator[Command]:
     distance = 4.0 * around
     key = threejs.light(
         "DirectionalLight",
-        0.44,
+        0.44 * strength,
         castShadow=True,
         shadow={
             "radius": 3.0,

@@ -23,5 +23,8 @@ class Transport(Protocol):
     def wait_for_page(self, timeout: float) -> bool:
         """Wait until a page shows all that was sent [s]; return whether one does."""
 
+    def wait_until_closed(self) -> None:
+        """Wait until no page is open any more."""
+
     def close(self) -> None:
         """Stop; again is no error."""

@@ -2,8 +2,9 @@
 
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
-from hsp_control.config.models.view import ViewModel
+from hsp_control.controller import Controller
 from hsp_control.exceptions import ExportError
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
@@ -13,7 +14,8 @@ from hsp_control.viewer.export.page import assemble
 from hsp_control.viewer.export.panels import pack_panels
 from hsp_control.viewer.export.scene import light_scene
 from hsp_control.viewer.recorder import Recorder
-from hsp_control.viewer.replay import robot_of, view_rollout
+from hsp_control.viewer.replay import act_of
+from hsp_control.viewer.viewer import Viewer
 
 
 def export_html(
@@ -21,7 +23,8 @@ def export_html(
     path: str | Path,
     *,
     robot: Robot | None = None,
-    settings: ViewModel | None = None,
+    controller: Controller | None = None,
+    **view: Any,
 ) -> Path:
     """Write one page that plays a run offline, with its plots beside it.
 
@@ -30,17 +33,20 @@ def export_html(
     Args:
         rollout: The run.
         path: The file to write.
-        robot: The robot; None: built anew from the configuration that the log holds.
-        settings: Camera and speed; None: as the log's configuration says.
+        robot: The robot; None: it and its controller are built anew from the
+            configuration that the log holds.
+        controller: What controlled the run: see `Viewer.play`.
+        view: What to change of the log's own ``view``: see `Viewer`.
 
     Raises:
         ViewerError: If the robot cannot be found again, or the run is empty or of
             another robot.
+        ConfigError: If there is no such thing in a view.
         ExportError: If a mesh cannot be read, what reads it is not installed, or the
             file cannot be written.
     """
     path = Path(path)
-    text = page_of(rollout, robot=robot, settings=settings)
+    text = page_of(rollout, robot, controller, view)
     part = path.with_name(f".{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -57,14 +63,17 @@ def export_html(
 
 def page_of(
     rollout: Rollout,
-    *,
-    robot: Robot | None = None,
-    settings: ViewModel | None = None,
+    robot: Robot | None,
+    controller: Controller | None,
+    view: dict[str, Any],
 ) -> str:
     """Return the page that `export_html` writes."""
+    if robot is None:
+        _, robot, _, controller = act_of(rollout, "the log")
     recorder, arrays = Recorder(), ArrayTable()
-    robot = robot_of(rollout) if robot is None else robot
-    view_rollout(robot, rollout, settings, transport=recorder).close()
+    own = (rollout.config or {}).get("view", {})
+    with Viewer(robot, transport=recorder, **{**own, **view}) as viewer:
+        viewer.play(rollout, controller=controller)
     commands = [unpack(packed) for _, _, packed in recorder.scene.items()]
     content: Json = {
         "type": "show",

@@ -10,7 +10,7 @@ for (const name of ["Lights", "Grid", "Axes"]) viewer.delete_path([name]);
 const player = new Player(viewer);
 new Controls(player, document.body);
 
-const words = {camera, caption, time, status, trail, trail_more, clip, still, seek, ask, set_object,
+const words = {camera, caption, time, status, ghost, trail, trail_more, clip, still, seek, ask, set_object,
                nothing() {}};
 viewer.handle_command = (command) => {
   if (Array.isArray(command)) command.forEach(viewer.handle_command);
@@ -108,8 +108,9 @@ function camera({target, eye, direction, up, points, radius, field_of_view}) {
   viewer.controls.target.copy(center);
 }
 
-function caption({title, legend}) {
+function caption({title, legend, dark}) {
   document.title = title;
+  document.body.classList.toggle("dark", dark);
   document.querySelector("#caption h1").textContent = title;
   document.querySelector("#caption ul").replaceChildren(...legend.map(({name, color}) => {
     const entry = document.createElement("li");
@@ -117,6 +118,16 @@ function caption({title, legend}) {
     entry.style.setProperty("--color", color);
     return entry;
   }));
+}
+
+// Tint all that is at a node, and let what is behind it shine through.
+function ghost({path, color, opacity}) {
+  const tint = new MeshCat.THREE.Color(color);
+  eachMaterial(node(path), (material) => {
+    material.color?.lerp(tint, 0.6);
+    Object.assign(material, {opacity, transparent: true, needsUpdate: true});
+  });
+  node(path).traverse((thing) => { thing.castShadow = false; });
 }
 
 // The clock of a scene that is shown from outside, step by step.

@@ -1,4 +1,4 @@
-"""What is shown besides the robot, whether it comes from a scene or from a log."""
+"""What the stage can be set for: a scene, a run, or several runs."""
 
 from collections.abc import Iterator
 from typing import Protocol
@@ -7,17 +7,14 @@ from hsp_control.arrays import Array
 from hsp_control.viewer.commands import Command
 
 
-class Surroundings(Protocol):
-    """Draws itself once, then moves with time."""
+class Drawable(Protocol):
+    """Draws itself once, and tells where it will be."""
 
     def draw(self, size: float) -> Iterator[Command]:
         """Yield what puts it into a scene of some size [m]."""
 
-    def move(self, time: float) -> Iterator[Command]:
-        """Yield what moves it to where it is at a time [s]."""
-
     def points(self) -> Array:
-        """Return where robot and targets will be [m], shape (K, 3); may be none."""
+        """Return where robots and targets will be [m], shape (K, 3); may be none."""
 
     def obstacle_points(self) -> Array:
         """Return points that enclose the obstacles [m], shape (L, 3); may be none."""
