@@ -227,7 +227,7 @@ def test_timeline_plots_and_robot_move_together(
     expect(2.0)
     seek(watched, 3.25)
     expect(3.25)
-    shown = page.locator("#side section:nth-of-type(3) output").all_inner_texts()
+    shown = page.locator("#side section:nth-of-type(4) output").all_inner_texts()
     row = int(np.argmin(np.abs(planar.t - 3.25)))
     angles = np.cumsum(planar["joint_positions"][row])
     numbers = [float(text.replace("−", "-")) for text in shown]

@@ -545,8 +545,8 @@ def test_the_plots_are_the_logs(panda: Rollout) -> None:
     assert list(panels) == [
         "Task error ‖e‖",
         "Null-space error ‖e_N‖",
-        "Joint positions",
         "Least distance",
+        "Joint positions",
         "Manipulability",
         "Value of the field",
         "Efforts τ",
@@ -601,7 +601,7 @@ def test_a_run_of_one_row_is_exported(planar: Rollout, tmp_path: Path) -> None:
     columns = {name: column[:1] for name, column in planar.columns.items()}
     page = export_html(Rollout(columns, planar.meta), tmp_path / "one.html")
     assert content_of(page)["plots"]["panels"]
-    assert frame_times(planar.t[:1], 30.0, 1.0).tolist() == [0.0]
+    assert frame_times((0.0, 0.0), 30.0, 1.0).tolist() == [0.0]
 
 
 def test_what_cannot_be_exported_is_said(planar: Rollout, tmp_path: Path) -> None:
@@ -621,13 +621,13 @@ def test_what_cannot_be_exported_is_said(planar: Rollout, tmp_path: Path) -> Non
 # -- films ----------------------------------------------------------------------------
 
 
-def test_a_films_moments_are_evenly_spread(planar: Rollout) -> None:
-    times = frame_times(planar.t, 30.0, 2.0)
+def test_a_films_moments_are_evenly_spread() -> None:
+    times = frame_times((0.0, 3.0), 30.0, 2.0)
     assert len(times) == 46
     np.testing.assert_allclose(np.diff(times), 2.0 / 30.0)
     assert times[-1] == pytest.approx(3.0)
     with pytest.raises(ExportError, match="900001 pictures"):
-        frame_times(planar.t, 30.0, 1e-4)
+        frame_times((0.0, 3.0), 30.0, 1e-4)
 
 
 @pytest.mark.parametrize(
@@ -637,6 +637,12 @@ def test_a_films_moments_are_evenly_spread(planar: Rollout) -> None:
         ("film.mp4", FilmStyle(size=(10, 400)), "10x400 pixels: each must be between"),
         ("film.gif", FilmStyle(frame_rate=0.5), "0.5 pictures in a second"),
         ("film.gif", FilmStyle(speed=0.0), "speed 0 must be positive"),
+        (
+            "film.gif",
+            FilmStyle(start=2, end=1),
+            "from 2 to 1 s: the run goes from 0 to",
+        ),
+        ("film.gif", FilmStyle(end=3.5), "from 0 to 3.5 s: the run goes from 0 to 3 s"),
     ],
 )
 def test_a_film_that_cannot_be_is_refused(

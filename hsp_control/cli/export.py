@@ -42,7 +42,15 @@ def export(options: argparse.Namespace) -> int:
 
     if options.html:
         write(options.html, lambda: export_html(rollout, options.html, **made))
-    style = FilmStyle(options.size, options.fps, options.speed, options.plots)
+    style = FilmStyle(
+        size=options.size,
+        frame_rate=options.fps,
+        speed=options.speed,
+        plots=options.plots,
+        caption=options.caption,
+        start=options.first,
+        end=options.last,
+    )
     for path in films:
         with _Bar(path.name) as bar:
             write(

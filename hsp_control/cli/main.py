@@ -157,12 +157,21 @@ def _add_export(export: argparse.ArgumentParser) -> None:
         metavar="X",
         help="seconds of the run in a second of films; default: 1",
     )
-    export.add_argument(
-        "--plots",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="show the plots in films",
-    )
+    for name, which in (("from", "first"), ("to", "last")):
+        export.add_argument(
+            f"--{name}",
+            type=float,
+            dest=which,
+            metavar="T",
+            help=f"the {which} moment of films [s]; default: the run's",
+        )
+    for name in ("plots", "caption"):
+        export.add_argument(
+            f"--{name}",
+            action=argparse.BooleanOptionalAction,
+            default=True,
+            help=f"show the {name} in films; default: yes",
+        )
 
 
 def _picture_size(text: str) -> tuple[int, int]:

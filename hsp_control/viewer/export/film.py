@@ -28,12 +28,18 @@ class FilmStyle(NamedTuple):
         frame_rate: Pictures in a second [Hz]; None: 30, of a GIF or WebP 20.
         speed: Seconds of the run in one second of the film.
         plots: Whether the plots are in the picture.
+        caption: Whether title, clock and legend are.
+        start: The moment with which it begins [s]; None: the run's start.
+        end: The moment after which it ends [s]; None: the run's end.
     """
 
     size: tuple[int, int] | None = None
     frame_rate: float | None = None
     speed: float = 1.0
     plots: bool = True
+    caption: bool = True
+    start: float | None = None
+    end: float | None = None
 
 
 def export_film(
@@ -67,9 +73,10 @@ def export_film(
             one of them fails, or the file cannot be written.
     """
     path = Path(path)
-    size, frame_rate, speed, plots = _settled(path, style or FilmStyle())
+    style = style or FilmStyle()
+    size, frame_rate = _settled(path, style)
+    times = frame_times(_span(rollout, style), frame_rate, style.speed)
     find_ffmpeg()  # what is missing is said before the work, not after
-    times = frame_times(rollout.t, frame_rate, speed)
     stopped = Event()
 
     def take() -> None:
@@ -78,7 +85,10 @@ def export_film(
             export_html(rollout, file, robot=robot, controller=controller, **view)
             page = open_page(browser, file, size)
             with encoder(path, frame_rate) as write:
-                for number, picture in enumerate(pictures(page, times, plots), start=1):
+                for number, picture in enumerate(
+                    pictures(page, times, plots=style.plots, caption=style.caption),
+                    start=1,
+                ):
                     write(picture)
                     if stopped.is_set():
                         raise ExportError(f"{path}: stopped")
@@ -96,10 +106,8 @@ def export_film(
     return path
 
 
-def _settled(
-    path: Path, style: FilmStyle
-) -> tuple[tuple[int, int], float, float, bool]:
-    """Return size, frame rate, speed and whether there are plots, if they can be."""
+def _settled(path: Path, style: FilmStyle) -> tuple[tuple[int, int], float]:
+    """Return size and frame rate; refuse a style that cannot be."""
     if path.suffix.lower() not in FORMATS:
         raise ExportError(
             f"{path}: a film ends with one of {', '.join(FORMATS)}"
@@ -117,4 +125,17 @@ def _settled(
         raise ExportError(f"{frame_rate:g} pictures in a second: must be 1 to 240")
     if not 0.0 < style.speed < float("inf"):
         raise ExportError(f"speed {style.speed:g} must be positive")
-    return size, frame_rate, style.speed, style.plots
+    return size, frame_rate
+
+
+def _span(rollout: Rollout, style: FilmStyle) -> tuple[float, float]:
+    """Return the first and the last moment [s]."""
+    first, last = (float(t) for t in rollout.t[[0, -1]]) if len(rollout) else (0.0, 0.0)
+    start = first if style.start is None else style.start
+    end = last if style.end is None else style.end
+    if not first <= start <= end <= last:
+        raise ExportError(
+            f"a film from {start:g} to {end:g} s: the run goes from {first:g} to "
+            f"{last:g} s"
+        )
+    return start, end

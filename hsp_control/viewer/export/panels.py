@@ -103,17 +103,17 @@ def _panels(rollout: Rollout) -> Iterator[Panel]:
         list(_null_space(rollout)),
         logarithmic=True,
     )
+    watched = readings.distances(rollout)
+    if watched:
+        values = np.column_stack([rollout[f"distance.{name}"] for name in watched])
+        names = [name.replace("_", " ") for name in watched]
+        yield Panel("Least distance", "m", _lines(values, names), zero=True)
     positions, what = readings.joint_positions(rollout)
     yield Panel(
         what.capitalize() + "s",
         readings.position_unit(rollout),
         _lines(positions, readings.joint_names(rollout)),
     )
-    watched = readings.distances(rollout)
-    if watched:
-        values = np.column_stack([rollout[f"distance.{name}"] for name in watched])
-        names = [name.replace("_", " ") for name in watched]
-        yield Panel("Least distance", "m", _lines(values, names), zero=True)
     manipulability = Series("det(J W⁻¹ Jᵀ)", rollout["manipulability"], palette.TASK)
     yield Panel(
         "Manipulability",

@@ -14,12 +14,17 @@ if TYPE_CHECKING:
 
 _MOST_FRAMES = 100_000
 
-_PREPARE = """(plots) => {
+_PREPARE = """({plots, caption}) => {
   player.pause();
   document.body.classList.add("film");
   document.body.classList.toggle("alone", !plots);
+  document.body.classList.toggle("bare", !caption);
   const clock = () => words.time({text: `t = ${player.time.toFixed(2)} s`});
   player.addEventListener("time", clock);
+  const end = document.getElementById("side").getBoundingClientRect().bottom;
+  for (const plot of document.querySelectorAll("#side section")) {
+    if (plot.getBoundingClientRect().bottom > end) plot.hidden = true;  // it is cut
+  }
 }"""
 
 # Seek, draw, and wait until what was drawn is what a screenshot shows: without the two
@@ -32,32 +37,36 @@ _SHOW = """(time) => {
 }"""
 
 
-def frame_times(times: Array, frame_rate: float, speed: float) -> Array:
+def frame_times(span: tuple[float, float], frame_rate: float, speed: float) -> Array:
     """Return the moments of the run that a film shows [s], the first one its start.
 
     Args:
-        times: Of the log [s], shape (N,).
+        span: The first and the last that may be shown [s].
         frame_rate: Pictures in a second [Hz].
         speed: Seconds of the run in one second of the film.
 
     Raises:
         ExportError: If they are more than anyone would want.
     """
-    count = int((times[-1] - times[0]) * frame_rate / speed + 1e-9) + 1
+    start, end = span
+    count = int((end - start) * frame_rate / speed + 1e-9) + 1
     if count > _MOST_FRAMES:
         raise ExportError(f"the film would have {count} pictures: raise the speed")
-    return np.asarray(times[0] + np.arange(count) * speed / frame_rate)
+    return np.asarray(start + np.arange(count) * speed / frame_rate)
 
 
-def pictures(page: "Page", times: Array, plots: bool) -> Iterator[bytes]:
+def pictures(
+    page: "Page", times: Array, *, plots: bool, caption: bool
+) -> Iterator[bytes]:
     """Yield pictures of moments, as PNG files.
 
     Args:
         page: An exported page that shows its scene.
         times: The moments [s], shape (N,).
         plots: Whether the plots are in the picture.
+        caption: Whether title, clock and legend are.
     """
-    page.evaluate(_PREPARE, plots)
+    page.evaluate(_PREPARE, {"plots": plots, "caption": caption})
     page.evaluate(_SHOW, float(times[0]))  # sizes change only with the next frame
     camera = page.context.new_cdp_session(page)
     for time in times:
