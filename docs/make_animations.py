@@ -22,7 +22,7 @@ def main() -> None:
 
 
 def film_paper() -> None:
-    """Film one period of the fourth simulation, long after its start: without a seam."""
+    """Film one period of the fourth simulation, after many others: without a seam."""
     rollout = hsp.load_experiment("paper/4_moving_obstacle").run()
     start = 3.0 * PERIOD
     pictures = round(PERIOD * FRAME_RATE)
@@ -42,7 +42,7 @@ def film_panda() -> None:
     """Film the Panda whose elbow a ball sweeps past: all of it, with the plots."""
     rollout = hsp.load_experiment("panda_obstacle").run()
     style = FilmStyle(
-        size=(880, 495), frame_rate=FRAME_RATE, speed=2.0, caption=False, end=9.99
+        size=(900, 560), frame_rate=FRAME_RATE, speed=2.0, caption=False, end=9.99
     )
     export_film(rollout, FOLDER / "panda.webp", style=style, **VIEW)
 

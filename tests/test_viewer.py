@@ -1,6 +1,5 @@
 """The view shows what Pinocchio computed, to this machine alone, and leaves nothing."""
 
-import asyncio
 import logging
 import os
 import re
@@ -23,12 +22,11 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-import umsgpack
-from hsp_control.viewer.tube import tube
-from tornado.websocket import WebSocketClosedError, websocket_connect
+from clips import Clip
+from pages import Page
 
 from hsp_control import Obstacle, Robot, Rollout, Scene, load_experiment
-from hsp_control.exceptions import ViewerError
+from hsp_control.exceptions import ConfigError, ViewerError
 from hsp_control.shapes import (
     Box,
     Capsule,
@@ -45,13 +43,13 @@ from hsp_control.viewer import (
     Recorder,
     Viewer,
     browser,
-    playback,
     robot_of,
     server,
-    view_rollout,
+    view_logs,
 )
-from hsp_control.viewer.commands import CAMERA, CAPTION
+from hsp_control.viewer.commands import CAMERA, CAPTION, CLIP
 from hsp_control.viewer.kept import Kept, key_of
+from hsp_control.viewer.motion import motion_of
 from hsp_control.viewer.records import DELETE, SET, Decoder, Record, encode
 from hsp_control.viewer.server import Server
 from hsp_control.viewer.threejs import _Y_TO_Z
@@ -222,38 +220,57 @@ def test_paths_target_and_obstacle_follow_the_log(
 ) -> None:
     viewer = Viewer(arm, transport=recorder)
     viewer.draw_scene(run)
-    assert recorder.paths("/tasks/") == [
-        "/tasks/tip/desired", "/tasks/tip/actual", "/tasks/tip/target",
-    ]  # fmt: skip
+    assert recorder.paths("/paths/") == ["/paths/tip/desired", "/paths/tip/actual"]
+    assert recorder.paths("/targets/") == ["/targets/tip"]
     assert recorder.paths("/obstacles/") == ["/obstacles/disk"]
     (disk,) = geometries(recorder, "/obstacles/disk")
     assert (disk["type"], disk["radius"]) == ("SphereGeometry", 0.2)
-    (desired,) = geometries(recorder, "/tasks/tip/desired")
-    rings = np.reshape(desired["data"]["attributes"]["position"]["array"], (-1, 8, 3))
-    np.testing.assert_allclose(
-        rings.mean(axis=1)[:, :2], run["task.tip.reference"], atol=1e-6
-    )
+    desired = recorder.command("/paths/tip/desired", "object")
+    assert desired is not None
+    points = np.reshape(desired["points"], (-1, 3))[:, :2]
+    np.testing.assert_allclose(points, run["task.tip.reference"], atol=1e-6)
 
-    state = arm.state(0.0, run.q[0], run.v[0])
+    clip = Clip(recorder)
+    assert (clip.start, clip.end) == (run.t[0], run.t[-1])
+    data = arm.model.createData()
     for row in (0, 37, 150):
-        state.update(run.t[row], run.q[row], run.v[row])
-        viewer.show(state)
-        center = recorder.transform("/obstacles/disk")[:3, 3]
-        np.testing.assert_allclose(center, run["obstacle.disk"][row], atol=1e-9)
-        target = recorder.transform("/tasks/tip/target")[:2, 3]
-        np.testing.assert_allclose(target, run["task.tip.reference"][row], atol=1e-9)
-        length = recorder.command("/tasks/tip/actual", "length")
-        assert length is not None
-        assert length["fraction"] == pytest.approx(row / (len(run) - 1))
-        clock = recorder.command(CAPTION, "time")
-        assert clock is not None
-        assert clock["text"] == f"t = {run.t[row]:.2f} s"
+        t = run.t[row]
+        center = clip.value("/obstacles/disk", "position", t)
+        np.testing.assert_allclose(center, run["obstacle.disk"][row], atol=1e-6)
+        target = clip.value("/targets/tip", "position", t)[:2]
+        np.testing.assert_allclose(target, run["task.tip.reference"][row], atol=1e-6)
+        assert clip.value("/paths/tip/actual", "length", t) == pytest.approx(row)
+        pin.forwardKinematics(arm.model, data, run.q[row])
+        for joint in (1, 2, 3):
+            shown = clip.pose(f"/robot/joint{joint}", t)
+            expected = data.oMi[joint].homogeneous
+            np.testing.assert_allclose(shown, expected, atol=1e-6)
     caption = recorder.command(CAPTION, "caption")
     assert caption is not None
     assert caption["title"] == run.meta["title"]
     assert [entry["name"] for entry in caption["legend"]] == [
         "desired path", "actual path", "disk",
     ]  # fmt: skip
+
+
+def test_a_state_is_shown_with_what_the_run_did_then(
+    arm: Robot, run: Rollout, recorder: Recorder
+) -> None:
+    viewer = Viewer(arm, transport=recorder)
+    viewer.draw_scene(run)
+    q = arm.integrate(run.q[37], np.full(3, 0.1))
+    viewer.show(arm.state(run.t[37], q, run.v[37]))
+    sought = recorder.command(CLIP, "seek")
+    assert sought is not None
+    assert sought["time"] == run.t[37]
+    expected = arm.state(0.0, q, np.zeros(3)).data.oMi[3].homogeneous
+    np.testing.assert_array_equal(recorder.transform("/robot/joint3"), expected)
+    viewer.draw_scene(Scene())
+    assert recorder.command(CLIP, "begin") == {"type": "still", "path": CLIP}
+    viewer.show(arm.state(0.25, q, run.v[37]))
+    clock = recorder.command(CAPTION, "time")
+    assert clock is not None
+    assert clock["text"] == "t = 0.25 s"
 
 
 def test_a_new_scene_replaces_the_old(
@@ -263,7 +280,7 @@ def test_a_new_scene_replaces_the_old(
     viewer.draw_scene(run)
     ball = Obstacle("ball", Sphere(0.1), UniformLine([1, 0, 0], [0, 2, 0]))
     viewer.draw_scene(Scene([ball]))
-    assert recorder.paths("/tasks/") == []
+    assert recorder.paths("/paths/") == recorder.paths("/targets/") == []
     assert recorder.paths("/obstacles/") == ["/obstacles/ball"]
     viewer.show(arm.state(0.5, arm.home(), np.zeros(3)))
     center = recorder.transform("/obstacles/ball")[:3, 3]
@@ -291,8 +308,8 @@ def test_a_pose_task_shows_its_axes(recorder: Recorder) -> None:
     rollout = experiment.run()
     viewer = Viewer(experiment.robot, transport=recorder)
     viewer.play(rollout, speed=10.0)
-    assert len(children(recorder, "/tasks/hand/target")) == 3
-    shown = pin.SE3(recorder.transform("/tasks/hand/target"))
+    assert len(children(recorder, "/targets/hand")) == 3
+    shown = pin.SE3(Clip(recorder).pose("/targets/hand", 0.1))
     goal = pin.SE3(pin.rpy.rpyToMatrix(3.0, 0.2, 0.0), np.array([0.5, 0.1, 0.5]))
     assert np.linalg.norm(pin.log6(shown.actInv(goal))) < 1e-6
 
@@ -343,79 +360,76 @@ def test_a_mesh_is_drawn_and_one_that_is_gone_becomes_a_ball(
     assert (thing["type"], thing["radius"]) == ("SphereGeometry", 0.4)
 
 
-def test_a_tube_lies_about_its_path_even_where_that_rests_or_turns_back() -> None:
-    points = np.array([[0, 0, 0], [0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 0, 0.0]])
-    attributes = tube(points, 0.1)["data"]["attributes"]
-    rings = np.frombuffer(attributes["position"]["array"].data, "<f4").reshape(-1, 8, 3)
-    distances = np.linalg.norm(rings - points[:, None, :], axis=2)
-    np.testing.assert_allclose(distances, 0.1, atol=1e-6)
-
-
 # -- playing --------------------------------------------------------------------------
 
 
-class Clock:
-    """A clock that only drawing and sleeping move."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.now = 0.0
-        monkeypatch.setattr(playback, "time", self)
-
-    def perf_counter(self) -> float:
-        return self.now
-
-    def sleep(self, seconds: float) -> None:
-        assert seconds >= 0.0
-        self.now += seconds
-
-
-def test_playing_keeps_to_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = Clock(monkeypatch)
-    drawn: list[float] = []
-    played = playback.play(drawn.append, start=1.0, end=3.0, speed=2.0)
-    assert played.seconds == pytest.approx(1.0, abs=0.02)
-    assert played.rate == pytest.approx(60.0, abs=2.0)
-    assert (drawn[0], drawn[-1]) == (1.0, 3.0)
-    assert clock.now == pytest.approx(1.0, abs=0.02)
-
-
-def test_what_is_late_is_left_out_and_reported(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    clock = Clock(monkeypatch)
-
-    def slow(now: float) -> None:
-        assert now == pytest.approx(clock.now, abs=0.02) or now == 5.0
-        clock.sleep(0.1)
-
-    played = playback.play(slow, start=0.0, end=5.0, speed=1.0)
-    assert played.frames < 60
-    assert played.seconds < 5.3
-    assert "cannot keep up" in caplog.text
-
-
-def test_coarse_logs_play_smoothly(
+def test_the_page_is_told_how_to_play(
     arm: Robot, run: Rollout, recorder: Recorder
 ) -> None:
-    coarse = Rollout({k: v[::10] for k, v in run.columns.items()}, run.meta)
+    viewer = Viewer(arm, transport=recorder, speed=0.5)
+    viewer.play(run)
+    begin = recorder.command(CLIP, "begin")
+    assert begin is not None
+    assert (begin["play"], begin["loop"], begin["speed"]) == (True, False, 0.5)
+    viewer.play(run, speed=3.0, loop=True)
+    begin = recorder.command(CLIP, "begin")
+    assert begin is not None
+    assert (begin["play"], begin["loop"], begin["speed"]) == (True, True, 3.0)
+
+
+def test_coarse_logs_play_smoothly_and_fine_ones_are_thinned(
+    arm: Robot, run: Rollout, recorder: Recorder
+) -> None:
     viewer = Viewer(arm, transport=recorder)
+    coarse = Rollout({k: v[::10] for k, v in run.columns.items()}, run.meta)
     viewer.draw_scene(coarse)
-    seen = []
+    clip = Clip(recorder)
+    times = clip.times("/robot/joint3", "position")
+    assert (times[0], times[-1]) == (coarse.t[0], coarse.t[-1])
+    assert np.diff(times).max() < 0.034
+    assert np.isin(coarse.t, times).all()
+    # Between two rows the links keep their lengths: joints turn, nothing is cut short.
+    for t in times:
+        places = [clip.value(f"/robot/joint{k}", "position", t) for k in (1, 2, 3)]
+        lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        np.testing.assert_allclose(lengths, 1.0, atol=1e-6)
 
-    class Watch(Recorder):
-        def send(self, commands: Any) -> None:
-            recorder.send(commands)
-            seen.append(recorder.transform("/robot/joint1")[0, 0])
+    fine = motion_of(arm, resampled(run, 4000))
+    assert len(fine.times) < 160
+    assert (fine.times[0], fine.times[-1]) == (run.t[0], run.t[-1])
 
-    viewer.transport = Watch()
-    viewer.play(coarse, speed=5.0)
-    assert len(set(seen)) > len(coarse)
+
+def resampled(run: Rollout, rows: int) -> Rollout:
+    t = np.linspace(run.t[0], run.t[-1], rows)
+    near = np.searchsorted(run.t, t).clip(0, len(run) - 1)
+    return Rollout({k: v[near] for k, v in run.columns.items()} | {"t": t}, run.meta)
+
+
+def test_orientations_between_rows_turn_the_short_way(recorder: Recorder) -> None:
+    robot = Robot.load("iiwa14")
+    turns = np.array([[0, 0, 0, 1.0], [0, 0, -np.sin(0.2), -np.cos(0.2)]])
+    columns = {
+        "t": np.array([0.0, 1.0]),
+        "q": np.zeros((2, 7)),
+        "v": np.zeros((2, 7)),
+        "obstacle.box": np.zeros((2, 3)),
+        "obstacle.box.quaternion": turns,
+    }
+    about = {"box": {"shape": "Box", "parameters": {"size": [1, 1, 1]}, "radius": 1}}
+    viewer = Viewer(robot, transport=recorder)
+    viewer.draw_scene(Rollout(columns, {"status": "completed", "obstacles": about}))
+    half = Clip(recorder).value("/obstacles/box", "quaternion", 0.5)
+    assert abs(half @ [0, 0, np.sin(0.1), np.cos(0.1)]) == pytest.approx(1.0)
 
 
 def test_what_cannot_be_played_is_refused(arm: Robot, run: Rollout) -> None:
     viewer = Viewer(arm, transport=Recorder())
     with pytest.raises(ViewerError, match="speed -1 must be positive"):
         viewer.play(run, speed=-1)
+    with pytest.raises(ConfigError, match=r"view: camra: .*did you mean 'camera'"):
+        Viewer(arm, transport=Recorder(), camra=[1, 2, 3])
+    with pytest.raises(ViewerError, match=r"controller is for iiwa14 with nq = 7"):
+        viewer.play(run, controller=load_experiment("iiwa_singular").controller)
     empty = Rollout({k: v[:0] for k, v in run.columns.items()}, run.meta)
     with pytest.raises(ViewerError, match="the run is empty"):
         viewer.play(empty)
@@ -427,18 +441,43 @@ def test_what_cannot_be_played_is_refused(arm: Robot, run: Rollout) -> None:
 def test_a_log_is_viewed_as_its_configuration_says(
     tmp_path: Path, run: Rollout, recorder: Recorder
 ) -> None:
-    saved = Rollout.load(run.save(tmp_path / "run.npz"))
-    saved.meta["config"]["view"] = {"camera": [0, 0, 9], "speed": 20.0}
-    robot = robot_of(saved)
+    look = {"camera": [0, 0, 9], "speed": 20.0, "show": {"paths": False}}
+    config = {**(run.config or {}), "view": look}
+    log = Rollout(run.columns, {**run.meta, "config": config})
+    path = log.save(tmp_path / "run.npz")
+    robot = robot_of(Rollout.load(path))
     assert (robot.name, robot.nq) == ("planar3r", 6)
     assert not robot.model.gravity.linear.any()  # as configured
-    viewer = view_rollout(robot, saved, transport=recorder)
+    viewer = view_logs([path], transport=recorder)
     camera = recorder.command(CAMERA, "camera")
     assert camera is not None
     assert camera["eye"] == [0.0, 0.0, 9.0]
-    tip = recorder.transform("/robot/joint3") @ [1.0, 0.0, 0.0, 1.0]
-    np.testing.assert_allclose(tip[:2], saved["task.tip.actual"][-1], atol=1e-9)
+    begin = recorder.command(CLIP, "begin")
+    assert begin is not None
+    assert begin["speed"] == 20.0
+    hidden = recorder.command("/paths", "visible")
+    assert hidden is not None
+    assert hidden["value"] is False
+    assert recorder.command("/targets", "visible") is None
+    tip = Clip(recorder).pose("/robot/joint3", run.t[-1]) @ [1.0, 0.0, 0.0, 1.0]
+    np.testing.assert_allclose(tip[:2], run["task.tip.actual"][-1], atol=1e-6)
     viewer.close()
+
+
+def test_a_log_whose_controller_is_gone_shows_what_its_columns_tell(
+    tmp_path: Path,
+    run: Rollout,
+    recorder: Recorder,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    config = {**(run.config or {})}
+    field = {"type": "point_distance", "frames": ["gone"], "obstacle": "disk"}
+    config["null_space"] = {"fields": [field]}
+    log = Rollout(run.columns, {**run.meta, "config": config})
+    view_logs([log.save(tmp_path / "run.npz")], transport=recorder)
+    assert re.search(r"run: only what its columns tell is drawn:.*'gone'", caplog.text)
+    assert recorder.paths("/paths/")
+    assert not recorder.paths("/distances")
 
 
 def test_a_log_whose_robot_is_gone_says_so(run: Rollout) -> None:
@@ -586,19 +625,31 @@ def test_without_a_browser_nothing_waits(
     arm: Robot, run: Rollout, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin = time.monotonic()
-    announced: list[str] = []
-    view = {**(run.config or {}), "view": {"speed": 50.0}}
-    fast = Rollout(run.columns, {**run.meta, "config": view})
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)
-    with view_rollout(
-        arm, fast, announce=announced.append, open_browser=True
-    ) as viewer:
-        assert announced == [viewer.url]
+    with Viewer(arm, open_browser=True) as viewer:
+        viewer.play(run)
         for _ in range(5000):  # more than any pipe holds
             viewer.show(arm.home())
         assert not viewer.wait_for_browser(0.0)
     assert time.monotonic() - begin < 10.0
+
+
+def test_it_is_known_when_the_last_page_is_closed(
+    arm: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "RELOAD_TIMEOUT", 0.7)
+    with Viewer(arm) as viewer:
+        assert viewer.url is not None
+        page = Page(viewer.url)
+        assert viewer.wait_for_browser(8.0)
+        waiting = threading.Thread(target=viewer.wait_until_closed, daemon=True)
+        waiting.start()
+        waiting.join(1.5)
+        assert waiting.is_alive()
+        page.leave()
+        waiting.join(8.0)
+        assert not waiting.is_alive()
 
 
 def test_a_dead_or_stopped_server_is_an_error_not_a_wait(
@@ -622,41 +673,6 @@ def show_for(viewer: Viewer, seconds: float) -> None:
         viewer.show(viewer.robot.home())
 
 
-class Page(threading.Thread):
-    """What a browser does: connect, take commands, answer when it has drawn."""
-
-    def __init__(self, url: str, pause: float = 0.0) -> None:
-        super().__init__(daemon=True)
-        self.url, self.pause = url, pause
-        self.commands: list[dict[str, Any]] = []
-        self.start()
-
-    def run(self) -> None:
-        asyncio.run(self.look())
-
-    async def look(self) -> None:
-        page = await websocket_connect(self.url.replace("http", "ws") + "scene")
-        try:
-            while (message := await page.read_message()) is not None:
-                for command in umsgpack.unpackb(message):
-                    self.commands.append(command)
-                    if command["type"] == "ask":
-                        await page.write_message(str(command["number"]))
-                await asyncio.sleep(self.pause)
-                await page.write_message("taken")
-        except WebSocketClosedError:
-            pass
-        finally:
-            page.close()
-
-    def last(self, kind: str, path: str) -> dict[str, Any]:
-        return next(
-            command
-            for command in reversed(self.commands)
-            if (command["type"], command.get("path")) == (kind, path)
-        )
-
-
 def test_a_page_that_opens_late_sees_everything(arm: Robot, run: Rollout) -> None:
     with Viewer(arm) as viewer:
         assert viewer.url is not None
@@ -667,7 +683,8 @@ def test_a_page_that_opens_late_sees_everything(arm: Robot, run: Rollout) -> Non
         assert viewer.wait_for_browser(8.0)
         kinds = [(command["type"], command.get("path")) for command in first.commands]
         assert ("set_object", "/robot/joint3/link3") in kinds
-        assert ("set_object", "/tasks/tip/desired") in kinds
+        assert ("trail", "/paths/tip/desired") in kinds
+        assert ("clip", CLIP) in kinds
         assert ("camera", CAMERA) in kinds
         assert len(kinds) == len(set(kinds)) + 1  # the background's two colours
         viewer.draw_scene(Scene())
@@ -675,11 +692,11 @@ def test_a_page_that_opens_late_sees_everything(arm: Robot, run: Rollout) -> Non
         assert viewer.wait_for_browser(8.0)
         assert wait_until(lambda: second.commands and first.commands[-1] == {
             **second.commands[-1]})  # fmt: skip
-        assert ("delete", "/tasks") in [
+        assert ("delete", "/paths") in [
             (c["type"], c.get("path")) for c in first.commands
         ]
         paths = [command.get("path", "") for command in second.commands]
-        assert not any(path.startswith("/tasks") for path in paths)
+        assert not any(path.startswith("/paths") for path in paths)
     first.join(5.0)
     second.join(5.0)
 
@@ -707,7 +724,13 @@ def test_a_slow_page_skips_what_is_out_of_date(arm: Robot) -> None:
 
 def test_its_files_are_for_this_machine_alone(started: Server) -> None:
     assert started.url is not None
-    for file, text in (("", "connect();"), ("page.js", "MeshCat"), ("main.min.js", "")):
+    for file, text in (
+        ("", "connect();"),
+        ("page.js", "MeshCat"),
+        ("player.js", "class Player"),
+        ("player.css", ".player"),
+        ("main.min.js", ""),
+    ):
         with urllib.request.urlopen(started.url + file) as answer:
             assert text in answer.read().decode()
     for path, headers in (

@@ -8,14 +8,16 @@ LINK, JOINT = palette.LINK, palette.JOINT
 AXES = (palette.OBSTACLE, palette.TASK, palette.ACTUAL)
 """x, y and z of a target: as near to red, green and blue as all eyes tell apart."""
 
-HAZE = 0.11
-"""How much darker the horizon is than the sky."""
+HAZE = 0.19
+"""How much darker the horizon is than the sky: the share of grey."""
 GRID = "#8794A1"
 
 PATH_RADIUS = 0.0045
 """Of the actual path, over the size of the scene."""
 DESIRED_WIDENING = 2.0
 """How much thicker the desired path is: a sleeve, in which the actual one lies."""
+GHOST_NARROWING = 0.8
+"""How much thinner a ghost's path is: it lies within the path of the run."""
 OBSTACLE_OPACITY = 0.75
 ZONE_OPACITY = 0.13
 DISTANCE = palette.INK

@@ -18,6 +18,7 @@ def unit_arrow(surface: Json, radius: float) -> Json:
     """Return an arrow along z of length 1, its shaft of a radius [m]."""
     profile = np.array([(0, 0), (1, 0), (1, 0.72), (2.5, 0.72), (0, 1)])
     thing = threejs.mesh(threejs.turned(profile * [radius, 1.0]), surface, shadow=False)
+    thing["object"]["renderOrder"] = 1  # after what it shines through
     return threejs.group([thing])
 
 

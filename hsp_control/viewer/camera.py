@@ -24,6 +24,8 @@ def look_at(
     points: Array,
     eye: Sequence[float] | None = None,
     target: Sequence[float] | None = None,
+    *,
+    fit: bool = False,
 ) -> Command:
     """Return the command that places the camera.
 
@@ -35,16 +37,15 @@ def look_at(
         points: What is to be in sight [m], shape (K, 3).
         eye: Where one looks from [m]; None: far enough to see all points.
         target: Where one looks at [m]; None: the points' middle.
+        fit: Only look from the same side, but see all points.
     """
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    center = middle if target is None else np.asarray(target, float)
+    center = middle if target is None or fit else np.asarray(target, float)
+    direction = from_where(robot, eye, center if target is None else target)
     view: dict[str, object] = {}
-    if eye is not None:
-        direction = np.asarray(eye, float) - center
+    if eye is not None and not fit:
         view["eye"] = [float(x) for x in eye]
     else:
-        normal = plane_normal(robot)
-        direction = _SLANT if normal is None else normal
         stride = max(1, len(points) // _MOST_POINTS)
         view["direction"] = direction.tolist()
         view["points"] = points[::stride].tolist()
@@ -58,6 +59,22 @@ def look_at(
     )
 
 
+def from_where(
+    robot: Robot, eye: Sequence[float] | None, target: Array | Sequence[float] | None
+) -> Array:
+    """Return the direction towards the eye, of any length.
+
+    Args:
+        robot: The robot.
+        eye: Where one looks from [m]; None: from where the robot is seen well.
+        target: Where one looks at [m]; None: the origin.
+    """
+    if eye is not None:
+        return np.subtract(eye, np.zeros(3) if target is None else target)
+    normal = plane_normal(robot)
+    return _SLANT if normal is None else normal
+
+
 def to_the_right(
     robot: Robot, eye: Sequence[float] | None, target: Sequence[float] | None
 ) -> Array:
@@ -65,13 +82,10 @@ def to_the_right(
 
     Args:
         robot: The robot.
-        eye: Where one looks from [m]; None: from where `look_at` would.
-        target: Where one looks at [m]; None: the origin.
+        eye: See `from_where`.
+        target: See `from_where`.
     """
-    direction = _SLANT if (normal := plane_normal(robot)) is None else normal
-    if eye is not None:
-        middle = np.zeros(3) if target is None else np.asarray(target, float)
-        direction = np.asarray(eye, float) - middle
+    direction = from_where(robot, eye, target)
     right = np.array([-direction[1], direction[0], 0.0])
     length = float(np.linalg.norm(right))
     return right / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])

@@ -18,8 +18,10 @@ from hsp_control.viewer.motion import motion_of
 from hsp_control.viewer.poses import moved_to
 from hsp_control.viewer.robot_drawing import RobotDrawing
 from hsp_control.viewer.run_drawing import RunDrawing, all_layers, ghost_layers
+from hsp_control.viewer.self_motion import SelfMotion
+from hsp_control.viewer.stage import in_sight
 
-GHOSTS = (palette.FIELD, palette.TASK, palette.DESIRED)
+GHOSTS = (palette.TASK, palette.SERIES[4], palette.WARNING)
 """Colours of the second run, the third and so on."""
 _OPACITY = 0.38
 _GAP = 0.35
@@ -81,6 +83,10 @@ class Comparison:
                 RunDrawing(drawing, motion, layers, root=root, shown=shown)
             )
         self._places = self._offsets()
+        moving = [run.layers.get("self_motion") for run in self._runs]
+        arrows = [layer for layer in moving if isinstance(layer, SelfMotion)]
+        for layer in arrows:  # what is compared has one scale
+            layer.seconds = min(each.seconds for each in arrows)
 
     def draw(self, size: float) -> Iterator[Command]:
         """Yield what puts the runs, and all robots but the first, into the scene."""
@@ -133,7 +139,8 @@ class Comparison:
         places: list[Array] = []
         edge = 0.0
         for run in self._runs:
-            across = np.vstack([run.points(), np.zeros((1, 3))]) @ self._beside
+            own = np.vstack([run.points(), np.zeros((1, 3))])
+            across = in_sight(own, run.obstacle_points()) @ self._beside
             low, high = float(across.min()), float(across.max())
             shift = 0.0 if not places else edge - low
             places.append(shift * self._beside)

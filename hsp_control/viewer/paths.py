@@ -9,6 +9,7 @@ from hsp_control.viewer.appearance import (
     ACTUAL,
     DESIRED,
     DESIRED_WIDENING,
+    GHOST_NARROWING,
     PATH_RADIUS,
 )
 from hsp_control.viewer.clip import Track
@@ -25,7 +26,7 @@ class Paths:
     """The desired path as a sleeve, the actual one within it, as far as it has come."""
 
     def __init__(
-        self, motion: Motion, root: str, color: str = ACTUAL, *, desired: bool = True
+        self, motion: Motion, root: str, color: str = ACTUAL, *, ghost: bool = False
     ) -> None:
         """Read where the tasks' points were and should have been.
 
@@ -33,11 +34,11 @@ class Paths:
             motion: The run.
             root: The layer's node.
             color: The actual path's.
-            desired: Whether to draw the desired path, too.
+            ghost: Draw the actual path alone, within another's if they are the same.
         """
         self._root = root
         self._color = color
-        self._desired = desired
+        self._ghost = ghost
         rows = _ring_rows(len(motion.times))
         self._ring_times = motion.times[rows]
         self._paths = {
@@ -49,15 +50,17 @@ class Paths:
     def draw(self, size: float) -> Iterator[Command]:
         """Yield what puts it into a scene of some size [m]."""
         radius = PATH_RADIUS * size
+        slender = GHOST_NARROWING if self._ghost else 1.0
         actual, desired = color_number(self._color), color_number(DESIRED)
         for name, (wanted, was) in self._paths.items():
             # Where it stands still, the target shows where.
-            if self._desired and np.ptp(wanted, axis=0).max() >= radius:
+            if not self._ghost and np.ptp(wanted, axis=0).max() >= radius:
                 wide = DESIRED_WIDENING * radius
                 path = self._path(name, "desired")
                 yield set_trail(path, wanted, wide, desired, sleeve=True)
             if len(was) and np.ptp(was, axis=0).max() >= radius:
-                yield set_trail(self._path(name, "actual"), was, radius, actual)
+                path = self._path(name, "actual")
+                yield set_trail(path, was, slender * radius, actual)
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
         """Yield how it moves along the run."""

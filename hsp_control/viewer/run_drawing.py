@@ -66,7 +66,7 @@ def all_layers(
 
 def ghost_layers(motion: Motion, color: str, root: str) -> dict[str, Layer]:
     """Return no more than where the robot went, in a colour."""
-    return {"paths": Paths(motion, f"{root}/paths", color, desired=False)}
+    return {"paths": Paths(motion, f"{root}/paths", color, ghost=True)}
 
 
 class RunDrawing:

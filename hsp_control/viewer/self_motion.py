@@ -50,7 +50,7 @@ class SelfMotion:
         self._joints = _chosen(places, speeds.mean(axis=0), _APART * size)
         quick = float(np.quantile(speeds.max(axis=1), 0.9))
         fitting = [s for s in SECONDS if s * quick <= _USUAL * size]
-        self._seconds = max(fitting, default=SECONDS[0])
+        self.seconds = max(fitting, default=SECONDS[0])
 
     def draw(self, size: float) -> Iterator[Command]:
         """Yield what puts it into a scene of some size [m]."""
@@ -75,7 +75,7 @@ class SelfMotion:
                     self._path(kind, joint),
                     motion.times,
                     places[:, k],
-                    self._shortened(self._seconds * speeds[:, k]),
+                    self._shortened(self.seconds * speeds[:, k]),
                     radius,
                 )
 
@@ -83,7 +83,7 @@ class SelfMotion:
         """Return names and colours."""
         if not self._joints:
             return []
-        return [(f"self-motion of {self._seconds:g} s, in its field's", FIELD)]
+        return [(f"self-motion in {self.seconds:g} s, within the field's", FIELD)]
 
     def _measured(
         self, motion: Motion, joints: slice | list[int]

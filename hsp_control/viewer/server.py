@@ -128,7 +128,7 @@ class Server:
         while time.monotonic() < last_seen + RELOAD_TIMEOUT:
             if self._ask()["pages"]:
                 last_seen = time.monotonic()
-            time.sleep(10 * _POLL)
+            time.sleep(RELOAD_TIMEOUT / 6.0)
 
     def close(self) -> None:
         """End the process; again is no error."""

@@ -31,7 +31,7 @@ def draw_stage(points: Array, floor: float, view: ViewModel) -> Iterator[Command
         view: How it is lit and coloured, and whether there is a grid.
     """
     sky = view.background
-    horizon = palette.blend(sky, palette.INK, HAZE)
+    horizon = palette.blend(sky, palette.MUTED, HAZE)
     yield set_property("/Background", "top_color", _channels(sky))
     yield set_property("/Background", "bottom_color", _channels(horizon))
     center = 0.5 * (points.min(axis=0) + points.max(axis=0))

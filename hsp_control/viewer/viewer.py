@@ -308,20 +308,19 @@ class Viewer:
             scene: What is drawn.
             title: The title; None: the robot's name.
             moving: Points of the robot [m], shape (K, 3); None: the scene's own.
-            fit: Look at all points, even if the view says from where to look.
+            fit: See all points, even if the view says where the eye is.
         """
         view = self.view
         subject = self._subject(scene.points() if moving is None else moving)
         points = in_sight(subject, scene.obstacle_points())
         floor = min(0.0, float(subject[:, 2].min()))
-        eye, target = (None, None) if fit else (view.camera, view.target)
         dark = is_dark(view.background)
         commands = [
             *clear(),
             *(delete(root) for root in self._others),
             *draw_stage(points, floor, view),
             *scene.draw(scene_size(points)),
-            look_at(self.robot, points, eye, target),
+            look_at(self.robot, points, view.camera, view.target, fit=fit),
             set_caption(title or self.robot.name, scene.legend(), dark=dark),
             set_time(""),
             set_status(""),

@@ -125,7 +125,9 @@ function ghost({path, color, opacity}) {
   const tint = new MeshCat.THREE.Color(color);
   eachMaterial(node(path), (material) => {
     material.color?.lerp(tint, 0.6);
-    Object.assign(material, {opacity, transparent: true, needsUpdate: true});
+    // Where it coincides with what is solid, it lies behind.
+    const behind = {polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 8};
+    Object.assign(material, {opacity, transparent: true, needsUpdate: true, ...behind});
   });
   node(path).traverse((thing) => { thing.castShadow = false; });
 }

@@ -1,0 +1,47 @@
+"""A page as the server sees it, without a browser; for tests."""
+
+import asyncio
+import threading
+from typing import Any
+
+import umsgpack
+from tornado.websocket import WebSocketClosedError, websocket_connect
+
+
+class Page(threading.Thread):
+    """What a browser does: connect, take commands, answer when it has drawn."""
+
+    def __init__(self, url: str, pause: float = 0.0) -> None:
+        super().__init__(daemon=True)
+        self.url, self.pause = url, pause
+        self.commands: list[dict[str, Any]] = []
+        self.start()
+
+    def run(self) -> None:
+        asyncio.run(self.look())
+
+    def leave(self) -> None:
+        self.loop.call_soon_threadsafe(self.socket.close)
+
+    async def look(self) -> None:
+        page = await websocket_connect(self.url.replace("http", "ws") + "scene")
+        self.loop, self.socket = asyncio.get_running_loop(), page
+        try:
+            while (message := await page.read_message()) is not None:
+                for command in umsgpack.unpackb(message):
+                    self.commands.append(command)
+                    if command["type"] == "ask":
+                        await page.write_message(str(command["number"]))
+                await asyncio.sleep(self.pause)
+                await page.write_message("taken")
+        except WebSocketClosedError:
+            pass
+        finally:
+            page.close()
+
+    def last(self, kind: str, path: str) -> dict[str, Any]:
+        return next(
+            command
+            for command in reversed(self.commands)
+            if (command["type"], command.get("path")) == (kind, path)
+        )
