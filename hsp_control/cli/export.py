@@ -3,7 +3,6 @@
 import argparse
 import sys
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -28,20 +27,7 @@ def export(options: argparse.Namespace) -> int:
     for kind in ("mp4", "gif", "webp"):
         _check_ending(getattr(options, kind), f".{kind}")
     rollout = Rollout.load(options.log)
-    _, robot, _, controller = act_of(rollout, options.log.name)
-    made = {"robot": robot, "controller": controller}
-    said: list[str] = []
-
-    def write(path: Path, how: Callable[[], Path]) -> None:
-        try:
-            out.print(f"{_size(how())}: {path}")
-        except ExportError as error:
-            if str(error) not in said:
-                print(f"hsp: {error}", file=sys.stderr)
-            said.append(str(error))
-
-    if options.html:
-        write(options.html, lambda: export_html(rollout, options.html, **made))
+    act = act_of(rollout, options.log.name)
     style = FilmStyle(
         size=options.size,
         frame_rate=options.fps,
@@ -51,19 +37,37 @@ def export(options: argparse.Namespace) -> int:
         start=options.first,
         end=options.last,
     )
-    for path in films:
+
+    def page(path: Path) -> Path:
+        return export_html(rollout, path, robot=act.robot, controller=act.controller)
+
+    def film(path: Path) -> Path:
         with _Bar(path.name) as bar:
-            write(
+            return export_film(
+                rollout,
                 path,
-                partial(
-                    export_film,
-                    rollout,
-                    path,
-                    style=style,
-                    **made,
-                    progress=bar.update,
-                ),
+                style=style,
+                robot=act.robot,
+                controller=act.controller,
+                progress=bar.update,
             )
+
+    wanted = [(options.html, page)] if options.html else []
+    return _write([*wanted, *((path, film) for path in films)])
+
+
+def _write(wanted: list[tuple[Path, Callable[[Path], Path]]]) -> int:
+    """Write files; what is missing for several of them is said once."""
+    said: list[str] = []
+    for path, write in wanted:
+        try:
+            size = write(path).stat().st_size
+        except ExportError as error:
+            if str(error) not in said:
+                print(f"hsp: {error}", file=sys.stderr)
+            said.append(str(error))
+        else:
+            out.print(f"{size / 1e6:.2f} MB: {path}")
     return 2 if said else 0
 
 
@@ -96,7 +100,3 @@ class _Bar:
 def _check_ending(path: Path | None, ending: str) -> None:
     if path is not None and path.suffix.lower() != ending:
         raise ExportError(f"--{ending[1:]} {path}: its name must end with {ending}")
-
-
-def _size(file: Path) -> str:
-    return f"{file.stat().st_size / 1e6:.2f} MB"
