@@ -204,7 +204,7 @@ def test_every_joint_is_where_pinocchio_has_it(
     )
     assert len(meshes) > 11
     assert all(vertices == normals for vertices, normals, _ in meshes)
-    assert 20_000 < sum(corners for *_, corners in meshes) / 3 < 134_000
+    assert sum(corners for *_, corners in meshes) / 3 > 130_000  # all there are
 
 
 def test_timeline_plots_and_robot_move_together(

@@ -9,15 +9,12 @@ from hsp_control.arrays import Array
 from hsp_control.viewer.commands import Json
 from hsp_control.viewer.export.meshes import Piece, read_mesh
 from hsp_control.viewer.export.packing import ArrayTable, step_of
-from hsp_control.viewer.export.simplification import simplify
 from hsp_control.viewer.export.surfaces import in_order, split_creases, weld
 from hsp_control.viewer.export.tracks import light_clip
 from hsp_control.viewer.surfaces import material
 from hsp_control.viewer.threejs import matrix, unique_name
 
-SURFACE_BOUND = 3e-4
-"""How far a vertex of a mesh may be from the mesh that is shown [m]."""
-_FINEST = 2e-5
+VERTEX_STEP = 2e-5
 """Vertices are told apart to this [m], or to 2⁻¹⁶ of a mesh."""
 _TRAIL_STEP = 5e-5
 """The same of the points of a trail [m]."""
@@ -151,10 +148,8 @@ def _geometry(piece: Piece, scale: float, arrays: ArrayTable) -> Json:
     """Return a piece as a packed geometry; the page computes its normals."""
     size = float(np.ptp(piece.vertices, axis=0).max(initial=0.0)) or 1.0
     vertices, triangles = weld(piece.vertices, piece.triangles, 1e-6 * size)
-    bound = min(SURFACE_BOUND / scale, size / 100.0)
-    triangles = simplify(vertices, triangles, bound)
     vertices, triangles = in_order(*split_creases(vertices, triangles))
-    step = max(_FINEST / scale, size * 2.0**-16)
+    step = max(VERTEX_STEP / scale, size * 2.0**-16)
     return {
         "uuid": unique_name(),
         "type": "BufferGeometry",
