@@ -10,9 +10,17 @@ import yaml
 import hsp_control
 from hsp_control import load_experiment
 from hsp_control.cli.main import _parser
+from hsp_control.config.models.view import ShowModel
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+SMALL = """
+robot: {name: planar3r}
+tasks: {tip: {type: frame_position, axes: xy, trajectory: {type: hold}}}
+simulation: {duration: 0.1}
+"""
 
 
 def blocks(text: str, language: str) -> list[str]:
@@ -50,10 +58,25 @@ def test_the_readme_s_commands_exist() -> None:
         if line.startswith("hsp ")
     ]
     assert {command[0] for command in commands} == {
-        "run", "plot", "export", "check", "robots", "schema",
+        "run", "view", "plot", "export", "check", "robots", "schema",
     }  # fmt: skip
     for command in commands:
         _parser().parse_args(command)
+
+
+def test_the_view_s_document_is_true(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (ROOT / "docs" / "view.md").read_text(encoding="utf-8")
+    (commands,) = blocks(text, "sh")
+    for command in commands.splitlines():
+        _parser().parse_args(command.split("#")[0].split()[1:])
+    (view,) = blocks(text, "yaml")
+    configuration = {**yaml.safe_load(view), **yaml.safe_load(SMALL)}
+    assert load_experiment(configuration).scenario.view.show.ellipsoid
+    told = re.findall(r"^\| `(\w+)` \| (on|off) \|", text, re.MULTILINE)
+    defaults = ShowModel().model_dump()
+    assert {name: state == "on" for name, state in told} == defaults
+    (snippet,) = blocks(text, "python")
+    exec(compile(snippet, "view.md", "exec"), {})
 
 
 def test_the_law_in_the_document_is_the_law_of_the_code() -> None:

@@ -221,6 +221,13 @@ def test_it_is_steered_from_the_page(page: Any) -> None:
     page.locator(".timeline").focus()
     page.keyboard.press("Home")
     assert player(page, "time") == 1.0
+    page.locator(".speed").select_option("0.05")
+    page.keyboard.press("ArrowRight")
+    assert player(page, "time") == pytest.approx(1.0 + 1 / 30)
+    page.locator(".toggle").click()
+    assert player(page, "playing") is True
+    page.keyboard.press(" ")  # once, not by the button in focus as well
+    assert player(page, "playing") is False
 
 
 def test_others_are_told_the_time(page: Any) -> None:

@@ -514,6 +514,22 @@ def test_a_run_is_shown_while_it_is_computed(
     assert Clip(transport).value("/paths/tip/actual", "length", 0.5) == 50
 
 
+def test_what_is_hidden_costs_the_run_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live, "PERIOD", 0.0)
+    experiment = load_experiment(PLANAR, "simulation.duration=0.1")
+    transport = Watched()
+    off = dict.fromkeys(LAYERS, False)
+    viewer = Viewer(experiment.robot, transport=transport, show=off)
+    view = LiveView(viewer, experiment)
+    del transport.sent[:]
+    rollout = experiment.run(on_row=view.on_row)
+    moving = {track["path"] for c in transport.sent for track in c.get("tracks", ())}
+    assert moving == {f"/robot/joint{k}" for k in (1, 2, 3)}
+    assert not [c for c in transport.sent if c["type"] == "trail_more"]
+    view.finish(rollout)  # and then it is there, to be switched on
+    assert "/paths/tip/actual" in transport.paths("/paths")
+
+
 def test_drawing_leaves_rows_out_so_that_it_stays_cheap(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -4,7 +4,9 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.markup import escape
@@ -21,18 +23,28 @@ from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.sources import example_robots
 
+if TYPE_CHECKING:
+    from hsp_control.cli.screen import Screen
+
 
 def run(options: argparse.Namespace) -> int:
     """Simulate, save the log, say what it shows; keep what was computed."""
     experiment = load_experiment(options.config, *options.overrides)
     log = options.out / f"{experiment.name}.npz"
     log.parent.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
-    status, screen = 0, None
-    if options.view:
-        from hsp_control.cli.screen import Screen
+    if not options.view:
+        return _run_and_save(experiment, log, None)
+    from hsp_control.cli.screen import Screen
 
-        screen = Screen.open(experiment, options, _out.print)
-        status = 0 if screen else 2
+    screen = Screen.open(experiment, options, _out.print)
+    if screen is None:
+        return max(_run_and_save(experiment, log, None), 2)
+    with closing(screen):
+        return _run_and_save(experiment, log, screen)
+
+
+def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") -> int:
+    status = 0
     try:
         rollout = _run_with_progress(experiment, screen.on_row if screen else None)
     except SimulationError as error:

@@ -3,7 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import Self
 
 from hsp_control.config import Experiment
@@ -34,32 +34,35 @@ class Screen:
     ) -> Self | None:
         """Open it, or say why it cannot be and return None: the run goes on without."""
         view = experiment.scenario.view.model_dump()
-        try:
-            viewer = Viewer(experiment.robot, port=options.port, **view)
-        except ViewerError as error:
-            print(f"hsp: {error}; the run goes on unseen", file=sys.stderr)
-            return None
-        announce(f"View: {viewer.url}")
-        opened = options.browser and viewer.open_browser()
-        try:
-            return cls(viewer, experiment, opened=opened)
-        except BaseException:
-            viewer.close()
-            raise
+        with ExitStack() as stack:
+            try:
+                viewer = Viewer(experiment.robot, port=options.port, **view)
+                stack.enter_context(viewer)
+                announce(f"View: {viewer.url}")
+                opened = options.browser and viewer.open_browser()
+                screen = cls(viewer, experiment, opened=opened)
+            except ViewerError as error:
+                print(f"hsp: {error}; the run goes on unseen", file=sys.stderr)
+                return None
+            stack.pop_all()  # it stays open
+        return screen
 
     def on_row(self, recorder: Recorder) -> None:
         """Show what has been computed."""
         self._live.on_row(recorder)
 
     def finish(self, rollout: Rollout) -> None:
-        """Show the whole run until a person has seen it, and close.
+        """Show the whole run until a person has seen it.
 
         Raises:
             ViewerError: If the server has ended.
         """
-        with self._viewer:
-            self._live.finish(rollout)
-            attend(self._viewer, opened=self._opened)
+        self._live.finish(rollout)
+        attend(self._viewer, opened=self._opened)
+
+    def close(self) -> None:
+        """End the view; again is no error."""
+        self._viewer.close()
 
 
 def attend(viewer: Viewer, *, opened: bool) -> None:

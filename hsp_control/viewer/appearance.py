@@ -20,7 +20,8 @@ GHOST_NARROWING = 0.8
 """How much thinner a ghost's path is: it lies within the path of the run."""
 OBSTACLE_OPACITY = 0.75
 ZONE_OPACITY = 0.13
-DISTANCE = palette.INK
+INK, CHALK = palette.INK, palette.WALL
+"""What is drawn on a light background, and on a dark one."""
 BAR_RADIUS = 0.003
 """Of a distance, over the size of the scene."""
 ELLIPSOID, ELLIPSOID_OPACITY = palette.TASK, 0.3

@@ -54,6 +54,7 @@ class Comparison:
         *,
         shown: Mapping[str, bool],
         beside: Array | None,
+        dark: bool,
     ) -> None:
         """Read the logs.
 
@@ -63,6 +64,7 @@ class Comparison:
             shown: Whether each layer is shown at first.
             beside: The direction in which to set the runs side by side, a unit vector
                 of shape (3,); None: over each other, all but the first as ghosts.
+            dark: Whether the background is.
         """
         self._names = [act.name for act in acts]
         self.roots = ["", *(f"/{element(act.name)}" for act in acts[1:])]
@@ -76,7 +78,7 @@ class Comparison:
             layers = (
                 ghost_layers(motion, _color(number), root)
                 if number and beside is None
-                else all_layers(act.robot, motion, act.controller, root)
+                else all_layers(act.robot, motion, act.controller, root=root, dark=dark)
             )
             drawing = self._drawings[-1]
             self._runs.append(

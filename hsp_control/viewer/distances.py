@@ -9,7 +9,7 @@ from hsp_control.arrays import Array
 from hsp_control.controller import Controller
 from hsp_control.fields import Clearance, PointDistance
 from hsp_control.robot import RobotState
-from hsp_control.viewer.appearance import BAR_RADIUS, DISTANCE
+from hsp_control.viewer.appearance import BAR_RADIUS
 from hsp_control.viewer.arrows import bar_tracks, unit_bar
 from hsp_control.viewer.clip import Track
 from hsp_control.viewer.commands import Command, set_object
@@ -38,9 +38,10 @@ class Nearest(NamedTuple):
 class Distances:
     """One bar for each obstacle, from the link nearest to it, while the field acts."""
 
-    def __init__(self, controller: Controller, root: str) -> None:
-        """Find out what the controller's field watches."""
+    def __init__(self, controller: Controller, root: str, color: str) -> None:
+        """Find out what the controller's field watches; draw it in a colour."""
         self._root = root
+        self._color = color
         field = controller.field
         self._watches: dict[str, _Pairs | _Frames] = {}
         for clearance in terms(field, Clearance):
@@ -52,7 +53,7 @@ class Distances:
     def draw(self, size: float) -> Iterator[Command]:
         """Yield what puts it into a scene of some size [m]."""
         for name in self._watches:
-            bar = unit_bar(paint(DISTANCE), BAR_RADIUS * size)
+            bar = unit_bar(paint(self._color), BAR_RADIUS * size)
             yield set_object(self._path(name), bar)
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
@@ -67,7 +68,7 @@ class Distances:
 
     def legend(self) -> list[tuple[str, str]]:
         """Return names and colours."""
-        return [("shortest distance", DISTANCE)] if self._watches else []
+        return [("shortest distance", self._color)] if self._watches else []
 
     def _path(self, name: str) -> str:
         return f"{self._root}/{element(name)}"

@@ -83,7 +83,7 @@ def zone(shape: Shape, influence: float, extent: float) -> Json:
         case shapes.HalfSpace():
             solid = threejs.plane(extent)
             pose = moved_to([0.0, 0.0, influence])
-            surface |= {"side": 2}
+            surface |= {"side": 2, "opacity": 0.5 * ZONE_OPACITY}
         case shapes.Box():
             corners = np.array(list(product((-0.5, 0.5), repeat=3)))
             solid = _rounded(corners * np.asarray(shape.size), influence)

@@ -52,9 +52,8 @@ class LiveView:
         robot, controller = experiment.robot, experiment.controller
         motion = motion_of(robot, preview)
         shown = viewer.view.show.model_dump()
-        layers = all_layers(robot, motion, controller)
-        self._paths = GrowingPaths(motion, "/paths")
-        layers["paths"] = self._paths
+        layers = all_layers(robot, motion, controller, dark=viewer.dark)
+        layers["paths"] = GrowingPaths(motion, "/paths")
         # What nobody sees need not be computed now.
         layers = {name: layer for name, layer in layers.items() if shown[name]}
         self._run = RunDrawing(viewer.drawing, motion, layers, shown=shown)
@@ -133,7 +132,8 @@ class LiveView:
             if first
             else [extend_clip(clip, self._pieces)]
         )
-        grown = self._paths.extend(motion)
+        paths = self._run.layers.get("paths")
+        grown = paths.extend(motion) if isinstance(paths, GrowingPaths) else ()
         if not rate:
             return [*grown, *said]
         return [*grown, *said, set_status(f"computing at {_shown(rate)} × real time")]

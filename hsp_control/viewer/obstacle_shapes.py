@@ -73,6 +73,8 @@ def obstacle(shape: Shape, extent: float) -> Json:
             surface |= {"side": 2}
     thing = threejs.mesh(solid, surface, pose)
     thing["object"]["receiveShadow"] = False  # nor its own, which would show through
+    if isinstance(shape, shapes.HalfSpace):
+        thing["object"]["castShadow"] = False  # it has no end, but its picture has
     return threejs.group([thing])
 
 

@@ -39,6 +39,7 @@ class Paths:
         self._root = root
         self._color = color
         self._ghost = ghost
+        self._still = PATH_RADIUS * motion.size
         rows = _ring_rows(len(motion.times))
         self._ring_times = motion.times[rows]
         self._paths = {
@@ -54,11 +55,11 @@ class Paths:
         actual, desired = color_number(self._color), color_number(DESIRED)
         for name, (wanted, was) in self._paths.items():
             # Where it stands still, the target shows where.
-            if not self._ghost and np.ptp(wanted, axis=0).max() >= radius:
+            if not self._ghost and self._leads_away(wanted):
                 wide = DESIRED_WIDENING * radius
                 path = self._path(name, "desired")
                 yield set_trail(path, wanted, wide, desired, sleeve=True)
-            if len(was) and np.ptp(was, axis=0).max() >= radius:
+            if self._leads_away(was):
                 path = self._path(name, "actual")
                 yield set_trail(path, was, slender * radius, actual)
 
@@ -72,7 +73,8 @@ class Paths:
 
     def legend(self) -> list[tuple[str, str]]:
         """Return names and colours."""
-        if not self._paths:
+        paths = self._paths.values()
+        if not any(self._leads_away(wanted) for wanted, _ in paths):
             return []
         return [("desired path", DESIRED), ("actual path", self._color)]
 
@@ -80,6 +82,10 @@ class Paths:
         """Return points of the desired paths [m], shape (K, 3)."""
         wanted = [desired for desired, _ in self._paths.values()]
         return np.concatenate([np.zeros((0, 3)), *wanted])
+
+    def _leads_away(self, path: Array) -> bool:
+        """Return whether a path is one, and not the point where something rests."""
+        return bool(len(path) and np.ptp(path, axis=0).max() >= self._still)
 
     def _path(self, name: str, kind: str) -> str:
         return f"{self._root}/{element(name)}/{kind}"

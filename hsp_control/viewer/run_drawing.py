@@ -7,6 +7,7 @@ import numpy as np
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller
 from hsp_control.robot import Robot
+from hsp_control.viewer.appearance import CHALK, INK
 from hsp_control.viewer.clip import Clip, Track
 from hsp_control.viewer.commands import Command, delete, set_property
 from hsp_control.viewer.contacts import Contacts
@@ -35,7 +36,12 @@ LAYERS = (
 
 
 def all_layers(
-    robot: Robot, motion: Motion, controller: Controller | None, root: str = ""
+    robot: Robot,
+    motion: Motion,
+    controller: Controller | None,
+    *,
+    root: str = "",
+    dark: bool = False,
 ) -> dict[str, Layer]:
     """Return the layers that a log can be drawn in, by name.
 
@@ -45,7 +51,9 @@ def all_layers(
         controller: What controlled the robot; without it, layers that need more than
             the log's columns are left out.
         root: The node that holds them.
+        dark: Whether the background is.
     """
+    ink = CHALK if dark else INK
     obstacles = ObstacleLayer(motion, f"{root}/obstacles")
     layers: dict[str, Layer] = {
         "paths": Paths(motion, f"{root}/paths"),
@@ -58,9 +66,11 @@ def all_layers(
         field = controller.field
         layers |= {
             "influence": Influence(field, obstacles.shapes, f"{root}/influence"),
-            "distances": Distances(controller, f"{root}/distances"),
-            "self_motion": SelfMotion(controller, motion, f"{root}/self_motion"),
+            "distances": Distances(controller, f"{root}/distances", ink),
         }
+        if "field.g" in motion.rows:
+            arrows = SelfMotion(controller, motion, f"{root}/self_motion")
+            layers["self_motion"] = arrows
     return layers
 
 

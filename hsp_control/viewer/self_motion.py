@@ -44,7 +44,8 @@ class SelfMotion:
         self._controller = controller
         self._radius = ARROW_RADIUS * motion.size
         self._longest = _LONGEST * motion.size
-        places, moves, wants = self._measured(motion, slice(1, None))
+        places, moves, wants = self._measured(motion)
+        self._last = motion, (places, moves, wants)
         size = motion.size
         speeds = np.maximum(*(np.linalg.norm(each, axis=2) for each in (moves, wants)))
         self._joints = _chosen(places, speeds.mean(axis=0), _APART * size)
@@ -65,11 +66,14 @@ class SelfMotion:
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
         """Yield how it moves along the run."""
-        places, moves, wants = self._measured(motion, self._joints)
+        if self._last[0] is not motion:
+            self._last = motion, self._measured(motion)
+        places, moves, wants = self._last[1]
         arrows = [("velocity", moves, self._radius)]
         if self._controller.field.controls:
             arrows.append(("field", wants, _WIDENING * self._radius))
-        for k, joint in enumerate(self._joints):
+        for joint in self._joints:
+            k = joint - 1  # the world has no row
             for kind, speeds, radius in arrows:
                 yield from arrow_tracks(
                     self._path(kind, joint),
@@ -85,9 +89,7 @@ class SelfMotion:
             return []
         return [(f"self-motion in {self.seconds:g} s, within the field's", FIELD)]
 
-    def _measured(
-        self, motion: Motion, joints: slice | list[int]
-    ) -> tuple[Array, Array, Array]:
+    def _measured(self, motion: Motion) -> tuple[Array, Array, Array]:
         """Return places [m], velocities of P v and P g [m/s], each (N, joints, 3)."""
         data = self._controller.robot.model.createData()
         rows: list[tuple[Array, Array, Array]] = []
@@ -96,13 +98,14 @@ class SelfMotion:
             places = np.array([place.translation for place in state.data.oMi])
             moves = _joint_velocities(state, P @ state.v, data)
             wants = _joint_velocities(state, P @ g, data)
-            rows.append((places[joints], moves[joints], wants[joints]))
+            rows.append((places[1:], moves[1:], wants[1:]))
         places, moves, wants = map(np.array, zip(*rows, strict=True))
         return places, moves, wants
 
     def _shortened(self, vectors: Array) -> Array:
         lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-        return vectors * np.minimum(1.0, self._longest / np.maximum(lengths, 1e-12))
+        shares = np.minimum(1.0, self._longest / np.maximum(lengths, 1e-12))
+        return np.asarray(vectors * shares)
 
     def _path(self, kind: str, joint: int) -> str:
         name = self._controller.robot.model.names[joint]

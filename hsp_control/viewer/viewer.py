@@ -96,6 +96,11 @@ class Viewer:
         """The page's address; None where there is no page."""
         return self.transport.url
 
+    @property
+    def dark(self) -> bool:
+        """Whether the background is dark."""
+        return is_dark(self.view.background)
+
     def draw_scene(
         self, scene: Rollout | Scene, *, controller: Controller | None = None
     ) -> None:
@@ -191,7 +196,11 @@ class Viewer:
         view = self.view
         right = to_the_right(self.robot, view.camera, view.target) if beside else None
         comparison = Comparison(
-            self.drawing, acts, shown=view.show.model_dump(), beside=right
+            self.drawing,
+            acts,
+            shown=view.show.model_dump(),
+            beside=right,
+            dark=self.dark,
         )
         stage = self._stage(comparison, comparison.title(), fit=beside)
         clip = set_clip(comparison.clip(), play=True, **playing)
@@ -275,7 +284,7 @@ class Viewer:
     def _run(self, rollout: Rollout, controller: Controller | None) -> RunDrawing:
         _check(self.robot, rollout, controller)
         motion = motion_of(self.robot, rollout)
-        layers = all_layers(self.robot, motion, controller)
+        layers = all_layers(self.robot, motion, controller, dark=self.dark)
         shown = self.view.show.model_dump()
         return RunDrawing(self.drawing, motion, layers, shown=shown)
 
@@ -314,14 +323,13 @@ class Viewer:
         subject = self._subject(scene.points() if moving is None else moving)
         points = in_sight(subject, scene.obstacle_points())
         floor = min(0.0, float(subject[:, 2].min()))
-        dark = is_dark(view.background)
         commands = [
             *clear(),
             *(delete(root) for root in self._others),
             *draw_stage(points, floor, view),
             *scene.draw(scene_size(points)),
             look_at(self.robot, points, view.camera, view.target, fit=fit),
-            set_caption(title or self.robot.name, scene.legend(), dark=dark),
+            set_caption(title or self.robot.name, scene.legend(), dark=self.dark),
             set_time(""),
             set_status(""),
         ]

@@ -34,7 +34,10 @@ class Controls {
     part("start").onclick = () => player.seek(player.start);
     this.button.onclick = () => player.toggle();
     this.loop.onclick = () => player.setLoop(!player.loop);
-    this.speed.onchange = () => player.setSpeed(Number(this.speed.value));
+    this.speed.onchange = () => {
+      player.setSpeed(Number(this.speed.value));
+      this.speed.blur();  // the keys are the player's again
+    };
     this.timeline.oninput = () => player.seek(Number(this.timeline.value));
     // While the hand is on the timeline, time stands still.
     this.timeline.onpointerdown = () => {

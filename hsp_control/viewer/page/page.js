@@ -6,6 +6,7 @@ const meshcat = viewer.handle_command.bind(viewer);
 
 // Our own lights, floor and grid come with the scene; they fit the robot.
 for (const name of ["Lights", "Grid", "Axes"]) viewer.delete_path([name]);
+viewer.gui.removeFolder(viewer.animator.folder);  // the player is ours, too
 
 const player = new Player(viewer);
 new Controls(player, document.body);
@@ -75,7 +76,8 @@ function divide(mesh, parts) {
 // Pinocchio's z is up, three.js's y.
 function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
 
-const BAR = 0.1;  // the share of the picture's height that is left to the player's bar
+// The shares of the picture's height that are left to the player's bar and to the title.
+const BAR = 0.1, TITLE = 0.06;
 
 // Look at a target, from an eye or, along a direction, from where all balls are seen.
 function camera({target, eye, direction, up, points, radius, field_of_view}) {
@@ -92,7 +94,7 @@ function camera({target, eye, direction, up, points, radius, field_of_view}) {
   const needed = (point) => {
     const offset = vector(point).sub(center);
     const x = Math.abs(offset.dot(right)) + radius, y = Math.abs(offset.dot(above)) + radius;
-    return offset.dot(toEye) + Math.max(x / wide, y / (tall * (1 - BAR)));
+    return offset.dot(toEye) + Math.max(x / wide, y / (tall * (1 - BAR - TITLE)));
   };
   const away = distance || Math.max(...points.map(needed));
   const lens = viewer.camera;
@@ -101,7 +103,7 @@ function camera({target, eye, direction, up, points, radius, field_of_view}) {
   lens.far = away * 100;
   lens.up.copy(vector(up));
   lens.position.copy(center).addScaledVector(toEye, away);
-  lens.setViewOffset(1, 1, 0, BAR / 2, 1, 1);
+  lens.setViewOffset(1, 1, 0, (BAR - TITLE) / 2, 1, 1);
   viewer.set_3d_pane_size();
   viewer.controls.dispose();
   viewer.set_camera(lens);  // new controls, that orbit about the new up
