@@ -274,6 +274,8 @@ def test_another_clip_can_go_on_where_the_last_one_was(
     assert page.evaluate("[player.time, player.playing, player.speed]") == [
         2.2, False, 0.5,
     ]  # fmt: skip
+    tell(viewer, set_clip(clip(6), keep=True))
+    assert player(page, "time") == 1.5  # there is no more
     tell(viewer, set_clip(clip(), play=False, speed=1.0))
     assert page.evaluate("[player.time, player.speed]") == [1, 1]
 

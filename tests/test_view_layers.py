@@ -293,18 +293,21 @@ def test_the_ellipsoid_is_the_image_of_the_ball_of_joint_speeds(
 
 
 def test_its_axes_turn_no_more_than_they_must() -> None:
+    """Also where two of them become equal, change places in length, or change signs."""
     rng = np.random.default_rng(1)
-    J, step = rng.standard_normal((3, 7)), 1e-3 * rng.standard_normal((3, 7))
-    last = np.eye(3)
-    last, _ = principal_axes(J, last)
-    for k in range(1, 200):
-        axes, lengths = principal_axes(J + k * step, last)
+    frame = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    right = np.linalg.qr(rng.standard_normal((7, 7)))[0][:3]
+    last, _ = principal_axes(frame @ np.diag([1.0, 0.7, 0.5]) @ right, np.eye(3))
+    for s in np.linspace(0.7, 1.3, 200):
+        turned = pin.exp3(np.array([0.0, 0.5 * s, 0.0])) @ frame
+        J = turned @ np.diag([1.0, s, 0.5]) @ right
+        axes, lengths = principal_axes(J, last)
         assert np.linalg.det(axes) == pytest.approx(1.0)
-        assert np.trace(axes.T @ last) > 3.0 - 0.05
-        rebuilt = axes @ np.diag(lengths**2) @ axes.T
         np.testing.assert_allclose(
-            rebuilt, (J + k * step) @ (J + k * step).T, atol=1e-9
+            axes @ np.diag(lengths**2) @ axes.T, J @ J.T, atol=1e-9
         )
+        if s > 0.7:
+            assert np.linalg.norm(pin.log3(last.T @ axes)) < 0.01
         last = axes
 
 

@@ -652,6 +652,12 @@ def test_it_is_known_when_the_last_page_is_closed(
         assert not waiting.is_alive()
 
 
+def test_a_notebook_shows_the_page_in_a_frame(arm: Robot, recorder: Recorder) -> None:
+    with Viewer(arm) as viewer:
+        assert f'<iframe src="{viewer.url}"' in viewer._repr_html_()
+    assert "it has no page" in Viewer(arm, transport=recorder)._repr_html_()
+
+
 def test_a_dead_or_stopped_server_is_an_error_not_a_wait(
     arm: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
