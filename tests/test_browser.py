@@ -6,6 +6,7 @@ Chromium without a window. Where there is none these tests are skipped, but not 
 import io
 import itertools
 import os
+import re
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -32,7 +33,8 @@ from hsp_control.viewer.export.tracks import ANGLE_BOUND, POSITION_BOUND
 
 sync_api = pytest.importorskip("playwright.sync_api")
 
-SCREENSHOTS = Path(__file__).parents[1] / "out" / "screenshots"
+ROOT = Path(__file__).parents[1]
+SCREENSHOTS = ROOT / "out" / "screenshots"
 SIZE = (1000, 640)
 # As configured, a run takes minutes without compiled kernels.
 COARSE = (
@@ -374,6 +376,19 @@ def test_films_from_the_command_line(
     with Image.open(films[1]) as film:
         assert (film.format, film.size) == ("WEBP", (301, 200))
         assert film.n_frames == 5
+
+
+def test_the_document_s_film(
+    planar: Rollout, browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    del browser
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+    snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)[1]
+    columns = {name: column[:101] for name, column in planar.columns.items()}
+    exec(snippet, {"rollout": Rollout(columns, planar.meta)})
+    with Image.open(tmp_path / "out" / "film.webp") as film:
+        assert film.n_frames == 6
 
 
 # -- every configuration --------------------------------------------------------------
