@@ -57,11 +57,15 @@ wheel-test: $(STAMP) ## build the wheel, install it elsewhere, use it from there
 	hsp robots; \
 	hsp check paper/4_moving_obstacle; \
 	hsp run paper/4_moving_obstacle --set simulation.duration=1 --out out --no-view; \
+	hsp export out/4_moving_obstacle.npz --html out/page.html; \
 	echo "The wheel works."
 
 ##@ Keep
 figures: $(STAMP) ## draw the documents' figures anew, into docs/figures
 	@$(BIN)/python docs/make_figures.py
+
+animations: $(STAMP) ## film the README's animations anew, into docs/figures (needs Chromium)
+	@$(BIN)/python docs/make_animations.py
 
 format: $(STAMP) ## let ruff format the code and fix what it can, strip the notebooks
 	@$(BIN)/ruff check --fix --quiet || true
@@ -83,7 +87,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help figures demo test lint coverage wheel-test format constraints clean
+.PHONY: help figures animations demo test lint coverage wheel-test format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

@@ -106,5 +106,9 @@ class ViewerError(HspControlError, RuntimeError):
     """A 3-D view that cannot be opened, or that is gone."""
 
 
+class ExportError(HspControlError, RuntimeError):
+    """A page or a film that cannot be written, or what is missing to write it."""
+
+
 class PlotError(HspControlError, ValueError):
     """A log that cannot be drawn, or a picture that cannot be written."""

@@ -58,7 +58,7 @@ def test_the_readme_s_commands_exist() -> None:
         if line.startswith("hsp ")
     ]
     assert {command[0] for command in commands} == {
-        "run", "view", "plot", "check", "robots", "schema",
+        "run", "view", "plot", "export", "check", "robots", "schema",
     }  # fmt: skip
     for command in commands:
         _parser().parse_args(command)
@@ -77,6 +77,22 @@ def test_the_view_s_document_is_true(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {name: state == "on" for name, state in told} == defaults
     (snippet,) = blocks(text, "python")
     exec(compile(snippet, "view.md", "exec"), {})
+
+
+def test_the_export_s_document_is_true(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+    (commands,) = blocks(text, "sh")
+    for command in commands.splitlines():
+        _parser().parse_args(command.split("#")[0].split()[1:])
+    known = _parser().parse_args(["export", "log.npz"])
+    for option in re.findall(r"`--(?:no-)?(\w+)`", text):
+        assert {"from": "first", "to": "last"}.get(option, option) in vars(known)
+    page, _ = blocks(text, "python")  # the film is taken in test_browser.py
+    exec(compile(page, "export.md", "exec"), {})
+    assert (tmp_path / "out" / "page.html").is_file()
 
 
 def test_the_law_in_the_document_is_the_law_of_the_code() -> None:

@@ -39,11 +39,12 @@ from hsp_control import (
     Task,
     load_experiment,
     palette,
+    readings,
     simulate,
 )
+from hsp_control.decay import predicted_decay
 from hsp_control.exceptions import PlotError
-from hsp_control.plots import bodies, box, paths, readings, views, world
-from hsp_control.plots.null_space import predicted_decay
+from hsp_control.plots import bodies, box, paths, views, world
 from hsp_control.resources import bundled_configs
 from hsp_control.shapes import (
     Box,

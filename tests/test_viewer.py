@@ -773,7 +773,7 @@ def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_server_that_cannot_start_says_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server, "_meshcat_page", lambda: tmp_path)
+    monkeypatch.setattr(server, "meshcat_page", lambda: tmp_path)
     with pytest.raises(ViewerError, match=r"cannot start: .*main\.min\.js"):
         Server()
     monkeypatch.setattr(server.sys, "executable", "/bin/false")

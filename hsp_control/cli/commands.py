@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from hsp_control.cli import robot_table
+from hsp_control.cli.consoles import errors as _errors
+from hsp_control.cli.consoles import out as _out
 from hsp_control.config import Experiment, json_schema, load_experiment
 from hsp_control.exceptions import SimulationError
 from hsp_control.robot import Robot
@@ -24,12 +25,6 @@ from hsp_control.sources import example_robots
 
 if TYPE_CHECKING:
     from hsp_control.cli.screen import Screen
-
-# A pipe or a file has no width of its own: tables then need not be squeezed.
-_out = Console(
-    highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160
-)
-_errors = Console(stderr=True, highlight=False)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -130,6 +125,13 @@ def plot(options: argparse.Namespace) -> int:
     ):
         _out.print(f"Figure: {file}")
     return 0
+
+
+def export(options: argparse.Namespace) -> int:
+    """Write a log as a page, or as films."""
+    from hsp_control.cli import export as exports
+
+    return exports.export(options)
 
 
 def robots(options: argparse.Namespace) -> int:

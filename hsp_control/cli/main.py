@@ -109,6 +109,8 @@ def _parser() -> argparse.ArgumentParser:
         help="draw joint angles, not absolute ones, where the robot has both",
     )
 
+    _add_export(_command(commands, "export", "write a log as a page or as a film"))
+
     robots = _command(commands, "robots", "list what can be loaded, or describe one")
     which = robots.add_mutually_exclusive_group()
     which.add_argument("name", nargs="?", metavar="ROBOT", help="a name or a URDF")
@@ -124,6 +126,59 @@ def _command(
     text: str,
 ) -> argparse.ArgumentParser:
     return commands.add_parser(name, help=text, description=text.capitalize() + ".")
+
+
+def _add_export(export: argparse.ArgumentParser) -> None:
+    export.add_argument("log", type=Path, metavar="LOG", help="written by hsp run")
+    files = {
+        "html": "a page that plays offline, with the plots",
+        "mp4": "a film",
+        "gif": "an animated GIF",
+        "webp": "an animated WebP: smaller than a GIF, in all its colours",
+    }
+    for name, text in files.items():
+        export.add_argument(f"--{name}", type=Path, metavar="FILE", help=text)
+    export.add_argument(
+        "--size",
+        type=_picture_size,
+        metavar="WxH",
+        help="of films [pixels]; default: 1280x720, of GIF and WebP 800x450",
+    )
+    export.add_argument(
+        "--fps",
+        type=float,
+        metavar="N",
+        help="pictures in a second of films; default: 30, of GIF and WebP 20",
+    )
+    export.add_argument(
+        "--speed",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="seconds of the run in a second of films; default: 1",
+    )
+    for name, which in (("from", "first"), ("to", "last")):
+        export.add_argument(
+            f"--{name}",
+            type=float,
+            dest=which,
+            metavar="T",
+            help=f"the {which} moment of films [s]; default: the run's",
+        )
+    for name in ("plots", "caption"):
+        export.add_argument(
+            f"--{name}",
+            action=argparse.BooleanOptionalAction,
+            default=True,
+            help=f"show the {name} in films; default: yes",
+        )
+
+
+def _picture_size(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT, as 1280x720")
+    return int(width), int(height)
 
 
 def _add_page(parser: argparse.ArgumentParser) -> None:

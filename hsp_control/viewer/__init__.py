@@ -1,6 +1,9 @@
 """Watch a robot in a browser: live, or a run again."""
 
 from .comparison import Act as Act
+from .export import FilmStyle as FilmStyle
+from .export import export_film as export_film
+from .export import export_html as export_html
 from .live import LiveView as LiveView
 from .recorder import Recorder as Recorder
 from .replay import robot_of as robot_of

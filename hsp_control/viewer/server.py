@@ -66,7 +66,7 @@ class Server:
         self._unsent = b""
         self._answers = b""
         self._asked = 0
-        arguments = [Path(__file__).parent, _meshcat_page(), port or 0, os.getpid()]
+        arguments = [Path(__file__).parent, meshcat_page(), port or 0, os.getpid()]
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-c", _LAUNCH, *map(str, arguments)],
             bufsize=0,
@@ -196,7 +196,7 @@ def _wait(descriptor: int, event: int, timeout: float) -> bool:
     return bool(poll.poll(max(0.0, 1000.0 * timeout)))
 
 
-def _meshcat_page() -> Path:
+def meshcat_page() -> Path:
     """Return the folder of Meshcat's page, without importing Meshcat."""
     spec = importlib.util.find_spec("meshcat")
     if spec is None or spec.origin is None:

@@ -152,7 +152,7 @@ def segments(points: Array, colors: Array) -> Json:
         "depthWrite": False,
     }
     thing = mesh(geometry, surface, shadow=False)
-    thing["object"]["type"] = "LineSegments"
+    thing["object"] |= {"type": "LineSegments", "renderOrder": -1}
     return thing
 
 
@@ -167,7 +167,8 @@ def shadow_catcher(size: float, opacity: float) -> Json:
         "depthWrite": False,
     }
     thing = mesh(plane(size), surface)
-    thing["object"]["castShadow"] = False
+    # On the floor first: lines and shadow lie at one depth, and would take turns.
+    thing["object"] |= {"castShadow": False, "renderOrder": -2}
     return thing
 
 

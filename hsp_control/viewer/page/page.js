@@ -87,7 +87,8 @@ function camera({target, eye, direction, up, points, radius, field_of_view}) {
   const distance = eye ? toEye.length() : 0;
   toEye.normalize();
   const tall = Math.tan(field_of_view * Math.PI / 360);
-  const wide = tall * (viewer.dom_element.offsetWidth / window.innerHeight || 1.5);
+  const {clientWidth, clientHeight} = viewer.dom_element;
+  const wide = tall * (clientWidth / clientHeight || 1.5);
   const right = vector(up).cross(toEye).normalize();
   const above = toEye.clone().cross(right);
   const needed = (point) => {

@@ -1,0 +1,102 @@
+"""``hsp export``: a log as a page that plays offline, or as films."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Self
+
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from hsp_control.cli.consoles import errors, out
+from hsp_control.exceptions import ExportError
+from hsp_control.simulation import Rollout
+
+
+def export(options: argparse.Namespace) -> int:
+    """Write every file that is asked for; one that fails does not stop the others."""
+    from hsp_control.viewer.export import FilmStyle, export_film, export_html
+    from hsp_control.viewer.replay import act_of
+
+    films = [path for path in (options.mp4, options.gif, options.webp) if path]
+    if not options.html and not films:
+        raise ExportError(
+            "nothing to write: name a file with --html, --mp4, --gif or --webp"
+        )
+    for kind in ("mp4", "gif", "webp"):
+        _check_ending(getattr(options, kind), f".{kind}")
+    rollout = Rollout.load(options.log)
+    act = act_of(rollout, options.log.name)
+    style = FilmStyle(
+        size=options.size,
+        frame_rate=options.fps,
+        speed=options.speed,
+        plots=options.plots,
+        caption=options.caption,
+        start=options.first,
+        end=options.last,
+    )
+
+    def page(path: Path) -> Path:
+        return export_html(rollout, path, robot=act.robot, controller=act.controller)
+
+    def film(path: Path) -> Path:
+        with _Bar(path.name) as bar:
+            return export_film(
+                rollout,
+                path,
+                style=style,
+                robot=act.robot,
+                controller=act.controller,
+                progress=bar.update,
+            )
+
+    wanted = [(options.html, page)] if options.html else []
+    return _write([*wanted, *((path, film) for path in films)])
+
+
+def _write(wanted: list[tuple[Path, Callable[[Path], Path]]]) -> int:
+    """Write files; what is missing for several of them is said once."""
+    said: list[str] = []
+    for path, write in wanted:
+        try:
+            size = write(path).stat().st_size
+        except ExportError as error:
+            if str(error) not in said:
+                print(f"hsp: {error}", file=sys.stderr)
+            said.append(str(error))
+        else:
+            out.print(f"{size / 1e6:.2f} MB: {path}")
+    return 2 if said else 0
+
+
+class _Bar:
+    """A bar on standard error while a film is taken; none where that is a file."""
+
+    def __init__(self, name: str) -> None:
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:3.0f} %"),
+            TimeRemainingColumn(),
+            console=errors,
+            transient=True,
+            disable=not errors.is_terminal,
+        )
+        self._task = self._progress.add_task(escape(name), total=1.0)
+
+    def update(self, done: float) -> None:
+        self._progress.update(self._task, completed=done)
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(self, *ended: object) -> None:
+        self._progress.stop()
+
+
+def _check_ending(path: Path | None, ending: str) -> None:
+    if path is not None and path.suffix.lower() != ending:
+        raise ExportError(f"--{ending[1:]} {path}: its name must end with {ending}")

@@ -1,0 +1,5 @@
+"""A run as a file that one can send: a page that plays offline, or a film."""
+
+from .film import FilmStyle as FilmStyle
+from .film import export_film as export_film
+from .html import export_html as export_html

@@ -1,0 +1,39 @@
+// Arrays as hsp_control/viewer/export/packing.py packed them.
+"use strict";
+
+function unpackArray({kind, rows, columns, width, bytes, offset, step}) {
+  // Planes of bytes, the lowest first; in each, columns one after another.
+  const whole = (row, column) => {
+    let number = 0;
+    for (let plane = width - 1; plane >= 0; plane--) {
+      number = 256 * number + bytes[(plane * columns + column) * rows + row];
+    }
+    return number % 2 ? -(number + 1) / 2 : number / 2;
+  };
+  if (kind === "triangles") {
+    const corners = new Uint32Array(3 * rows);
+    for (let i = 0, unused = 0; i < corners.length; i++) {
+      corners[i] = unused - whole(Math.floor(i / 3), i % 3);
+      unused = Math.max(unused, corners[i] + 1);
+    }
+    return corners;
+  }
+  const kinds = {Float32Array, Float64Array, Uint8Array, Uint32Array};
+  const values = new kinds[kind](rows * columns);
+  for (let column = 0; column < columns; column++) {
+    for (let row = 0, sum = 0; row < rows; row++) {
+      sum += whole(row, column);
+      values[row * columns + column] = offset[column] + sum * step[column];
+    }
+  }
+  return values;
+}
+
+// Data with its arrays back in their places.
+function withArrays(value, arrays) {
+  if (value === null || typeof value !== "object" || ArrayBuffer.isView(value)) return value;
+  if (Array.isArray(value)) return value.map((item) => withArrays(item, arrays));
+  if ("$array" in value) return arrays[value.$array];
+  const entries = Object.entries(value).map(([key, item]) => [key, withArrays(item, arrays)]);
+  return Object.fromEntries(entries);
+}
