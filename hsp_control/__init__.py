@@ -56,6 +56,8 @@ from .simulation import Rk4 as Rk4
 from .simulation import Rollout as Rollout
 from .simulation import SemiImplicitEuler as SemiImplicitEuler
 from .simulation import simulate as simulate
+from .sweeps import Sweep as Sweep
+from .sweeps import sweep as sweep
 from .tasks import FrameOrientation as FrameOrientation
 from .tasks import FramePose as FramePose
 from .tasks import FramePosition as FramePosition

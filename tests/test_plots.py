@@ -42,7 +42,8 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.exceptions import PlotError
-from hsp_control.plots import bodies, box, paths, readings, views, world
+from hsp_control import readings
+from hsp_control.plots import bodies, box, paths, views, world
 from hsp_control.plots.null_space import predicted_decay
 from hsp_control.resources import bundled_configs
 from hsp_control.shapes import (

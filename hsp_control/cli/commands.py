@@ -6,23 +6,18 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from hsp_control.cli import robot_table
+from hsp_control.cli.consoles import errors as _errors
+from hsp_control.cli.consoles import out as _out
 from hsp_control.config import Experiment, json_schema, load_experiment
 from hsp_control.exceptions import SimulationError
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.sources import example_robots
-
-# A pipe or a file has no width of its own: tables then need not be squeezed.
-_out = Console(
-    highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160
-)
-_errors = Console(stderr=True, highlight=False)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -79,7 +74,11 @@ def check(options: argparse.Namespace) -> int:
 
 
 def plot(options: argparse.Namespace) -> int:
-    """Draw a log's figures."""
+    """Draw the figures of a log, or of a sweep."""
+    if options.log.suffix == ".parquet":
+        from hsp_control.cli import sweep as sweeps
+
+        return sweeps.plot(options)
     from hsp_control.plots import save_figures
 
     rollout = Rollout.load(options.log)
@@ -93,6 +92,20 @@ def plot(options: argparse.Namespace) -> int:
     ):
         _out.print(f"Figure: {file}")
     return 0
+
+
+def sweep(options: argparse.Namespace) -> int:
+    """Run a configuration many times."""
+    from hsp_control.cli import sweep as sweeps
+
+    return sweeps.sweep(options)
+
+
+def bench(options: argparse.Namespace) -> int:
+    """Measure how late a loop against the clock is."""
+    from hsp_control.cli import bench as benches
+
+    return benches.bench(options)
 
 
 def robots(options: argparse.Namespace) -> int:

@@ -14,8 +14,9 @@ from .null_space import draw_field_terms as draw_field_terms
 from .null_space import draw_field_value as draw_field_value
 from .null_space import draw_null_space_error as draw_null_space_error
 from .paths import draw_end_effector as draw_end_effector
-from .readings import chosen_rows as chosen_rows
 from .saving import save_figures as save_figures
 from .style import new_figure as new_figure
 from .style import styled as styled
+from .sweep import save_sweep_figure as save_sweep_figure
+from .sweep import sweep_figure as sweep_figure
 from .task_errors import draw_task_errors as draw_task_errors

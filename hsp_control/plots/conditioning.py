@@ -12,7 +12,7 @@ from hsp_control.plots.lines import (
     single,
     time_axis,
 )
-from hsp_control.plots.readings import column_unit
+from hsp_control.readings import column_unit
 from hsp_control.simulation import Rollout
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")

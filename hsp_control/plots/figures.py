@@ -18,9 +18,9 @@ from hsp_control.plots.null_space import (
     draw_null_space_error,
 )
 from hsp_control.plots.paths import draw_end_effector
-from hsp_control.plots.readings import chosen_rows, distances, field_terms
 from hsp_control.plots.style import new_figure, styled
 from hsp_control.plots.task_errors import draw_task_errors
+from hsp_control.readings import chosen_rows, distances, field_terms
 from hsp_control.simulation import Rollout
 
 _HEADING = {"x": 0.01, "ha": "left", "fontsize": 10.0, "fontweight": "bold"}

@@ -4,7 +4,7 @@ from matplotlib.axes import Axes
 
 from hsp_control.plots.legends import legend_below
 from hsp_control.plots.lines import draw_lines, time_axis
-from hsp_control.plots.readings import (
+from hsp_control.readings import (
     effort_unit,
     joint_names,
     joint_positions,

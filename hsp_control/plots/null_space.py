@@ -16,7 +16,7 @@ from hsp_control.plots.lines import (
     single,
     time_axis,
 )
-from hsp_control.plots.readings import (
+from hsp_control.readings import (
     column_unit,
     constant_metric,
     distances,

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from hsp_control import palette
 from hsp_control.plots.legends import legend_below, plain
 from hsp_control.plots.lines import log_scale, mark_damped, single, time_axis
-from hsp_control.plots.readings import task_errors
+from hsp_control.readings import task_errors
 from hsp_control.simulation import Rollout
 
 _DASHES = {"rad": "--", "–": ":"}

@@ -6,7 +6,7 @@ import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.plots.bodies import bodies
-from hsp_control.plots.readings import task_names, task_type
+from hsp_control.readings import task_names, task_type
 from hsp_control.simulation import Rollout
 
 
