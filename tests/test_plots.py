@@ -39,10 +39,10 @@ from hsp_control import (
     Task,
     load_experiment,
     palette,
+    readings,
     simulate,
 )
 from hsp_control.exceptions import PlotError
-from hsp_control import readings
 from hsp_control.plots import bodies, box, paths, views, world
 from hsp_control.plots.null_space import predicted_decay
 from hsp_control.resources import bundled_configs

@@ -165,6 +165,12 @@ def _add_bench(bench: argparse.ArgumentParser) -> None:
         "--rate", type=float, default=1000.0, metavar="HZ", help="default: 1000"
     )
     bench.add_argument(
+        "--priority",
+        type=int,
+        metavar="LEVEL",
+        help="real-time priority (SCHED_FIFO), 1 to 99; needs the right to it",
+    )
+    bench.add_argument(
         "--plot", type=Path, metavar="FILE", help="draw the distributions (.png, ...)"
     )
 

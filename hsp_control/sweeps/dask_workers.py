@@ -78,7 +78,8 @@ class DaskWorkers:
             runs[future.key] = run
             return future
 
-        running = as_completed([submit(*task) for task in islice(pending, _WINDOW)])
+        first = [submit(*task) for task in islice(pending, _WINDOW)]
+        running = as_completed(first, loop=self._client.loop)
         for future in running:
             run = runs.pop(future.key)
             error = future.exception()

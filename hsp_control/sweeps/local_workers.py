@@ -31,6 +31,8 @@ _ONE_THREAD = dict.fromkeys(
 """The matrices are small: more threads only wait, and take the other workers' cores."""
 
 
+_MAIN = f"from {main.__module__} import main; main()"
+
 _Results: TypeAlias = "queue.SimpleQueue[tuple[int, str] | Exception | None]"
 """What the threads that feed workers report; None: one of them is done."""
 
@@ -129,12 +131,7 @@ class LocalWorkers:
                 raise SweepError("the workers are closed")
             process = subprocess.Popen(
                 # -P: this package is meant, not one in the folder one stands in.
-                [
-                    sys.executable,
-                    "-P",
-                    "-c",
-                    f"from {main.__module__} import main; main()",
-                ],
+                [sys.executable, "-P", "-c", _MAIN],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 text=True,
@@ -146,9 +143,6 @@ class LocalWorkers:
         if process.stdout.readline().strip() != READY:
             raise SweepError(f"a worker does not start: {_end(process)}")
         return process
-
-
-_MAIN = f"from {main.__module__} import main; main()"
 
 
 class _Shared:

@@ -85,7 +85,7 @@ class Plan:
         versions that numbers depend on.
         """
         model = experiment.robot.model.saveToString()
-        return {
+        identity = {
             "configuration": self.data,
             "factors": [factor.description() for factor in self.factors],
             "design": self.design,
@@ -94,6 +94,7 @@ class Plan:
             "model": hashlib.sha256(model.encode()).hexdigest(),
             "versions": versions(),
         }
+        return dict(json.loads(json.dumps(identity)))  # as files give it back
 
 
 def document(task: str) -> Document:

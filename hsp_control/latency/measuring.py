@@ -1,0 +1,80 @@
+"""Run a loop against the clock, beside an empty one."""
+
+from collections.abc import Callable
+from time import perf_counter_ns
+
+import numpy as np
+from numba.core import event
+
+from hsp_control.arrays import Array
+from hsp_control.exceptions import SimulationError
+from hsp_control.latency.clocked import Record, run_clocked
+from hsp_control.latency.control_loop import ControlLoop
+from hsp_control.latency.quiet import no_garbage_collection
+from hsp_control.latency.report import Latency
+
+TURN = 2.0
+"""How long [s] each loop runs before the other has its turn: the machine's noise comes
+and goes, and both shall see the same."""
+
+
+def measure(
+    loop: ControlLoop,
+    seconds: float,
+    on_progress: Callable[[float], None] | None = None,
+) -> Latency:
+    """Measure a loop against the clock for a time, and an empty one for as long.
+
+    Before that the very same steps are run off the clock. Law and plant have no memory
+    but the state, so that nothing is left to be compiled, loaded or allocated on the
+    clock which the rehearsal did not meet.
+
+    Args:
+        loop: The controller and its robot, at its start.
+        seconds: How long each of the two loops runs [s].
+        on_progress: Called with the fraction done, between turns.
+
+    Returns:
+        What was measured; after Ctrl-C, what was until then.
+
+    Raises:
+        SimulationError: If the time is not one, or the motion diverges in it.
+    """
+    if not 0.0 < seconds < np.inf:
+        raise SimulationError(f"{seconds:g} s; must be positive")
+    count = max(1, round(seconds / loop.period))
+    turn = max(1, round(TURN / loop.period))
+    period = round(loop.period * 1e9)
+    control, empty = Record(period, count), Record(period, count)
+    with no_garbage_collection(), event.install_recorder("numba:compile") as compiled:
+        back_to_back = _rehearse(loop, count)
+        compiled.buffer.clear()
+        try:
+            while control.steps < count:
+                steps = min(turn, count - control.steps)
+                run_clocked(loop.control, loop.move, control, steps)
+                run_clocked(_nothing, _nothing, empty, steps)
+                if on_progress is not None:
+                    on_progress(control.steps / count)
+        except KeyboardInterrupt:
+            if not empty.steps:
+                raise
+        compilations = sum(each.is_start for _, each in compiled.buffer)
+    return Latency(control, empty, back_to_back, compilations)
+
+
+def _rehearse(loop: ControlLoop, count: int) -> Array:
+    """Run the steps to come as fast as they go, and return how long each took [s]."""
+    took = np.zeros(count)
+    loop.restart()
+    for k in range(count):
+        start = perf_counter_ns()
+        loop.control()
+        took[k] = (perf_counter_ns() - start) * 1e-9
+        loop.move()
+    loop.restart()
+    return took
+
+
+def _nothing() -> None:
+    pass
