@@ -7,7 +7,9 @@ debugging and coverage.
 """
 
 import hashlib
+import warnings
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -17,11 +19,10 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def _package_state() -> str:
-    """Return a digest of the times and sizes of the package's files."""
+    """Return a digest of the package's code: the same however it was installed."""
     state = hashlib.sha256()
     for file in sorted(Path(__file__).parent.rglob("*.py")):
-        stat = file.stat()
-        state.update(f"{file.name} {stat.st_mtime_ns} {stat.st_size} ".encode())
+        state.update(f"{file.name}\n".encode() + file.read_bytes())
     return state.hexdigest()[:12]
 
 
@@ -33,11 +34,31 @@ def kernel(function: Function) -> Function:
 
     Numba keeps code for as long as the function's own file does not change, though it
     has the code of kernels in other files inside. The name that it is kept under
-    therefore tells the state of the whole package.
+    therefore tells the state of the whole package. It is kept beside the package's
+    files, or where these are read-only in the user's cache folder; the environment
+    variable ``NUMBA_CACHE_DIR`` names another. Where nothing can be written, every
+    start compiles anew.
 
     Division by zero follows NumPy (inf, nan) instead of raising, so that no branch is
     spent on it; finiteness is checked once, at the border (`RobotState.update`).
     """
     function.__qualname__ += f"_{_PACKAGE_STATE}"
-    compiled = numba.njit(cache=True, error_model="numpy")(function)
+    try:
+        compiled = numba.njit(cache=True, error_model="numpy")(function)
+    except RuntimeError as error:  # Numba found no folder to keep the code in
+        if "cannot cache" not in str(error):
+            raise
+        _warn_of_no_cache()
+        compiled = numba.njit(error_model="numpy")(function)
     return cast("Function", compiled)
+
+
+@cache
+def _warn_of_no_cache() -> None:
+    warnings.warn(
+        "compiled code cannot be kept: neither the package's folder nor the user's "
+        "cache can be written. Every start will take some ten seconds longer; set "
+        "NUMBA_CACHE_DIR to a folder that can be written",
+        RuntimeWarning,
+        stacklevel=2,
+    )

@@ -226,7 +226,9 @@ def test_the_file_is_parquet_that_describes_itself(file: Path, swept: Sweep) -> 
 
 def test_metres_and_radians_are_not_added() -> None:
     short = ["simulation.duration=0.02", "simulation.log_period=0.01"]
-    found = hsp.sweep("panda_obstacle", {"null_space.gain": [5]}, overrides=short, workers=1)
+    found = hsp.sweep(
+        "panda_obstacle", {"null_space.gain": [5]}, overrides=short, workers=1
+    )
     units = {name: told["unit"] for name, told in found.meta["metrics"].items()}
     assert units["tracking.hand.position.rms"] == "m"
     assert units["tracking.hand.orientation.rms"] == "rad"

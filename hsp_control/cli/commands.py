@@ -13,6 +13,7 @@ from rich.table import Table
 from hsp_control.cli import robot_table
 from hsp_control.cli.consoles import errors as _errors
 from hsp_control.cli.consoles import out as _out
+from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.config import Experiment, json_schema, load_experiment
 from hsp_control.exceptions import SimulationError
 from hsp_control.robot import Robot
@@ -26,8 +27,9 @@ def run(options: argparse.Namespace) -> int:
     log = options.out / f"{experiment.name}.npz"
     log.parent.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
     status = 0
+    stopwatch = Stopwatch()
     try:
-        rollout = _run_with_progress(experiment)
+        rollout = _run_with_progress(experiment, stopwatch)
     except SimulationError as error:
         if not isinstance(error.rollout, Rollout) or not len(error.rollout):
             raise
@@ -37,7 +39,10 @@ def run(options: argparse.Namespace) -> int:
         print(f"hsp: stopped by the user at t = {rollout.t[-1]:g} s", file=sys.stderr)
         status = 2
     rollout.save(log)
-    _out.print(_summary(rollout))
+    summary = _summary(rollout)
+    for line in stopwatch.told(rollout):
+        summary.add_row(*line)
+    _out.print(summary)
     _out.print(f"Log: {log}")
     if options.view and status == 0:
         _show(experiment, rollout)
@@ -160,7 +165,7 @@ def _show(experiment: Experiment, rollout: Rollout) -> None:
             input("Press Enter to close the view. ")
 
 
-def _run_with_progress(experiment: Experiment) -> Rollout:
+def _run_with_progress(experiment: Experiment, stopwatch: Stopwatch) -> Rollout:
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -171,7 +176,12 @@ def _run_with_progress(experiment: Experiment) -> Rollout:
         disable=not _errors.is_terminal,
     ) as progress:
         bar = progress.add_task(experiment.name, total=1.0)
-        return experiment.run(lambda done: progress.update(bar, completed=done))
+
+        def show(done: float) -> None:
+            stopwatch.lap()
+            progress.update(bar, completed=done)
+
+        return experiment.run(show)
 
 
 def _summary(rollout: Rollout) -> Table:
