@@ -5,7 +5,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from hsp_control.arrays import Array
-from hsp_control.latency.clocked import Record
+from hsp_control.latency.clocked import Nanoseconds, Record
 
 
 class Quantiles(NamedTuple):
@@ -47,9 +47,9 @@ class Latency:
     ) -> None:
         """Take what whole periods say."""
         self.period = control.period * 1e-9
-        self.step: Array = control.step[: control.steps] * 1e-9
-        self.wake: Array = control.wake[: control.steps] * 1e-9
-        self.empty: Array = empty.wake[: empty.steps] * 1e-9
+        self.step = _seconds(control.step[: control.steps])
+        self.wake = _seconds(control.wake[: control.steps])
+        self.empty = _seconds(empty.wake[: empty.steps])
         self.back_to_back = back_to_back
         self.compilations = compilations
 
@@ -67,3 +67,7 @@ class Latency:
     def empty_missed(self) -> int:
         """How many periods the empty loop slept through: the machine's own share."""
         return int((self.empty > self.period).sum())
+
+
+def _seconds(times: Nanoseconds) -> Array:
+    return np.asarray(times * 1e-9, dtype=np.float64)

@@ -6,6 +6,7 @@ robot's files under the same paths.
 """
 
 from collections.abc import Iterable, Iterator
+from importlib import import_module
 from itertools import islice
 from types import TracebackType
 from typing import Any, Self
@@ -38,13 +39,13 @@ class DaskWorkers:
             SweepError: If no scheduler answers there, or Dask is not installed.
         """
         try:
-            import distributed
+            self._dask: Any = import_module("distributed")
         except ImportError:
             raise SweepError(
                 "a scheduler needs Dask: pip install 'hsp_control[dask]'"
             ) from None
         try:
-            self._client: Any = distributed.Client(
+            self._client: Any = self._dask.Client(
                 address, timeout=PATIENCE, set_as_default=False
             )
         except (OSError, ValueError, TimeoutError) as error:
@@ -67,8 +68,6 @@ class DaskWorkers:
 
     def map(self, tasks: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
         """Yield every task's result as soon as it is there; see `LocalWorkers.map`."""
-        from distributed import as_completed
-
         pending = iter(tasks)
         runs: dict[str, int] = {}
 
@@ -79,7 +78,7 @@ class DaskWorkers:
             return future
 
         first = [submit(*task) for task in islice(pending, _WINDOW)]
-        running = as_completed(first, loop=self._client.loop)
+        running = self._dask.as_completed(first, loop=self._client.loop)
         for future in running:
             run = runs.pop(future.key)
             error = future.exception()

@@ -96,7 +96,7 @@ class LogUniform(Distribution):
 
     def quantile(self, fraction: float) -> float:
         """Return low (high/low)^fraction."""
-        return self.low * (self.high / self.low) ** fraction
+        return float(self.low * (self.high / self.low) ** fraction)
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class Normal(Distribution):
         value = self.mean + self.deviation * float(
             ndtri(min(max(inside, _LEAST), _MOST))
         )
-        return min(max(value, self.low), self.high)
+        return float(min(max(value, self.low), self.high))
 
     def _below(self, value: float) -> float:
         return float(ndtr((value - self.mean) / self.deviation))
