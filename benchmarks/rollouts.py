@@ -4,9 +4,9 @@
 
 First 10 s of a Panda at 1 kHz (6-D pose and joint centering) with a fixed-step plant
 and with RK4, logged every 10 ms and at every step, in turns; then every bundled
-configuration as it is. Logging is included, compiling is not. Processor time is counted,
-not the clock's: other processes on the machine then matter little. Memory is what the
-columns of the log take.
+configuration as it is. Logging is included, compiling is not. Processor time is
+counted, not the clock's: other processes on the machine then matter little. Memory is
+what the columns of the log take.
 """
 
 import argparse

@@ -50,7 +50,7 @@ def test_the_readme_s_commands_exist() -> None:
         if line.startswith("hsp ")
     ]
     assert {command[0] for command in commands} == {
-        "run", "plot", "check", "robots", "schema",
+        "run", "plot", "check", "robots", "schema", "sweep", "bench",
     }  # fmt: skip
     for command in commands:
         _parser().parse_args(command)

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -30,6 +31,7 @@ from hsp_control.sweeps import (
     Uniform,
     local_workers,
     sensitivity,
+    sweeping,
 )
 from hsp_control.sweeps.design import points
 from hsp_control.sweeps.factor import factors
@@ -574,6 +576,50 @@ def test_without_pyarrow_the_message_says_what_to_install(
     with pytest.raises(SweepError, match=r"pip install 'hsp_control\[sweeps\]'"):
         hsp.sweep(MOVING, OVER, overrides=QUICK, out=tmp_path / "x.parquet")
     assert len(hsp.sweep(MOVING, {"null_space.gain": [3]}, overrides=QUICK)) == 1
+
+
+def test_a_mistake_in_the_file_is_told_with_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("robot:\n  name: pand\ntasks:\n  a: {type: joint_posture}\n")
+    assert main(["sweep", str(file), "--over", "null_space.gain=1,2"]) == 2
+    assert f"hsp: {file}:2: robot.name: " in capsys.readouterr().err
+    with pytest.raises(SweepError, match=r"x.csv: the name .* ends in .parquet"):
+        hsp.sweep(MOVING, OVER, overrides=QUICK, out=tmp_path / "x.csv")
+
+
+def test_a_robot_beside_its_configuration_is_found_from_anywhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copy(hsp.Robot.load("planar3r").source.urdf, tmp_path / "arm.urdf")
+    (tmp_path / "mine.yaml").write_text(
+        "robot: {name: arm.urdf}\n"
+        "start: {joints: [0.3, 0.4, 0.5]}\n"
+        "tasks: {tip: {type: frame_position, axes: xy, frame: tip,"
+        " trajectory: {type: hold}, gains: {kp: 9, kv: 6}}}\n"
+        "simulation: {duration: 0.02}\n"
+    )
+    found = hsp.sweep(tmp_path / "mine.yaml", {"null_space.gain": [1]}, workers=1)
+    assert found.completed.all()
+
+
+def test_a_worker_with_other_versions_is_an_error_that_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Mixed(local_workers.LocalWorkers):
+        def map(self, tasks: Any) -> Iterator[tuple[int, str]]:
+            for run, text in super().map(tasks):
+                result = json.loads(text)
+                if run == 1:
+                    result["versions"]["pin"] = "3.0"
+                yield run, json.dumps(result)
+
+    monkeypatch.setattr(sweeping, "LocalWorkers", Mixed)
+    out, over = tmp_path / "mixed.parquet", {"null_space.gain": [1.0, 2.0, 3.0]}
+    with pytest.raises(SweepError, match=r"a worker has pin 3.0, here is"):
+        hsp.sweep(MOVING, over, overrides=QUICK, out=out, workers=1)
+    assert Sweep.load(out)["run"].tolist() == [0]
 
 
 # ------------------------------------------------------------------------- sensitivity

@@ -2,6 +2,7 @@
 
 from .control_loop import ControlLoop as ControlLoop
 from .measuring import measure as measure
+from .measuring import rehearse as rehearse
 from .quiet import no_garbage_collection as no_garbage_collection
 from .quiet import real_time_priority as real_time_priority
 from .report import Latency as Latency

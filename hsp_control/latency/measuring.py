@@ -40,14 +40,12 @@ def measure(
     Raises:
         SimulationError: If the time is not one, or the motion diverges in it.
     """
-    if not 0.0 < seconds < np.inf:
-        raise SimulationError(f"{seconds:g} s; must be positive")
-    count = max(1, round(seconds / loop.period))
+    count = _periods(loop, seconds)
     turn = max(1, round(TURN / loop.period))
     period = round(loop.period * 1e9)
     control, empty = Record(period, count), Record(period, count)
     with no_garbage_collection(), event.install_recorder("numba:compile") as compiled:
-        back_to_back = _rehearse(loop, count)
+        back_to_back = rehearse(loop, seconds)
         compiled.buffer.clear()
         try:
             while control.steps < count:
@@ -63,8 +61,20 @@ def measure(
     return Latency(control, empty, back_to_back, compilations)
 
 
-def _rehearse(loop: ControlLoop, count: int) -> Array:
-    """Run the steps to come as fast as they go, and return how long each took [s]."""
+def rehearse(loop: ControlLoop, seconds: float) -> Array:
+    """Run the steps to come as fast as they go, off the clock, and return to the start.
+
+    Args:
+        loop: The controller and its robot.
+        seconds: Of the loop's own time [s].
+
+    Returns:
+        How long each step took [s].
+
+    Raises:
+        SimulationError: If the time is not one, or the motion diverges in it.
+    """
+    count = _periods(loop, seconds)
     took = np.zeros(count)
     loop.restart()
     for k in range(count):
@@ -74,6 +84,12 @@ def _rehearse(loop: ControlLoop, count: int) -> Array:
         loop.move()
     loop.restart()
     return took
+
+
+def _periods(loop: ControlLoop, seconds: float) -> int:
+    if not 0.0 < seconds < np.inf:
+        raise SimulationError(f"{seconds:g} s; must be positive")
+    return max(1, round(seconds / loop.period))
 
 
 def _nothing() -> None:

@@ -203,7 +203,7 @@ def _medians(x: Array, y: Array) -> tuple[Array, Array]:
 
 def _entitle(figure: Figure, sweep: Sweep, found: Sensitivity) -> None:
     identity = sweep.meta["identity"]
-    named = identity["configuration"].get("title") or sweep.meta["name"]
+    named = identity["configuration"].get("title") or Path(sweep.meta["name"]).stem
     figure.suptitle(plain(textwrap.fill(str(named), 24 + 22 * len(found.parameters))))
     failed = len(sweep) - found.runs
     parts = [

@@ -67,8 +67,20 @@ class DaskWorkers:
         self._client.close()
 
     def map(self, tasks: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-        """Yield every task's result as soon as it is there; see `LocalWorkers.map`."""
-        pending = iter(tasks)
+        """Yield every task's result as soon as it is there; see `LocalWorkers.map`.
+
+        Raises:
+            SweepError: If the scheduler is lost.
+        """
+        try:
+            yield from self._map(iter(tasks))
+        except Exception as error:  # connections end in many ways
+            raise SweepError(
+                f"the Dask cluster is gone ({_brief(error)}); what is done is kept, "
+                "and the same command does the rest"
+            ) from error
+
+    def _map(self, pending: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
         runs: dict[str, int] = {}
 
         def submit(run: int, task: str) -> Any:
@@ -81,6 +93,7 @@ class DaskWorkers:
         running = self._dask.as_completed(first, loop=self._client.loop)
         for future in running:
             run = runs.pop(future.key)
+            # What a future has whose worker died too often; a cancelled one raises.
             error = future.exception()
             yield run, crashed(_brief(error)) if error else future.result()
             for task in islice(pending, 1):

@@ -2,8 +2,9 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from hsp_control.config import Experiment
@@ -44,11 +45,17 @@ class Plan:
 
     def task(self, run: int) -> str:
         """Return all that a worker needs for a run, as a JSON text."""
-        changes = [
-            {"keys": factor.keys, "value": value, "origin": factor.origin}
+        # Its paths begin where its file is, and a worker may stand anywhere.
+        name = str(Path(self.name).resolve())
+        parts = {"name": name, "data": self.data, "changes": self.changes(run)}
+        return json.dumps(parts)
+
+    def changes(self, run: int) -> list[dict[str, Any]]:
+        """Return where a run's values go, for `insert`."""
+        return [
+            {"keys": list(factor.keys), "value": value, "origin": factor.origin}
             for factor, value in zip(self.factors, self.points[run], strict=True)
         ]
-        return json.dumps({"name": self.name, "data": self.data, "changes": changes})
 
     def first_run(self) -> int:
         """Return the first run that can be built.
@@ -105,6 +112,15 @@ def document(task: str) -> Document:
     """
     parts = json.loads(task)
     found = Document(parts["data"], {}, parts["name"])
-    for change in parts["changes"]:
-        found.assign(change["keys"], change["value"], change["origin"])
+    insert(found, parts["changes"])
     return found
+
+
+def insert(base: Document, changes: Iterable[dict[str, Any]]) -> None:
+    """Put a run's values into a configuration.
+
+    Raises:
+        ConfigError: If a key path leads nowhere.
+    """
+    for change in changes:
+        base.assign(change["keys"], change["value"], change["origin"])

@@ -25,8 +25,13 @@ def run_task(task: str) -> str:
         The result, for `read_result`.
     """
     start = perf_counter()
-    status, message, rollout = _run(task)
-    found = {} if rollout is None else measures(rollout)
+    found: dict[str, Measure] = {}
+    try:
+        status, message, rollout = _run(task)
+        if rollout is not None:
+            found = measures(rollout)
+    except Exception as error:  # one run must not end thousands
+        status, message = "failed", f"{type(error).__name__}: {error}"
     return json.dumps(
         {
             "status": status,
@@ -68,8 +73,6 @@ def _run(task: str) -> tuple[str, str, Rollout | None]:
         return "refused", str(error), None
     except HspControlError as error:
         return "refused", str(error), None
-    except Exception as error:  # one run must not end thousands
-        return "failed", f"{type(error).__name__}: {error}", None
     return rollout.status, str(rollout.meta["message"]), rollout
 
 

@@ -118,14 +118,20 @@ class Sweep:
         """Which runs reached their end, shape (N,)."""
         return np.asarray(self.columns["status"] == "completed")
 
-    def configuration(self, row: int) -> dict[str, Any]:
-        """Return the whole configuration of a row, to look at that run again.
+    def configuration(self, run: int) -> dict[str, Any]:
+        """Return the whole configuration of a run, to look at it again.
 
         For example ``hsp.load_experiment(sweep.configuration(17)).run()``.
+
+        Raises:
+            SweepError: If the sweep has no such run.
         """
+        rows = np.flatnonzero(self.columns["run"] == run)
+        if not len(rows):
+            raise SweepError(f"the sweep has no run {run} (it has {len(self)} runs)")
         changes = []
         for name, parameter in self.meta["parameters"].items():
-            value = self.columns[name][row]
+            value = self.columns[name][rows[0]]
             value = value.item() if isinstance(value, np.generic) else value
             changes.append(
                 {

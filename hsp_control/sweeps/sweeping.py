@@ -14,7 +14,7 @@ from hsp_control.sweeps.dask_workers import DaskWorkers
 from hsp_control.sweeps.design import chosen_design, points
 from hsp_control.sweeps.factor import factors
 from hsp_control.sweeps.local_workers import LocalWorkers
-from hsp_control.sweeps.plan import Plan, document
+from hsp_control.sweeps.plan import Plan, document, insert
 from hsp_control.sweeps.running import read_result
 from hsp_control.sweeps.store import Store
 from hsp_control.sweeps.sweep import Sweep
@@ -82,10 +82,17 @@ def sweep(
         seed=seed,
         points=points(varied, form, samples, seed),
     )
-    first = plan.first_run()
+    try:
+        first = plan.first_run()
+    except HspControlError:
+        insert(base, plan.changes(0))
+        build(base)  # says the same, and in which line of the file
+        raise
     identity = plan.identity(plan.experiment(first))
     path = None if out is None else Path(out)
-    with _workers(workers, scheduler, len(plan)) as crew:
+    if path is not None and path.suffix != ".parquet":
+        raise SweepError(f"{path}: the name of a sweep's file ends in .parquet")
+    with _workers(workers, scheduler) as crew:
         store = Store(plan, identity, path, fresh=fresh)
         try:
             with suppress(KeyboardInterrupt):
@@ -98,9 +105,7 @@ def sweep(
         return store.close()
 
 
-def _workers(
-    count: int | None, scheduler: str | None, runs: int
-) -> LocalWorkers | DaskWorkers:
+def _workers(count: int | None, scheduler: str | None) -> LocalWorkers | DaskWorkers:
     if scheduler is not None:
         if count is not None:
             raise SweepError("the scheduler has its own workers: leave --workers out")
@@ -116,7 +121,8 @@ def _compile(plan: Plan, run: int) -> None:
     short = document(plan.task(run))
     short.assign(["simulation", "duration"], period, "")
     with suppress(HspControlError):  # whatever is wrong with that run, its row will say
-        build(short).run()
+        if build(short).run().status == "interrupted":
+            raise KeyboardInterrupt
 
 
 def _work(
@@ -132,7 +138,7 @@ def _work(
     for run, text in crew.map((run, plan.task(run)) for run in store.pending):
         row, found, others = read_result(run, text)
         if others and others != own:
-            (name,) = [k for k in own if others.get(k) != own[k]][:1]
+            name = next(name for name in own if others.get(name) != own[name])
             raise SweepError(
                 f"a worker has {name} {others.get(name)}, here is {own[name]}: its "
                 "numbers would not be comparable"
