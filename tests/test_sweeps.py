@@ -516,6 +516,10 @@ def test_another_program_s_parquet_is_refused(tmp_path: Path) -> None:
         (["--over", "null_space.gain=1:2", "--design", "latin"], "'latin_hypercube'?"),
         (["--over", "null_space.gain=1:2", "--design", "random"], "number of --samp"),
         (["--over", "null_space.gain=1:2", "--samples", "0"], "0 samples"),
+        (
+            ["--over", "null_space.gain=1:2", "--samples", "9", "--seed", "-1"],
+            "seed is",
+        ),
         (["--over", "null_space.gain=1,2", "--workers", "0"], "0 workers"),
     ],
 )
@@ -690,6 +694,13 @@ def test_what_cannot_be_told_is_not_told() -> None:
         sensitivity(invented(10))
     with pytest.raises(SweepError, match=r"did you mean 'effort.max'\?"):
         sensitivity(invented(), ["effort.mx"])
+    unknown = invented()
+    unknown["effort.max"][5:] = np.nan
+    assert "effort.max" not in sensitivity(unknown).outcomes
+    with pytest.raises(SweepError, match="no completed run has the metric"):
+        sensitivity(unknown, ["effort.max"])
+    with pytest.raises(SweepError, match="has no run 200"):
+        invented().configuration(200)
     with pytest.raises(SweepError, match="has no column 'upp'; did you mean 'up'"):
         invented()["upp"]
 

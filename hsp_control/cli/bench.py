@@ -25,7 +25,9 @@ from hsp_control.latency import (
 def bench(options: argparse.Namespace) -> int:
     """Run the loop, and print how late it was."""
     if not 0.0 < options.rate <= 1e5:
-        raise SimulationError(f"--rate {options.rate:g}; must be from 0 to 100000 Hz")
+        raise SimulationError(
+            f"--rate {options.rate:g}; must be positive, 100000 Hz at most"
+        )
     experiment = load_experiment(options.config, *options.overrides)
     loop = ControlLoop(
         experiment.controller, experiment.q0, experiment.v0, 1.0 / options.rate

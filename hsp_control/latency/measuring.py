@@ -18,6 +18,10 @@ TURN = 2.0
 and goes, and both shall see the same."""
 
 
+MOST_PERIODS = 100_000_000
+"""All are kept in memory: a day at 1 kHz."""
+
+
 def measure(
     loop: ControlLoop,
     seconds: float,
@@ -87,8 +91,10 @@ def rehearse(loop: ControlLoop, seconds: float) -> Array:
 
 
 def _periods(loop: ControlLoop, seconds: float) -> int:
-    if not 0.0 < seconds < np.inf:
-        raise SimulationError(f"{seconds:g} s; must be positive")
+    if not 0.0 < seconds <= MOST_PERIODS * loop.period:
+        raise SimulationError(
+            f"{seconds:g} s; must be positive, and {MOST_PERIODS} periods at most"
+        )
     return max(1, round(seconds / loop.period))
 
 

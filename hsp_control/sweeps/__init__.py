@@ -6,7 +6,7 @@ from .distributions import Integers as Integers
 from .distributions import LogUniform as LogUniform
 from .distributions import Normal as Normal
 from .distributions import Uniform as Uniform
+from .results import Sweep as Sweep
 from .sensitivity import Sensitivity as Sensitivity
 from .sensitivity import sensitivity as sensitivity
-from .sweep import Sweep as Sweep
 from .sweeping import sweep as sweep

@@ -8,7 +8,6 @@ robot's files under the same paths.
 from collections.abc import Iterable, Iterator
 from importlib import import_module
 from itertools import islice
-from types import TracebackType
 from typing import Any, Self
 
 from hsp_control.exceptions import SweepError
@@ -57,12 +56,7 @@ class DaskWorkers:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         """Forget what is not done, and leave the cluster as it was."""
         self._client.close()
 

@@ -56,10 +56,13 @@ def points(
         seed: Of the random numbers: the same seed gives the same runs.
 
     Raises:
-        SweepError: If a grid is asked of a distribution, or has too many runs.
+        SweepError: If a grid is asked of a distribution or has too many runs, or the
+            seed is negative.
     """
     if design == "grid":
         return _grid(factors)
+    if seed < 0:
+        raise SweepError(f"the seed is {seed}; must not be negative")
     assert samples is not None
     from scipy.stats import qmc  # here: it takes longer to import than all else
 

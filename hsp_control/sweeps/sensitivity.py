@@ -9,7 +9,7 @@ from scipy.special import fdtrc
 from hsp_control.arrays import Array
 from hsp_control.exceptions import SweepError
 from hsp_control.suggest import did_you_mean, listing
-from hsp_control.sweeps.sweep import Column, Sweep
+from hsp_control.sweeps.results import Column, Sweep
 
 LEAST_RUNS = 8
 """Completed runs below which nothing is said: chance alone correlates so few."""
@@ -55,7 +55,7 @@ def default_outcomes(sweep: Sweep) -> list[str]:
         *(name for name in sweep.metrics if _is(name, "distance.", ".min")),
         "effort.max",
     ]
-    return [name for name in wanted if name in sweep]
+    return [name for name in wanted if name in sweep and _known(sweep, name)]
 
 
 def sensitivity(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Sensitivity:
@@ -78,6 +78,8 @@ def sensitivity(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Sensitiv
                 f"the sweep has no metric {name!r}{did_you_mean(name, sweep.metrics)} "
                 f"(it has {listing(sweep.metrics, 40)})"
             )
+        if not _known(sweep, name):
+            raise SweepError(f"no completed run has the metric {name!r}")
     chosen = sweep.completed
     runs = int(chosen.sum())
     if runs < LEAST_RUNS:
@@ -145,6 +147,10 @@ def _explained(classes: Column, rank: Array) -> float:
     if within > 0.0 and fdtrc(groups - 1, freedoms, between / within) > CHANCE:
         return 0.0
     return max(0.0, 1.0 - within / float(np.var(rank, ddof=1)))
+
+
+def _known(sweep: Sweep, name: str) -> bool:
+    return bool(np.isfinite(sweep[name][sweep.completed]).any())
 
 
 def _is(name: str, beginning: str, end: str) -> bool:

@@ -10,8 +10,8 @@ from hsp_control.sweeps.journal import Journal, journal_of
 from hsp_control.sweeps.metrics import Measure
 from hsp_control.sweeps.parquet import require_parquet
 from hsp_control.sweeps.plan import Plan
+from hsp_control.sweeps.results import Sweep
 from hsp_control.sweeps.row import CRASHED, Row
-from hsp_control.sweeps.sweep import Sweep
 
 
 class Store:

@@ -15,9 +15,9 @@ from hsp_control.sweeps.design import chosen_design, points
 from hsp_control.sweeps.factor import factors
 from hsp_control.sweeps.local_workers import LocalWorkers
 from hsp_control.sweeps.plan import Plan, document, insert
+from hsp_control.sweeps.results import Sweep
 from hsp_control.sweeps.running import read_result
 from hsp_control.sweeps.store import Store
-from hsp_control.sweeps.sweep import Sweep
 
 
 def sweep(

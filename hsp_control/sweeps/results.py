@@ -63,7 +63,9 @@ class Sweep:
                 column = _texts([json.dumps(point[k]) for point in plan.points])
             columns[factor.name] = column[columns["run"]]
             parameters[factor.name] = {"keys": list(factor.keys), "json": encoded}
-        names = sorted(described, key=list(described).index)
+        # By run, not in the order in which runs were done: that is another each time.
+        measured = [name for row in ordered for name in row.metrics]
+        names = list(dict.fromkeys([*measured, *described]))
         for name in names:
             columns[name] = np.array([row.metrics.get(name, np.nan) for row in ordered])
         meta = {
