@@ -2,25 +2,34 @@
 
     .venv/bin/python benchmarks/sweep_efficiency.py [--rounds N] [--samples N]
 
-The same sweep with one worker and with two, in turns; the efficiency is T1/(2 T2), the
-start of the workers included. A machine that others use too does not give two processes
-twice as much as one: a plain arithmetic loop, as much of it in one process and halved
-between two, says what it gives at that moment. Both are printed, and their ratio.
+The same sweep with one worker and with two, in turns, the start of the workers included.
+By the clock the efficiency is T1/(2 T2), which means nothing on a machine that others
+use: two processes do not get twice as much there as one. What does not depend on others
+is what the efficiency is made of: how much processor time the work takes, C1/C2, and
+which share of their time workers spend in runs rather than starting and waiting,
+B2/B1. Their product is the efficiency on a machine of one's own.
 """
 
 import argparse
+import resource
 import statistics
-import subprocess
-import sys
 from time import perf_counter
+from typing import NamedTuple
 
 from hsp_control import sweep
 
-WORK = "total = 0.0\nfor k in range({}):\n    total += k * k % 7\n"
+
+class Cost(NamedTuple):
+    """What a sweep took: by the clock, of processors, and the workers' share in runs."""
+
+    clock: float
+    processor: float
+    busy: float
 
 
-def sweeping(samples: int, workers: int) -> float:
-    """Return how long a sweep takes [s]."""
+def cost(samples: int, workers: int) -> Cost:
+    """Return what a sweep takes."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     begin = perf_counter()
     found = sweep(
         "panda_limits",
@@ -29,46 +38,37 @@ def sweeping(samples: int, workers: int) -> float:
         overrides=["simulation.duration=5"],
         workers=workers,
     )
+    clock = perf_counter() - begin
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert found.completed.all()
-    return perf_counter() - begin
-
-
-def plain(work: int, processes: int) -> float:
-    """Return how long plain work takes, divided between processes [s]."""
-    begin = perf_counter()
-    code = WORK.format(work // processes)
-    started = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(processes)]
-    for process in started:
-        process.wait()
-    return perf_counter() - begin
+    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return Cost(clock, processor, float(found["wall_time"].sum()) / workers / clock)
 
 
 def main() -> None:
     """Print each round, and the medians."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--samples", type=int, default=60)
+    parser.add_argument("--samples", type=int, default=100)
     options = parser.parse_args()
-    sweeping(2, 1)  # compiles
-    work = 10_000_000
-    work = int(work * max(1.0, 10.0 / plain(work, 1)))
-    print("| round | 1 worker | 2 workers | efficiency | the machine's | ratio |")
-    print("|--:|--:|--:|--:|--:|--:|")
+    cost(2, 1)  # compiles
+    print(
+        "| round | T1 | T2 | T1/(2 T2) | C1/C2 | B1 | B2 | on a machine of one's own |"
+    )
+    print("|--:|--:|--:|--:|--:|--:|--:|--:|")
     found = []
     for k in range(options.rounds):
-        one, plain_one = sweeping(options.samples, 1), plain(work, 1)
-        two, plain_two = sweeping(options.samples, 2), plain(work, 2)
-        own, machine = one / two / 2, plain_one / plain_two / 2
-        found.append((own, machine, own / machine))
+        one, two = cost(options.samples, 1), cost(options.samples, 2)
+        clock, work = one.clock / two.clock / 2, one.processor / two.processor
+        own = work * two.busy / one.busy
+        found.append((clock, own))
         print(
-            f"| {k + 1} | {one:.1f} s | {two:.1f} s | {own:.2f} | {machine:.2f} | "
-            f"{own / machine:.2f} |",
+            f"| {k + 1} | {one.clock:.1f} s | {two.clock:.1f} s | {clock:.2f} | "
+            f"{work:.3f} | {one.busy:.3f} | {two.busy:.3f} | {own:.3f} |",
             flush=True,
         )
-    own, machine, ratio = (
-        statistics.median(column) for column in zip(*found, strict=True)
-    )
-    print(f"| median | | | {own:.2f} | {machine:.2f} | {ratio:.2f} |")
+    clock, own = (statistics.median(column) for column in zip(*found, strict=True))
+    print(f"| median | | | {clock:.2f} | | | | {own:.3f} |")
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import psutil
 import pyarrow.parquet as pq
@@ -43,7 +44,9 @@ QUICK = [
     "simulation.duration=0.1",
     "simulation.integrator={type: rk4, step: 0.005}",
 ]
-SLOWER = [QUICK[1], "simulation.duration=3"]  # some tenths of a second each
+# Some tenths of a second each, also where kernels are not compiled.
+SECONDS = 0.3 if numba.config.DISABLE_JIT else 3
+SLOWER = [QUICK[1], f"simulation.duration={SECONDS}"]
 OVER = {
     "null_space.gain": "log:1:100:3",
     "start.coordinates.0": "1.0:1.6:2",
