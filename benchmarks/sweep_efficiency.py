@@ -2,8 +2,8 @@
 
     .venv/bin/python benchmarks/sweep_efficiency.py [--rounds N] [--samples N]
 
-The same sweep with one worker and with two, in turns, the start of the workers included.
-By the clock the efficiency is T1/(2 T2), which means nothing on a machine that others
+The same sweep with one worker and with two, in turns, workers' start included. By the
+clock the efficiency is T1/(2 T2), which means nothing on a machine that others
 use: two processes do not get twice as much there as one. What does not depend on others
 is what the efficiency is made of: how much processor time the work takes, C1/C2, and
 which share of their time workers spend in runs rather than starting and waiting,
@@ -20,7 +20,7 @@ from hsp_control import sweep
 
 
 class Cost(NamedTuple):
-    """What a sweep took: by the clock, of processors, and the workers' share in runs."""
+    """What a sweep took: by the clock, of processors; the workers' share in runs."""
 
     clock: float
     processor: float
