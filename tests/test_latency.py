@@ -145,6 +145,22 @@ def test_priority_is_set_and_given_back(monkeypatch: pytest.MonkeyPatch) -> None
     assert calls[1][0] == before
 
 
+def test_the_rehearsal_is_not_real_time(
+    loop: ControlLoop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    events: list[str] = []
+    monkeypatch.setattr(
+        os, "sched_setscheduler", lambda _, policy, __: events.append(f"set {policy}")
+    )
+    rehearse = measuring.rehearse
+    monkeypatch.setattr(
+        measuring, "rehearse", lambda *a: events.append("rehearsed") or rehearse(*a)
+    )
+    measure(loop, 0.002, priority=40)
+    real, ordinary = f"set {os.SCHED_FIFO}", f"set {os.sched_getscheduler(0)}"
+    assert events == [real, ordinary, "rehearsed", real, ordinary]
+
+
 def test_priority_that_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(SimulationError, match="must be from 1 to 99"):
         real_time_priority(0).__enter__()
@@ -186,7 +202,7 @@ def test_a_measured_loop_did_the_same_steps_twice(
 ) -> None:
     monkeypatch.setattr(measuring, "TURN", 0.02)
     done: list[float] = []
-    found = measure(loop, 0.05, done.append)
+    found = measure(loop, 0.05, on_progress=done.append)
     assert len(found.step) == len(found.empty) == len(found.back_to_back) == 50
     assert done == [0.4, 0.8, 1.0]
     assert (found.step > 0.0).all()
@@ -226,7 +242,7 @@ def test_ctrl_c_keeps_what_was_measured(
     def interrupt(done: float) -> None:
         raise KeyboardInterrupt
 
-    found = measure(loop, 1.0, interrupt)
+    found = measure(loop, 1.0, on_progress=interrupt)
     assert len(found.step) == len(found.empty) == 10
     assert gc.isenabled()
 

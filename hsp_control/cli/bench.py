@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from contextlib import ExitStack
 from pathlib import Path
 
 from rich.markup import escape
@@ -18,7 +17,6 @@ from hsp_control.latency import (
     Latency,
     Quantiles,
     measure,
-    real_time_priority,
 )
 
 
@@ -32,10 +30,7 @@ def bench(options: argparse.Namespace) -> int:
     loop = ControlLoop(
         experiment.controller, experiment.q0, experiment.v0, 1.0 / options.rate
     )
-    with ExitStack() as stack:
-        if options.priority is not None:
-            stack.enter_context(real_time_priority(options.priority))
-        found = _measure(loop, options.seconds, options.config)
+    found = _measure(loop, options)
     out.print(
         f"{options.config} at {options.rate:g} Hz: {len(found.step)} periods, in turns "
         "with as many of an empty loop; times in microseconds"
@@ -55,7 +50,7 @@ def bench(options: argparse.Namespace) -> int:
     return 0
 
 
-def _measure(loop: ControlLoop, seconds: float, name: str) -> Latency:
+def _measure(loop: ControlLoop, options: argparse.Namespace) -> Latency:
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -65,12 +60,14 @@ def _measure(loop: ControlLoop, seconds: float, name: str) -> Latency:
         auto_refresh=False,  # its thread would wake between the loop's steps
         disable=not errors.is_terminal,
     ) as progress:
-        bar = progress.add_task(escape(name), total=1.0)
+        bar = progress.add_task(escape(options.config), total=1.0)
 
         def show(done: float) -> None:
             progress.update(bar, completed=done, refresh=True)
 
-        return measure(loop, seconds, show)
+        return measure(
+            loop, options.seconds, priority=options.priority, on_progress=show
+        )
 
 
 def _table(found: Latency) -> Table:

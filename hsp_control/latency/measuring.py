@@ -1,6 +1,7 @@
 """Run a loop against the clock, beside an empty one."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from time import perf_counter_ns
 
 import numpy as np
@@ -10,7 +11,7 @@ from hsp_control.arrays import Array
 from hsp_control.exceptions import SimulationError
 from hsp_control.latency.clocked import Record, run_clocked
 from hsp_control.latency.control_loop import ControlLoop
-from hsp_control.latency.quiet import no_garbage_collection
+from hsp_control.latency.quiet import no_garbage_collection, real_time_priority
 from hsp_control.latency.report import Latency
 
 TURN = 2.0
@@ -25,6 +26,8 @@ MOST_PERIODS = 100_000_000
 def measure(
     loop: ControlLoop,
     seconds: float,
+    *,
+    priority: int | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Latency:
     """Measure a loop against the clock for a time, and an empty one for as long.
@@ -36,21 +39,29 @@ def measure(
     Args:
         loop: The controller and its robot, at its start.
         seconds: How long each of the two loops runs [s].
+        priority: Real-time priority of both; None: that of all processes.
         on_progress: Called with the fraction done, between turns.
 
     Returns:
         What was measured; after Ctrl-C, what was until then.
 
     Raises:
-        SimulationError: If the time is not one, or the motion diverges in it.
+        SimulationError: If the time is not one, the motion diverges in it, or the
+            priority is refused.
     """
     count = _periods(loop, seconds)
+    with _priority(priority):
+        pass  # what is refused is refused at once
     turn = max(1, round(TURN / loop.period))
     period = round(loop.period * 1e9)
     control, empty = Record(period, count), Record(period, count)
-    with no_garbage_collection(), event.install_recorder("numba:compile") as compiled:
-        back_to_back = rehearse(loop, seconds)
-        compiled.buffer.clear()
+    # Without priority: Linux stops real-time processes that do not sleep.
+    back_to_back = rehearse(loop, seconds)
+    with (
+        no_garbage_collection(),
+        _priority(priority),
+        event.install_recorder("numba:compile") as compiled,
+    ):
         try:
             while control.steps < count:
                 steps = min(turn, count - control.steps)
@@ -88,6 +99,10 @@ def rehearse(loop: ControlLoop, seconds: float) -> Array:
         loop.move()
     loop.restart()
     return took
+
+
+def _priority(level: int | None) -> AbstractContextManager[None]:
+    return nullcontext() if level is None else real_time_priority(level)
 
 
 def _periods(loop: ControlLoop, seconds: float) -> int:
