@@ -133,6 +133,20 @@ def test_the_collector_is_away_and_comes_back() -> None:
         gc.enable()
 
 
+@pytest.mark.parametrize("config", [MOVING, "iiwa_null_space"])
+def test_steps_leave_nothing_to_collect(config: str) -> None:
+    experiment = hsp.load_experiment(config)
+    loop = ControlLoop(experiment.controller, experiment.q0, experiment.v0, 0.001)
+    loop.control()
+    with no_garbage_collection():
+        tracked = len(gc.get_objects())
+        for _ in range(50):
+            loop.control()
+            loop.move()
+        assert len(gc.get_objects()) < tracked + 25  # not one in two steps
+        assert gc.collect() == 0
+
+
 def test_priority_is_set_and_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[Any] = []
     monkeypatch.setattr(
