@@ -37,6 +37,8 @@ from hsp_control.sweeps import (
 from hsp_control.sweeps.design import points
 from hsp_control.sweeps.factor import factors
 from hsp_control.sweeps.journal import Journal, journal_of
+from hsp_control.sweeps.metrics import Measure
+from hsp_control.sweeps.row import Row
 from hsp_control.sweeps.spelling import values
 
 MOVING = "paper/4_moving_obstacle"
@@ -368,6 +370,33 @@ def test_ctrl_c_leaves_a_readable_file_and_the_same_command_ends_it(
     same(resumed, whole)
     kept = part["run"]
     assert resumed["wall_time"][kept].tobytes() == part["wall_time"].tobytes()
+
+
+def test_half_a_line_is_cut_off_before_another_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "x.parquet.journal"
+    rows = [Row(k, "completed", "", {"e": 0.1 * k}, 0.5) for k in range(3)]
+    journal = Journal(path)
+    journal.begin({"seed": 1})
+    journal.add(rows[0], {"e": Measure(0.0, "m", "error")})
+    journal.close()
+    for row, half in zip(
+        rows[1:], ('{"row": {"run"', '{"described": {"é'), strict=True
+    ):
+        with path.open("a", encoding="utf-8") as file:
+            file.write(half)
+        journal = Journal(path)
+        assert journal.rows == rows[: row.run]
+        journal.add(row, {})
+        journal.close()
+    journal = Journal(path)
+    assert journal.rows == rows
+    assert journal.identity == {"seed": 1}
+    assert journal.described == {"e": Measure(0.0, "m", "error")}
+    journal.remove()
+    path.write_text('{"swe')  # killed in the first line
+    journal = Journal(path)
+    assert (journal.rows, journal.identity) == ([], None)
+    journal.remove()
 
 
 def test_killed_between_the_file_and_the_journal(file: Path, tmp_path: Path) -> None:
