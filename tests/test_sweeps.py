@@ -596,6 +596,22 @@ def test_the_command_tells_and_draws_what_it_found(
     assert (tmp_path / "found-sensitivity.svg").is_file()
 
 
+def test_reasons_that_differ_in_numbers_alone_are_told_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = [*QUICK, "simulation.control_period=0.01"]
+    options = [word for setting in settings for word in ("--set", setting)]
+    over = ["--over", "null_space.gain=10,900,1100,-1,-2.5"]
+    out = ["--out", str(tmp_path / "failing.parquet"), "--workers", "1"]
+    assert main(["sweep", MOVING, *options, *over, *out]) == 0
+    printed = capsys.readouterr().out
+    assert "5 of 5 runs: 2 diverged, 2 refused, 1 completed" in printed
+    assert printed.count("  2 x refused: --over null_space.gain: ") == 1
+    assert printed.count("  2 x diverged: the motion diverged before t = ") == 1
+    assert "other reasons" not in printed
+    assert "No sensitivities: 1 runs were completed" in printed
+
+
 def test_importing_the_package_imports_no_extra() -> None:
     heavy = ["pyarrow", "distributed", "matplotlib", "scipy.stats", "meshcat"]
     code = f"import sys, hsp_control; print([m for m in {heavy} if m in sys.modules])"

@@ -1,6 +1,7 @@
 """``hsp sweep``, and ``hsp plot`` of what it wrote."""
 
 import argparse
+import re
 import sys
 from collections import Counter
 from pathlib import Path
@@ -22,7 +23,8 @@ from hsp_control.exceptions import SweepError
 from hsp_control.sweeps import Sensitivity, Sweep, sensitivity
 from hsp_control.sweeps import sweep as run_sweep
 
-_MESSAGES = 3  # of runs that did not complete
+_REASONS = 3  # of runs that did not complete
+_NUMBER = re.compile(r"-?[0-9][0-9.]*(e[-+]?[0-9]+)?")
 
 
 def sweep(options: argparse.Namespace) -> int:
@@ -95,11 +97,7 @@ def _tell(swept: Sweep, took: float | None) -> None:
     work = float(swept["wall_time"].sum())
     pace = "" if took is None else f"; {work:.1f} s of runs, {took:.1f} s now"
     out.print(f"{len(swept)} of {swept.meta['runs']} runs: {states or 'none'}{pace}")
-    messages = Counter(map(str, swept["message"][~swept.completed]))
-    for message, count in messages.most_common(_MESSAGES):
-        out.print(f"  {count} x {escape(message.splitlines()[0] if message else '-')}")
-    if len(messages) > _MESSAGES:
-        out.print(f"  ... and {len(messages) - _MESSAGES} other reasons")
+    _tell_failures(swept)
     try:
         found = sensitivity(swept)
     except SweepError as error:
@@ -112,6 +110,22 @@ def _tell(swept: Sweep, took: float | None) -> None:
             "Rank correlation, and the share of the variance of ranks that the "
             f"parameter explains alone; below {found.noise:.2f} it may be chance (.)."
         )
+
+
+def _tell_failures(swept: Sweep) -> None:
+    """Tell why runs did not complete, once where reasons differ in numbers alone."""
+    reasons: dict[str, list[str]] = {}
+    failed = ~swept.completed
+    for status, message in zip(
+        swept["status"][failed], swept["message"][failed], strict=True
+    ):
+        first = f"{status}: {message}".splitlines()[0]
+        reasons.setdefault(_NUMBER.sub("#", first), []).append(first)
+    usual = sorted(reasons.values(), key=len, reverse=True)
+    for alike in usual[:_REASONS]:
+        out.print(f"  {len(alike)} x {escape(alike[0])}")
+    if len(usual) > _REASONS:
+        out.print(f"  ... and {len(usual) - _REASONS} other reasons")
 
 
 def _spread(swept: Sweep, found: Sensitivity) -> Table:
