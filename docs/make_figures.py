@@ -10,7 +10,13 @@ from matplotlib.figure import Figure
 
 import hsp_control as hsp
 from hsp_control.palette import DESIRED, INK, SERIES
-from hsp_control.plots import chosen_rows, new_figure, paper_figure, styled
+from hsp_control.plots import (
+    chosen_rows,
+    new_figure,
+    paper_figure,
+    styled,
+    sweep_figure,
+)
 
 FOLDER = Path(__file__).parent / "figures"
 GAIN, FREQUENCY = 4.0, 6.0
@@ -84,8 +90,28 @@ def main() -> None:
         draw_propositions(left, middle)
         draw_chaos(right)
         figure.savefig(FOLDER / "propositions.png", dpi=130)
+    draw_sweep()
     for file in sorted(FOLDER.glob("*.png")):
         print(f"Figure: {file.relative_to(FOLDER.parents[1])}")
+
+
+def draw_sweep() -> None:
+    """Draw what the sweep of docs/sweeps.md finds."""
+    found = hsp.sweep(
+        "panda_obstacle",
+        {
+            "null_space.gain": "loguniform:2:60",
+            "null_space.fields.0.weight": "loguniform:0.2:5",
+            "scene.obstacles.ball.shape.radius": "uniform:0.05:0.2",
+            "tasks.hand.gains.natural_frequency": "5:25",
+            "start.joints.panda_joint4": "normal:-2.2:0.1",
+        },
+        samples=80,
+        seed=1,
+        overrides=["simulation.duration=6"],
+    )
+    with styled():
+        sweep_figure(found).savefig(FOLDER / "sweep_panda_obstacle.png", dpi=85)
 
 
 def draw_propositions(left: Axes, middle: Axes) -> None:

@@ -76,6 +76,8 @@ from .shapes import Shape as Shape
 from .shapes import Sphere as Sphere
 from .simulation import Rollout as Rollout
 from .simulation import simulate as simulate
+from .sweeps import Sweep as Sweep
+from .sweeps import sweep as sweep
 from .tasks import AngularMomentum as AngularMomentum
 from .tasks import CenterOfMass as CenterOfMass
 from .tasks import FrameOrientation as FrameOrientation

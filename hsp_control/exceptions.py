@@ -102,6 +102,10 @@ class ConfigError(HspControlError, ValueError):
     """A configuration file that does not follow the schema."""
 
 
+class SweepError(HspControlError, ValueError):
+    """A sweep that is ill-defined, or whose file cannot be read or written."""
+
+
 class ViewerError(HspControlError, RuntimeError):
     """A 3-D view that cannot be opened, or that is gone."""
 

@@ -7,8 +7,9 @@ debugging and coverage.
 """
 
 import hashlib
+import warnings
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -18,11 +19,10 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def _package_state() -> str:
-    """Return a digest of the times and sizes of the package's files."""
+    """Return a digest of the package's code: the same however it was installed."""
     state = hashlib.sha256()
     for file in sorted(Path(__file__).parent.rglob("*.py")):
-        stat = file.stat()
-        state.update(f"{file.name} {stat.st_mtime_ns} {stat.st_size} ".encode())
+        state.update(f"{file.name}\n".encode() + file.read_bytes())
     return state.hexdigest()[:12]
 
 
@@ -34,7 +34,10 @@ def kernel(function: Function) -> Function:
 
     Numba keeps code for as long as the function's own file does not change, though it
     has the code of kernels in other files inside. The name that it is kept under
-    therefore tells the state of the whole package.
+    therefore tells the state of the whole package. It is kept beside the package's
+    files, or where these are read-only in the user's cache folder; the environment
+    variable ``NUMBA_CACHE_DIR`` names another. Where nothing can be written, every
+    start compiles anew.
 
     It may return arrays to other kernels alone, not to Python: for that there is
     `uncompiled`.
@@ -46,7 +49,13 @@ def kernel(function: Function) -> Function:
     # Without the reference counts of Numba's memory manager, handing over an array
     # costs 6 ns instead of 27, a slice nothing; and what allocates does not compile.
     options: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
-    compiled = numba.njit(**options)(function)
+    try:
+        compiled = numba.njit(**options)(function)
+    except RuntimeError as error:  # Numba found no folder to keep the code in
+        if "cannot cache" not in str(error):
+            raise
+        _warn_of_no_cache()
+        compiled = numba.njit(**(options | {"cache": False}))(function)
     return cast("Function", compiled)
 
 
@@ -77,3 +86,14 @@ def bind(
     types = tuple(typeof(argument) for argument in (*arguments, *free))
     compiled.compile(types)
     return partial(compiled.overloads[types].entry_point, *arguments)
+
+
+@cache
+def _warn_of_no_cache() -> None:
+    warnings.warn(
+        "compiled code cannot be kept: neither the package's folder nor the user's "
+        "cache can be written. Every start will take some ten seconds longer; set "
+        "NUMBA_CACHE_DIR to a folder that can be written",
+        RuntimeWarning,
+        stacklevel=2,
+    )

@@ -1,6 +1,7 @@
 """The documents are executed: what the README shows is what happens."""
 
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +45,19 @@ def test_the_readme_s_python_runs(
     np.testing.assert_allclose(rollout["null_space_norm"], decay, rtol=1e-4, atol=1e-8)
 
 
+@pytest.mark.parametrize("page", ["sweeps", "latency"])
+def test_the_pages_python_runs_and_their_commands_exist(page: str) -> None:
+    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    (snippet,) = blocks(text, "python")
+    exec(compile(snippet, f"{page}.md", "exec"), {})
+    shell = "".join(blocks(text, "sh")).replace("\\\n", " ")
+    commands = [line.split("#")[0] for line in shell.splitlines()]
+    used = [shlex.split(line)[1:] for line in commands if line.startswith("hsp ")]
+    assert used
+    for command in used:
+        _parser().parse_args(command)
+
+
 def test_the_readme_s_yaml_is_a_configuration() -> None:
     (text,) = blocks(README, "yaml")
     experiment = load_experiment(yaml.safe_load(text), "simulation.duration=0.05")
@@ -58,7 +72,7 @@ def test_the_readme_s_commands_exist() -> None:
         if line.startswith("hsp ")
     ]
     assert {command[0] for command in commands} == {
-        "run", "view", "plot", "export", "check", "robots", "schema",
+        "run", "view", "plot", "export", "check", "robots", "schema", "sweep", "bench",
     }  # fmt: skip
     for command in commands:
         _parser().parse_args(command)

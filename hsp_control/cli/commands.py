@@ -16,6 +16,7 @@ from rich.table import Table
 from hsp_control.cli import robot_table
 from hsp_control.cli.consoles import errors as _errors
 from hsp_control.cli.consoles import out as _out
+from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.config import Experiment, json_schema, load_experiment
 from hsp_control.exceptions import SimulationError
 from hsp_control.robot import Robot
@@ -45,8 +46,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") -> int:
     status = 0
+    stopwatch = Stopwatch()
     try:
-        rollout = _run_with_progress(experiment, screen.on_row if screen else None)
+        rollout = _run_with_progress(
+            experiment, stopwatch, screen.on_row if screen else None
+        )
     except SimulationError as error:
         if not isinstance(error.rollout, Rollout) or not len(error.rollout):
             raise
@@ -56,7 +60,10 @@ def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") ->
         print(f"hsp: stopped by the user at t = {rollout.t[-1]:g} s", file=sys.stderr)
         status = 2
     rollout.save(log)
-    _out.print(_summary(rollout))
+    summary = _summary(rollout)
+    for line in stopwatch.told(rollout):
+        summary.add_row(*line)
+    _out.print(summary)
     _out.print(f"Log: {log}")
     if screen is not None:
         screen.finish(rollout)
@@ -111,7 +118,11 @@ def check(options: argparse.Namespace) -> int:
 
 
 def plot(options: argparse.Namespace) -> int:
-    """Draw a log's figures."""
+    """Draw the figures of a log, or of a sweep."""
+    if options.log.suffix == ".parquet":
+        from hsp_control.cli import sweep as sweeps
+
+        return sweeps.plot(options)
     from hsp_control.plots import save_figures
 
     rollout = Rollout.load(options.log)
@@ -132,6 +143,20 @@ def export(options: argparse.Namespace) -> int:
     from hsp_control.cli import export as exports
 
     return exports.export(options)
+
+
+def sweep(options: argparse.Namespace) -> int:
+    """Run a configuration many times."""
+    from hsp_control.cli import sweep as sweeps
+
+    return sweeps.sweep(options)
+
+
+def bench(options: argparse.Namespace) -> int:
+    """Measure how late a loop against the clock is."""
+    from hsp_control.cli import bench as benches
+
+    return benches.bench(options)
 
 
 def robots(options: argparse.Namespace) -> int:
@@ -172,7 +197,9 @@ def schema(options: argparse.Namespace) -> int:
 
 
 def _run_with_progress(
-    experiment: Experiment, on_row: Callable[[Recorder], None] | None = None
+    experiment: Experiment,
+    stopwatch: Stopwatch,
+    on_row: Callable[[Recorder], None] | None = None,
 ) -> Rollout:
     with Progress(
         TextColumn("{task.description}"),
@@ -184,7 +211,12 @@ def _run_with_progress(
         disable=not _errors.is_terminal,
     ) as progress:
         bar = progress.add_task(experiment.name, total=1.0)
-        return experiment.run(lambda done: progress.update(bar, completed=done), on_row)
+
+        def show(done: float) -> None:
+            stopwatch.lap()
+            progress.update(bar, completed=done)
+
+        return experiment.run(show, on_row)
 
 
 def _summary(rollout: Rollout) -> Table:

@@ -92,8 +92,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_page(view)
 
-    plot = _command(commands, "plot", "draw the figures of a log")
-    plot.add_argument("log", type=Path, metavar="LOG", help="a log written by hsp run")
+    plot = _command(commands, "plot", "draw the figures of a log or a sweep")
+    plot.add_argument(
+        "log", type=Path, metavar="LOG", help="written by hsp run (.npz) or hsp sweep"
+    )
     plot.add_argument("--out", type=Path, metavar="DIR", help="default: beside the log")
     plot.add_argument(
         "--format",
@@ -110,6 +112,8 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     _add_export(_command(commands, "export", "write a log as a page or as a film"))
+    _add_sweep(_command(commands, "sweep", "run a configuration many times"))
+    _add_bench(_command(commands, "bench", "measure a control loop on this machine"))
 
     robots = _command(commands, "robots", "list what can be loaded, or describe one")
     which = robots.add_mutually_exclusive_group()
@@ -196,12 +200,92 @@ def _add_page(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_sweep(sweep: argparse.ArgumentParser) -> None:
+    _add_configuration(sweep)
+    sweep.add_argument(
+        "--over",
+        action="append",
+        default=[],
+        metavar="KEY=VALUES",
+        help="what varies: a,b,c or LOW:HIGH:COUNT or log:LOW:HIGH:COUNT, or (with "
+        "--samples) uniform:LOW:HIGH, loguniform:LOW:HIGH, normal:MEAN:DEVIATION, "
+        "integers:LOW:HIGH; may be repeated",
+    )
+    sweep.add_argument(
+        "--samples", type=int, metavar="N", help="runs; default: every combination"
+    )
+    sweep.add_argument(
+        "--design",
+        metavar="DESIGN",
+        help="grid, random, latin_hypercube or sobol; default: grid without --samples, "
+        "latin_hypercube with them",
+    )
+    sweep.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
+    sweep.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="a Parquet file; what is in it already is not computed again; default: "
+        "out/NAME-sweep.parquet",
+    )
+    sweep.add_argument(
+        "--fresh", action="store_true", help="begin anew, whatever the file holds"
+    )
+    sweep.add_argument(
+        "--workers", type=int, metavar="N", help="processes; default: one a core"
+    )
+    sweep.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="use the workers of this Dask scheduler, such as tcp://host:8786",
+    )
+    sweep.add_argument(
+        "--plot", action="store_true", help="draw what was found, beside the file"
+    )
+
+
+def _add_bench(bench: argparse.ArgumentParser) -> None:
+    bench.add_argument(
+        "--latency",
+        action="store_true",
+        required=True,
+        help="a loop against the clock, beside an empty one",
+    )
+    bench.add_argument(
+        "config",
+        nargs="?",
+        default="panda_obstacle",
+        metavar="CONFIG",
+        help="as for hsp run; default: panda_obstacle",
+    )
+    _add_overrides(bench)
+    bench.add_argument(
+        "--seconds", type=float, default=60.0, metavar="S", help="default: 60"
+    )
+    bench.add_argument(
+        "--rate", type=float, default=1000.0, metavar="HZ", help="default: 1000"
+    )
+    bench.add_argument(
+        "--priority",
+        type=int,
+        metavar="LEVEL",
+        help="real-time priority (SCHED_FIFO), 1 to 99; needs the right to it",
+    )
+    bench.add_argument(
+        "--plot", type=Path, metavar="FILE", help="draw the distributions (.png, ...)"
+    )
+
+
 def _add_configuration(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "config",
         metavar="CONFIG",
         help="a bundled name such as paper/4_moving_obstacle, a YAML file, or a log",
     )
+    _add_overrides(parser)
+
+
+def _add_overrides(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set",
         action="append",

@@ -98,14 +98,31 @@ class Document:
         try:
             keys, text = split_assignment(assignment)
             value, _ = read_yaml(text)
-            path = assign(self._data, keys, value)
         except YamlError as error:
             raise located(origin, error.message) from None
+        except ValueError as error:
+            raise located(origin, str(error)) from None
+        self.assign(keys, value, origin)
+
+    def assign(self, keys: list[str], value: Any, origin: str) -> KeyPath:
+        """Put plain data where the keys lead, and return the key path of that place.
+
+        Args:
+            keys: The parts of the key path, as text; see `override`.
+            value: The data.
+            origin: What stands for the file and line in messages about it.
+
+        Raises:
+            ConfigError: If there is no such place.
+        """
+        try:
+            path = assign(self._data, keys, value)
         except ValueError as error:
             raise located(origin, str(error)) from None
         for inside in [key for key in self._origins if key[: len(path)] == path]:
             del self._origins[inside]
         self._origins[path] = origin
+        return path
 
     def __contains__(self, path: KeyPath) -> bool:
         """Say whether there is a value at the key path."""

@@ -43,12 +43,17 @@ def save_figures(
     for name, figure in figures.items():
         for suffix in formats:
             path = Path(folder) / f"{stem}-{name}.{suffix}"
-            _save(figure, path, suffix)
+            save_figure(figure, path, suffix)
             paths.append(path)
     return paths
 
 
-def _save(figure: Figure, path: Path, suffix: str) -> None:
+def save_figure(figure: Figure, path: Path, suffix: str) -> None:
+    """Write one figure in one format.
+
+    Raises:
+        PlotError: If the format is not known, or the file cannot be written.
+    """
     known = figure.canvas.get_supported_filetypes()
     if suffix not in known:
         raise PlotError(

@@ -1,0 +1,90 @@
+"""How many times faster than real time a rollout is, on one core.
+
+    .venv/bin/python benchmarks/rollouts.py [--rounds N]
+
+First 10 s of a Panda at 1 kHz (6-D pose and joint centering) with a fixed-step plant
+and with RK4, logged every 10 ms and at every step, in turns; then every bundled
+configuration as it is. Logging is included, compiling is not. Processor time is
+counted, not the clock's: other processes on the machine then matter little. Memory is
+what the columns of the log take.
+"""
+
+import argparse
+import statistics
+from time import process_time
+from typing import Any
+
+from hsp_control import Rollout, load_experiment
+from hsp_control.resources import bundled_configs
+
+PANDA: dict[str, Any] = {
+    "robot": {"name": "panda"},
+    "tasks": {
+        "hand": {
+            "type": "frame_pose",
+            "trajectory": {
+                "type": "composed",
+                "position": {
+                    "type": "circle", "origin": "start", "center": [0, 0, 0],
+                    "radius": 0.1, "angular_rate": 2.0, "normal": [0, 0, 1],
+                },
+            },
+            "gains": {"natural_frequency": 10.0},
+            "blend": 1.0,
+        }
+    },
+    "null_space": {"gain": 8.0, "fields": [{"type": "joint_centering", "weight": 2.0}]},
+    "simulation": {"duration": 10.0, "control_period": 0.001},
+}  # fmt: skip
+
+
+def run(config: Any, *overrides: str) -> tuple[float, Rollout]:
+    """Return how many times faster than real time it ran, and the rollout."""
+    experiment = load_experiment(config, *overrides)
+    laps: list[float] = []
+    rollout = experiment.run(lambda done: laps.append(process_time()))
+    return float(rollout.t[-1] - rollout.t[0]) / (laps[-1] - laps[0]), rollout
+
+
+def row(name: str, factors: list[float], rollout: Rollout) -> str:
+    """Return a row of a table."""
+    size = sum(column.nbytes for column in rollout.columns.values()) / len(rollout)
+    error = max(
+        abs(rollout[f"task.{task}.error"]).max() for task in rollout.meta["tasks"]
+    )
+    return (
+        f"| {name} | {statistics.median(factors):.3g} | {min(factors):.3g} to "
+        f"{max(factors):.3g} | {len(rollout)} | {size:.0f} B | {error:.2g} |"
+    )
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=5)
+    rounds = parser.parse_args().rounds
+    head = "| {} | x real time | from, to | rows | a row | largest error |"
+    cases = {
+        f"{name}, a row {logged}": (f"simulation.integrator={{type: {kind}}}", period)
+        for name, kind in (("fixed step", "semi_implicit_euler"), ("RK4", "rk4"))
+        for logged, period in (("every 10 ms", "0.01"), ("every step", "0.001"))
+    }
+    found: dict[str, list[float]] = {name: [] for name in cases}
+    rollouts = {}
+    for _ in range(rounds):
+        for name, (integrator, period) in cases.items():
+            log = f"simulation.log_period={period}"
+            factor, rollouts[name] = run(PANDA, integrator, log)
+            found[name].append(factor)
+    print(head.format("Panda, 10 s at 1 kHz"), "|---|--:|---|--:|--:|--:|", sep="\n")
+    for name, factors in found.items():
+        print(row(name, factors, rollouts[name]))
+    print()
+    print(head.format("configuration"), "|---|--:|---|--:|--:|--:|", sep="\n")
+    for name in bundled_configs():
+        runs = [run(name) for _ in range(rounds)]
+        print(row(f"`{name}`", [factor for factor, _ in runs], runs[-1][1]), flush=True)
+
+
+if __name__ == "__main__":
+    main()

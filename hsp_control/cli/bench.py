@@ -1,0 +1,94 @@
+"""``hsp bench --latency``: a loop against the clock, beside an empty one."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from hsp_control.arrays import Array
+from hsp_control.cli.consoles import errors, out
+from hsp_control.config import load_experiment
+from hsp_control.exceptions import SimulationError
+from hsp_control.latency import (
+    ControlLoop,
+    Latency,
+    Quantiles,
+    measure,
+)
+
+
+def bench(options: argparse.Namespace) -> int:
+    """Run the loop, and print how late it was."""
+    if not 0.0 < options.rate <= 1e5:
+        raise SimulationError(
+            f"--rate {options.rate:g}; must be positive, 100000 Hz at most"
+        )
+    experiment = load_experiment(options.config, *options.overrides)
+    loop = ControlLoop(
+        experiment.controller, experiment.q0, experiment.v0, 1.0 / options.rate
+    )
+    found = _measure(loop, options)
+    out.print(
+        f"{options.config} at {options.rate:g} Hz: {len(found.step)} periods, in turns "
+        "with as many of an empty loop; times in microseconds"
+    )
+    out.print(_table(found))
+    out.print(
+        f"Missed periods: {found.missed} of {len(found.step)}; the empty loop "
+        f"{found.empty_missed} of {len(found.empty)}"
+    )
+    if found.compilations:
+        out.print(f"{found.compilations} kernels were compiled on the clock")
+    if options.plot is not None:
+        _draw(found, options.plot, f"{experiment.name}: a loop at {options.rate:g} Hz")
+    if len(found.step) < round(options.seconds * options.rate):
+        print("hsp: stopped by the user", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _measure(loop: ControlLoop, options: argparse.Namespace) -> Latency:
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeRemainingColumn(),
+        console=errors,
+        transient=True,
+        auto_refresh=False,  # its thread would wake between the loop's steps
+        disable=not errors.is_terminal,
+    ) as progress:
+        bar = progress.add_task(escape(options.config), total=1.0)
+
+        def show(done: float) -> None:
+            progress.update(bar, completed=done, refresh=True)
+
+        return measure(
+            loop, options.seconds, priority=options.priority, on_progress=show
+        )
+
+
+def _table(found: Latency) -> Table:
+    table = Table(box=None, pad_edge=False)
+    table.add_column("")
+    for heading in ("median", "p99", "p99.9", "worst"):
+        table.add_column(heading, justify="right")
+
+    def row(name: str, times: Array) -> None:
+        table.add_row(name, *(f"{1e6 * x:.0f}" for x in Quantiles.of(times)))
+
+    row("step: state and law", found.step)
+    row("the same back to back, off the clock", found.back_to_back)
+    row("wake-up", found.wake)
+    row("wake-up of the empty loop", found.empty)
+    row("from the period's beginning to the effort", found.response)
+    return table
+
+
+def _draw(found: Latency, file: Path, title: str) -> None:
+    from hsp_control.plots import latency_figure, save_figure
+
+    save_figure(latency_figure(found, title), file, file.suffix.lstrip(".") or "png")
+    out.print(f"Figure: {file}")

@@ -1,0 +1,70 @@
+"""A controller and a robot to control, one period at a time."""
+
+from hsp_control.arrays import Array
+from hsp_control.controller import Controller
+from hsp_control.plants import Plant, RigidBodyPlant
+from hsp_control.robot import RobotState
+from hsp_control.simulation import SemiImplicitEuler
+
+
+class ControlLoop:
+    """What runs in a period: `control` on the clock, `move` in the robot's place.
+
+    Attributes:
+        period: Length of a period [s].
+        t: Time [s].
+        q: Configuration, shape (nq,).
+        v: Velocity, shape (nv,).
+        tau: The last effort, shape (nv,).
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        q0: Array,
+        v0: Array,
+        period: float,
+        plant: Plant | None = None,
+    ) -> None:
+        """Stand at the start.
+
+        Args:
+            controller: The controller.
+            q0: Start configuration, shape (nq,).
+            v0: Start velocity, shape (nv,).
+            period: Length of a period [s].
+            plant: What the effort moves; None: the controller's own model.
+        """
+        self._controller = controller
+        self._plant = RigidBodyPlant(controller.robot) if plant is None else plant
+        self._integrator = SemiImplicitEuler(period)
+        self._state = RobotState(controller.robot)
+        self._start = q0.copy(), v0.copy()
+        self.period = period
+        self.restart()
+
+    def restart(self) -> None:
+        """Stand at the start again."""
+        self.periods = 0
+        self.t = 0.0
+        self.q, self.v = (part.copy() for part in self._start)
+        self.tau = self._controller.compute(
+            self._state.update(self.t, self.q, self.v)
+        ).tau
+
+    def control(self) -> None:
+        """Compute the effort: all that a user's loop would do, but for its I/O."""
+        state = self._state.update(self.t, self.q, self.v)
+        self.tau = self._controller.compute(state).tau
+
+    def move(self) -> None:
+        """Let the effort act for a period, in one step."""
+        end = (self.periods + 1) * self.period
+        self.q, self.v = self._integrator.advance(
+            self._controller.robot, self._answer, self.t, end, self.q, self.v
+        )
+        self.periods += 1
+        self.t = end
+
+    def _answer(self, t: float, q: Array, v: Array) -> Array:
+        return self._plant.acceleration(t, q, v, self.tau)

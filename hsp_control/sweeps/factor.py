@@ -1,0 +1,113 @@
+"""A factor: one key path of a configuration and the values that it takes."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hsp_control.config.keys import split_assignment, written
+from hsp_control.exceptions import SweepError
+from hsp_control.sweeps.distributions import Choices, Distribution
+from hsp_control.sweeps.spelling import values
+
+
+@dataclass(frozen=True)
+class Factor:
+    """What is varied, and how.
+
+    Attributes:
+        keys: The parts of the key path, as text.
+        distribution: The values.
+    """
+
+    keys: tuple[str, ...]
+    distribution: Distribution
+
+    @property
+    def name(self) -> str:
+        """The key path with dots: a column of the result."""
+        return written(self.keys)
+
+    @property
+    def origin(self) -> str:
+        """What stands for file and line in messages about its values."""
+        return f"--over {self.name}"
+
+    def description(self) -> dict[str, Any]:
+        """Return what the factor is, as JSON data."""
+        kind = type(self.distribution).__name__
+        numbers = {
+            name: str(value) if value in (-math.inf, math.inf) else value  # not in JSON
+            for name, value in vars(self.distribution).items()
+        }
+        return {"key": self.name, "type": kind, **numbers}
+
+
+def factors(over: Mapping[str, Any] | Iterable[str]) -> tuple[Factor, ...]:
+    """Return the factors of a sweep.
+
+    Args:
+        over: Key paths and their values: texts ``key=values`` as on the command line,
+            or a mapping from key path to such a text, a sequence or a `Distribution`.
+
+    Raises:
+        SweepError: If a key path or values cannot be read, a key comes twice, or there
+            is none.
+    """
+    pairs = over.items() if isinstance(over, Mapping) else map(_split, over)
+    found = [_factor(key, spec) for key, spec in pairs]
+    if not found:
+        raise SweepError(
+            "a sweep varies something: --over null_space.gain=1:20:5, for example"
+        )
+    names = [factor.name for factor in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise SweepError(f"--over {name}: is given twice")
+    return tuple(found)
+
+
+def _split(text: str) -> tuple[str, str]:
+    try:
+        keys, spec = split_assignment(text)
+    except ValueError:
+        raise SweepError(
+            f"--over {text}: needs the form key=values, for example "
+            "null_space.gain=1:20:5"
+        ) from None
+    return written(tuple(keys)), spec
+
+
+def _factor(key: str, spec: Any) -> Factor:
+    try:
+        keys, nothing = split_assignment(f"{key}=")
+    except ValueError:
+        nothing = key
+    if nothing:
+        raise SweepError(f"--over {key}: is no key path such as null_space.gain")
+    try:
+        return Factor(tuple(keys), _distribution(spec))
+    except SweepError as error:
+        raise SweepError(f"--over {key}: {error}") from None
+
+
+def _distribution(spec: Any) -> Distribution:
+    if isinstance(spec, Distribution):
+        return spec
+    if isinstance(spec, str):
+        return values(spec)
+    if isinstance(spec, np.ndarray):
+        spec = spec.tolist()
+    if not isinstance(spec, list | tuple | range):
+        raise SweepError(
+            f"{spec!r} is neither a text such as '1:10:5', nor a list of values, nor "
+            "a distribution"
+        )
+    return Choices(tuple(_plain(value) for value in spec))
+
+
+def _plain(value: Any) -> Any:
+    """Return NumPy's scalars and arrays as Python's, for JSON."""
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value

@@ -1,0 +1,181 @@
+"""Run tasks in processes on this machine.
+
+Each worker is a fresh interpreter that speaks lines of JSON. That needs no
+``if __name__ == "__main__"`` in the user's script and pickles nothing; and where a
+worker dies, it is known which task it was at, which a process pool does not tell.
+"""
+
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Self, TypeAlias
+
+import hsp_control
+from hsp_control.exceptions import SweepError
+from hsp_control.sweeps.running import crashed
+from hsp_control.sweeps.worker import READY, main
+
+_ATTEMPTS = 2
+"""How often a task is begun whose worker dies, before it is held to be the cause."""
+
+_ONE_THREAD = dict.fromkeys(
+    ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1"
+)
+"""The matrices are small: more threads only wait, and take the other workers' cores."""
+
+
+_MAIN = f"from {main.__module__} import main; main()"
+
+_Results: TypeAlias = "queue.SimpleQueue[tuple[int, str] | Exception | None]"
+"""What the threads that feed workers report; None: one of them is done."""
+
+
+class LocalWorkers:
+    """Processes that run tasks, used within a ``with`` block.
+
+    Attributes:
+        count: How many.
+    """
+
+    def __init__(self, count: int) -> None:
+        """Set how many; they start with the first task.
+
+        Raises:
+            SweepError: If there are none.
+        """
+        if count < 1:
+            raise SweepError(f"{count} workers; needs at least 1")
+        self.count = count
+        self._closed = threading.Event()
+        self._processes: dict[int, subprocess.Popen[str]] = {}
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Stop all workers at once; a run in progress is lost."""
+        self._closed.set()
+        with self._lock:
+            for process in self._processes.values():
+                process.kill()
+
+    def map(self, tasks: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+        """Yield every task's result as soon as it is there.
+
+        Args:
+            tasks: Runs and their tasks (`hsp_control.sweeps.plan.Plan.task`).
+
+        Yields:
+            Runs and their results (`hsp_control.sweeps.running.read_result`).
+
+        Raises:
+            SweepError: If workers cannot start.
+        """
+        source = _Shared(iter(tasks))
+        done: _Results = queue.SimpleQueue()
+        for _ in range(self.count):
+            serve = threading.Thread(
+                target=self._serve, args=(source, done), daemon=True
+            )
+            serve.start()
+        serving = self.count
+        while serving:
+            result = done.get()
+            if result is None:
+                serving -= 1
+            elif isinstance(result, BaseException):
+                raise result
+            else:
+                yield result
+
+    def _serve(self, source: "_Shared", done: "_Results") -> None:
+        """Feed one worker until there are no tasks; replace it when it dies."""
+        process: subprocess.Popen[str] | None = None
+        try:
+            while not self._closed.is_set() and (next_one := source.take()):
+                run, task = next_one
+                result, reason = None, ""
+                for _ in range(_ATTEMPTS):
+                    process = process or self._start()
+                    result = _ask(process, task)
+                    if result is not None or self._closed.is_set():
+                        break
+                    reason, process = _end(process), None
+                done.put((run, crashed(reason) if result is None else result))
+        except Exception as error:
+            done.put(error)
+        finally:
+            if process is not None:
+                _end(process)
+            done.put(None)
+
+    def _start(self) -> subprocess.Popen[str]:
+        root = str(Path(hsp_control.__file__).resolve().parents[1])
+        inherited = os.environ.get("PYTHONPATH")
+        path = os.pathsep.join([root, inherited] if inherited else [root])
+        with self._lock:
+            if self._closed.is_set():
+                raise SweepError("the workers are closed")
+            process = subprocess.Popen(
+                # -P: this package is meant, not one in the folder one stands in.
+                [sys.executable, "-P", "-c", _MAIN],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                encoding="utf-8",
+                env={**os.environ, **_ONE_THREAD, "PYTHONPATH": path},
+            )
+            self._processes[process.pid] = process
+        assert process.stdout is not None
+        if process.stdout.readline().strip() != READY:
+            raise SweepError(f"a worker does not start: {_end(process)}")
+        return process
+
+
+class _Shared:
+    """An iterator that several threads take from."""
+
+    def __init__(self, tasks: Iterator[tuple[int, str]]) -> None:
+        self._tasks = tasks
+        self._lock = threading.Lock()
+
+    def take(self) -> tuple[int, str] | None:
+        with self._lock:
+            return next(self._tasks, None)
+
+
+def _ask(process: subprocess.Popen[str], task: str) -> str | None:
+    """Return a worker's answer; None if it died over it."""
+    assert process.stdin is not None
+    assert process.stdout is not None
+    try:
+        process.stdin.write(task + "\n")
+        process.stdin.flush()
+        answer = process.stdout.readline()
+    except OSError:  # its end of the pipe is closed
+        return None
+    return answer if answer.endswith("\n") else None
+
+
+def _end(process: subprocess.Popen[str]) -> str:
+    """Stop a worker, if it has not stopped, and say how it ended."""
+    for pipe in (process.stdin, process.stdout):
+        assert pipe is not None
+        with suppress(OSError):  # what was not yet written to a dead worker
+            pipe.close()
+    code = process.wait()
+    if code >= 0:
+        return f"the worker left with status {code}"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    hint = " (out of memory?)" if name == "SIGKILL" else ""
+    return f"the worker was ended by {name}{hint}"

@@ -1,0 +1,87 @@
+"""What a run is summarised by: a few numbers of its rollout."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.arrays import Array
+from hsp_control.readings import column_unit, distances, effort_unit, task_errors
+from hsp_control.simulation import Rollout
+
+
+class Measure(NamedTuple):
+    """A number that summarises a run.
+
+    Attributes:
+        value: The number.
+        unit: Its unit, a dash for a mere number.
+        meaning: What it is, in a few words.
+    """
+
+    value: float
+    unit: str
+    meaning: str
+
+
+def measures(rollout: Rollout) -> dict[str, Measure]:
+    """Return a run's summary, by the names of a sweep's columns.
+
+    A run that ended early is summarised as far as it came; ``simulated_time`` says how
+    far that is.
+    """
+    if not len(rollout):
+        return {}
+    found: dict[str, Measure] = {}
+    for part in task_errors(rollout):
+        name = f"tracking.{part.label.replace(' ', '.')}"
+        what = f"error of {part.label}"
+        found[f"{name}.rms"] = Measure(_rms(part.norm), part.unit, f"rms {what}")
+        found[f"{name}.max"] = Measure(_most(part.norm), part.unit, f"largest {what}")
+        found[f"{name}.end"] = Measure(
+            float(part.norm[-1]), part.unit, f"{what} at the end"
+        )
+    e_N = rollout["null_space_norm"]
+    unit = column_unit(rollout, "null_space_norm")
+    found["null_space_error.rms"] = Measure(_rms(e_N), unit, "rms null-space error")
+    found["null_space_error.max"] = Measure(
+        _most(e_N), unit, "largest null-space error"
+    )
+    found["null_space_error.end"] = Measure(
+        float(e_N[-1]), unit, "null-space error at the end"
+    )
+    found["manipulability.min"] = Measure(
+        _least(rollout["manipulability"]), "–", "least det(J W⁻¹ Jᵀ)"
+    )
+    found["singular_value.min"] = Measure(
+        _least(rollout["singular_values"]), "–", "least singular value"
+    )
+    found["damped.fraction"] = Measure(
+        float(np.mean(rollout["damped"])), "–", "share of time near a singularity"
+    )
+    for field in distances(rollout):
+        found[f"distance.{field}.min"] = Measure(
+            _least(rollout[f"distance.{field}"]), "m", f"least distance of {field}"
+        )
+    unit = effort_unit(rollout)
+    found["effort.max"] = Measure(_most(np.abs(rollout.tau)), unit, "largest effort")
+    found["effort.rms"] = Measure(
+        _rms(np.linalg.norm(rollout.tau, axis=1)), unit, "rms effort of all joints"
+    )
+    unit = column_unit(rollout, "v")
+    found["speed.max"] = Measure(_most(np.abs(rollout.v)), unit, "largest joint speed")
+    found["simulated_time"] = Measure(
+        float(rollout.t[-1] - rollout.t[0]), "s", "how far the run came"
+    )
+    return found
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _most(values: Array) -> float:
+    return float(values.max())
+
+
+def _least(values: Array) -> float:
+    return float(values.min())

@@ -1,0 +1,81 @@
+"""Run one task: plain text in, plain text out, in whatever process and machine."""
+
+import json
+from functools import cache
+from time import perf_counter
+
+from hsp_control.config.experiment import build
+from hsp_control.exceptions import HspControlError, SimulationError
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.recorder import versions
+from hsp_control.sweeps.metrics import Measure, measures
+from hsp_control.sweeps.plan import document
+from hsp_control.sweeps.row import CRASHED, Row
+
+
+def run_task(task: str) -> str:
+    """Run a task and return its result; nothing is raised, whatever happens.
+
+    Both are JSON: a worker needs no code but this package's, and trusts no other.
+
+    Args:
+        task: See `Plan.task`.
+
+    Returns:
+        The result, for `read_result`.
+    """
+    start = perf_counter()
+    found: dict[str, Measure] = {}
+    try:
+        status, message, rollout = _run(task)
+        if rollout is not None:
+            found = measures(rollout)
+    except Exception as error:  # one run must not end thousands
+        status, message = "failed", f"{type(error).__name__}: {error}"
+    return json.dumps(
+        {
+            "status": status,
+            "message": message,
+            "measures": {name: list(measure) for name, measure in found.items()},
+            "wall_time": perf_counter() - start,
+            "versions": _versions(),
+        }
+    )
+
+
+def crashed(reason: str) -> str:
+    """Return the result of a task whose worker died."""
+    return json.dumps({"status": CRASHED, "message": reason})
+
+
+def read_result(run: int, text: str) -> tuple[Row, dict[str, Measure], dict[str, str]]:
+    """Return a result's row, what it measured, and the versions it was made with."""
+    result = json.loads(text)
+    found = {k: Measure(*measure) for k, measure in result.get("measures", {}).items()}
+    metrics = {name: measure.value for name, measure in found.items()}
+    row = Row(
+        run,
+        result["status"],
+        result["message"],
+        metrics,
+        result.get("wall_time", 0.0),
+    )
+    return row, found, result.get("versions", {})
+
+
+def _run(task: str) -> tuple[str, str, Rollout | None]:
+    try:
+        experiment = build(document(task))
+        rollout = experiment.run()
+    except SimulationError as error:
+        if isinstance(error.rollout, Rollout):
+            return "diverged", str(error.__cause__ or error), error.rollout
+        return "refused", str(error), None
+    except HspControlError as error:
+        return "refused", str(error), None
+    return rollout.status, str(rollout.meta["message"]), rollout
+
+
+@cache
+def _versions() -> dict[str, str]:
+    return versions()

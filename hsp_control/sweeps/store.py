@@ -1,0 +1,123 @@
+"""Where a sweep's rows are kept, from the first run to the finished file."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from hsp_control.config.plain import shown
+from hsp_control.exceptions import SweepError
+from hsp_control.sweeps.journal import Journal, journal_of
+from hsp_control.sweeps.metrics import Measure
+from hsp_control.sweeps.parquet import require_parquet
+from hsp_control.sweeps.plan import Plan
+from hsp_control.sweeps.results import Sweep
+from hsp_control.sweeps.row import CRASHED, Row
+
+
+class Store:
+    """The rows of a sweep: in memory, and in files if it has one.
+
+    Attributes:
+        rows: What is done, by run.
+    """
+
+    def __init__(
+        self, plan: Plan, identity: dict[str, Any], out: Path | None, *, fresh: bool
+    ) -> None:
+        """Take up what files have of the sweep.
+
+        Args:
+            plan: What is to be run.
+            identity: See `Plan.identity`.
+            out: The sweep's file; None: rows are kept in memory alone.
+            fresh: Begin anew, whatever there is.
+
+        Raises:
+            SweepError: If the files are of another sweep, in use, or unwritable.
+        """
+        self.rows: dict[int, Row] = {}
+        self._described: dict[str, Measure] = {}
+        self._plan, self._identity, self._out = plan, identity, out
+        self._journal: Journal | None = None
+        if out is None:
+            return
+        require_parquet()
+        self._journal = Journal(journal_of(out))
+        try:
+            if not fresh:
+                self._resume(out, self._journal)
+        except SweepError:
+            self._journal.close()
+            if self._journal.identity is None:
+                self._journal.path.unlink()
+            raise
+        if self._journal.identity is None or fresh:
+            self._journal.begin(identity)
+
+    @property
+    def pending(self) -> list[int]:
+        """The runs that are left to do."""
+        return [run for run in range(len(self._plan)) if run not in self.rows]
+
+    def add(self, row: Row, found: dict[str, Measure]) -> None:
+        """Keep a row: once this returns, no end of this process loses it."""
+        self.rows[row.run] = row
+        self._described = {**found, **self._described}
+        if self._journal is not None:
+            self._journal.add(row, found)
+
+    def close(self) -> Sweep:
+        """Write the file, of all rows that there are, and return the sweep.
+
+        Raises:
+            SweepError: If it cannot be written; the journal then stays.
+        """
+        sweep = Sweep.collect(
+            self._plan, self._identity, self.rows.values(), self._described
+        )
+        if self._out is not None and self._journal is not None:
+            try:
+                sweep.save(self._out)
+            except SweepError:
+                self._journal.close()
+                raise
+            self._journal.remove()
+        return sweep
+
+    def _resume(self, out: Path, journal: Journal) -> None:
+        if journal.identity is not None:
+            self._compare(journal.path, journal.identity)
+        earlier: list[Row] = []
+        if out.exists():
+            sweep = Sweep.load(out)
+            self._compare(out, sweep.meta["identity"])
+            earlier = sweep.rows()
+            self._described = {
+                name: Measure(0.0, **told)
+                for name, told in sweep.meta["metrics"].items()
+            }
+        self._described = {**self._described, **journal.described}
+        # A run that took a worker with it has no result; it is tried once more.
+        self.rows = {
+            row.run: row for row in [*earlier, *journal.rows] if row.status != CRASHED
+        }
+
+    def _compare(self, path: Path, identity: dict[str, Any]) -> None:
+        for name, own in self._identity.items():
+            other = identity.get(name)
+            if json.dumps(own) != json.dumps(other):
+                raise SweepError(
+                    f"{path}: holds another sweep: {_difference(name, other, own)}; "
+                    "give another --out, or --fresh to begin anew"
+                )
+
+
+def _difference(name: str, other: Any, own: Any) -> str:
+    """Return what differs between two parts of sweeps' identities."""
+    if isinstance(own, dict) and isinstance(other, dict):
+        for key in sorted({*own, *other}):
+            if json.dumps(own.get(key)) != json.dumps(other.get(key)):
+                return _difference(f"{name}.{key}", other.get(key), own.get(key))
+    if name == "model":
+        return "its robot's model is another one"
+    return f"its {name} is {shown(other)}, and not {shown(own)}"

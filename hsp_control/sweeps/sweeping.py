@@ -1,0 +1,149 @@
+"""Run one experiment many times."""
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from hsp_control.config.experiment import build, read_document
+from hsp_control.exceptions import HspControlError, SweepError
+from hsp_control.simulation.recorder import versions
+from hsp_control.sweeps.dask_workers import DaskWorkers
+from hsp_control.sweeps.design import chosen_design, points
+from hsp_control.sweeps.factor import factors
+from hsp_control.sweeps.local_workers import LocalWorkers
+from hsp_control.sweeps.plan import Plan, document, insert
+from hsp_control.sweeps.results import Sweep
+from hsp_control.sweeps.running import read_result
+from hsp_control.sweeps.store import Store
+
+
+def sweep(
+    source: str | PathLike[str] | dict[str, Any],
+    over: Mapping[str, Any] | Iterable[str],
+    *,
+    samples: int | None = None,
+    design: str | None = None,
+    seed: int = 0,
+    out: str | PathLike[str] | None = None,
+    overrides: Iterable[str] = (),
+    workers: int | None = None,
+    scheduler: str | None = None,
+    fresh: bool = False,
+    on_progress: Callable[[int, int, int], None] | None = None,
+) -> Sweep:
+    """Run an experiment with other values, many times, and return what came of it.
+
+    The numbers depend on the arguments above ``out`` alone: not on how many workers
+    there are, in which order they finish, or how often the sweep was interrupted.
+
+    Args:
+        source: A configuration; see `hsp_control.load_experiment`.
+        over: What is varied: key paths of the configuration and their values, as a
+            mapping ``{"null_space.gain": "1:20:5"}`` or as texts ``key=values``. Values
+            are a text (see `hsp_control.sweeps.spelling.values`), a sequence or a
+            `hsp_control.sweeps.Distribution`.
+        samples: How many runs; None: every combination.
+        design: ``grid``, ``random``, ``latin_hypercube`` or ``sobol``; None: the grid
+            without ``samples``, Latin hypercube with them.
+        seed: Of the design.
+        out: A Parquet file. What it or its journal already has of the same sweep is not
+            computed again. None: nothing is written.
+        overrides: Values to change in all runs, each ``key.path=value``.
+        workers: How many processes; None: one a core.
+        scheduler: Address of a Dask scheduler, whose workers are used instead.
+        fresh: Begin anew, whatever ``out`` holds.
+        on_progress: Called with how many runs are done, how many there are, and how
+            many of the done did not complete.
+
+    Returns:
+        The sweep. Ctrl-C ends it early, with all rows computed until then, also in the
+        file; `Sweep.complete` tells.
+
+    Raises:
+        SweepError: If the sweep is ill-defined, its file is another sweep's or cannot
+            be written, or no worker can be had.
+        HspControlError: If the configuration cannot be built with any of the first
+            values. Single runs that are refused, diverge or crash are rows.
+    """
+    varied = factors(over)
+    form = chosen_design(design, samples)
+    base = read_document(source)
+    for assignment in overrides:
+        base.override(assignment)
+    plan = Plan(
+        name=base.name,
+        data=base.to_dict(),
+        factors=varied,
+        design=form,
+        samples=samples,
+        seed=seed,
+        points=points(varied, form, samples, seed),
+    )
+    try:
+        first = plan.first_run()
+    except HspControlError:
+        insert(base, plan.changes(0))
+        build(base)  # says the same, and in which line of the file
+        raise
+    identity = plan.identity(plan.experiment(first))
+    path = None if out is None else Path(out)
+    if path is not None and path.suffix != ".parquet":
+        raise SweepError(f"{path}: the name of a sweep's file ends in .parquet")
+    with _workers(workers, scheduler) as crew:
+        store = Store(plan, identity, path, fresh=fresh)
+        try:
+            with suppress(KeyboardInterrupt):
+                if store.pending:
+                    _compile(plan, first)
+                _work(plan, store, crew, on_progress)
+        except BaseException:
+            store.close()
+            raise
+        return store.close()
+
+
+def _workers(count: int | None, scheduler: str | None) -> LocalWorkers | DaskWorkers:
+    if scheduler is not None:
+        if count is not None:
+            raise SweepError("the scheduler has its own workers: leave --workers out")
+        return DaskWorkers(scheduler)
+    if count is None:
+        count = len(os.sched_getaffinity(0))
+    return LocalWorkers(count)
+
+
+def _compile(plan: Plan, run: int) -> None:
+    """Run one row, so that workers find kernels compiled instead of all compiling."""
+    period = plan.experiment(run).scenario.simulation.log_period
+    short = document(plan.task(run))
+    short.assign(["simulation", "duration"], period, "")
+    with suppress(HspControlError):  # whatever is wrong with that run, its row will say
+        if build(short).run().status == "interrupted":
+            raise KeyboardInterrupt
+
+
+def _work(
+    plan: Plan,
+    store: Store,
+    crew: LocalWorkers | DaskWorkers,
+    on_progress: Callable[[int, int, int], None] | None,
+) -> None:
+    own = versions()
+    failures = sum(row.status != "completed" for row in store.rows.values())
+    if on_progress is not None:
+        on_progress(len(store.rows), len(plan), failures)
+    for run, text in crew.map((run, plan.task(run)) for run in store.pending):
+        row, found, others = read_result(run, text)
+        if others and others != own:
+            name = next(name for name in own if others.get(name) != own[name])
+            raise SweepError(
+                f"a worker has {name} {others.get(name)}, here is {own[name]}: its "
+                "numbers would not be comparable"
+            )
+        store.add(row, found)
+        failures += row.status != "completed"
+        if on_progress is not None:
+            on_progress(len(store.rows), len(plan), failures)
