@@ -396,13 +396,14 @@ def test_the_document_s_film(
 
 # A robot's motion is run coarsely and not to its end: what it does is tested elsewhere.
 QUICK = (*COARSE, "simulation.duration=4")
+SHOWN = {"paper": (), "whole_body": ("simulation.duration=0.6",)}
 
 
 @pytest.mark.parametrize("name", bundled_configs())
 def test_every_configuration_has_its_picture(
     name: str, browser: Any, tmp_path: Path
 ) -> None:
-    overrides = () if name.startswith("paper/") else QUICK
+    overrides = SHOWN.get(name.partition("/")[0], QUICK)
     rollout = load_experiment(name, *overrides).run()
     file = export_html(rollout, tmp_path / "page.html")
     page = open_page(browser, file, (1280, 800))

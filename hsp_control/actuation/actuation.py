@@ -29,7 +29,7 @@ from hsp_control.actuation.yielding import yielding_metric
 from hsp_control.arrays import Array, Indices
 from hsp_control.contacts import Contact
 from hsp_control.limits import Limits
-from hsp_control.limits.acceleration_bounds import acceleration_bounds
+from hsp_control.limits.acceleration_bounds import acceleration_bounds, within
 from hsp_control.resolution import Resolution
 from hsp_control.robot import Robot, RobotState
 
@@ -90,6 +90,7 @@ class Actuation:
         self._weight = 9.81 * self._mass
         self._least, self._greatest = np.full(nv, -np.inf), np.full(nv, np.inf)
         self._low, self._high = np.full(nv, -np.inf), np.full(nv, np.inf)
+        self._nothing = Rows(np.zeros((0, nv)), np.zeros(0), np.zeros(0))
         self._no_support = Support((), nv, self._weight)
         self.forget()
 
@@ -135,14 +136,15 @@ class Actuation:
         if self.limits is None and not self.base.size:
             return Delivered(wanted, a, np.zeros(0), EXACT, 0.0)
         wanted = wanted.copy()
-        forces = np.zeros(support.size)
-        tau = wanted
+        forces, tau = np.zeros(support.size), wanted
         if support.size:
             support.update(state)
             forces = support.least_norm(self.base, wanted[self.base])
             tau = wanted - support.map @ forces
         apart = self._apart(state)
-        moves = self._moves(state, a) and bool((apart.A @ a >= apart.lower).all())
+        moves = self._moves(state, a) and (
+            apart is self._nothing or bool((apart.A @ a >= apart.lower).all())
+        )
         if moves and support.bears(forces) and self._within_efforts(tau):
             tau[self.base] = 0.0
             return Delivered(tau, a, forces, EXACT, 0.0)
@@ -169,25 +171,21 @@ class Actuation:
             self._least,
             self._greatest,
         )
-        return bool((a >= self._least).all() and (a <= self._greatest).all())
+        return within(a, self._least, self._greatest)
 
     def _apart(self, state: RobotState) -> Rows:
         """Return the rows that keep distances, A a ≥ lower."""
         limits = self.limits
-        parts = [(np.zeros((0, state.robot.nv)), np.zeros(0))]
-        if limits is not None:
-            parts += [each.rows(state, limits.bandwidth) for each in limits.distances]
+        if limits is None or not limits.distances:
+            return self._nothing
+        parts = [each.rows(state, limits.bandwidth) for each in limits.distances]
         lower = np.concatenate([b for _, b in parts])
         return Rows(
             np.vstack([A for A, _ in parts]), lower, np.full(len(lower), np.inf)
         )
 
     def _within_efforts(self, tau: Array) -> bool:
-        motors = self._motors
-        return bool(
-            (tau[motors] >= self._low[motors]).all()
-            and (tau[motors] <= self._high[motors]).all()
-        )
+        return within(tau, self._low, self._high)
 
     def _redistribute(
         self, wanted: Array, forces: Array, support: Support

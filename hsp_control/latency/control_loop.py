@@ -2,9 +2,14 @@
 
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller
-from hsp_control.plants import Plant, RigidBodyPlant
+from hsp_control.plants import (
+    ContinuousPlant,
+    IntegratedPlant,
+    RigidBodyPlant,
+    SampledPlant,
+    SemiImplicitEuler,
+)
 from hsp_control.robot import RobotState
-from hsp_control.simulation import SemiImplicitEuler
 
 
 class ControlLoop:
@@ -24,7 +29,7 @@ class ControlLoop:
         q0: Array,
         v0: Array,
         period: float,
-        plant: Plant | None = None,
+        plant: ContinuousPlant | SampledPlant | None = None,
     ) -> None:
         """Stand at the start.
 
@@ -33,11 +38,16 @@ class ControlLoop:
             q0: Start configuration, shape (nq,).
             v0: Start velocity, shape (nv,).
             period: Length of a period [s].
-            plant: What the effort moves; None: the controller's own model.
+            plant: What the effort moves; None: the controller's own model. A continuous
+                one takes one semi-implicit step a period.
         """
         self._controller = controller
-        self._plant = RigidBodyPlant(controller.robot) if plant is None else plant
-        self._integrator = SemiImplicitEuler(period)
+        plant = RigidBodyPlant(controller.robot) if plant is None else plant
+        self._plant = (
+            plant
+            if isinstance(plant, SampledPlant)
+            else IntegratedPlant(plant, SemiImplicitEuler(period))
+        )
         self._state = RobotState(controller.robot)
         self._start = q0.copy(), v0.copy()
         self.period = period
@@ -48,6 +58,8 @@ class ControlLoop:
         self.periods = 0
         self.t = 0.0
         self.q, self.v = (part.copy() for part in self._start)
+        self._plant.reset(self.t, self.q, self.v)
+        self._controller.restart()
         self.tau = self._controller.compute(
             self._state.update(self.t, self.q, self.v)
         ).tau
@@ -60,11 +72,7 @@ class ControlLoop:
     def move(self) -> None:
         """Let the effort act for a period, in one step."""
         end = (self.periods + 1) * self.period
-        self.q, self.v = self._integrator.advance(
-            self._controller.robot, self._answer, self.t, end, self.q, self.v
-        )
+        self._controller.applied(self.tau, self.period)
+        self.q, self.v = self._plant.advance(self.t, end, self.tau)
         self.periods += 1
         self.t = end
-
-    def _answer(self, t: float, q: Array, v: Array) -> Array:
-        return self._plant.acceleration(t, q, v, self.tau)

@@ -51,6 +51,15 @@ def acceleration_bounds(
 
 
 @kernel
+def within(x: Array, least: Array, greatest: Array) -> bool:
+    """Return whether every component is within its bounds."""
+    inside = True
+    for i in range(x.shape[0]):
+        inside = inside and least[i] <= x[i] <= greatest[i]
+    return inside
+
+
+@kernel
 def _narrow(
     low: float, high: float, least: float, greatest: float
 ) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.arrays import Array, Indices
-from hsp_control.kernels import kernel
+from hsp_control.kernels import bind, kernel
 from hsp_control.linalg import orthogonalise_columns, solve_lower
 from hsp_control.metrics.metric import IDENTITY
 from hsp_control.resolution.hierarchy import resolve_levels
@@ -63,6 +63,7 @@ class Resolution:
         self.threshold = threshold
         self._scratch = np.zeros(_scratch_size(m, nv))
         self._a, self.null_space_error = np.zeros(nv), np.zeros(nv)
+        self._bound: tuple[Array | None, bool] = None, True
 
     def resolve(self, v: Array, *, controls_null_space: bool = True) -> Resolved:
         """Return the acceleration that tracks the tasks and the field.
@@ -71,17 +72,21 @@ class Resolution:
             v: Velocity, shape (nv,).
             controls_null_space: False for φ_N = 0, the paper's first simulation.
         """
-        damped, finite = _resolve(
-            self.problem.block,
-            v,
-            self.ends,
-            self._form,
-            self.threshold,
-            controls_null_space,
-            self._scratch,
-            self.null_space_error,
-            self._a,
-        )
+        if v is not self._bound[0] or controls_null_space is not self._bound[1]:
+            self._bound = v, controls_null_space
+            self._law = bind(
+                _resolve,
+                self.problem.block,
+                v,
+                self.ends,
+                self._form,
+                self.threshold,
+                controls_null_space,
+                self._scratch,
+                self.null_space_error,
+                self._a,
+            )
+        damped, finite = self._law()
         return Resolved(self._a, self.null_space_error, damped, finite)
 
     def singular_values(self, first: int = 0) -> Array:

@@ -148,7 +148,8 @@ def _preview(experiment: Experiment) -> Rollout:
     for t in np.linspace(0.0, duration, _PREVIEWED):
         state.update(float(t), experiment.q0, experiment.v0)
         try:
-            recorder.record(state, controller.compute(state))
+            output = controller.compute(state)
+            recorder.record(state, output, output.tau, {})
         except HspControlError:  # as the run may, later
             if not len(recorder.rows(0)["t"]):
                 raise
