@@ -1,4 +1,4 @@
-"""Whole bodies on an engine that knows nothing of the law: the bundled configurations."""
+"""Whole bodies on an engine that knows nothing of the law: bundled configurations."""
 
 from functools import cache
 from pathlib import Path
