@@ -2,9 +2,7 @@
 
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller
-from hsp_control.plants import Plant, RigidBodyPlant
 from hsp_control.robot import RobotState
-from hsp_control.simulation import SemiImplicitEuler
 
 
 class ControlLoop:
@@ -24,7 +22,6 @@ class ControlLoop:
         q0: Array,
         v0: Array,
         period: float,
-        plant: Plant | None = None,
     ) -> None:
         """Stand at the start.
 
@@ -33,11 +30,8 @@ class ControlLoop:
             q0: Start configuration, shape (nq,).
             v0: Start velocity, shape (nv,).
             period: Length of a period [s].
-            plant: What the effort moves; None: the controller's own model.
         """
         self._controller = controller
-        self._plant = RigidBodyPlant(controller.robot) if plant is None else plant
-        self._integrator = SemiImplicitEuler(period)
         self._state = RobotState(controller.robot)
         self._start = q0.copy(), v0.copy()
         self.period = period
@@ -58,13 +52,11 @@ class ControlLoop:
         self.tau = self._controller.compute(state).tau
 
     def move(self) -> None:
-        """Let the effort act for a period, in one step."""
+        """Let the effort act on the model, in one semi-implicit Euler step."""
+        robot = self._controller.robot
         end = (self.periods + 1) * self.period
-        self.q, self.v = self._integrator.advance(
-            self._controller.robot, self._answer, self.t, end, self.q, self.v
-        )
+        h = end - self.t
+        self.v = self.v + h * robot.forward_dynamics(self.q, self.v, self.tau)
+        self.q = robot.integrate(self.q, h * self.v)
         self.periods += 1
         self.t = end
-
-    def _answer(self, t: float, q: Array, v: Array) -> Array:
-        return self._plant.acceleration(t, q, v, self.tau)
