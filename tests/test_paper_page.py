@@ -13,7 +13,7 @@ from PIL import Image
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.config import Experiment
-from hsp_control.plots.readings import joint_positions
+from hsp_control.readings import joint_positions
 
 pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]

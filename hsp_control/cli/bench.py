@@ -28,7 +28,11 @@ def bench(options: argparse.Namespace) -> int:
         )
     experiment = load_experiment(options.config, *options.overrides)
     loop = ControlLoop(
-        experiment.controller, experiment.q0, experiment.v0, 1.0 / options.rate
+        experiment.controller,
+        experiment.q0,
+        experiment.v0,
+        1.0 / options.rate,
+        experiment.plant,
     )
     found = _measure(loop, options)
     out.print(
