@@ -298,8 +298,8 @@ TEXT = """\
 Written by `make bench` (`benchmarks/scaling.py`); do not edit.
 
 One `RobotState.update` and one `Controller.compute` [µs], medians over {rounds}
-interleaved rounds of {block} steps on one core, and the fitted t = a + b nᵖ, n ≥ 1. Near
-a singularity a stack of 18 rows takes some 100 µs more (Jacobi's method). Ratios
+interleaved rounds of {block} steps on one core, and the fitted t = a + b nᵖ, n ≥ 1.
+Near a singularity a stack of 18 rows takes some 100 µs more (Jacobi's method). Ratios
 carry over to another machine, microseconds do not.
 
 ![Time of a step against joints, tasks, fields and obstacles](figures/scaling.png)

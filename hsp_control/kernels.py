@@ -45,7 +45,8 @@ def kernel(function: Function) -> Function:
     function.__qualname__ += f"_{_PACKAGE_STATE}"
     # Without the reference counts of Numba's memory manager, handing over an array
     # costs 6 ns instead of 27, a slice nothing, and what allocates does not compile.
-    compiled = numba.njit(cache=True, error_model="numpy", _nrt=False)(function)
+    njit = cast("Any", numba.njit)  # its types leave this option out
+    compiled = njit(cache=True, error_model="numpy", _nrt=False)(function)
     return cast("Function", compiled)
 
 
