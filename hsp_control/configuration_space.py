@@ -67,6 +67,8 @@ class ConfigurationSpace:
         self.freedom_indices: Indices = own
         fits = home is not None and len(home) == self.nv
         self._home = np.array(home) if fits else None
+        if self._home is not None:  # some SRDFs have a joint stand beyond its limit
+            self._home = np.clip(self._home, *self.position_limits())
 
     def neutral(self) -> Array:
         """Return the configuration with every joint at zero, shape (nq,)."""
