@@ -10,13 +10,8 @@ from matplotlib.figure import Figure
 
 import hsp_control as hsp
 from hsp_control.palette import DESIRED, INK, SERIES
-from hsp_control.plots import (
-    chosen_rows,
-    new_figure,
-    paper_figure,
-    styled,
-    sweep_figure,
-)
+from hsp_control.plots import new_figure, paper_figure, styled, sweep_figure
+from hsp_control.readings import chosen_rows
 
 FOLDER = Path(__file__).parent / "figures"
 GAIN, FREQUENCY = 4.0, 6.0

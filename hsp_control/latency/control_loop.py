@@ -2,9 +2,11 @@
 
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller
+from hsp_control.exceptions import SimulationError
 from hsp_control.plants import (
     ContinuousPlant,
     IntegratedPlant,
+    Plant,
     RigidBodyPlant,
     SampledPlant,
     SemiImplicitEuler,
@@ -29,7 +31,7 @@ class ControlLoop:
         q0: Array,
         v0: Array,
         period: float,
-        plant: ContinuousPlant | SampledPlant | None = None,
+        plant: Plant | None = None,
     ) -> None:
         """Stand at the start.
 
@@ -43,11 +45,11 @@ class ControlLoop:
         """
         self._controller = controller
         plant = RigidBodyPlant(controller.robot) if plant is None else plant
-        self._plant = (
-            plant
-            if isinstance(plant, SampledPlant)
-            else IntegratedPlant(plant, SemiImplicitEuler(period))
-        )
+        if isinstance(plant, ContinuousPlant):
+            plant = IntegratedPlant(plant, SemiImplicitEuler(period))
+        if not isinstance(plant, SampledPlant):
+            raise SimulationError(f"{type(plant).__name__} is no plant that can move")
+        self._plant = plant
         self._state = RobotState(controller.robot)
         self._start = q0.copy(), v0.copy()
         self.period = period
