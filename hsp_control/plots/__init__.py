@@ -1,5 +1,7 @@
 """Figures of a run, drawn from its log alone."""
 
+from hsp_control.readings import chosen_rows as chosen_rows
+
 from .conditioning import draw_manipulability as draw_manipulability
 from .conditioning import draw_singular_values as draw_singular_values
 from .figures import diagnostics_figure as diagnostics_figure
