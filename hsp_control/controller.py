@@ -291,6 +291,11 @@ class Controller:
             raise ControllerError("nothing has been computed yet")
         return self._mode
 
+    def stack(self, state: RobotState) -> TaskSample:
+        """Return the rows of all contacts and tasks that count at a state."""
+        self._scheduled(state)
+        return self.mode.stack
+
     def level_of(self, task: str) -> int:
         """Return the level that a task is at, 0 the highest.
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.robot import Robot
 from hsp_control.viewer import threejs
 from hsp_control.viewer.appearance import ARROW_RADIUS, CONTACT
@@ -12,7 +13,7 @@ from hsp_control.viewer.clip import Track
 from hsp_control.viewer.commands import Command, set_object
 from hsp_control.viewer.element import element
 from hsp_control.viewer.motion import Motion
-from hsp_control.viewer.surfaces import material
+from hsp_control.viewer.surfaces import material, seen_through
 
 _PREFIX, _FORCE, _PLACE = "contact.", ".force", ".position"
 _WEIGHT = 0.5
@@ -40,7 +41,7 @@ class Contacts:
     def draw(self, size: float) -> Iterator[Command]:
         """Yield what puts it into a scene of some size [m]."""
         for name in self._names:
-            surface = material(CONTACT, glow=0.5)
+            surface = seen_through(material(CONTACT, glow=0.5))  # legs are thick
             arrow = unit_arrow(surface, ARROW_RADIUS * self._size)
             yield set_object(self._path(name, "force"), arrow)
             ball = threejs.sphere(1.5 * ARROW_RADIUS * self._size)
@@ -52,7 +53,7 @@ class Contacts:
         """Yield how it moves along the run; a contact without force is not shown."""
         times = motion.times
         for name in self._names:
-            place = motion.rows[f"{_PREFIX}{name}{_PLACE}"]
+            place = _held(motion.rows[f"{_PREFIX}{name}{_PLACE}"])
             force = motion.rows[f"{_PREFIX}{name}{_FORCE}"]
             arrows = _WEIGHT * self._size / self._weight * force
             radius = ARROW_RADIUS * self._size
@@ -69,3 +70,12 @@ class Contacts:
 
     def _path(self, name: str, kind: str) -> str:
         return f"{self._root}/{element(name)}/{kind}"
+
+
+def _held(places: Array) -> Array:
+    """Return places with those of a contact that is off, which are NaN, held."""
+    known = np.flatnonzero(np.isfinite(places).all(axis=1))
+    if not known.size:
+        return np.zeros_like(places)
+    latest = np.searchsorted(known, np.arange(len(places)), side="right") - 1
+    return np.asarray(places[known[np.maximum(latest, 0)]])

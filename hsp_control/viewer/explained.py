@@ -23,11 +23,12 @@ def terms(field: NullSpaceField, kind: type[_Term]) -> Iterator[_Term]:
 
 
 def null_space_projector(controller: Controller, state: RobotState) -> Array:
-    """Return P = I - J#J of all tasks in the controller's metric, shape (nv, nv).
+    """Return P = I - J#J in the controller's metric, shape (nv, nv).
 
-    J# = W⁻¹Jᵀ(J W⁻¹Jᵀ)⁻¹; where the tasks lose rank, P is that of the rank left.
+    J has the rows of all that counts at the state's time, contacts and tasks, and
+    J# = W⁻¹Jᵀ(J W⁻¹Jᵀ)⁻¹; where they lose rank, P is that of the rank left.
     """
-    J = np.vstack([task.evaluate(state).jacobian for task in controller.tasks])
+    J = controller.stack(state).jacobian
     nv = controller.robot.nv
     metric = controller.metric.evaluate(state, MetricSample.allocate(nv))
     # With W = L Lᵀ, P = L⁻ᵀ (I - B⁺B) Lᵀ for B = J L⁻ᵀ.
