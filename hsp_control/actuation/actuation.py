@@ -90,6 +90,7 @@ class Actuation:
         self._weight = 9.81 * self._mass
         self._least, self._greatest = np.full(nv, -np.inf), np.full(nv, np.inf)
         self._low, self._high = np.full(nv, -np.inf), np.full(nv, np.inf)
+        self._no_forces = np.zeros(0)
         self._nothing = Rows(np.zeros((0, nv)), np.zeros(0), np.zeros(0))
         self._no_support = Support((), nv, self._weight)
         self.forget()
@@ -134,7 +135,7 @@ class Actuation:
         """
         wanted = state.inverse_dynamics(a)  # M a + N
         if self.limits is None and not self.base.size:
-            return Delivered(wanted, a, np.zeros(0), EXACT, 0.0)
+            return Delivered(wanted, a, self._no_forces, EXACT, 0.0)
         wanted = wanted.copy()
         forces, tau = np.zeros(support.size), wanted
         if support.size:
