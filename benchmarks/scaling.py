@@ -110,11 +110,37 @@ def obstacles() -> Iterator[Point]:
         yield n, robot, {"this law": Law(panda_pose(robot, field))}
 
 
+def levels() -> Iterator[Point]:
+    """Ever more levels of a chain of 40 joints, a position each; and a rival below.
+
+    The rival wants the first position elsewhere, which calls the recursion.
+    """
+    robot = chain(40)
+    frames = [f"link{40 - 6 * k}" for k in range(5)]
+    paths = circles(robot, frames)
+    positions = [
+        hsp.FramePosition(robot, frame, path, GAINS)
+        for frame, path in zip(frames, paths, strict=True)
+    ]
+    away = hsp.Hold(paths[0].center + 0.3)
+    rival = hsp.FramePosition(robot, frames[0], away, GAINS, name="rival")
+    posture = TargetPosture(robot, bent(robot))
+
+    def law(stack: list[list[hsp.Task]]) -> Law:
+        return Law(hsp.Controller(robot, stack, posture, singularity_threshold=1e-3))
+
+    for n in range(1, 6):
+        upper: list[list[hsp.Task]] = [[task] for task in positions[:n]]
+        contested = [*upper[:-1], [*upper[-1], rival]]
+        yield n, robot, {"this law": law(upper), "in conflict": law(contested)}
+
+
 SERIES: dict[str, Callable[[], Iterator[Point]]] = {
     "joints": joints,
     "tasks": tasks,
     "fields": fields,
     "obstacles": obstacles,
+    "levels": levels,
 }
 
 
@@ -302,7 +328,7 @@ interleaved rounds of {block} steps on one core, and the fitted t = a + b nᵖ, 
 Near a singularity a stack of 18 rows takes some 100 µs more (Jacobi's method). Ratios
 carry over to another machine, microseconds do not.
 
-![Time of a step against joints, tasks, fields and obstacles](figures/scaling.png)
+![Time of a step against joints, tasks, fields, obstacles, levels](figures/scaling.png)
 
 """
 ABOUT = {
@@ -310,6 +336,8 @@ ABOUT = {
     "tasks": "Positions of a chain of 40 joints, 3 rows each, posture beside them",
     "fields": "A Panda's pose; centering, limit barrier, posture, manipulability, "
     "inverse condition and transmission, in this order",
+    "levels": "Positions of a chain of 40 joints, one a level; in conflict: with a "
+    "rival of the first one at the lowest level",
     "obstacles": "A Panda's pose, posture, and moving balls against its 12 capsules",
 }
 
@@ -324,7 +352,7 @@ def table(what: str, found: dict[str, Array]) -> str:
         a, b, p = growth(rows)
         cells = "".join(f" {t:.1f} |" for t in rows[:, 1])
         text += f"| {name} |{cells} {a:.1f} + {b:.2g} n^{p:.2f} |\n"
-    if len(found) == 2:
+    if "TSID" in found:
         ratio = found["this law"][:, 1] / found["TSID"][:, 1]
         text += "| ratio |" + "".join(f" {r:.2f} |" for r in ratio) + " |\n"
     return text + "\n"
