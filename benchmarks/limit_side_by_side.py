@@ -74,7 +74,7 @@ def tsid_of(experiment: Experiment, limits: hsp.Limits, weight: float) -> Comput
 
     robot, (task,) = experiment.robot, experiment.controller.tasks
     assert isinstance(task, hsp.FramePosition)
-    field, q0 = experiment.controller.field, experiment.q0
+    controller, q0 = experiment.controller, experiment.q0
     model, nv = robot.model, robot.nv
     peer = tsid.RobotWrapper(model, tsid.FIXED_BASE_SYSTEM, False)
     problem = tsid.InverseDynamicsFormulationAccForce("tsid", peer, False)
@@ -88,8 +88,7 @@ def tsid_of(experiment: Experiment, limits: hsp.Limits, weight: float) -> Comput
     problem.addMotionTask(hand, 1.0, 1, 0.0)
 
     # g is linear in q: its slope and its zero, from two of its values.
-    still, rates = hsp.RobotState(robot), np.zeros(nv)
-    controller = experiment.controller
+    still = hsp.RobotState(robot)
 
     def flow(q: Array) -> Array:
         controller.compute(still.update(0.0, q, np.zeros(nv)))
@@ -99,7 +98,6 @@ def tsid_of(experiment: Experiment, limits: hsp.Limits, weight: float) -> Comput
     rates = -(flow(q0 + step) - flow(q0)) / step
     goal = q0 + flow(q0) / rates
     gain = float(controller.null_space_gain[0, 0])
-    del field
     posture = tsid.TaskJointPosture("posture", peer)
     posture.setKp(gain * rates)
     posture.setKd(gain + rates)
@@ -152,7 +150,7 @@ def close_loop(experiment: Experiment, compute: Compute) -> Run:
     def accelerate(t: float, q: Array, v: Array) -> Array:
         return plant.acceleration(t, q, v, tau)
 
-    for k in range(round(experiment.duration / PERIOD)):
+    for k in range(round(experiment.scenario.simulation.duration / PERIOD)):
         t = k * PERIOD
         try:
             tau[:] = compute(t, q, v)

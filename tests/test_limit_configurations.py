@@ -48,7 +48,8 @@ def test_half_strength() -> None:
     first = int(np.flatnonzero(limited)[0])
     soon = slice(first, first + 60)
     assert np.abs(error(ours)[soon] - error(free)[soon]).max() < 1e-5
-    assert ours["null_space_norm"][soon].max() > 10.0 * free["null_space_norm"].max() / 5
+    assert ours["null_space_norm"][soon].max() > 0.3
+    assert free["null_space_norm"][soon].max() < 0.03
 
 
 def test_towards_a_joint_limit() -> None:

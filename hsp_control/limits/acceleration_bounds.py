@@ -52,8 +52,10 @@ def acceleration_bounds(
         rising = 2.0 * bandwidth * (velocity[i] - v[i])
         if slowing > 0.0:
             slowing *= _STEEPER
+            rising = max(rising, slowing)
         if rising < 0.0:
             rising *= _STEEPER
+            slowing = min(slowing, rising)
         low, high = _narrow(low, high, slowing, rising)
         low, high = _narrow(low, high, -acceleration[i], acceleration[i])
         least[i], greatest[i] = low, high
