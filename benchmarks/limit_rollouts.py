@@ -2,8 +2,8 @@
 
     .venv/bin/python benchmarks/limit_rollouts.py [--rollouts N] [--pushes N]
 
-Each number is found in the log alone: positions, velocities and efforts of every step of
-1 ms, and the differences of efforts. The tables are written into docs/limits.md.
+Each number is found in the log alone: positions, velocities and efforts of every step
+of 1 ms, and the differences of efforts. The tables are written into docs/limits.md.
 """
 
 import argparse
@@ -68,8 +68,8 @@ def draw(seed: int) -> tuple[hsp.Controller, hsp.Limits, Array]:
     """Return a controller that its limits will meet, these, and a start.
 
     70 to 100 % of the arm's efforts, 20 to 50 % of its speeds, 1000 N·m/s, its joint
-    ranges; the hand is asked to go round a circle of 20 cm at 1 to 6 rad/s, up to a metre
-    from where it is: mostly more than that allows, often out of reach.
+    ranges; the hand is asked to go round a circle of 20 cm at 1 to 6 rad/s, up to a
+    metre from where it is: mostly more than that allows, often out of reach.
     """
     robot, rng = panda(), np.random.default_rng(seed)
     lower, upper = robot.position_limits()
@@ -173,8 +173,8 @@ def arm_table(runs: list[Arm]) -> str:
     met = sum(run.limited + run.relaxed > 0 for run in runs)
     ratio = np.nanmedian([run.limited_step / run.exact_step for run in runs])
     return lines + (
-        f"\n{len(runs)} rollouts of 0.8 s, {rows} steps, {len(runs)} "
-        f"begun and {sum(run.completed for run in runs)} completed. Limits were met in "
+        f"\n{len(runs)} rollouts of 0.8 s, {rows} steps, "
+        f"{sum(run.completed for run in runs)} completed. Limits were met in "
         f"{met} of them: {100 * limited:.1f} % of all steps are limited (status 2), "
         f"{relaxed} steps in {with_relaxed} rollouts relaxed (status 3: barriers that "
         "the efforts cannot keep; the worst was missed by "
@@ -280,9 +280,13 @@ def push(legs: Legs, seed: int) -> Pushed:
         sunk=sunk,
         tilted=float(tilted),
         moved=float(moved.max()),
-        asked=max(float(np.nanmax(rollout[f"contact.{n}.friction_used"])) for n in names),
+        asked=max(
+            float(np.nanmax(rollout[f"contact.{n}.friction_used"])) for n in names
+        ),
         answered=max(cone_used(rollout[end], legs.ground) for end in ends),
-        pulls=sum(int((rollout[f"contact.{n}.force"][:, 2] < 0.0).sum()) for n in names),
+        pulls=sum(
+            int((rollout[f"contact.{n}.force"][:, 2] < 0.0).sum()) for n in names
+        ),
         relaxed=int((rollout["status"] == RELAXED).sum()),
         rows=len(rollout),
         after=float(moved[-200:].max()),

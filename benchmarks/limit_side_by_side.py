@@ -1,6 +1,6 @@
 """An arm that meets its limits: this law with and without them, and TSID.
 
-    .venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/limit_side_by_side.py
+    .venv-peers/bin/python benchmarks/limit_side_by_side.py
 
 The configurations of configs/limits on rigid bodies at 1 kHz; without TSID its rows are
 left out. Writes a table into docs/limits.md and draws docs/figures/limits.png.
@@ -21,6 +21,7 @@ from hsp_control.plots import new_figure, styled
 
 PERIOD = 1e-3  # [s]
 NAMES = ("panda_half_strength", "panda_towards_limit")
+SHOWN = ("this law, limits", "this law, no limits", "TSID, posture 1e-03")
 Compute = Callable[[float, Array, Array], Array]
 
 
@@ -114,7 +115,10 @@ def tsid_of(experiment: Experiment, limits: hsp.Limits, weight: float) -> Comput
 
     solver = tsid.SolverHQuadProgFast("qp")
     solver.resize(problem.nVar, problem.nEq, problem.nIn)
-    hand_sample, posture_sample = tsid.TrajectorySample(12, 6), tsid.TrajectorySample(nv)
+    hand_sample, posture_sample = (
+        tsid.TrajectorySample(12, 6),
+        tsid.TrajectorySample(nv),
+    )
     posture_sample.value(goal)
     posture_sample.derivative(np.zeros(nv))
     place, rate, rate_dot = np.zeros(12), np.zeros(6), np.zeros(6)
@@ -188,8 +192,8 @@ def runs_of(name: str) -> tuple[dict[str, Run], hsp.Limits]:
         print("TSID is not installed: make bench")
     else:
         for weight in (1e-3, 1e-5):
-            controllers[f"TSID, posture {weight:.0e}"] = (
-                lambda weight=weight: tsid_of(load(free), limits, weight)
+            controllers[f"TSID, posture {weight:.0e}"] = lambda weight=weight: tsid_of(
+                load(free), limits, weight
             )
     return {
         label: close_loop(load(free), make()) for label, make in controllers.items()
@@ -229,7 +233,7 @@ def figure(found: dict[str, tuple[dict[str, Run], hsp.Limits]]) -> Figure:
     for column, name in enumerate((half, towards)):
         runs, limits = found[name]
         top, middle, bottom = axes[:, column]
-        labels = [label for label in runs if "clipped" not in label and "1e-05" not in label]
+        labels = [label for label in SHOWN if label in runs]
         for color, label in zip(SERIES, labels, strict=False):
             run = runs[label]
             style = {"color": color, "lw": 1.3, "label": label}

@@ -294,7 +294,7 @@ def test_contradiction_is_relaxed_and_told() -> None:
 
 
 def test_least_violation_is_the_least() -> None:
-    """However far the law's acceleration is: against the same programme, solved alone."""
+    """However far the law's acceleration is: against the same programme, alone."""
     rng = np.random.default_rng(3)
     effort = rng.standard_normal((3, 5))
     hard = Rows(effort, np.full(3, -1.0), np.full(3, 1.0))

@@ -39,9 +39,9 @@ else does. With 1e-8 and less the solver takes Talos' programmes for infeasible.
 _ORDER = {"contacts": 1e3, "distances": 30.0, "motion": 1.0}
 """What yields last has the greatest cost, where limits contradict each other."""
 _INDIFFERENT, _ROUNDS = 1e-4, 4
-"""Cost of all else, while the least violation is looked for; and how often it is looked
-for about what the last round found: the cost is of the difference, so that it fades.
-Accelerations of 1e3 rad/s², as a far target asks for, would else outweigh a violation."""
+"""Cost of all else, while the least violation is looked for; and how often it is
+looked for about what the last round found: the cost is of the difference, so it fades.
+Else 1e3 rad/s², as a far target asks for, would outweigh a violation."""
 
 
 class Delivered(NamedTuple):
@@ -317,12 +317,10 @@ def _padded(rows: Rows, before: int, after: int) -> Rows:
     return rows._replace(A=np.pad(rows.A, ((0, 0), (before, after))))
 
 
-def _relax(
-    hard: Rows, soft: Mapping[str, Rows]
-) -> tuple[Rows, Array | None, float]:
+def _relax(hard: Rows, soft: Mapping[str, Rows]) -> tuple[Rows, Array | None, float]:
     """Return soft rows widened by the least violation that the hard rows leave.
 
-    Also an x within them, and the worst violation; (rows, None, inf) where none is found.
+    Also an x within them, and the worst violation; rows, None, inf if none is found.
 
     Joints pass their bounds before things come too near, and before contacts move; none
     of them more than is needed.

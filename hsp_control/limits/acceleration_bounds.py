@@ -6,9 +6,9 @@ from hsp_control.arrays import Array, Indices
 from hsp_control.kernels import kernel
 
 _STEEPER = 4.0
-"""How much steeper the velocity's barrier is beyond the guarded speed. An effort that is
-held while it changes at 1000 N·m/s is wrong by M⁻¹·0.5 N·m at the end of 1 ms, up to half
-a rad/s² on a Panda for as long as it changes; within the margin this must be held."""
+"""How much steeper the velocity's barrier is beyond the guarded speed. With efforts
+held for 1 ms that change at 1000 N·m/s the acceleration is wrong by M⁻¹·0.5 N·m, half a
+rad/s² on a Panda, for as long as they change: the margin must be enough for it."""
 
 
 @kernel
