@@ -19,7 +19,7 @@ from rich.progress import track
 
 import hsp_control as hsp
 from hsp_control.actuation import LIMITED, RELAXED
-from hsp_control.arrays import Array
+from hsp_control.arrays import Array, Indices
 
 T = TypeVar("T")
 PERIOD = 1e-3  # [s]
@@ -143,7 +143,7 @@ def parts(rollout: hsp.Rollout, limits: hsp.Limits) -> tuple[Array, ...]:
     )
 
 
-def step_time(controller: hsp.Controller, rollout: hsp.Rollout, rows: Array) -> float:
+def step_time(controller: hsp.Controller, rollout: hsp.Rollout, rows: Indices) -> float:
     """Return the median time of some of the steps, taken again; NaN of none [s]."""
     rows, times = rows[rows > 0][:40], []
     for k in rows:
@@ -158,7 +158,7 @@ def step_time(controller: hsp.Controller, rollout: hsp.Rollout, rows: Array) -> 
 def arm_table(runs: list[Arm]) -> str:
     """Return what all rollouts of the arm showed."""
     rows = sum(run.rows for run in runs)
-    violated = sum(run.violated for run in runs)
+    violated = np.sum([run.violated for run in runs], axis=0)
     excess = np.max([run.excess for run in runs], axis=0)
     used = np.array([run.used for run in runs])
     lines = "| limit | steps beyond it | nearest to it, or worst beyond | 99 % of it "
@@ -246,7 +246,7 @@ class Pushed(NamedTuple):
 def weight(name: str) -> float:
     """Return a configuration's robot's weight [N]."""
     model = hsp.load_experiment(f"whole_body/{name}").robot.model
-    return 9.81 * sum(inertia.mass for inertia in model.inertias)
+    return 9.81 * float(sum(inertia.mass for inertia in model.inertias))
 
 
 def push(legs: Legs, seed: int) -> Pushed:
