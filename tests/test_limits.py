@@ -31,6 +31,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.actuation import EXACT, LIMITED
+from hsp_control.actuation.actuation import _relax
 from hsp_control.actuation.programme import Rows, solve
 from hsp_control.actuation.yielding import yielding_metric
 from hsp_control.exceptions import LimitError
@@ -82,6 +83,17 @@ def test_bounds_are_the_barriers() -> None:
     np.testing.assert_allclose(greatest, expected, rtol=1e-14)
     expected = np.maximum(-64.0 * (q - lower) - 16.0 * v, -16.0 * (limits.velocity + v))
     np.testing.assert_allclose(least, expected, rtol=1e-14)
+
+
+def test_too_fast_is_slowed_down_more_steeply() -> None:
+    """Beyond the guarded speed the barrier is four times as steep."""
+    limits = Limits(panda(), velocity=1.0, position=None, bandwidth=8.0)
+    guarded = limits.guarded_velocity[0]
+    for excess, slope in ((-0.01, 16.0), (0.01, 64.0)):
+        _, greatest = bounds(limits, panda().home(), np.full(7, guarded + excess))
+        np.testing.assert_allclose(greatest, -slope * excess, rtol=1e-12)
+        least, _ = bounds(limits, panda().home(), np.full(7, -guarded - excess))
+        np.testing.assert_allclose(least, slope * excess, rtol=1e-12)
 
 
 @given(seeds)
@@ -279,6 +291,26 @@ def test_contradiction_is_relaxed_and_told() -> None:
     assert (np.abs(out.tau) <= 1.0).all()
     assert out.status > LIMITED
     assert 0.0 < out.relaxation < np.inf
+
+
+def test_least_violation_is_the_least() -> None:
+    """However far the law's acceleration is: against the same programme, alone."""
+    rng = np.random.default_rng(3)
+    effort = rng.standard_normal((3, 5))
+    hard = Rows(effort, np.full(3, -1.0), np.full(3, 1.0))
+    for far in (1.0, 1e4):
+        center = far * rng.standard_normal(5)
+        soft = Rows(np.eye(5), center - 0.1, center + 0.1)
+        _, x, relaxation = _relax(hard, {"motion": soft})
+        assert x is not None
+        H = np.diag(np.concatenate([np.full(5, 1e-9), np.ones(5)]))
+        rows = Rows(
+            np.block([[effort, np.zeros((3, 5))], [np.eye(5), np.eye(5)]]),
+            np.concatenate([hard.lower, soft.lower]),
+            np.concatenate([hard.upper, soft.upper]),
+        )
+        least = np.abs(oracle(H, np.zeros(10), rows)[5:]).max()
+        assert relaxation == pytest.approx(least, rel=1e-5)
 
 
 def test_effort_rate_needs_to_know_what_went_out() -> None:

@@ -38,8 +38,10 @@ _FORCE_COST = 1e-6
 else does. With 1e-8 and less the solver takes Talos' programmes for infeasible."""
 _ORDER = {"contacts": 1e3, "distances": 30.0, "motion": 1.0}
 """What yields last has the greatest cost, where limits contradict each other."""
-_INDIFFERENT = 1e-4
-"""Cost of all else, while the least violation is looked for."""
+_INDIFFERENT, _ROUNDS = 1e-4, 4
+"""Cost of all else, while the least violation is looked for; and how often it is
+looked for about what the last round found: the cost is of the difference, so it fades.
+Else 1e3 rad/s², as a far target asks for, would outweigh a violation."""
 
 
 class Delivered(NamedTuple):
@@ -242,8 +244,9 @@ class Actuation:
         x = solve(H, f, stacked(*hard, *soft.values()))
         status, relaxation = LIMITED, 0.0
         if x is None:
-            widened, relaxation = _relax(stacked(*hard), soft)
+            widened, least, relaxation = _relax(stacked(*hard), soft)
             x = solve(H, f, stacked(*hard, widened))
+            x = least if x is None else x
             status = RELAXED
         if x is None:  # beyond what the solver can do: still no effort beyond limits
             tau = np.clip(wanted - support.map @ forces, self._low, self._high)
@@ -315,8 +318,10 @@ def _padded(rows: Rows, before: int, after: int) -> Rows:
     return rows._replace(A=np.pad(rows.A, ((0, 0), (before, after))))
 
 
-def _relax(hard: Rows, soft: Mapping[str, Rows]) -> tuple[Rows, float]:
+def _relax(hard: Rows, soft: Mapping[str, Rows]) -> tuple[Rows, Array | None, float]:
     """Return soft rows widened by the least violation that the hard rows leave.
+
+    Also an x within them, and the worst violation; rows, None, inf if none is found.
 
     Joints pass their bounds before things come too near, and before contacts move; none
     of them more than is needed.
@@ -326,11 +331,19 @@ def _relax(hard: Rows, soft: Mapping[str, Rows]) -> tuple[Rows, float]:
     cost = np.concatenate(
         [np.full(len(some.A), _ORDER[kind]) for kind, some in soft.items()]
     )
-    H = np.diag(np.concatenate([np.full(n, _INDIFFERENT), cost]))
+    weights = np.concatenate([np.full(n, _INDIFFERENT), cost])
+    H, center = np.diag(weights), np.zeros(n + s)
     softened = Rows(np.hstack([rows.A, np.eye(s)]), rows.lower, rows.upper)
-    x = solve(H, np.zeros(n + s), stacked(_padded(hard, 0, s), softened))
+    everything = stacked(_padded(hard, 0, s), softened)
+    x = None
+    for _ in range(_ROUNDS):
+        nearer = solve(H, -weights * center, everything)
+        if nearer is None:
+            break
+        x = nearer
+        center[:n] = x[:n]
     if x is None:
-        return rows, np.inf
+        return rows, None, np.inf
     reached = rows.A @ x[:n]
     slack = 1e-7 * (1.0 + np.abs(reached))
     widened = Rows(
@@ -338,4 +351,4 @@ def _relax(hard: Rows, soft: Mapping[str, Rows]) -> tuple[Rows, float]:
         np.minimum(rows.lower, reached - slack),
         np.maximum(rows.upper, reached + slack),
     )
-    return widened, float(np.abs(x[n:]).max(initial=0.0))
+    return widened, x[:n], float(np.abs(x[n:]).max(initial=0.0))

@@ -156,7 +156,7 @@ def build(document: Document) -> Experiment:
     ]
     metric = build_metric(document, scenario.null_space.metric, robot)
     field = build_fields(document, scenario.null_space.fields, start, scene)
-    with document.at("base"):
+    with document.at("contacts" if contacts and scenario.base is None else "base"):
         check_support(robot, contacts, scenario.base)
     limits = build_limits(document, scenario.limits, robot, scene)
     schedules = build_schedules(document, scenario.tasks)

@@ -25,9 +25,10 @@ class Limits:
         velocity        a ≤ 2α (v_max - v)
         acceleration    a ≤ a_max
 
-    and alike from below; distances have barriers of their own, see `MinimumDistance`.
-    Where limits contradict each other, acceleration yields to velocity, velocity to
-    position, position to distance, and all of them to the effort.
+    and alike from below, the velocity's four times as steep within its margin.
+    Distances have barriers of their own, see `MinimumDistance`. Where limits contradict
+    each other, acceleration yields to velocity, velocity to position, position to
+    distance, and all of them to the effort.
 
     Attributes:
         robot: The robot.

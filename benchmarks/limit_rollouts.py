@@ -1,0 +1,370 @@
+"""Count violations of limits: a thousand rollouts of an arm, and pushes on legs.
+
+    .venv/bin/python benchmarks/limit_rollouts.py [--rollouts N] [--pushes N]
+
+Each number is found in the log alone: positions, velocities and efforts of every step
+of 1 ms, and the differences of efforts. The tables are written into docs/limits.md.
+"""
+
+import argparse
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache
+from time import process_time
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from marked import DOCS, replace_part
+from rich.progress import track
+
+import hsp_control as hsp
+from hsp_control.actuation import LIMITED, RELAXED
+from hsp_control.arrays import Array, Indices
+
+T = TypeVar("T")
+PERIOD = 1e-3  # [s]
+ROUNDING = 1e-9  # beside a limit, of what is no violation
+EXCESS = ("effort [N·m]", "effort rate [N·m/s]", "velocity [rad/s]", "position [rad]")
+
+
+# ------------------------------------------------------------------------ the arm
+
+
+class Arm(NamedTuple):
+    """What a rollout of the arm showed.
+
+    Attributes:
+        completed: Whether it went on to its end.
+        rows: Steps.
+        violated: Steps beyond each limit, shape (4,).
+        excess: The largest, by how much, shape (4,).
+        used: The largest part of each limit that was used, shape (4,).
+        limited: Steps as near to the law as limits permit.
+        relaxed: Steps at which limits contradicted each other.
+        relaxation: By how much the worst barrier was then missed [rad/s²].
+        exact_step: Median processor time of a step of the law [s].
+        limited_step: Median processor time of a limited step [s].
+    """
+
+    completed: bool
+    rows: int
+    violated: Array
+    excess: Array
+    used: Array
+    limited: int
+    relaxed: int
+    relaxation: float
+    exact_step: float
+    limited_step: float
+
+
+@cache
+def panda() -> hsp.Robot:
+    """Return the arm, once a process."""
+    return hsp.Robot.load("panda")
+
+
+def draw(seed: int) -> tuple[hsp.Controller, hsp.Limits, Array]:
+    """Return a controller that its limits will meet, these, and a start.
+
+    70 to 100 % of the arm's efforts, 20 to 50 % of its speeds, 1000 N·m/s, its joint
+    ranges; the hand is asked to go round a circle of 20 cm at 1 to 6 rad/s, up to a
+    metre from where it is: mostly more than that allows, often out of reach.
+    """
+    robot, rng = panda(), np.random.default_rng(seed)
+    lower, upper = robot.position_limits()
+    q0 = 0.5 * (lower + upper) + 0.35 * (upper - lower) * rng.uniform(-1.0, 1.0, 7)
+    own = hsp.Limits(robot)
+    limits = hsp.Limits(
+        robot,
+        effort=own.effort * rng.uniform(0.7, 1.0),
+        effort_rate=1000.0,
+        velocity=own.velocity * rng.uniform(0.2, 0.5),
+    )
+    start = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp")
+    away = rng.uniform(0.0, 0.5) * rng.normal(size=3)
+    center, rate = start + away, rng.uniform(1.0, 6.0)
+    path = hsp.Circle(center, 0.2, rate, normal=rng.normal(size=3))
+    gains = hsp.Gains.from_frequency(rng.uniform(5.0, 12.0))
+    task = hsp.FramePosition(robot, "panda_tcp", path, gains)
+    field = hsp.JointCentering(robot)
+    return hsp.Controller(robot, [task], field, limits=limits), limits, q0
+
+
+def roll_out(seed: int) -> Arm:
+    """Return what one random rollout of 0.8 s shows."""
+    controller, limits, q0 = draw(seed)
+    rollout = hsp.simulate(
+        controller,
+        q0,
+        duration=0.8,
+        control_period=PERIOD,
+        log_period=PERIOD,
+        integrator=hsp.Rk4(PERIOD),
+    )
+    excess = beyond(rollout, limits)
+    status = rollout["status"]
+    of_each = [np.flatnonzero(status == kind) for kind in (0, LIMITED)]
+    exact_step, limited_step = (step_time(controller, rollout, k) for k in of_each)
+    return Arm(
+        completed=rollout.meta["status"] == "completed",
+        rows=len(rollout),
+        violated=np.array([(each > ROUNDING).any(axis=1).sum() for each in excess]),
+        excess=np.array([each.max() for each in excess]),
+        used=np.array([part.max() for part in parts(rollout, limits)]),
+        limited=int((status == LIMITED).sum()),
+        relaxed=int((status == RELAXED).sum()),
+        relaxation=float(rollout["relaxation"].max()),
+        exact_step=exact_step,
+        limited_step=limited_step,
+    )
+
+
+def beyond(rollout: hsp.Rollout, limits: hsp.Limits) -> tuple[Array, ...]:
+    """Return by how much each limit is exceeded, step by step and joint by joint."""
+    q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
+    return (
+        np.abs(tau) - limits.effort,
+        np.abs(np.diff(tau, axis=0)) / PERIOD - limits.effort_rate,
+        np.abs(v) - limits.velocity,
+        np.maximum(q - limits.upper, limits.lower - q),
+    )
+
+
+def parts(rollout: hsp.Rollout, limits: hsp.Limits) -> tuple[Array, ...]:
+    """Return which part of each limit is used; of positions, from the middle."""
+    q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
+    middle, half = 0.5 * (limits.upper + limits.lower), limits.upper - limits.lower
+    return (
+        np.abs(tau) / limits.effort,
+        np.abs(np.diff(tau, axis=0)) / PERIOD / limits.effort_rate,
+        np.abs(v) / limits.velocity,
+        np.abs(q - middle) / (0.5 * half),
+    )
+
+
+def step_time(controller: hsp.Controller, rollout: hsp.Rollout, rows: Indices) -> float:
+    """Return the median time of some of the steps, taken again; NaN of none [s]."""
+    rows, times = rows[rows > 0][:40], []
+    for k in rows:
+        controller.applied(rollout["tau"][k - 1], PERIOD)
+        state = controller.robot.state(rollout.t[k], rollout["q"][k], rollout["v"][k])
+        before = process_time()
+        controller.compute(state)
+        times.append(process_time() - before)
+    return float(np.median(times)) if times else float("nan")
+
+
+def arm_table(runs: list[Arm]) -> str:
+    """Return what all rollouts of the arm showed."""
+    rows = sum(run.rows for run in runs)
+    violated = np.sum([run.violated for run in runs], axis=0)
+    excess = np.max([run.excess for run in runs], axis=0)
+    used = np.array([run.used for run in runs])
+    lines = "| limit | steps beyond it | nearest to it, or worst beyond | 99 % of it "
+    lines += "used in |\n|---|--:|--:|--:|\n"
+    for k, name in enumerate(EXCESS):
+        share = 100.0 * (used[:, k] > 0.99).mean()
+        nearest = f"{excess[k] + 0.0:.2g}" if abs(excess[k]) > ROUNDING else "0"
+        lines += f"| {name} | {violated[k]} | {nearest} | {share:.0f} % of runs |\n"
+    limited = sum(run.limited for run in runs) / rows
+    relaxed = sum(run.relaxed for run in runs)
+    with_relaxed = sum(run.relaxed > 0 for run in runs)
+    met = sum(run.limited + run.relaxed > 0 for run in runs)
+    ratio = np.nanmedian([run.limited_step / run.exact_step for run in runs])
+    return lines + (
+        f"\n{len(runs)} rollouts of 0.8 s, {rows} steps, "
+        f"{sum(run.completed for run in runs)} completed. Limits were met in "
+        f"{met} of them: {100 * limited:.1f} % of all steps are limited (status 2), "
+        f"{relaxed} steps in {with_relaxed} rollouts relaxed (status 3: barriers that "
+        "the efforts cannot keep; the worst was missed by "
+        f"{max(run.relaxation for run in runs):.3g} rad/s²). A limited step takes "
+        f"{ratio:.1f} times as long as one of the law, median over the rollouts.\n"
+    )
+
+
+# ---------------------------------------------------------------------- the legs
+
+
+class Legs(NamedTuple):
+    """A robot on legs and how it is pushed.
+
+    Attributes:
+        name: The bundled configuration.
+        overrides: What is changed in it.
+        frame: What is pushed.
+        body: The task that tells how far the trunk is turned, its last rows.
+        impulse: Force over weight.
+        ground: Friction of the plant's ground.
+    """
+
+    name: str
+    overrides: tuple[str, ...]
+    frame: str
+    body: str
+    impulse: float
+    ground: float
+
+
+STANDING = ("tasks.center_of_mass.trajectory={type: hold}",)
+LEGS = (
+    Legs("talos_circle", STANDING, "base_link", "trunk", 0.2, 0.7),
+    Legs("solo12_trunk", (), "base_link", "trunk", 0.2, 0.8),
+)
+START, PUSHED, DURATION = 1.0, 0.1, 4.0  # [s]
+
+
+class Pushed(NamedTuple):
+    """What a push did.
+
+    Attributes:
+        fell: Whether the trunk sank by 10 cm, tilted by 30°, or the run ended early.
+        sunk: How far the root sank beside the run's own motion [m].
+        tilted: The largest error of the trunk's orientation [rad].
+        moved: The largest error of the first task [m].
+        asked: The largest part of a friction cone that a force asked for uses.
+        answered: The same of the engine's forces.
+        pulls: Steps at which a force that was asked for pulls.
+        relaxed: Steps at which limits contradicted each other.
+        rows: Steps.
+        after: Error of the first task in the last 0.2 s [m].
+    """
+
+    fell: bool
+    sunk: float
+    tilted: float
+    moved: float
+    asked: float
+    answered: float
+    pulls: int
+    relaxed: int
+    rows: int
+    after: float
+
+
+@cache
+def weight(name: str) -> float:
+    """Return a configuration's robot's weight [N]."""
+    model = hsp.load_experiment(f"whole_body/{name}").robot.model
+    return 9.81 * float(sum(inertia.mass for inertia in model.inertias))
+
+
+def push(legs: Legs, seed: int) -> Pushed:
+    """Return what a push in a random horizontal direction does."""
+    heading = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi)
+    force = legs.impulse * weight(legs.name)
+    blow: dict[str, Any] = {
+        "frame": legs.frame,
+        "force": [force * float(np.cos(heading)), force * float(np.sin(heading)), 0.0],
+        "start": START,
+        "duration": PUSHED,
+    }
+    rollout = hsp.load_experiment(
+        f"whole_body/{legs.name}",
+        *legs.overrides,
+        f"plant.pushes=[{blow}]",
+        f"simulation.duration={DURATION}",
+        f"simulation.log_period={PERIOD}",
+    ).run()
+    columns = rollout.columns
+    names = [c.split(".")[1] for c in columns if c.endswith("friction_used")]
+    ends = [c for c in columns if c.startswith("plant.contact.") and c[-6:] == ".force"]
+    first = next(iter(rollout.meta["tasks"]))
+    moved = np.linalg.norm(rollout[f"task.{first}.error"][:, :3], axis=1)
+    tilted = np.linalg.norm(rollout[f"task.{legs.body}.error"][:, -3:], axis=1).max()
+    height = rollout["q"][:, 2]
+    sunk = float(height[0] - height.min())
+    completed = rollout.meta["status"] == "completed"
+    return Pushed(
+        fell=not completed or sunk > 0.1 or tilted > np.pi / 6.0,
+        sunk=sunk,
+        tilted=float(tilted),
+        moved=float(moved.max()),
+        asked=max(
+            float(np.nanmax(rollout[f"contact.{n}.friction_used"])) for n in names
+        ),
+        answered=max(cone_used(rollout[end], legs.ground) for end in ends),
+        pulls=sum(
+            int((rollout[f"contact.{n}.force"][:, 2] < 0.0).sum()) for n in names
+        ),
+        relaxed=int((rollout["status"] == RELAXED).sum()),
+        rows=len(rollout),
+        after=float(moved[-200:].max()),
+    )
+
+
+def cone_used(force: Array, friction: float) -> float:
+    """Return the largest part of a cone that forces use, where something bears [-]."""
+    bears = force[:, 2] > 1.0
+    slope = np.linalg.norm(force[bears, :2], axis=1) / force[bears, 2]
+    return float(slope.max(initial=0.0)) / friction
+
+
+def leg_table(runs: dict[Legs, list[Pushed]]) -> str:
+    """Return what all pushes did."""
+    lines = (
+        "| robot | push | falls | worst error of the first task [mm], and at the end | "
+        "worst tilt [°] | friction used: asked, answered | pulling forces | relaxed "
+        "steps |\n|---|---|--:|--:|--:|--:|--:|--:|\n"
+    )
+    for legs, pushed in runs.items():
+        force = legs.impulse * weight(legs.name)
+        rows = sum(each.rows for each in pushed)
+        lines += (
+            f"| `{legs.name}` | {force:.0f} N for {PUSHED:g} s | "
+            f"{sum(each.fell for each in pushed)} of {len(pushed)} | "
+            f"{1e3 * max(each.moved for each in pushed):.2g}, "
+            f"{1e3 * max(each.after for each in pushed):.2g} | "
+            f"{np.rad2deg(max(each.tilted for each in pushed)):.2g} | "
+            f"{100 * max(each.asked for each in pushed):.1f} %, "
+            f"{100 * max(each.answered for each in pushed):.1f} % | "
+            f"{sum(each.pulls for each in pushed)} | "
+            f"{sum(each.relaxed for each in pushed)} of {rows} |\n"
+        )
+    return lines
+
+
+# --------------------------------------------------------------------------- main
+
+
+def spread(work: Callable[[Any], T], items: Iterable[Any], what: str) -> list[T]:
+    """Return the work on every item, two at a time."""
+    items = list(items)
+    with ProcessPoolExecutor(2) as pool:
+        done = pool.map(work, items, chunksize=max(1, min(10, len(items) // 4)))
+        return list(track(done, what, total=len(items), transient=True))
+
+
+def push_of(item: tuple[Legs, int]) -> Pushed:
+    """Return what a push does: `push` for a pool, which maps one argument."""
+    return push(*item)
+
+
+def main() -> None:
+    """Run everything and write the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rollouts", type=int, default=1000)
+    parser.add_argument("--pushes", type=int, default=20)
+    parser.add_argument("--dry", action="store_true", help="print, write nothing")
+    options = parser.parse_args()
+    tables = {}
+    if options.rollouts:
+        runs = spread(roll_out, range(options.rollouts), "arm")
+        tables["limit_rollouts"] = arm_table(runs)
+        for seed, run in enumerate(runs):
+            if run.violated.any() or run.relaxed:
+                print(f"seed {seed}: {run}")
+    if options.pushes:
+        pushed = {
+            legs: spread(push_of, ((legs, k) for k in range(options.pushes)), legs.name)
+            for legs in LEGS
+        }
+        tables["pushes"] = leg_table(pushed)
+    for name, table in tables.items():
+        print(table)
+        if not options.dry:
+            replace_part(DOCS / "limits.md", name, "\n" + table + "\n")
+
+
+if __name__ == "__main__":
+    main()
