@@ -117,7 +117,7 @@ class Standing:
         self.hand = Blend(start, circle, 1.5)
         self.upright = state.frame(body.trunk).rotation.copy()
         self.gains = hsp.Gains.from_frequency(FREQUENCY)
-        self._judge = self.controller(limited=False)
+        self._judge = self.controller(limited=False, threshold=1e-6)  # an exact P
         self._state = hsp.RobotState(robot)
         self._edges = _cone_edges(self.corners)
 
@@ -128,7 +128,9 @@ class Standing:
         flat = np.array([[x, y, 0.0], [x, -y, 0.0], [-x, y, 0.0], [-x, -y, 0.0]])
         return flat + np.array(self.body.center)
 
-    def controller(self, *, limited: bool = True) -> hsp.Controller:
+    def controller(
+        self, *, limited: bool = True, threshold: float = 0.03
+    ) -> hsp.Controller:
         """Return this law; its posture field leaves the root out, as TSID's task."""
         robot, body = self.robot, self.body
         weights = np.full(robot.nv, POSTURE_RATE)
@@ -149,6 +151,7 @@ class Standing:
             tasks,
             hsp.TargetPosture(robot, self.q0, weights=weights),
             null_space_gain=GAIN,
+            singularity_threshold=threshold,
             contacts=[
                 hsp.SurfaceContact(
                     robot,

@@ -17,7 +17,7 @@ FORCE_WEIGHT = 1e-5  # of the forces' regularisation, as in TSID's exercises
 
 def make(
     case: Standing, *, posture_weight: float
-) -> tuple[Callable[[float, Array, Array], Array], list[int]]:
+) -> tuple[Callable[[float, Array, Array], Array], list[str]]:
     """Return the controller, and the list that it writes the solver's status into."""
     model, nv = case.robot.model, case.robot.nv
     robot = tsid.RobotWrapper(model, tsid.FLOATING_BASE_SYSTEM, False)
@@ -77,7 +77,7 @@ def make(
     posture.setReference(posture_sample)
     com_sample, hand_sample = tsid.TrajectorySample(3), tsid.TrajectorySample(12, 6)
     hand_place, hand_rate, hand_rate_dot = place.copy(), np.zeros(6), np.zeros(6)
-    statuses: list[int] = []
+    statuses: list[str] = []
     tau = np.zeros(nv)
 
     def compute(t: float, q: Array, v: Array) -> Array:
@@ -95,7 +95,7 @@ def make(
         hand.setReference(hand_sample)
         data = problem.computeProblemData(t, q, v)
         solution = solver.solve(data)
-        statuses.append(int(solution.status))
+        statuses.append(str(int(solution.status)))
         if solution.status == 0:  # else the last effort goes on
             tau[6:] = problem.getActuatorForces(solution)
         return tau
