@@ -113,7 +113,7 @@ class Standing:
         circle = hsp.Circle(start, 0.03, 2.5, normal=up)
         self.com = Blend(start, circle, 1.5)
         start = state.position(body.hand).copy()
-        circle = hsp.Circle(start + [0.05, 0.0, 0.1], 0.08, 3.8, normal=ahead)
+        circle = hsp.Circle(start + np.array([0.05, 0.0, 0.1]), 0.08, 3.8, normal=ahead)
         self.hand = Blend(start, circle, 1.5)
         self.upright = state.frame(body.trunk).rotation.copy()
         self.gains = hsp.Gains.from_frequency(FREQUENCY)

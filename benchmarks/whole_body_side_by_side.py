@@ -225,32 +225,35 @@ def compare(
         f"\nMedians of {options.rounds} interleaved rounds of {options.block} steps "
         "along this law's path on MuJoCo, quartiles in brackets.\n\n"
     )
-    say(f"Where this law's step goes:\n\n{parts_table(case, path[::5])}\n")
+    say(
+        "Where this law's step goes (*deliver* contains inverse dynamics, map, least "
+        "forces and cones):\n\n{parts_table(case, path[::5])}\n"
+    )
 
 
 INTRODUCTION = """# Whole bodies, side by side with TSID
 
 Written by `make bench` (`benchmarks/whole_body_side_by_side.py`); do not edit.
 
-Two soles on the ground; the centre of mass goes round a circle of 3 cm, a hand round one
-of 8 cm, the trunk stays upright, the rest of the joints holds the posture of the start.
-{duration:g} s from rest at 1 kHz, the effort held. Both controllers have the same model,
+Two soles on the ground; the centre of mass goes round a circle of 3 cm, a hand round
+one of 8 cm, the trunk stays upright, the rest of the joints holds the posture of the
+start. {duration:g} s from rest at 1 kHz, the effort held. Both have the same model,
 soles, friction pyramids (within the cone of {friction:g}), effort limits, task gains
 (ω₀ = 10 1/s) and contact damping; TSID's posture has Kp = 12 and Kd = 8, which is
 K_N = 6 and g = -2 (q - q_start). TSID 1.10 has contacts as constraints, forces at the
 soles' corners and eiquadprog-fast; tasks have weight 1. Joint ranges bind nobody here:
 neither controller knows them, and neither plant has them.
 
-All run on one thread. TSID's solver, built with OpenMP, took 0.12 ms a step with one and
-11 ms with two on a machine of two busy cores: that is no property of TSID's, and no
+All run on one thread. TSID's solver, built with OpenMP, took 0.12 ms a step with one
+and 11 ms with two on a machine of two busy cores: that is no property of TSID's, and no
 ratio here is taken like that.
 
 The *ideal contacts* hold whatever that takes, so a force that they had to give and the
 ground could not is counted: *outside the cones* is the share of instants. MuJoCo's slip
 instead: *soles shifted*. P is the projector into the null space of contacts and tasks,
 the same for all. Status of this law: 0 the law, 1 forces redistributed, 2 limited, 3
-limits relaxed, and *damped* where the tasks' Jacobian is so near a loss of rank that the
-law is bounded and not exact (`singularity_threshold`, at its default); of TSID:
+limits relaxed, and *damped* where the tasks' Jacobian is so near a loss of rank that
+the law is bounded and not exact (`singularity_threshold`, at its default); of TSID:
 0 solved, anything else: its last effort went on.
 
 """
