@@ -225,9 +225,10 @@ def compare(
         f"\nMedians of {options.rounds} interleaved rounds of {options.block} steps "
         "along this law's path on MuJoCo, quartiles in brackets.\n\n"
     )
+    parts = parts_table(case, path[::5])
     say(
         "Where this law's step goes (*deliver* contains inverse dynamics, map, least "
-        "forces and cones):\n\n{parts_table(case, path[::5])}\n"
+        f"forces and cones):\n\n{parts}\n"
     )
 
 

@@ -53,7 +53,7 @@ class Support:
                     self.cone[4 * k + row, 3 * k + axis] = sign
                     self.cone[4 * k + row, 3 * k + 2] = side
 
-        self._pushing = []
+        self._pushing: list[tuple[Contact, slice, Array, Array, Array]] = []
         for contact, where in zip(self.contacts, self.points, strict=True):
             count = where.stop - where.start
             # arm × axis is linear in the arm: row l holds e_l × axis, by moment, axis.
@@ -61,8 +61,7 @@ class Support:
             pushed = np.vstack([np.tile(contact.axes, count), np.zeros((3, 3 * count))])
             easy = np.tile([contact.friction**2, contact.friction**2, 1.0], count)
             self.ease[3 * where.start : 3 * where.stop] = easy
-            row = (contact, where, turning.reshape(3, 9), pushed, easy)
-            self._pushing.append(row)
+            self._pushing.append((contact, where, turning.reshape(3, 9), pushed, easy))
 
     def update(self, state: RobotState) -> None:
         """Compute the map, the places, and what the schedules let each contact bear."""
