@@ -45,6 +45,8 @@ bench: $(STAMP) ## compare with other controllers, in .venv-peers (TSID builds: 
 	fi
 	@.venv-peers/bin/python benchmarks/install_peers.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/side_by_side.py
+	@.venv-peers/bin/python -W "ignore:to-Python converter" \
+	  benchmarks/whole_body_side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/scaling.py
 
 wheel-test: $(STAMP) ## build the wheel, install it elsewhere, use it from there

@@ -94,7 +94,7 @@ def install_placo() -> None:
 def main() -> None:
     """Install everything that installs; keep a record of what did not."""
     print("Installing this checkout into", HOME, flush=True)
-    pip("install", "--quiet", "--editable", f"{ROOT}[robots]", *PIN)
+    pip("install", "--quiet", "--editable", f"{ROOT}[robots,mujoco]", *PIN)
     installers: dict[str, Callable[[], None]] = {
         "pink": install_pink,
         "tsid": install_tsid,

@@ -53,26 +53,30 @@ class Support:
                     self.cone[4 * k + row, 3 * k + axis] = sign
                     self.cone[4 * k + row, 3 * k + 2] = side
 
+        self._pushing: list[tuple[Contact, slice, Array, Array, Array]] = []
+        for contact, where in zip(self.contacts, self.points, strict=True):
+            count = where.stop - where.start
+            # arm × axis is linear in the arm: row l holds e_l × axis, by moment, axis.
+            turning = np.stack([np.cross(e, contact.axes.T).T for e in np.eye(3)])
+            pushed = np.vstack([np.tile(contact.axes, count), np.zeros((3, 3 * count))])
+            easy = np.tile([contact.friction**2, contact.friction**2, 1.0], count)
+            self.ease[3 * where.start : 3 * where.stop] = easy
+            self._pushing.append((contact, where, turning.reshape(3, 9), pushed, easy))
+
     def update(self, state: RobotState) -> None:
         """Compute the map, the places, and what the schedules let each contact bear."""
-        for contact, where in zip(self.contacts, self.points, strict=True):
+        for contact, where, turning, pushed, easy in self._pushing:
             frame = state.frame(contact.frame)
             arms = contact.arms(frame)
             self.places[where] = frame.position + arms
             columns = slice(3 * where.start, 3 * where.stop)
-            pushed = np.zeros((6, columns.stop - columns.start))
-            for k, arm in enumerate(arms):
-                block = slice(3 * k, 3 * k + 3)
-                pushed[:3, block] = contact.axes
-                pushed[3:, block] = np.cross(arm, contact.axes.T).T
+            moments = (arms @ turning).reshape(-1, 3, 3)  # point, moment, force
+            pushed[3:] = moments.transpose(1, 0, 2).reshape(3, -1)
             self.map[:, columns] = frame.jacobian.T @ pushed
             if not contact.schedule.constant or contact.schedule.ramp:
                 on = max(contact.schedule.weight(state.t), 1e-6)
                 self.greatest[columns][2::3] = on * _HEAVIEST * self._weight
-            else:
-                on = 1.0
-            easy = contact.friction**2
-            self.ease[columns] = np.tile([on * easy, on * easy, on], len(arms))
+                self.ease[columns] = on * easy
 
     def least_norm(self, base: Indices, wrench: Array) -> Array:
         """Return the forces of least Σ f²/ease that push the base with a wrench.

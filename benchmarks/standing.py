@@ -1,0 +1,271 @@
+"""The common case on two feet: circles of the centre of mass and of a hand.
+
+Robot, start, soles, trajectories, gains and posture are the same numbers for every
+controller; what is measured, is measured the same way for all.
+"""
+
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.optimize import nnls
+
+import hsp_control as hsp
+from hsp_control.arrays import Array
+from hsp_control.plants import ContactPlant, RigidContact
+from hsp_control.plants.mujoco import ContactShape, Ground, MujocoPlant
+from hsp_control.shapes import Box
+from hsp_control.trajectories import Blend
+
+COM, HAND, TRUNK = "center_of_mass", "hand", "trunk"
+PERIOD = 1e-3  # how long an effort is held [s]
+FRICTION = 0.7  # of the ground, and what both controllers are told
+CONTACT_DAMPING = 40.0  # Kd of the contacts, without stiffness [1/s]
+FREQUENCY = 10.0  # ω0 of the critically damped tasks [rad/s]
+GAIN, POSTURE_RATE = 6.0, 2.0  # K_N, and α of g = -α (q - q_start) [1/s]
+BEVEL = 16  # edges of the cone that forces are judged by
+THICKNESS = 0.02  # of the boxes that are MuJoCo's soles [m]
+
+
+@dataclass(frozen=True)
+class Body:
+    """What differs between the robots.
+
+    Attributes:
+        name: In the robots' catalogue.
+        soles: Frames of the feet.
+        size: Length and width of a sole, along the frame's x and y [m].
+        center: Of the sole in its frame [m].
+        hand: Frame of the hand.
+        trunk: Frame of the trunk.
+        locked: Joints that are none here, and where they stand [rad].
+        bent: Joints that differ from the home posture [rad].
+    """
+
+    name: str
+    soles: tuple[str, str]
+    size: tuple[float, float]
+    center: tuple[float, float, float]
+    hand: str
+    trunk: str
+    locked: dict[str, float] = field(default_factory=dict)
+    bent: dict[str, float] = field(default_factory=dict)
+
+
+def _both(name: str, value: float) -> dict[str, float]:
+    return {f"{side}_{name}_joint": value for side in ("left", "right")}
+
+
+TALOS = Body(
+    "talos",
+    ("left_sole_link", "right_sole_link"),
+    (0.16, 0.1),
+    (0.0, 0.0, 0.0),
+    "gripper_right_base_link",
+    "torso_2_link",
+    locked={"gripper_left_joint": 0.0, "gripper_right_joint": 0.0},
+)
+# The spheres below G1's ankles, of 5 mm, are the corners of a sole.
+G1 = Body(
+    "g1",
+    ("left_ankle_roll_link", "right_ankle_roll_link"),
+    (0.17, 0.05),
+    (0.035, 0.0, -0.035),
+    "right_rubber_hand",
+    "torso_link",
+    bent=_both("hip_pitch", -0.3)
+    | _both("knee", 0.6)
+    | _both("ankle_pitch", -0.3)
+    | _both("elbow", 0.6)
+    | {"left_shoulder_roll_joint": 0.2, "right_shoulder_roll_joint": -0.2},
+)
+
+
+class Standing:
+    """A robot that stands on both soles, and what it shall do.
+
+    Attributes:
+        robot: The robot.
+        q0: Where it starts, at rest, the soles on the ground.
+        com: Trajectory of the centre of mass.
+        hand: Trajectory of the hand.
+        upright: The trunk's orientation.
+        gains: Of all tasks.
+    """
+
+    def __init__(self, body: Body) -> None:
+        """Put it on its feet."""
+        self.body = body
+        self.robot = robot = hsp.Robot.load(body.name, locked=body.locked)
+        q = robot.home().copy()
+        for joint, value in body.bent.items():
+            q[robot.joints[joint].idx_q] = value
+        rest = np.zeros(robot.nv)
+        sole = robot.state(0.0, q, rest).frame(body.soles[0])
+        q[2] -= (sole.position + sole.rotation @ np.array(body.center))[2]
+        self.q0 = q
+        state = robot.state(0.0, q, rest)
+        self.weight = 9.81 * sum(inertia.mass for inertia in robot.model.inertias)
+        self.soles_at = [state.position(name).copy() for name in body.soles]
+        up, ahead = [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]
+        start = state.centroidal.position.copy()
+        circle = hsp.Circle(start, 0.03, 2.5, normal=up)
+        self.com = Blend(start, circle, 1.5)
+        start = state.position(body.hand).copy()
+        circle = hsp.Circle(start + np.array([0.05, 0.0, 0.1]), 0.08, 3.8, normal=ahead)
+        self.hand = Blend(start, circle, 1.5)
+        self.upright = state.frame(body.trunk).rotation.copy()
+        self.gains = hsp.Gains.from_frequency(FREQUENCY)
+        self._judge = self.controller(limited=False, threshold=1e-6)  # an exact P
+        self._state = hsp.RobotState(robot)
+        self._edges = _cone_edges(self.corners)
+
+    @property
+    def corners(self) -> Array:
+        """The corners of a sole in its frame, shape (4, 3) [m]."""
+        x, y = 0.5 * np.array(self.body.size)
+        flat = np.array([[x, y, 0.0], [x, -y, 0.0], [-x, y, 0.0], [-x, -y, 0.0]])
+        return flat + np.array(self.body.center)
+
+    def controller(
+        self, *, limited: bool = True, threshold: float = 0.03
+    ) -> hsp.Controller:
+        """Return this law; its posture field leaves the root out, as TSID's task."""
+        robot, body = self.robot, self.body
+        weights = np.full(robot.nv, POSTURE_RATE)
+        weights[list(robot.unactuated)] = 0.0
+        tasks = [
+            hsp.CenterOfMass(robot, self.com, self.gains, name=COM),
+            hsp.FramePosition(robot, body.hand, self.hand, self.gains, name=HAND),
+            hsp.FrameOrientation(
+                robot,
+                body.trunk,
+                hsp.HoldOrientation(self.upright),
+                self.gains,
+                name=TRUNK,
+            ),
+        ]
+        return hsp.Controller(
+            robot,
+            tasks,
+            hsp.TargetPosture(robot, self.q0, weights=weights),
+            null_space_gain=GAIN,
+            singularity_threshold=threshold,
+            contacts=[
+                hsp.SurfaceContact(
+                    robot,
+                    name,
+                    corners=self.corners,
+                    friction=FRICTION,
+                    damping=CONTACT_DAMPING,
+                )
+                for name in body.soles
+            ],
+            limits=hsp.Limits(robot, velocity=None, position=None) if limited else None,
+        )
+
+    # -- plants -----------------------------------------------------------------------
+
+    def ideal(self) -> "Engine":
+        """Return soles that are held whatever that takes, and a Runge-Kutta step."""
+        soles = [RigidContact(name) for name in self.body.soles]
+        plant, integrator = ContactPlant(self.robot, soles), hsp.Rk4(PERIOD)
+
+        def advance(t: float, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
+            push = partial(_held, plant, tau)
+            return integrator.advance(self.robot, push, t, t + PERIOD, q, v)
+
+        return Engine(plant, advance)
+
+    def mujoco(self) -> "Engine":
+        """Return MuJoCo, with boxes for soles."""
+        x, y, z = self.body.center
+        shapes = [
+            ContactShape(name, Box((*self.body.size, THICKNESS)), at)
+            for name in self.body.soles
+            for at in [(x, y, z + 0.5 * THICKNESS)]
+        ]
+        plant = MujocoPlant(
+            self.robot,
+            contacts=shapes,
+            ground=Ground(friction=FRICTION),
+            joint_limits=False,
+        )
+        plant.reset(0.0, self.q0, np.zeros(self.robot.nv))
+
+        def advance(t: float, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
+            return plant.advance(t, t + PERIOD, tau)
+
+        return Engine(plant, advance)
+
+    # -- what is measured -------------------------------------------------------------
+
+    def measure(self, t: float, q: Array, v: Array) -> dict[str, float]:
+        """Return the numbers of one instant, the same way for every controller."""
+        state = self._state.update(t, q, v)
+        output = self._judge.compute(state)
+        errors = {
+            name: float(np.linalg.norm(output.task.error[rows]))
+            for name, rows in self._judge.task_rows.items()
+        }
+        feet = zip(self.body.soles, self.soles_at, strict=True)
+        return errors | {
+            "posture": float(np.linalg.norm(q[7:] - self.q0[7:])),
+            "null_space_error": float(np.linalg.norm(output.null_space_error)),
+            "slip": max(
+                float(np.linalg.norm(state.position(name) - at)) for name, at in feet
+            ),
+        }
+
+    def outside_cones(self, q: Array, wrenches: list[Array]) -> bool:
+        """Return whether a sole's wrench is none that pushes within friction give.
+
+        Args:
+            q: Configuration.
+            wrenches: On each sole, about its frame's origin, in world axes, shape (6,).
+        """
+        state = self._state.update(0.0, q, np.zeros(self.robot.nv))
+        for name, wrench in zip(self.body.soles, wrenches, strict=True):
+            R = state.frame(name).rotation
+            local = np.concatenate([R.T @ wrench[:3], R.T @ wrench[3:]])
+            if nnls(self._edges, local)[1] > 1e-3 * self.weight:
+                return True
+        return False
+
+
+class Engine:
+    """A plant and how it goes on by one period."""
+
+    def __init__(self, plant: Any, advance: Any) -> None:
+        """Keep both."""
+        self.plant, self.advance = plant, advance
+
+    def wrenches(self, t: float, q: Array, v: Array, tau: Array) -> list[Array]:
+        """Return what it does to each sole, about its frame's origin."""
+        read = self.plant.readings(t, q, v, tau)
+        forces = [name for name in read if name.endswith(".force")]
+        return [
+            np.concatenate(
+                [read[name].value, read[name.replace(".force", ".moment")].value]
+            )
+            for name in forces
+        ]
+
+
+def _held(plant: ContactPlant, tau: Array, t: float, q: Array, v: Array) -> Array:
+    return plant.acceleration(t, q, v, tau)
+
+
+def _cone_edges(corners: Array) -> Array:
+    """Return wrenches of unit normal force along the cones' edges, (6, 4 BEVEL)."""
+    around = 2.0 * np.pi * np.arange(BEVEL) / BEVEL
+    side = FRICTION / np.cos(np.pi / BEVEL)  # the polygon about the circle
+    edge = np.column_stack(
+        [side * np.cos(around), side * np.sin(around), np.ones(BEVEL)]
+    )
+    columns = [
+        np.hstack([edge, np.cross(np.broadcast_to(corner, edge.shape), edge)])
+        for corner in corners
+    ]
+    return np.vstack(columns).T

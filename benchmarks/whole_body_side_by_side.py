@@ -1,0 +1,292 @@
+"""Talos and G1 on two feet under this law and under TSID, on two plants.
+
+    make bench      or      .venv-peers/bin/python benchmarks/whole_body_side_by_side.py
+
+Runs every controller against the ideal contacts and against MuJoCo's, times the steps
+interleaved along the same states, says where this law's step spends its time, prints
+the tables and writes them to docs/whole_body_side_by_side.md.
+"""
+
+# ruff: noqa: E402
+import os
+
+# TSID's wheel is built with OpenMP: with a second thread its solver takes a hundred
+# times as long where another process wants that core. Both sides have one thread.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ[name] = "1"
+
+import argparse
+import importlib
+import platform
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter_ns
+from typing import Any
+
+import numpy as np
+from standing import COM, G1, HAND, PERIOD, TALOS, TRUNK, Body, Engine, Standing
+from timing import Compute, State, ratios, spread, step_times
+
+import hsp_control as hsp
+from hsp_control.arrays import Array
+
+ROOT = Path(__file__).resolve().parent.parent
+LAW = "this law"
+WEIGHTS = (1e-2, 1e-3, 1e-4)  # of TSID's posture
+EVERY = 10  # control periods between two measurements
+FALLEN = 20.0  # joint speed at which a run is over [rad/s]
+Made = tuple[Compute, list[str]]
+
+
+def controllers() -> dict[str, Callable[[Standing], Made]]:
+    """Return what is compared, by name; each with the list of its statuses."""
+    made: dict[str, Callable[[Standing], Made]] = {LAW: this_law}
+    try:
+        peer: Any = importlib.import_module("controllers.standing_tsid")
+    except ImportError as error:
+        print(f"TSID is not installed ({error}): make bench")
+        return made
+    for weight in WEIGHTS:
+        made[f"TSID, posture weight {weight:.0e}"] = _tsid(peer, weight)
+    return made
+
+
+def _tsid(peer: Any, weight: float) -> Callable[[Standing], Made]:
+    return lambda case: peer.make(case, posture_weight=weight)
+
+
+def this_law(case: Standing) -> Made:
+    """Return `hsp_control.Controller` as a user would call it."""
+    controller, state = case.controller(), hsp.RobotState(case.robot)
+    statuses: list[str] = []
+
+    def compute(t: float, q: Array, v: Array) -> Array:
+        output = controller.compute(state.update(t, q, v))
+        statuses.append(f"{output.status}{' damped' if output.damped else ''}")
+        return output.tau
+
+    return compute, statuses
+
+
+# ------------------------------------------------------------------- the closed loop
+
+
+@dataclass
+class Run:
+    """What one controller did on one plant."""
+
+    columns: dict[str, Array] = field(default_factory=dict)
+    statuses: Counter[str] = field(default_factory=Counter)
+    states: list[State] = field(default_factory=list)
+    failure: str = ""
+
+    def rms(self, name: str) -> float:
+        """Return the root mean square of a column."""
+        return float(np.sqrt((self.columns[name] ** 2).mean()))
+
+
+def close_loop(case: Standing, engine: Engine, made: Made, duration: float) -> Run:
+    """Run a controller against a plant, its effort held each period."""
+    run, rows = Run(), []
+    compute, statuses = made
+    q, v = case.q0.copy(), np.zeros(case.robot.nv)
+    for k in range(round(duration / PERIOD)):
+        t = k * PERIOD
+        run.states.append((t, q, v))
+        tau = np.array(compute(t, q, v))
+        if k % EVERY == 0:
+            outside = case.outside_cones(q, engine.wrenches(t, q, v, tau))
+            now = {"effort": float(np.linalg.norm(tau)), "outside": float(outside)}
+            rows.append(case.measure(t, q, v) | now)
+        q, v = engine.advance(t, q, v, tau)
+        if not np.abs(v).max() < FALLEN:
+            run.failure = f"fell at t = {t:.2f} s"
+            break
+    run.statuses.update(statuses)
+    run.columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return run
+
+
+HEADER = (
+    "| controller | CoM rms / max [mm] | hand rms / max [mm] | trunk rms [mrad] | "
+    "‖q − q_start‖ rms [rad] | ‖P(g − v)‖ rms [rad/s] | effort rms [N·m] | "
+    "outside the cones | soles shifted [mm] | status |\n"
+    "|---|--:|--:|--:|--:|--:|--:|--:|--:|---|\n"
+)
+
+
+def row(name: str, run: Run) -> str:
+    """Return a line of the table."""
+    if run.failure:
+        return f"| {name} | {run.failure} |" + 8 * " |" + "\n"
+    c, steps = run.columns, run.statuses.total()
+    counts = ", ".join(
+        f"{status}: {100.0 * count / steps:.3g} %"
+        for status, count in sorted(run.statuses.items())
+    )
+    cells = [
+        *(f"{1e3 * run.rms(n):.2g} / {1e3 * c[n].max():.2g}" for n in (COM, HAND)),
+        f"{1e3 * run.rms(TRUNK):.2g}",
+        f"{run.rms('posture'):.2f}",
+        f"{run.rms('null_space_error'):.2g}",
+        f"{run.rms('effort'):.1f}",
+        f"{100.0 * c['outside'].mean():.3g} %",
+        f"{1e3 * c['slip'].max():.2g}",
+        counts,
+    ]
+    return f"| {name} | " + " | ".join(cells) + " |\n"
+
+
+# --------------------------------------------------------------------------- timing
+
+
+def timing_table(times: dict[str, Array]) -> str:
+    """Return the ratios to each of TSID's, with the quartiles over the rounds."""
+    reference = next((n for n in times if n.endswith("1e-03")), LAW)
+    lines = f"| controller | {reference} = 1 | µs |\n|---|--:|--:|\n"
+    for name, taken in times.items():
+        cell = spread(ratios(times, name, reference))
+        lines += f"| {name} | {cell} | {1e6 * np.median(taken):.0f} |\n"
+    return lines
+
+
+def parts_table(case: Standing, states: list[State]) -> str:
+    """Return where a step of this law spends its time, as shares of the whole."""
+    controller, state = case.controller(), hsp.RobotState(case.robot)
+    controller.compute(state.update(*states[0]))
+    mode, actuation = controller.mode, controller._actuation
+    problem, support = mode.resolution.problem, mode.support
+    taken: dict[str, list[str]] = {}
+
+    def timed(name: str, function: Callable[[], Any]) -> Any:
+        started = perf_counter_ns()
+        result = function()
+        taken.setdefault(name, []).append(perf_counter_ns() - started)
+        return result
+
+    def rows() -> None:
+        for part, sample in mode._parts:
+            part.evaluate(state, sample)
+
+    def law() -> Any:
+        controller.metric.evaluate(state, problem.metric)
+        form = controller.metric.form
+        controller.field.evaluate(state, problem.metric, form, problem.field)
+        return mode.resolution.resolve(state.v)
+
+    for t, q, v in states:
+        timed("kinematics, one pass of Pinocchio", lambda: state.update(t, q, v))  # noqa: B023
+        timed("rows of contacts and tasks", rows)
+        a = timed("field, metric and law", law).acceleration
+        wanted = timed("inverse dynamics", lambda: state.inverse_dynamics(a).copy())  # noqa: B023
+        timed("map of the corner forces", lambda: support.update(state))
+        base = actuation.base
+        forces = timed(
+            "least forces",
+            lambda: support.least_norm(base, wanted[base]),  # noqa: B023
+        )
+        timed("cones", lambda: support.bears(forces))  # noqa: B023
+        # Pinocchio's pass is kept until the state changes: the second call is cheap.
+        delivered = timed(
+            "deliver, all of it",
+            lambda: actuation.deliver(state, a, mode.resolution, support),  # noqa: B023
+        )
+        key = f"deliver, status {delivered.status}"
+        taken.setdefault(key, []).append(taken["deliver, all of it"][-1])
+    lines = "| part | median [µs] | steps |\n|---|--:|--:|\n"
+    for name, each in taken.items():
+        lines += f"| {name} | {1e-3 * np.median(each):.0f} | {len(each)} |\n"
+    return lines
+
+
+# ---------------------------------------------------------------------------- main
+
+
+def compare(
+    body: Body, options: argparse.Namespace, say: Callable[[str], None]
+) -> None:
+    """Write a robot's tables."""
+    case, chosen = Standing(body), controllers()
+    path: list[State] = []
+    for title, engine in (("ideal contacts", case.ideal), ("MuJoCo", case.mujoco)):
+        say(f"## {body.name}: {title}\n\n{HEADER}")
+        for name, make in chosen.items():
+            run = close_loop(case, engine(), make(case), options.duration)
+            say(row(name, run))
+            if name == LAW:
+                path = run.states
+        say("\n")
+    made = {name: make(case)[0] for name, make in chosen.items()}
+    say(f"## {body.name}: time of a step\n\n")
+    say(timing_table(step_times(made, path, options.rounds, options.block)))
+    say(
+        f"\nMedians of {options.rounds} interleaved rounds of {options.block} steps "
+        "along this law's path on MuJoCo, quartiles in brackets.\n\n"
+    )
+    parts = parts_table(case, path[::5])
+    say(
+        "Where this law's step goes (*deliver* contains inverse dynamics, map, least "
+        f"forces and cones):\n\n{parts}\n"
+    )
+
+
+INTRODUCTION = """# Whole bodies, side by side with TSID
+
+Written by `make bench` (`benchmarks/whole_body_side_by_side.py`); do not edit.
+
+Two soles on the ground; the centre of mass goes round a circle of 3 cm, a hand round
+one of 8 cm, the trunk stays upright, the rest of the joints holds the posture of the
+start. {duration:g} s from rest at 1 kHz, the effort held. Both have the same model,
+soles, friction pyramids (within the cone of {friction:g}), effort limits, task gains
+(ω₀ = 10 1/s) and contact damping; TSID's posture has Kp = 12 and Kd = 8, which is
+K_N = 6 and g = -2 (q - q_start). TSID 1.10 has contacts as constraints, forces at the
+soles' corners and eiquadprog-fast; tasks have weight 1. Joint ranges bind nobody here:
+neither controller knows them, and neither plant has them.
+
+All run on one thread. TSID's solver, built with OpenMP, took 0.12 ms a step with one
+and 11 ms with two on a machine of two busy cores: that is no property of TSID's, and no
+ratio here is taken like that.
+
+The *ideal contacts* hold whatever that takes, so a force that they had to give and the
+ground could not is counted: *outside the cones* is the share of instants. MuJoCo's slip
+instead: *soles shifted*. P is the projector into the null space of contacts and tasks,
+the same for all. Status of this law: 0 the law, 1 forces redistributed, 2 limited, 3
+limits relaxed, and *damped* where the tasks' Jacobian is so near a loss of rank that
+the law is bounded and not exact (`singularity_threshold`, at its default); of TSID:
+0 solved, anything else: its last effort went on.
+
+"""
+
+
+def main() -> None:
+    """Run the comparison."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--duration", type=float, default=3.0)
+    parser.add_argument("--rounds", type=int, default=30)
+    parser.add_argument("--block", type=int, default=40)
+    parser.add_argument("--only", choices=("talos", "g1"))
+    out = ROOT / "docs" / "whole_body_side_by_side.md"
+    parser.add_argument("--out", type=Path, default=out)
+    options = parser.parse_args()
+    text = ""
+
+    def say(part: str) -> None:
+        nonlocal text
+        text += part
+        print(part, end="", flush=True)
+
+    say(INTRODUCTION.format(duration=options.duration, friction=0.7))
+    for body in (TALOS, G1):
+        if options.only in (None, body.name):
+            compare(body, options, say)
+    say(
+        f"Python {platform.python_version()}, hsp_control {hsp.__version__}, numpy "
+        f"{np.__version__}. Only ratios carry over to another machine.\n"
+    )
+    options.out.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
