@@ -152,6 +152,7 @@ def test_priorities_meet_the_stack_where_they_take_over(seed: int) -> None:
 # --- along motions -------------------------------------------------------------------
 
 GAINS = Gains.from_frequency(8.0)
+SIDES = ("left", "right")
 
 
 @cache
@@ -223,3 +224,51 @@ def test_levels_are_lists_or_tasks_not_both() -> None:
         Controller(panda(), [hand, [rival]])
     with pytest.raises(ControllerError, match="at every level"):
         Controller(panda(), [[hand], []])
+
+
+def test_propositions_hold_for_two_arms() -> None:
+    """Baxter's hands at two levels, the second asking for more than is left of it."""
+    pytest.importorskip("example_robot_data")
+    locked = {
+        "head_pan": 0.0,
+        "l_gripper_l_finger_joint": 0.01,
+        "r_gripper_l_finger_joint": 0.01,
+    }
+    robot = Robot.load("baxter", locked=locked)
+    bend = np.array([-0.5, -0.4, -0.8, 1.4, 0.4, 0.8, 0.0])
+    mirror = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0])
+    q = robot.integrate(robot.neutral(), np.r_[bend, mirror * bend])
+    state = robot.state(0.0, q, np.zeros(robot.nv))
+    left, right = (state.position(f"{side}_gripper").copy() for side in SIDES)
+    x_axis = np.array([1.0, 0.0, 0.0])
+    levels = [
+        [
+            FramePosition(
+                robot, "left_gripper", Circle(left, 0.08, 1.5, normal=x_axis), GAINS
+            )
+        ],
+        [
+            FramePosition(robot, "right_gripper", Hold(right + 0.05), GAINS),
+            FramePosition(  # the first level's own row, wanted elsewhere
+                robot, "left_gripper", Hold([0.3]), GAINS, axes="x", name="rival"
+            ),
+        ],
+    ]
+    controller = Controller(robot, levels, JointCentering(robot), null_space_gain=4.0)
+    v0 = 0.2 * np.cos(np.arange(robot.nv))
+    rollout = simulate(
+        controller,
+        q,
+        v0,
+        duration=0.6,
+        log_period=0.05,
+        integrator=Dop853(rtol=1e-10, atol=1e-10),
+    )
+    assert rollout["damped"].all()
+    t, w = rollout.t, 8.0
+    for name in ("left_gripper", "right_gripper"):
+        e, rate = rollout[f"task.{name}.error"], rollout[f"task.{name}.error_rate"]
+        expected = np.exp(-w * t)[:, None] * (e[0] + (rate[0] + w * e[0]) * t[:, None])
+        np.testing.assert_allclose(e, expected, rtol=0, atol=1e-7)
+    norm = rollout["null_space_norm"]
+    np.testing.assert_allclose(norm, norm[0] * np.exp(-4.0 * t), rtol=1e-5, atol=0)
