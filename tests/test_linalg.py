@@ -35,6 +35,7 @@ from hsp_control import (
 from hsp_control.linalg import (
     cholesky,
     invert_upper,
+    least_singular_value_bound,
     multiply,
     multiply_transposed,
     orthogonalise_columns,
@@ -347,6 +348,7 @@ def arguments(name: str) -> tuple[Any, ...]:
         "gram": (J, J_dot, True, np.zeros((m, m))),
         "orthonormalise": (deficient, np.zeros((7, 5)), np.zeros((5, 5))),
         "invert_upper": (triangular(6).T.copy(), np.zeros((6, 6))),
+        "least_singular_value_bound": (triangular(6).T.copy(),),
         "orthogonalise_columns": (deficient.copy(), np.zeros((5, 5))),
         "acceleration": (
             *(J, J_dot, J_sharp, sample[0], J_sharp[0], sample[1]),
@@ -457,3 +459,18 @@ def test_a_controller_step_is_the_same_without_the_compiler() -> None:
         assert values[-1] == ("singular" in name)  # damped there, and only there
         # 1e-12 of efforts up to 1e3: sums are the same, hypot's last bit is not.
         np.testing.assert_allclose(plain[name], values, rtol=1e-12, atol=1e-11)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 12))
+def test_bounds_of_the_least_singular_value(seed: int, m: int) -> None:
+    """Both lie below it, the second within m to the power of a quarter."""
+    rng = np.random.default_rng(seed)
+    R = np.triu(rng.standard_normal((m, m)))
+    R[np.diag_indices(m)] = rng.uniform(0.1, 2.0, m)
+    V = np.zeros((m, m))
+    loose = invert_upper(R, V)
+    tight = least_singular_value_bound(V)
+    true = np.linalg.svd(R, compute_uv=False)[-1]
+    assert loose <= true * (1.0 + 1e-9)
+    assert tight <= true * (1.0 + 1e-9)
+    assert tight >= true * m**-0.25 * (1.0 - 1e-9)

@@ -8,6 +8,7 @@ from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
 from hsp_control.linalg import (
     invert_upper,
+    least_singular_value_bound,
     orthogonalise_columns,
     orthonormalise,
     solve_lower,
@@ -54,7 +55,11 @@ def weighted_pseudo_inverse(
             solve_lower(L, B[:, k])
     orthonormalise(B, Q, R)
     damped = False
-    if invert_upper(R, V) < threshold:
+    # The spectrum is asked for only where cheaper bounds leave open whether it is met.
+    bound = invert_upper(R, V)
+    if 0.0 < bound < threshold:
+        bound = least_singular_value_bound(V)
+    if bound < threshold:
         damped = _robust_factor(B, threshold, Q, R, V)
     # Away from singularities J# = L⁻ᵀ Q R⁻ᵀ, near them J# = L⁻ᵀ (B U) q(S²) Uᵀ: in both
     # cases the product of what Q and V hold now.
