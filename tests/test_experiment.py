@@ -265,7 +265,7 @@ MISTAKES = [
      "tasks.more: direction: [0, 0, 0] is none"),
     ("tasks.more", {"type": "frame_position", "axes": "xw",
                     "trajectory": {"type": "hold"}}, "TaskError",
-     "tasks.more.axes: 'xw': name distinct axes"),
+     "tasks.more.axes: axes 'xw': name distinct axes"),
     ("null_space.gain", [1, 2], "GainError",
      "null_space: null_space_gain has shape (2,)"),
     ("null_space.gain", 0, "ConfigError", "null_space.gain: "),

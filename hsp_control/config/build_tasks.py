@@ -26,6 +26,7 @@ from hsp_control.tasks import (
     RelativePose,
     Task,
 )
+from hsp_control.tasks.axes import axis_indices
 from hsp_control.trajectories import (
     Blend,
     BlendOrientation,
@@ -54,7 +55,7 @@ def build_task(
         match model:
             case s.FramePositionModel():
                 with document.at("tasks", name, "axes"):
-                    axes = _axes(model.axes)
+                    axes = axis_indices(model.axes)
                 with document.at("tasks", name, "trajectory"):
                     position = _position(model, here.position[axes])
                 return FramePosition(
@@ -97,7 +98,7 @@ def _whole_body(
         with document.at("tasks", name):
             return AngularMomentum(robot, momentum, model.rate, name=name)
     with document.at("tasks", name, "axes"):
-        axes = _axes(model.axes)
+        axes = axis_indices(model.axes)
     with document.at("tasks", name, "trajectory"):
         position = _position(model, start.centroidal.position[axes])
     with document.at("tasks", name):
@@ -140,12 +141,6 @@ def _joint_posture(
             joints=model.joints,
             name=name,
         )
-
-
-def _axes(letters: str) -> list[int]:
-    if not letters or set(letters) - set("xyz") or len(set(letters)) < len(letters):
-        raise TaskError(f"{letters!r}: name distinct axes among x, y and z")
-    return ["xyz".index(letter) for letter in letters]
 
 
 def _position(

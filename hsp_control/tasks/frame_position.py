@@ -3,13 +3,12 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
-
 from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import TaskError
 from hsp_control.kernels import bind, kernel
 from hsp_control.kinematics import FrameKinematics
 from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks.axes import axis_indices
 from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import TaskSample, named_after, track
@@ -51,9 +50,7 @@ class FramePosition(FrameTask):
                 has another dimension.
             GainError: If the gains do not fit.
         """
-        letters = "".join(axes)
-        if not letters or len(set(letters)) < len(letters) or set(letters) - set("xyz"):
-            raise TaskError(f"axes {letters!r}: name distinct axes among x, y and z")
+        letters, indices = "".join(axes), axis_indices(axes)
         super().__init__(robot, frame, len(letters), gains, name or named_after(frame))
         if trajectory.dimension != self.rows:
             raise TaskError(
@@ -62,7 +59,7 @@ class FramePosition(FrameTask):
             )
         self.axes = letters
         self.trajectory = trajectory
-        self._axes = np.array(["xyz".index(a) for a in letters], dtype=np.int64)
+        self._axes = indices
 
     def _bind(
         self, frame: FrameKinematics, out: TaskSample

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from hsp_control.schedules import Schedule
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import Task
 
@@ -17,21 +18,17 @@ class GainRamp:
 
         Raises:
             GainError: If the gains do not fit the task.
+            ScheduleError: If the ramp is negative.
         """
         self._task = task
         self._from = task.Kp.copy(), task.Kv.copy()
         self._to = gains.matrices(task.rows)
-        self._start, self._ramp = start, ramp
+        self._end = start + ramp
+        self._share = Schedule([(start, np.inf)], ramp=ramp)
 
     def apply(self, t: float) -> bool:
         """Set the gains of time t [s]; return whether they have arrived."""
-        s = (
-            (t - self._start) / self._ramp
-            if self._ramp > 0.0
-            else float(t >= self._start)
-        )
-        s = float(np.clip(s, 0.0, 1.0))
-        w = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+        w = self._share.weight(t)
         self._task.Kp[:] = (1.0 - w) * self._from[0] + w * self._to[0]
         self._task.Kv[:] = (1.0 - w) * self._from[1] + w * self._to[1]
-        return s >= 1.0
+        return t >= self._end
