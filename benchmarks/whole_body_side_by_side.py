@@ -193,7 +193,7 @@ def parts_table(case: Standing, states: list[State]) -> str:
             "deliver, all of it",
             lambda: actuation.deliver(state, a, mode.resolution, support),  # noqa: B023
         )
-        key = f"deliver, status {delivered.status}"
+        key = f"deliver, status {delivered[3]}"
         taken.setdefault(key, []).append(taken["deliver, all of it"][-1])
     lines = "| part | median [µs] | steps |\n|---|--:|--:|\n"
     for name, each in taken.items():

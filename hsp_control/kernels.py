@@ -48,7 +48,12 @@ def kernel(function: Function) -> Function:
     function.__qualname__ += f"_{_PACKAGE_STATE}"
     # Without the reference counts of Numba's memory manager, handing over an array
     # costs 6 ns instead of 27, a slice nothing; and what allocates does not compile.
-    options: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
+    options: dict[str, Any] = {
+        "cache": True,
+        "error_model": "numpy",
+        "_nrt": False,
+        "fastmath": {"reassoc", "contract"},
+    }
     try:
         compiled = numba.njit(**options)(function)
     except RuntimeError as error:  # Numba found no folder to keep the code in

@@ -22,7 +22,6 @@ class FrameKinematics:
 
     __slots__ = (
         "_compute",
-        "_id",
         "_stamp",
         "drift",
         "jacobian",
@@ -34,22 +33,27 @@ class FrameKinematics:
 
     def __init__(self, model: pin.Model, data: pin.Data, v: Array, index: int) -> None:
         """Allocate; `RobotState.frame` fills it, with ``v`` for the velocity."""
-        nv = model.nv
-        self.rotation: Array = data.oMf[index].rotation  # views: they follow the data
-        self.position: Array = data.oMf[index].translation
+        nv, frame = model.nv, model.frames[index]
+        joint = data.oMi[frame.parentJoint]  # its parts are views: they follow the data
+        self.rotation: Array = np.zeros((3, 3))
+        self.position: Array = np.zeros(3)
         self.jacobian: Array = np.zeros((6, nv))
         self.jacobian_dot: Array = np.zeros((6, nv))
         self.velocity: Array = np.zeros(6)
         self.drift: Array = np.zeros(6)
-        self._id = index
         self._stamp = -1
         self._compute = bind(
             frame_kinematics,
             data.J,
             data.dJ,
-            self.position,
+            joint.rotation,
+            joint.translation,
+            np.ascontiguousarray(frame.placement.rotation),
+            frame.placement.translation.copy(),
             v,
-            *joint_support(model, model.frames[index].parentJoint),
+            *joint_support(model, frame.parentJoint),
+            self.rotation,
+            self.position,
             self.jacobian,
             self.jacobian_dot,
             self.velocity,
@@ -61,21 +65,34 @@ class FrameKinematics:
 def frame_kinematics(
     J_world: Array,
     J_world_dot: Array,
-    p: Array,
+    R_joint: Array,
+    p_joint: Array,
+    R_local: Array,
+    p_local: Array,
     v: Array,
     columns: Indices,
     freedoms: Indices,
+    R: Array,
+    p: Array,
     J: Array,
     J_dot: Array,
     velocity: Array,
     drift: Array,
 ) -> None:
-    """Move the joints' Jacobian and its rate from the world's origin to a point.
+    """Write where a frame of a joint is, and how its origin moves.
 
+    The joints' Jacobian and its rate are moved from the world's origin to the frame's.
     A column (l, w) at the origin reads (l + w × p, w) at the point p, and its rate
     (l' + w' × p + w × p', w'). Only joints that carry the frame have columns; those of
     joints that mimic add to their leader's.
     """
+    for i in range(3):
+        p[i] = p_joint[i]
+        for j in range(3):
+            p[i] += R_joint[i, j] * p_local[j]
+            R[i, j] = 0.0
+            for k in range(3):
+                R[i, j] += R_joint[i, k] * R_local[k, j]
     for k in range(columns.shape[0]):
         j = freedoms[k]
         for i in range(6):

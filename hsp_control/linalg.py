@@ -27,6 +27,16 @@ def multiply_transposed(A: Array, x: Array, out: Array) -> None:
 
 
 @kernel
+def norm(W: Array, x: Array) -> float:
+    """Return ‖x‖_W = √(xᵀ W x)."""
+    square = 0.0
+    for i in range(x.shape[0]):
+        for j in range(x.shape[0]):
+            square += x[i] * W[i, j] * x[j]
+    return float(np.sqrt(square))
+
+
+@kernel
 def cholesky(A: Array, L: Array) -> bool:
     """Write the lower triangle L of A = L Lᵀ; return whether A is positive definite."""
     n = A.shape[0]
@@ -106,100 +116,105 @@ def gram(A: Array, B: Array, symmetric: bool, out: Array) -> None:
 
 
 @kernel
-def orthonormalise(B: Array, Q: Array, R: Array) -> None:
-    """Write the thin factors B = Q R of an n × m matrix with n ≥ m.
+def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
+    """Write a lower triangular X and Q = X J with orthonormal rows, for m ≤ n.
 
-    Gram-Schmidt, each column cleaned twice ("twice is enough", Giraud et al. 2005), so
-    that Q is orthonormal to rounding. A column that vanishes leaves zeros in Q and a
-    zero on the diagonal of R.
+    Gram-Schmidt, each row handing on what it shares with those after it; X goes through
+    the same steps. Where they cancel nine tenths of a row or more, all rows are cleaned
+    once more ("twice is enough", Giraud et al. 2005), so that Q is orthonormal to
+    rounding. A row that vanishes leaves zeros in Q and X.
+
+    Returns:
+        A lower bound of J's least singular value, within √m of it: 1/‖X‖_F, or 0 where
+        a row vanished.
     """
-    n, m = B.shape
+    m, n = J.shape
     for j in range(m):
         for i in range(n):
-            Q[i, j] = B[i, j]
-        for k in range(m):
-            R[k, j] = 0.0
-        for _ in range(2):
-            for k in range(j):
-                dot = 0.0
-                for i in range(n):
-                    dot += Q[i, k] * Q[i, j]
-                R[k, j] += dot
-                for i in range(n):
-                    Q[i, j] -= dot * Q[i, k]
-        square = 0.0
-        for i in range(n):
-            square += Q[i, j] * Q[i, j]
-        R[j, j] = np.sqrt(square)
-        scale = 1.0 / R[j, j] if R[j, j] > 0.0 else 0.0
-        for i in range(n):
-            Q[i, j] *= scale
-
-
-@kernel
-def invert_upper(R: Array, out: Array) -> float:
-    """Write R⁻¹ and return a lower bound of R's least singular value, 1/‖R⁻¹‖_F.
-
-    The bound is within √m of the singular value, and 0 for a singular R (whose
-    inverse is then not written to the end).
-    """
-    m = R.shape[0]
-    square = 0.0
+            Q[j, i] = J[j, i]
+        for i in range(m):
+            X[j, i] = 1.0 if i == j else 0.0
+    cancelled = False
     for j in range(m):
-        if R[j, j] == 0.0:
+        cancelled = _share_row(Q, X, j) < 0.01 * _square(J[j]) or cancelled
+    if cancelled:
+        for j in range(m):
+            _share_row(Q, X, j)
+    total = 0.0
+    for j in range(m):
+        if X[j, j] == 0.0:
             return 0.0
-        out[j, j] = 1.0 / R[j, j]
-        square += out[j, j] * out[j, j]
-        for i in range(j + 1, m):
-            out[i, j] = 0.0
-        for k in range(j):
-            i = j - 1 - k
-            total = 0.0
-            for p in range(i + 1, j + 1):
-                total += R[i, p] * out[p, j]
-            out[i, j] = -total / R[i, i]
-            square += out[i, j] * out[i, j]
-    return float(1.0 / np.sqrt(square))
+        total += _square(X[j, : j + 1])
+    return float(1.0 / np.sqrt(total))
 
 
 @kernel
-def least_singular_value_bound(V: Array) -> float:
-    """Return 1/√‖V Vᵀ‖_F for an upper triangular V = R⁻¹: a bound of R's least one.
+def _share_row(Q: Array, X: Array, j: int) -> float:
+    """Scale row j to length one, take it out of those after it; return its square."""
+    m, n = Q.shape
+    square = _square(Q[j])
+    scale = 1.0 / np.sqrt(square) if square > 0.0 else 0.0
+    for i in range(n):
+        Q[j, i] *= scale
+    for i in range(j + 1):
+        X[j, i] *= scale
+    for k in range(j + 1, m):
+        share = 0.0
+        for i in range(n):
+            share += Q[j, i] * Q[k, i]
+        for i in range(n):
+            Q[k, i] -= share * Q[j, i]
+        for i in range(j + 1):
+            X[k, i] -= share * X[j, i]
+    return square
 
-    It is within the fourth root of m of the least singular value of R, tighter than
-    that of `invert_upper`.
+
+@kernel
+def _square(x: Array) -> float:
+    """Return x·x."""
+    total = 0.0
+    for i in range(x.shape[0]):
+        total += x[i] * x[i]
+    return total
+
+
+@kernel
+def least_singular_value_bound(X: Array) -> float:
+    """Return 1/√‖X Xᵀ‖_F for the X of `orthonormalise_rows`: a tighter bound.
+
+    It is within the fourth root of m of the least singular value.
     """
-    m = V.shape[0]
+    m = X.shape[0]
     square = 0.0
     for i in range(m):
         for j in range(i + 1):
             dot = 0.0
-            for k in range(i, m):
-                dot += V[i, k] * V[j, k]
+            for k in range(j + 1):
+                dot += X[i, k] * X[j, k]
             square += dot * dot if i == j else 2.0 * dot * dot
     return float(1.0 / np.sqrt(np.sqrt(square)))
 
 
 @kernel
-def orthogonalise_columns(Y: Array, V: Array) -> None:
-    """Overwrite Y by Y V with orthogonal columns, V orthogonal (one-sided Jacobi).
+def orthogonalise_rows(Y: Array, U: Array) -> None:
+    """Overwrite Y by U Y with orthogonal rows, U orthogonal (one-sided Jacobi).
 
-    The columns' norms are then Y's singular values, small ones to high relative
-    accuracy (Demmel and Veselić 1992). Rank loss is welcome.
+    The rows' norms are then Y's singular values, small ones to high relative accuracy
+    (Demmel and Veselić 1992). Rank loss is welcome.
     """
-    n, m = Y.shape
+    m, n = Y.shape
     for i in range(m):
         for j in range(m):
-            V[i, j] = 1.0 if i == j else 0.0
+            U[i, j] = 1.0 if i == j else 0.0
     for _ in range(30):  # sweeps; about six are needed
         rotated = False
         for p in range(m - 1):
             for q in range(p + 1, m):
                 alpha = beta = gamma = 0.0
                 for i in range(n):
-                    alpha += Y[i, p] * Y[i, p]
-                    beta += Y[i, q] * Y[i, q]
-                    gamma += Y[i, p] * Y[i, q]
+                    alpha += Y[p, i] * Y[p, i]
+                    beta += Y[q, i] * Y[q, i]
+                    gamma += Y[p, i] * Y[q, i]
                 if abs(gamma) <= 1e-15 * np.sqrt(alpha * beta) or gamma == 0.0:
                     continue
                 rotated = True
@@ -209,12 +224,12 @@ def orthogonalise_columns(Y: Array, V: Array) -> None:
                 c = 1.0 / np.hypot(1.0, t)
                 s = c * t
                 for i in range(n):
-                    y = Y[i, p]
-                    Y[i, p] = c * y - s * Y[i, q]
-                    Y[i, q] = s * y + c * Y[i, q]
+                    y = Y[p, i]
+                    Y[p, i] = c * y - s * Y[q, i]
+                    Y[q, i] = s * y + c * Y[q, i]
                 for i in range(m):
-                    y = V[i, p]
-                    V[i, p] = c * y - s * V[i, q]
-                    V[i, q] = s * y + c * V[i, q]
+                    y = U[p, i]
+                    U[p, i] = c * y - s * U[q, i]
+                    U[q, i] = s * y + c * U[q, i]
         if not rotated:
             return

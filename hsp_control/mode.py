@@ -1,18 +1,21 @@
 """What is on at one time: the contacts that bear and the tasks that count, stacked."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from hsp_control.actuation.support import Support
 from hsp_control.arrays import Array, Indices
+from hsp_control.bound import Bound
 from hsp_control.contacts import Contact
 from hsp_control.contacts.unactuated import UnactuatedRows, unactuated_count
 from hsp_control.fields import NullSpaceField
 from hsp_control.metrics import Metric
-from hsp_control.resolution import Resolution, Resolved
+from hsp_control.resolution import Resolution
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
+from hsp_control.trajectories.following import stay
 
 
 class Mode:
@@ -61,6 +64,7 @@ class Mode:
         if free:
             self._rest = UnactuatedRows(robot, base, free)
             self._free = self.stack.rows(held, held + free)
+        self._bound: tuple[RobotState, Metric, NullSpaceField] | None = None
         self.contact_rows = _places(self.contacts, 0)
         tasks = [task for level in self.levels for task in level]
         self.first_task_row = held + free
@@ -74,16 +78,39 @@ class Mode:
 
     def resolve(
         self, state: RobotState, metric: Metric, field: NullSpaceField
-    ) -> Resolved:
-        """Return the law's acceleration at a state."""
-        for part, sample in self._parts:
-            part.evaluate(state, sample)
-        if self._rest is not None:
-            self._rest.evaluate(state, self._held, self._free)
+    ) -> tuple[bool, bool]:
+        """Resolve contacts, tasks and field: see `resolution` for what comes out.
+
+        Returns:
+            Whether the law was damped, and whether all is finite.
+        """
+        bound = self._bound
+        if bound is None or bound[0] is not state or bound[2] is not field:
+            self._bind(state, metric, field)
+        for follow in self._follow:
+            follow(state.t)
+        for write, arguments in self._write:
+            write(*arguments)
+        return self._law()
+
+    def _bind(self, state: RobotState, metric: Metric, field: NullSpaceField) -> None:
+        """Collect what a step calls."""
         problem = self.resolution.problem
-        metric.evaluate(state, problem.metric)
-        field.evaluate(state, problem.metric, metric.form, problem.field)
-        return self.resolution.resolve(state.v, controls_null_space=field.controls)
+        bounds = [part.bind(state, sample) for part, sample in self._parts]
+        if self._rest is not None:
+            rest = partial(self._rest.evaluate, state, self._held, self._free)
+            bounds.append(Bound(write=(rest,)))
+        bounds.append(metric.bind(state, problem.metric))
+        bounds.append(field.bind(state, problem.metric, metric.form, problem.field))
+        self._follow = [call for b in bounds for call in b.follow if call is not stay]
+        # Taken apart, partial calls need not put their arguments together each time.
+        self._write = [
+            (call.func, call.args) if type(call) is partial else (call, ())
+            for b in bounds
+            for call in b.write
+        ]
+        self._law = self.resolution.bind(state.v, controls=field.controls)
+        self._bound = state, metric, field
 
     def culprit(self) -> str | None:
         """Return which task's or contact's numbers are not finite, if any are."""

@@ -4,6 +4,7 @@ This is the only module that asks Pinocchio for kinematics and dynamics.
 """
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -242,6 +243,16 @@ class RobotState:
         self.q: Array = robot.neutral()
         self.v: Array = np.zeros(robot.nv)
         self.data: pin.Data = robot.model.createData()
+        self._move = partial(
+            pin.computeJointJacobiansTimeVariation,
+            robot.model,
+            self.data,
+            self.q,
+            self.v,
+        )
+        self._inverse_dynamics = partial(
+            pin.rnea, robot.model, self.data, self.q, self.v
+        )
         self._world: WorldKinematics | None = None
         self._unit_blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
         self._frames: dict[str, FrameKinematics] = {}
@@ -279,7 +290,7 @@ class RobotState:
             own_q[:], own_v[:] = q, v
         self.t = t
         self._stamp += 1
-        pin.computeJointJacobiansTimeVariation(robot.model, self.data, own_q, own_v)
+        self._move()
         return self
 
     def frame(self, name: str) -> FrameKinematics:
@@ -294,7 +305,6 @@ class RobotState:
             frame = FrameKinematics(self.robot.model, self.data, self.v, index)
             self._frames[name] = frame
         if frame._stamp != self._stamp:
-            pin.updateFramePlacement(self.robot.model, self.data, frame._id)
             frame._compute()
             frame._stamp = self._stamp
         return frame
@@ -346,9 +356,7 @@ class RobotState:
 
     def inverse_dynamics(self, acceleration: Array) -> Array:
         """Return the effort M a + N for an acceleration of shape (nv,) (RNEA)."""
-        return pin.rnea(  # type: ignore[no-any-return]
-            self.robot.model, self.data, self.q, self.v, acceleration
-        )
+        return self._inverse_dynamics(acceleration)  # type: ignore[no-any-return]
 
     @property
     def stamp(self) -> int:

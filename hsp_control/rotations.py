@@ -20,6 +20,9 @@ from hsp_control.kernels import kernel
 _SERIES_BELOW = 10.0  # s; just above π², so that the logarithm's range has no switch
 _C4_TERMS = tuple(1.0 / factorial(4 + 2 * j) for j in reversed(range(14)))
 _C5_TERMS = tuple(1.0 / factorial(5 + 2 * j) for j in reversed(range(14)))
+# Errors of tracking are small: below s = 0.2 the terms after six are below rounding.
+_SHORT_BELOW, _SHORT, _ALL = 0.2, 6, len(_C4_TERMS)
+_C4_SHORT, _C5_SHORT = _C4_TERMS[-_SHORT:], _C5_TERMS[-_SHORT:]
 
 
 @kernel
@@ -32,12 +35,15 @@ def stumpff(s: float) -> tuple[float, float, float, float, float, float]:
     the sine beyond.
     """
     if s < _SERIES_BELOW:
-        c4 = 0.0
-        for term in _C4_TERMS:
-            c4 = term - s * c4
-        c5 = 0.0
-        for term in _C5_TERMS:
-            c5 = term - s * c5
+        c4 = c5 = 0.0
+        if s < _SHORT_BELOW:
+            for k in range(_SHORT):
+                c4 = _C4_SHORT[k] - s * c4
+                c5 = _C5_SHORT[k] - s * c5
+        else:
+            for k in range(_ALL):
+                c4 = _C4_TERMS[k] - s * c4
+                c5 = _C5_TERMS[k] - s * c5
         c2 = 0.5 - s * c4
         c3 = 1.0 / 6.0 - s * c5
         return 1.0 - s * c2, 1.0 - s * c3, c2, c3, c4, c5

@@ -71,10 +71,9 @@ def pseudo_inverse(J: Array, W: Array | None, threshold: float) -> tuple[Array, 
     """Return the package's J# and whether it was damped; W None: the identity."""
     m, n = J.shape
     form, L = (IDENTITY, np.eye(n)) if W is None else (CONSTANT, np.linalg.cholesky(W))
-    out = np.full((n, m), np.nan)
-    scratch = (np.full(shape, np.nan) for shape in ((n, m), (n, m), (m, m), (m, m)))
-    damped = weighted_pseudo_inverse(J, L, form, threshold, *scratch, out)
-    return out, damped
+    B, Q, X = (np.full(shape, np.nan) for shape in ((m, n), (m, n), (m, m)))
+    damped = weighted_pseudo_inverse(J, L, form, threshold, B, Q, X)
+    return np.linalg.solve(L.T, Q.T @ X), damped
 
 
 # --- the pseudo-inverse --------------------------------------------------------------

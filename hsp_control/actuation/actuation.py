@@ -17,8 +17,7 @@ the order of their priority. The rows are affine in (δ, f):
 Where a* violates no row it is the optimum, and nothing is solved. ``law.md`` §5, §6.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -28,8 +27,9 @@ from hsp_control.actuation.support import Support
 from hsp_control.actuation.yielding import yielding_metric
 from hsp_control.arrays import Array, Indices
 from hsp_control.contacts import Contact
+from hsp_control.kernels import bind
 from hsp_control.limits import Limits
-from hsp_control.limits.acceleration_bounds import acceleration_bounds, within
+from hsp_control.limits.acceleration_bounds import keeps_limits, within
 from hsp_control.resolution import Resolution
 from hsp_control.robot import Robot, RobotState
 
@@ -44,22 +44,11 @@ looked for about what the last round found: the cost is of the difference, so it
 Else 1e3 rad/s², as a far target asks for, would outweigh a violation."""
 
 
-class Delivered(NamedTuple):
-    """What is done about the law's acceleration.
-
-    Attributes:
-        tau: Effort, shape (nv,), zero where no motor is [N·m or N].
-        acceleration: a, shape (nv,).
-        forces: At the points of the contacts, in their axes, shape (size,) [N].
-        status: `EXACT`, `REDISTRIBUTED`, `LIMITED` or `RELAXED`.
-        relaxation: By how much the worst bound is missed [rad/s² or m/s²].
-    """
-
-    tau: Array
-    acceleration: Array
-    forces: Array
-    status: int
-    relaxation: float
+Delivered = tuple[Array, Array, Array, int, float]
+"""What is done about the law's acceleration: effort, shape (nv,), zero where no motor
+is [N·m or N]; acceleration, shape (nv,); forces at the points of the contacts, in their
+axes, shape (size,) [N]; `EXACT`, `REDISTRIBUTED`, `LIMITED` or `RELAXED`; and by how
+much the worst bound is missed [rad/s² or m/s²]."""
 
 
 class Actuation:
@@ -87,6 +76,7 @@ class Actuation:
         self._robot = robot
         self.limits = limits
         self.base: Indices = np.array(base, dtype=np.int64)
+        self._floats = bool(self.base.size)
         self._motors: Indices = np.setdiff1d(np.arange(nv), self.base)
         self._mass = sum(inertia.mass for inertia in robot.model.inertias)
         self._weight = 9.81 * self._mass
@@ -95,6 +85,9 @@ class Actuation:
         self._no_forces = np.zeros(0)
         self._nothing = Rows(np.zeros((0, nv)), np.zeros(0), np.zeros(0))
         self._no_support = Support((), nv, self._weight)
+        self._bound: tuple[RobotState, Array] | None = None
+        self._check: Callable[[], tuple[bool, bool]]
+        self._only_boxes = not self._floats and not (limits and limits.distances)
         self.forget()
 
     def support(self, contacts: Sequence[Contact]) -> Support:
@@ -136,45 +129,58 @@ class Actuation:
             support: The contacts that bear; updated here.
         """
         wanted = state.inverse_dynamics(a)  # M a + N
-        if self.limits is None and not self.base.size:
-            return Delivered(wanted, a, self._no_forces, EXACT, 0.0)
-        wanted = wanted.copy()
-        forces, tau = np.zeros(support.size), wanted
+        forces, tau = self._no_forces, wanted
+        moves, affords = self._keeps_limits(state, a)
+        if self._only_boxes and moves and affords:
+            return wanted, a, forces, EXACT, 0.0
         if support.size:
             support.update(state)
             forces = support.least_norm(self.base, wanted[self.base])
             tau = wanted - support.map @ forces
         apart = self._apart(state)
-        moves = self._moves(state, a) and (
-            apart is self._nothing or bool((apart.A @ a >= apart.lower).all())
-        )
-        if moves and support.bears(forces) and self._within_efforts(tau):
-            tau[self.base] = 0.0
-            return Delivered(tau, a, forces, EXACT, 0.0)
+        if apart is not self._nothing:
+            moves = moves and bool((apart.A @ a >= apart.lower).all())
+        bears = not support.size or support.bears(forces)
+        if moves and bears and within(tau, self._low, self._high):
+            if self._floats:
+                tau[self.base] = 0.0
+            return tau, a, forces, EXACT, 0.0
         if moves and support.size:
             shared = self._redistribute(wanted, forces, support)
             if shared is not None:
                 return self._finish(wanted, a, shared, support, REDISTRIBUTED, 0.0)
         return self._limit(state, wanted, a, forces, resolution, support, apart)
 
-    def _moves(self, state: RobotState, a: Array) -> bool:
-        """Write the bounds on the acceleration; return whether a is within them."""
-        if self.limits is None:
-            return True
-        limits = self.limits
-        acceleration_bounds(
-            state.q,
-            state.v,
-            self._robot.freedom_indices,
-            limits.guarded_lower,
-            limits.guarded_upper,
-            limits.guarded_velocity,
-            limits.acceleration,
-            limits.bandwidth,
-            self._least,
-            self._greatest,
-        )
-        return within(a, self._least, self._greatest)
+    def _keeps_limits(self, state: RobotState, a: Array) -> tuple[bool, bool]:
+        """Write the bounds on the acceleration.
+
+        Returns:
+            Whether a is within them, and the effort without contacts, which Pinocchio's
+            data has just been given, within those of the effort.
+        """
+        limits, bound = self.limits, self._bound
+        if limits is None:
+            return True, True
+        if bound is None or bound[0] is not state or bound[1] is not a:
+            self._bound = state, a
+            self._check = bind(
+                keeps_limits,
+                state.q,
+                state.v,
+                a,
+                state.data.tau,
+                self._robot.freedom_indices,
+                limits.guarded_lower,
+                limits.guarded_upper,
+                limits.guarded_velocity,
+                limits.acceleration,
+                limits.bandwidth,
+                self._least,
+                self._greatest,
+                self._low,
+                self._high,
+            )
+        return self._check()
 
     def _apart(self, state: RobotState) -> Rows:
         """Return the rows that keep distances, A a ≥ lower."""
@@ -186,9 +192,6 @@ class Actuation:
         return Rows(
             np.vstack([A for A, _ in parts]), lower, np.full(len(lower), np.inf)
         )
-
-    def _within_efforts(self, tau: Array) -> bool:
-        return within(tau, self._low, self._high)
 
     def _redistribute(
         self, wanted: Array, forces: Array, support: Support
@@ -251,7 +254,7 @@ class Actuation:
         if x is None:  # beyond what the solver can do: still no effort beyond limits
             tau = np.clip(wanted - support.map @ forces, self._low, self._high)
             tau[base] = 0.0
-            return Delivered(tau, a, forces, RELAXED, np.inf)
+            return tau, a, forces, RELAXED, np.inf
         wanted = wanted + M @ x[:n]
         return self._finish(
             wanted, a + x[:n], x[n:] * scale, support, status, relaxation
@@ -270,7 +273,7 @@ class Actuation:
         forces = np.clip(forces, support.least, support.greatest)
         tau = np.clip(wanted - support.map @ forces, self._low, self._high)
         tau[self.base] = 0.0
-        return Delivered(tau, a, forces, status, relaxation)
+        return tau, a, forces, status, relaxation
 
     def _base_rows(self, A: Array, wrench: Array) -> Rows:
         """Return rows A x = wrench, per robot mass."""

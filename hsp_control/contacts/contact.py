@@ -2,11 +2,13 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from hsp_control.arrays import Array
+from hsp_control.bound import Bound
 from hsp_control.exceptions import ContactError
 from hsp_control.kinematics import FrameKinematics
 from hsp_control.robot import Robot, RobotState
@@ -67,6 +69,10 @@ class Contact(ABC):
         self.friction = _positive(friction, "friction", self.name)
         self.damping = _positive(damping, "damping", self.name)
         self.schedule = Schedule.always() if schedule is None else schedule
+
+    def bind(self, state: RobotState, out: TaskSample) -> Bound:
+        """Return what `evaluate` does with this state and this sample."""
+        return Bound(write=(partial(self.evaluate, state, out),))
 
     def evaluate(self, state: RobotState, out: TaskSample) -> TaskSample:
         """Write the rows: J, J', and the acceleration that brings it to rest."""

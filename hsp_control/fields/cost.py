@@ -75,7 +75,7 @@ class Cost(NullSpaceField):
                 metric,
                 form,
                 out,
-                bind(_descend, metric.L, metric.W_dot, form, out.g, out.g_dot),
+                bind(descend, metric.L, metric.W_dot, form, out.g, out.g_dot),
             )
         if not bound[3]():
             raise FieldError(
@@ -162,7 +162,7 @@ class FunctionCost(Cost):
 
 
 @kernel
-def _descend(L: Array, W_dot: Array, form: int, g: Array, g_dot: Array) -> bool:
+def descend(L: Array, W_dot: Array, form: int, g: Array, g_dot: Array) -> bool:
     """Overwrite (∇f, (∇f)') by (-W⁻¹∇f, -W⁻¹((∇f)' + W'g)); return if finite."""
     raise_covector(g, L, form)
     total = 0.0

@@ -2,12 +2,14 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from functools import partial
 from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hsp_control.arrays import Array
+from hsp_control.bound import Bound
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.weight import Product, Weight, as_weight
 from hsp_control.kernels import bind, kernel
@@ -51,6 +53,18 @@ class NullSpaceField(ABC):
         """Keep the robot and the name."""
         self.robot = robot
         self.name = name
+
+    def __init_subclass__(cls, **arguments: Any) -> None:
+        """Let an `evaluate` that is overridden count, also of a ready field."""
+        super().__init_subclass__(**arguments)
+        if "evaluate" in vars(cls) and "bind" not in vars(cls):
+            cls.bind = NullSpaceField.bind  # type: ignore[method-assign]
+
+    def bind(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> Bound:
+        """Return what `evaluate` does with this state and these samples."""
+        return Bound(write=(partial(self.evaluate, state, metric, form, out),))
 
     @abstractmethod
     def evaluate(
@@ -130,6 +144,18 @@ class WeightedSum(NullSpaceField):
             add(w, w_dot)
         return out
 
+    def bind(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> Bound:
+        """Return what `evaluate` does; see `NullSpaceField.bind`."""
+        follow: list[Callable[[float], object]] = []
+        write: list[Callable[[], object]] = []
+        for weight, field, sample, add in self._bind(out):
+            term = field.bind(state, metric, form, sample)
+            follow += term.follow
+            write += [*term.write, partial(_add_weighted, weight, state, add)]
+        return Bound(tuple(follow), tuple(write))
+
     def _bind(self, out: FieldSample) -> "list[_Term]":
         return [
             (weight, field, sample, bind(_add, k == 0, *sample, *out, free=(1.0, 1.0)))
@@ -151,6 +177,13 @@ class WeightedSum(NullSpaceField):
 
 _Term = tuple[Weight, NullSpaceField, FieldSample, Callable[[float, float], Any]]
 """A weight, its field, what the field writes and what then adds it to the sum."""
+
+
+def _add_weighted(
+    weight: Weight, state: RobotState, add: Callable[[float, float], Any]
+) -> None:
+    """Add a term whose sample has been written."""
+    add(*weight.sample(state))
 
 
 @kernel

@@ -62,6 +62,30 @@ def acceleration_bounds(
 
 
 @kernel
+def keeps_limits(
+    q: Array,
+    v: Array,
+    a: Array,
+    tau: Array,
+    where: Indices,
+    lower: Array,
+    upper: Array,
+    velocity: Array,
+    acceleration: Array,
+    bandwidth: float,
+    least: Array,
+    greatest: Array,
+    low: Array,
+    high: Array,
+) -> tuple[bool, bool]:
+    """Write the bounds, see `acceleration_bounds`; are a and tau within theirs?"""
+    acceleration_bounds(
+        q, v, where, lower, upper, velocity, acceleration, bandwidth, least, greatest
+    )
+    return within(a, least, greatest), within(tau, low, high)
+
+
+@kernel
 def within(x: Array, least: Array, greatest: Array) -> bool:
     """Return whether every component is within its bounds."""
     inside = True

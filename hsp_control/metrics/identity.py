@@ -2,6 +2,7 @@
 
 from typing import ClassVar
 
+from hsp_control.bound import Bound
 from hsp_control.metrics.metric import IDENTITY, Metric, MetricSample
 from hsp_control.robot import RobotState
 
@@ -10,6 +11,10 @@ class IdentityMetric(Metric):
     """W = I: every joint's motion counts the same. The sane default."""
 
     form: ClassVar[int] = IDENTITY
+
+    def bind(self, state: RobotState, out: MetricSample) -> Bound:
+        """Return nothing to do."""
+        return Bound()
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Leave ``out`` as `MetricSample.allocate` made it: the identity."""

@@ -1,11 +1,13 @@
 """What a joint-space metric is: a positive definite W(q) that measures velocities."""
 
 from abc import ABC, abstractmethod
+from functools import partial
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from hsp_control.arrays import Array
+from hsp_control.bound import Bound
 from hsp_control.kernels import kernel
 from hsp_control.linalg import solve_lower, solve_lower_transposed
 from hsp_control.robot import RobotState
@@ -46,6 +48,10 @@ class Metric(ABC):
 
     def check(self, nv: int) -> None:  # noqa: B027 (most metrics fit every robot)
         """Raise MetricError if the metric does not fit a robot of nv freedoms."""
+
+    def bind(self, state: RobotState, out: MetricSample) -> Bound:
+        """Return what `evaluate` does with this state and this sample."""
+        return Bound(write=(partial(self.evaluate, state, out),))
 
     @abstractmethod
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:

@@ -24,7 +24,7 @@ from hsp_control.kernels import kernel
 from hsp_control.linalg import (
     multiply,
     multiply_transposed,
-    orthogonalise_columns,
+    orthogonalise_rows,
     solve_lower,
     solve_lower_transposed,
 )
@@ -77,7 +77,7 @@ def resolve_levels(
         QJ: Scratch, shape (nv, m).
         G_inverse: Scratch, shape (m, m).
         square: Scratch, shape (2, m, m).
-        scratch: Scratch, shape (5, max(nv, m)).
+        scratch: Scratch, shape (6, max(nv, m)).
         e_N: Null-space error, shape (nv,).
         a: Acceleration, shape (nv,).
     """
@@ -177,22 +177,22 @@ def _open_level(
             for i in range(n):
                 total += J[p, i] * QJ[i, k]
             G[p, k] = G[k, p] = total
-    # G is symmetric and not negative: its columns' lengths become its eigenvalues.
-    orthogonalise_columns(G, V)
+    # G is symmetric and not negative: its rows' lengths become its eigenvalues.
+    orthogonalise_rows(G, V)
     floor = threshold * threshold
     damped = False
     for k in range(m):
         x = 0.0
         for p in range(m):
-            x += G[p, k] * G[p, k]
+            x += G[k, p] * G[k, p]
         x = np.sqrt(x)
         damped = damped or x < floor
-        G[0, k] = 1.0 / x if x >= floor else (2.0 - x / floor) / floor
+        G[k, 0] = 1.0 / x if x >= floor else (2.0 - x / floor) / floor
     for p in range(m):
         for k in range(m):
             total = 0.0
             for r in range(m):
-                total += V[p, r] * G[0, r] * V[k, r]
+                total += V[r, p] * G[r, 0] * V[r, k]
             G_inverse[p, k] = total
     return damped
 

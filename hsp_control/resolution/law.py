@@ -13,13 +13,15 @@ from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
 from hsp_control.linalg import multiply, multiply_transposed
 from hsp_control.metrics.metric import IDENTITY, VARYING, raise_covector
+from hsp_control.resolution.pseudo_inverse import pull_back, push_forward
 
 
 @kernel
 def null_space_command(
     J: Array,
     J_dot: Array,
-    J_sharp: Array,
+    Q: Array,
+    X: Array,
     v: Array,
     g: Array,
     g_dot: Array,
@@ -39,7 +41,8 @@ def null_space_command(
     Args:
         J: Jacobian of all tasks, shape (m, nv).
         J_dot: Its time derivative, shape (m, nv).
-        J_sharp: Weighted pseudo-inverse J#, shape (nv, m).
+        Q: One factor of J# = L⁻ᵀ Qᵀ X, shape (m, nv).
+        X: The other, shape (m, m).
         v: Velocity, shape (nv,).
         g: Field, shape (nv,).
         g_dot: Its total time derivative, shape (nv,).
@@ -48,31 +51,26 @@ def null_space_command(
         L: Its Cholesky factor, shape (nv, nv).
         W_dot: Its time derivative, shape (nv, nv).
         form: The metric's form.
-        scratch: Shape (5, nv).
+        scratch: Shape (6, nv).
         e_N: Null-space error, shape (nv,).
         u: Null-space command before projection, shape (nv,).
     """
-    n, m = J_sharp.shape
-    x, Jx, w, lowered, bent = (
-        scratch[0],
-        scratch[1, :m],
-        scratch[2, :m],
-        scratch[3],
-        scratch[4],
-    )
+    m, n = Q.shape
+    x, lowered, bent = scratch[0, :n], scratch[1, :n], scratch[2, :n]
+    Jx, w, part = scratch[3, :m], scratch[4, :m], scratch[5, :m]
 
     for i in range(n):
         x[i] = g[i] - v[i]
     multiply(J, x, Jx)
-    multiply(J_sharp, Jx, e_N)
+    pull_back(Q, X, L, form, Jx, part, e_N)
     for i in range(n):
         e_N[i] = x[i] - e_N[i]
 
     if form == IDENTITY:
-        multiply_transposed(J_sharp, x, w)
+        push_forward(Q, X, L, form, x, part, w)
     else:
         multiply(W, x, lowered)
-        multiply_transposed(J_sharp, lowered, w)
+        push_forward(Q, X, L, form, lowered, part, w)
 
     multiply_transposed(J_dot, w, bent)
     if form == VARYING:
@@ -92,7 +90,10 @@ def null_space_command(
 def acceleration(
     J: Array,
     J_dot: Array,
-    J_sharp: Array,
+    Q: Array,
+    X: Array,
+    L: Array,
+    form: int,
     v: Array,
     a_x: Array,
     u: Array,
@@ -104,19 +105,22 @@ def acceleration(
     Args:
         J: Jacobian of all tasks, shape (m, nv).
         J_dot: Its time derivative, shape (m, nv).
-        J_sharp: Weighted pseudo-inverse J#, shape (nv, m).
+        Q: One factor of J# = L⁻ᵀ Qᵀ X, shape (m, nv).
+        X: The other, shape (m, m).
+        L: Cholesky factor of the metric, shape (nv, nv).
+        form: The metric's form.
         v: Velocity, shape (nv,).
         a_x: Task acceleration x_d'' + Kv e' + Kp e, shape (m,).
         u: Null-space command, shape (nv,); zero for the paper's first simulation.
-        scratch: Shape (5, nv).
+        scratch: Shape (6, nv).
         a: Acceleration, shape (nv,).
     """
-    n, m = J_sharp.shape
-    drift, Ju = scratch[0, :m], scratch[1, :m]
+    m, n = Q.shape
+    drift, missing, part = scratch[3, :m], scratch[4, :m], scratch[5, :m]
     multiply(J_dot, v, drift)
-    multiply(J, u, Ju)
+    multiply(J, u, missing)
     for k in range(m):
-        Ju[k] = a_x[k] - drift[k] - Ju[k]
-    multiply(J_sharp, Ju, a)
+        missing[k] = a_x[k] - drift[k] - missing[k]
+    pull_back(Q, X, L, form, missing, part, a)
     for i in range(n):
         a[i] += u[i]

@@ -1,16 +1,19 @@
 """The weighted pseudo-inverse, exact away from singularities and bounded through them.
 
-Written for the whitened Jacobian B = L⁻¹Jᵀ with W = L Lᵀ, in which every metric is
-the Euclidean one: J# = L⁻ᵀ B q(BᵀB), where q inverts the spectrum.
+Written for the whitened Jacobian B = J L⁻ᵀ with W = L Lᵀ, in which every metric is the
+Euclidean one. It is kept as two factors, which the law multiplies by one after the
+other: J# = L⁻ᵀ Qᵀ X. Away from singularities Q = X B has orthonormal rows, X lower
+triangular; near them Q = U B has orthogonal rows, and X = q(s²) U inverts the spectrum.
 """
 
 from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
 from hsp_control.linalg import (
-    invert_upper,
     least_singular_value_bound,
-    orthogonalise_columns,
-    orthonormalise,
+    multiply,
+    multiply_transposed,
+    orthogonalise_rows,
+    orthonormalise_rows,
     solve_lower,
     solve_lower_transposed,
 )
@@ -25,11 +28,9 @@ def weighted_pseudo_inverse(
     threshold: float,
     B: Array,
     Q: Array,
-    R: Array,
-    V: Array,
-    out: Array,
+    X: Array,
 ) -> bool:
-    """Write J# = W⁻¹Jᵀ q(JW⁻¹Jᵀ); return whether a singular value was damped.
+    """Write the factors of J# = W⁻¹Jᵀ q(JW⁻¹Jᵀ); return whether it was damped.
 
     q(x) = 1/x for x ≥ threshold² and (2 - x/threshold²)/threshold² below it (law.md
     §4): continuously differentiable, exactly the inverse while every singular value of
@@ -41,56 +42,68 @@ def weighted_pseudo_inverse(
         L: Cholesky factor of the metric, shape (nv, nv).
         form: The metric's form.
         threshold: Singular value below which damping starts.
-        B: Scratch, shape (nv, m); holds the whitened Jacobian's transpose afterwards.
-        Q: Scratch, shape (nv, m).
-        R: Scratch, shape (m, m).
-        V: Scratch, shape (m, m).
-        out: J#, shape (nv, m).
+        B: Scratch, shape (m, nv); holds the whitened Jacobian afterwards.
+        Q: Rows that span those of B, shape (m, nv).
+        X: Shape (m, m).
     """
-    m, n = J.shape
-    for k in range(m):
-        for i in range(n):
-            B[i, k] = J[k, i]
-        if form != IDENTITY:
-            solve_lower(L, B[:, k])
-    orthonormalise(B, Q, R)
-    damped = False
+    whiten(J, L, form, B)
     # The spectrum is asked for only where cheaper bounds leave open whether it is met.
-    bound = invert_upper(R, V)
+    bound = orthonormalise_rows(B, Q, X)
     if 0.0 < bound < threshold:
-        bound = least_singular_value_bound(V)
+        bound = least_singular_value_bound(X)
     if bound < threshold:
-        damped = _robust_factor(B, threshold, Q, R, V)
-    # Away from singularities J# = L⁻ᵀ Q R⁻ᵀ, near them J# = L⁻ᵀ (B U) q(S²) Uᵀ: in both
-    # cases the product of what Q and V hold now.
-    for i in range(n):
-        for k in range(m):
-            total = 0.0
-            for p in range(m):
-                total += Q[i, p] * V[k, p]
-            out[i, k] = total
-    if form != IDENTITY:
-        for k in range(m):
-            solve_lower_transposed(L, out[:, k])
-    return damped
+        return _bounded_factors(B, threshold, Q, X)
+    return False
 
 
 @kernel
-def _robust_factor(B: Array, threshold: float, Q: Array, U: Array, V: Array) -> bool:
-    """Write Q = B U, with columns of norms s, and V = U q(s²); any s damped?"""
-    n, m = B.shape
-    for i in range(n):
-        for k in range(m):
-            Q[i, k] = B[i, k]
-    orthogonalise_columns(Q, U)
+def whiten(J: Array, L: Array, form: int, B: Array) -> None:
+    """Write B = J L⁻ᵀ."""
+    for k in range(J.shape[0]):
+        for i in range(J.shape[1]):
+            B[k, i] = J[k, i]
+        if form != IDENTITY:
+            solve_lower(L, B[k])
+
+
+@kernel
+def _bounded_factors(B: Array, threshold: float, Q: Array, X: Array) -> bool:
+    """Write Q = U B, with rows of norms s, and X = q(s²) U; any s damped?"""
+    m, n = B.shape
+    for k in range(m):
+        for i in range(n):
+            Q[k, i] = B[k, i]
+    orthogonalise_rows(Q, X)
     floor = threshold * threshold
     damped = False
     for k in range(m):
         x = 0.0
         for i in range(n):
-            x += Q[i, k] * Q[i, k]
+            x += Q[k, i] * Q[k, i]
         inverse = 1.0 / x if x >= floor else (2.0 - x / floor) / floor
         damped = damped or x < floor
         for i in range(m):
-            V[i, k] = U[i, k] * inverse
+            X[k, i] *= inverse
     return damped
+
+
+@kernel
+def pull_back(
+    Q: Array, X: Array, L: Array, form: int, x: Array, part: Array, out: Array
+) -> None:
+    """Write J# x = L⁻ᵀ Qᵀ X x, the least motion that x asks for; part is scratch."""
+    multiply(X, x, part)
+    multiply_transposed(Q, part, out)
+    if form != IDENTITY:
+        solve_lower_transposed(L, out)
+
+
+@kernel
+def push_forward(
+    Q: Array, X: Array, L: Array, form: int, y: Array, part: Array, out: Array
+) -> None:
+    """Write J#ᵀ y = Xᵀ Q L⁻¹ y, and overwrite y by L⁻¹ y; part is scratch."""
+    if form != IDENTITY:
+        solve_lower(L, y)
+    multiply(Q, y, part)
+    multiply_transposed(X, part, out)

@@ -1,18 +1,17 @@
 """From tasks and a field to one acceleration: the law with its memory."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.arrays import Array, Indices
 from hsp_control.kernels import bind, kernel
-from hsp_control.linalg import orthogonalise_columns, solve_lower
-from hsp_control.metrics.metric import IDENTITY
+from hsp_control.linalg import gram, norm, orthogonalise_rows, orthonormalise_rows
 from hsp_control.resolution.hierarchy import resolve_levels
 from hsp_control.resolution.law import acceleration, null_space_command
-from hsp_control.resolution.problem import Problem, parts
-from hsp_control.resolution.pseudo_inverse import weighted_pseudo_inverse
+from hsp_control.resolution.problem import Problem
+from hsp_control.resolution.pseudo_inverse import weighted_pseudo_inverse, whiten
 
 
 class Resolved(NamedTuple):
@@ -41,6 +40,7 @@ class Resolution:
         problem: What is to be resolved, to be filled in before `resolve`.
         ends: Where each level's rows end in the stack.
         threshold: Singular value below which the inverse is bounded.
+        acceleration: a of the last `resolve`, shape (nv,).
         null_space_error: e_N of the last `resolve`, shape (nv,).
     """
 
@@ -61,9 +61,16 @@ class Resolution:
         self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
         self._form = form
         self.threshold = threshold
-        self._scratch = np.zeros(_scratch_size(m, nv))
-        self._a, self.null_space_error = np.zeros(nv), np.zeros(nv)
-        self._bound: tuple[Array | None, bool] = None, True
+        self._scratch = (
+            np.zeros((2, m, nv)),
+            np.zeros((3, m, m)),
+            np.zeros((7, max(m, nv))),
+        )
+        # What only conflicting levels need.
+        self._levels_scratch = np.zeros((nv, m)), np.zeros((nv, nv))
+        self.acceleration, self.null_space_error = np.zeros(nv), np.zeros(nv)
+        self._norm = bind(norm, self.problem.metric.W, self.null_space_error)
+        self._spectra: dict[int, tuple[Callable[[], None], Array]] = {}
 
     def resolve(self, v: Array, *, controls_null_space: bool = True) -> Resolved:
         """Return the acceleration that tracks the tasks and the field.
@@ -72,73 +79,82 @@ class Resolution:
             v: Velocity, shape (nv,).
             controls_null_space: False for φ_N = 0, the paper's first simulation.
         """
-        if v is not self._bound[0] or controls_null_space is not self._bound[1]:
-            self._bound = v, controls_null_space
-            self._law = bind(
-                _resolve,
-                self.problem.block,
-                v,
-                self.ends,
-                self._form,
-                self.threshold,
-                controls_null_space,
-                self._scratch,
-                self.null_space_error,
-                self._a,
-            )
-        damped, finite = self._law()
-        return Resolved(self._a, self.null_space_error, damped, finite)
+        damped, finite = self.bind(v, controls=controls_null_space)()
+        return Resolved(self.acceleration, self.null_space_error, damped, finite)
+
+    def bind(self, v: Array, *, controls: bool) -> Callable[[], tuple[bool, bool]]:
+        """Return what `resolve` calls for a velocity, an array that is followed.
+
+        It returns whether the law was damped, and whether all is finite.
+        """
+        return bind(
+            _resolve,
+            *self.problem.arrays,
+            v,
+            self.ends,
+            self._form,
+            self.threshold,
+            controls,
+            *self._scratch,
+            *self._levels_scratch,
+            self.null_space_error,
+            self.acceleration,
+        )
 
     def singular_values(self, first: int = 0) -> Array:
         """Return the singular values of J L⁻ᵀ from a row on, largest first.
 
         Their product squared is det(J W⁻¹ Jᵀ), the manipulability of the paper.
         """
-        J = self.problem.task.jacobian[first:]
-        values = np.zeros(min(J.shape))
-        _singular_values(J, self.problem.metric.L, self._form, self._scratch, values)
-        return values
+        values = self._spectra.get(first)
+        if values is None:
+            J, L = self.problem.task.jacobian[first:], self.problem.metric.L
+            out = np.zeros(min(J.shape))
+            wide, small, _ = self._scratch
+            call = bind(_singular_values, J, L, self._form, wide, small, out)
+            self._spectra[first] = values = call, out
+        values[0]()
+        return values[1].copy()
 
-
-@kernel
-def _scratch_size(m: int, n: int) -> int:
-    return n * n + 3 * n * m + 3 * m * m + 5 * max(m, n) + n
+    def null_space_norm(self) -> float:
+        """Return ‖e_N‖_W, the square root of 2 V, at the last `resolve`."""
+        return float(self._norm())
 
 
 @kernel
 def _resolve(
-    block: Array,
+    jacobians: Array,
+    tasks: Array,
+    field: Array,
+    squares: Array,
     v: Array,
     ends: Indices,
     form: int,
     threshold: float,
     controls: bool,
+    wide: Array,
+    small: Array,
     scratch: Array,
+    tall: Array,
+    inner: Array,
     e_N: Array,
     a: Array,
 ) -> tuple[bool, bool]:
-    """Write e_N and a; return whether it was damped, and whether a is finite."""
-    m, n = ends[-1], v.shape[0]
-    J, J_dot, _, _, a_x, g, g_dot, W, L, W_dot, K_N = parts(block, m, n)
-    mn, mm, wide = m * n, m * m, max(m, n)
-    at = 3 * mn + 3 * mm
-    J_sharp = scratch[:mn].reshape(n, m)
-    B = scratch[mn : 2 * mn].reshape(n, m)
-    Q = scratch[2 * mn : 3 * mn].reshape(n, m)
-    R = scratch[3 * mn : 3 * mn + mm].reshape(m, m)
-    V = scratch[3 * mn + mm : 3 * mn + 2 * mm].reshape(m, m)
-    vectors = scratch[at : at + 5 * wide].reshape(5, wide)
-    u = scratch[at + 5 * wide : at + 5 * wide + n]
+    """Write e_N and a; return whether it was damped, and whether a is finite.
+
+    The first four arrays are those of a `Problem`, the next but the last two scratch.
+    """
+    J, J_dot, a_x, g, g_dot = jacobians[0], jacobians[1], tasks[2], field[0], field[1]
+    W, L, W_dot, K_N = squares[0], squares[1], squares[2], squares[3]
+    m, n = J.shape
+    Q, X, u = wide[1], small[1], scratch[6, :n]
 
     conflicting = m > n
     damped = False
     if not conflicting:
-        damped = weighted_pseudo_inverse(J, L, form, threshold, B, Q, R, V, J_sharp)
+        damped = weighted_pseudo_inverse(J, L, form, threshold, wide[0], Q, X)
         conflicting = damped and ends.shape[0] > 1
     if conflicting:
-        square = scratch[3 * mn : 3 * mn + 2 * mm].reshape(2, m, m)
-        G_inverse = scratch[3 * mn + 2 * mm : 3 * mn + 3 * mm].reshape(m, m)
-        inner = scratch[at + 5 * wide + n :].reshape(n, n)
         damped = resolve_levels(
             J,
             J_dot,
@@ -155,21 +171,21 @@ def _resolve(
             controls,
             ends,
             inner,
-            B,
-            G_inverse,
-            square,
-            vectors,
+            tall,
+            small[2],
+            small,
+            scratch,
             e_N,
             a,
         )
     else:
         null_space_command(
-            J, J_dot, J_sharp, v, g, g_dot, K_N, W, L, W_dot, form, vectors, e_N, u
+            J, J_dot, Q, X, v, g, g_dot, K_N, W, L, W_dot, form, scratch, e_N, u
         )
         if not controls:
             for i in range(n):
                 u[i] = 0.0
-        acceleration(J, J_dot, J_sharp, v, a_x, u, vectors, a)
+        acceleration(J, J_dot, Q, X, L, form, v, a_x, u, scratch, a)
     total = 0.0
     for i in range(n):
         total += a[i]
@@ -178,23 +194,26 @@ def _resolve(
 
 @kernel
 def _singular_values(
-    J: Array, L: Array, form: int, scratch: Array, values: Array
+    J: Array, L: Array, form: int, wide: Array, small: Array, values: Array
 ) -> None:
     """Write the singular values of J L⁻ᵀ, largest first; J of any shape."""
     m, n = J.shape
-    columns = scratch[: m * n].reshape(n, m)
-    for k in range(m):
-        for i in range(n):
-            columns[i, k] = J[k, i]
-        if form != IDENTITY:
-            solve_lower(L, columns[:, k])
-    V = scratch[m * n : m * n + m * m].reshape(m, m)
-    orthogonalise_columns(columns, V)
-    squares = scratch[m * n : m * n + m]
+    B, T, U = wide[0, :m], small[0, :m, :m], small[1, :m, :m]
+    whiten(J, L, form, B)
+    if m <= n:
+        # The columns of the triangular factor are nearer to orthogonal than the rows.
+        Q = wide[1, :m]
+        orthonormalise_rows(B, Q, U)
+        gram(Q, B, False, T)
+        for i in range(m):
+            for k in range(n):
+                B[i, k] = T[i, k] if k < m else 0.0
+    orthogonalise_rows(B, U)
+    squares = small[2, 0, :m]
     for k in range(m):
         squares[k] = 0.0
         for i in range(n):
-            squares[k] += columns[i, k] * columns[i, k]
+            squares[k] += B[k, i] * B[k, i]
     for rank in range(values.shape[0]):
         best = rank
         for k in range(rank + 1, m):

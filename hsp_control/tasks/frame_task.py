@@ -2,8 +2,10 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
+from hsp_control.bound import Bound
 from hsp_control.kinematics import FrameKinematics
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
@@ -41,6 +43,11 @@ class FrameTask(Task):
 
         Called whenever another state's frame, or another sample, is to be used.
         """
+
+    def bind(self, state: RobotState, out: TaskSample) -> Bound:
+        """Return what `evaluate` does; see `Task.bind`."""
+        follow, write = self._bind(state.frame(self.frame), out)
+        return Bound((follow,), (partial(state.frame, self.frame), write))
 
     def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
         """Return the rows of the frame; see `Task.evaluate`."""

@@ -2,11 +2,13 @@
 
 import re
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hsp_control.arrays import Array
+from hsp_control.bound import Bound
 from hsp_control.exceptions import TaskError
 from hsp_control.kernels import kernel
 from hsp_control.robot import Robot, RobotState
@@ -82,6 +84,16 @@ class Task(ABC):
         self.name = name
         self.rows = rows
         self.Kp, self.Kv = gains.matrices(rows)
+
+    def __init_subclass__(cls, **arguments: Any) -> None:
+        """Let an `evaluate` that is overridden count, also of a ready task."""
+        super().__init_subclass__(**arguments)
+        if "evaluate" in vars(cls) and "bind" not in vars(cls):
+            cls.bind = Task.bind  # type: ignore[method-assign]
+
+    def bind(self, state: RobotState, out: TaskSample) -> Bound:
+        """Return what `evaluate` does with this state and this sample."""
+        return Bound(write=(partial(self.evaluate, state, out),))
 
     @abstractmethod
     def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
