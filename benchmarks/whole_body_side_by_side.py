@@ -185,7 +185,7 @@ def parts_table(case: Standing, states: list[State]) -> str:
         base = actuation.base
         forces = timed(
             "least forces",
-            lambda: support.least_norm(base, wanted[base]),  # noqa: B023
+            lambda: support.least_forces(base, wanted)[0],  # noqa: B023
         )
         timed("cones", lambda: support.bears(forces))  # noqa: B023
         # Pinocchio's pass is kept until the state changes: the second call is cheap.

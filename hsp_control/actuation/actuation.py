@@ -135,8 +135,7 @@ class Actuation:
             return wanted, a, forces, EXACT, 0.0
         if support.size:
             support.update(state)
-            forces = support.least_norm(self.base, wanted[self.base])
-            tau = wanted - support.map @ forces
+            forces, tau = support.least_forces(self.base, wanted)
         apart = self._apart(state)
         if apart is not self._nothing:
             moves = moves and bool((apart.A @ a >= apart.lower).all())

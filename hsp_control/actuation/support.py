@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from hsp_control.actuation.pushing import bears, least_forces, push_map
 from hsp_control.arrays import Array, Indices
 from hsp_control.contacts import Contact
 from hsp_control.robot import RobotState
@@ -53,53 +54,62 @@ class Support:
                     self.cone[4 * k + row, 3 * k + axis] = sign
                     self.cone[4 * k + row, 3 * k + 2] = side
 
-        self._pushing: list[tuple[Contact, slice, Array, Array, Array]] = []
+        self._pushing: list[tuple[Contact, Array, Array, slice, Array]] = []
         for contact, where in zip(self.contacts, self.points, strict=True):
-            count = where.stop - where.start
-            # arm × axis is linear in the arm: row l holds e_l × axis, by moment, axis.
-            turning = np.stack([np.cross(e, contact.axes.T).T for e in np.eye(3)])
-            pushed = np.vstack([np.tile(contact.axes, count), np.zeros((3, 3 * count))])
-            easy = np.tile([contact.friction**2, contact.friction**2, 1.0], count)
-            self.ease[3 * where.start : 3 * where.stop] = easy
-            self._pushing.append((contact, where, turning.reshape(3, 9), pushed, easy))
+            columns = slice(3 * where.start, 3 * where.stop)
+            friction = contact.friction
+            easy = np.tile([friction**2, friction**2, 1.0], where.stop - where.start)
+            self.ease[columns] = easy
+            places, pushes = self.places[where], self.map[:, columns]
+            self._pushing.append((contact, places, pushes, columns, easy))
+        self._tau, self._forces = np.zeros(nv), np.zeros(self.size)
+        self._solver: tuple[Indices, tuple[Array, Array, Array, Array]] | None = None
 
     def update(self, state: RobotState) -> None:
         """Compute the map, the places, and what the schedules let each contact bear."""
-        for contact, where, turning, pushed, easy in self._pushing:
+        for contact, places, pushes, columns, easy in self._pushing:
             frame = state.frame(contact.frame)
             arms = contact.arms(frame)
-            self.places[where] = frame.position + arms
-            columns = slice(3 * where.start, 3 * where.stop)
-            moments = (arms @ turning).reshape(-1, 3, 3)  # point, moment, force
-            pushed[3:] = moments.transpose(1, 0, 2).reshape(3, -1)
-            self.map[:, columns] = frame.jacobian.T @ pushed
+            push_map(frame.jacobian, frame.position, arms, contact.axes, places, pushes)
             if not contact.schedule.constant or contact.schedule.ramp:
                 on = max(contact.schedule.weight(state.t), 1e-6)
                 self.greatest[columns][2::3] = on * _HEAVIEST * self._weight
                 self.ease[columns] = on * easy
 
-    def least_norm(self, base: Indices, wrench: Array) -> Array:
-        """Return the forces of least Σ f²/ease that push the base with a wrench.
+    def least_forces(self, base: Indices, wanted: Array) -> tuple[Array, Array]:
+        """Return the forces of least Σ f²/ease that hold the base, and what they leave.
 
         Args:
             base: The freedoms that no motor moves.
-            wrench: What they need, shape (len(base),).
+            wanted: The effort without contacts, shape (nv,).
+
+        Returns:
+            The forces, shape (size,), and the effort that is left to the motors, shape
+            (nv,): overwritten by the next call.
         """
-        A = self.map[base]
-        eased = A * self.ease
-        # The wrench lies in the range of A: directions without support are left out.
-        values, U = np.linalg.eigh(eased @ A.T)
-        kept = values > 1e-10 * values[-1]
-        inverse = (U[:, kept] / values[kept]) @ U[:, kept].T
-        return np.asarray(eased.T @ (inverse @ wrench))
+        if self._solver is None or self._solver[0] is not base:
+            n = len(base)
+            scratch = (
+                np.zeros((n, self.size)),
+                np.zeros((n, n)),
+                np.zeros((n, n)),
+                np.zeros((2, n)),
+            )
+            self._solver = base, scratch
+        least_forces(
+            self.map,
+            base,
+            self.ease,
+            wanted,
+            *self._solver[1],
+            self._forces,
+            self._tau,
+        )
+        return self._forces, self._tau
 
     def bears(self, forces: Array) -> bool:
         """Return whether forces are within cones and bounds."""
-        return bool(
-            (self.cone @ forces >= 0.0).all()
-            and (forces >= self.least).all()
-            and (forces <= self.greatest).all()
-        )
+        return bears(self.cone, forces, self.least, self.greatest)
 
     def in_world(self, forces: Array) -> Array:
         """Return the forces in world axes, shape (points, 3) [N]."""

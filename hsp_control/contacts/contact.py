@@ -10,6 +10,7 @@ import numpy as np
 from hsp_control.arrays import Array
 from hsp_control.bound import Bound
 from hsp_control.exceptions import ContactError
+from hsp_control.kernels import kernel
 from hsp_control.kinematics import FrameKinematics
 from hsp_control.robot import Robot, RobotState
 from hsp_control.schedules import Schedule
@@ -77,8 +78,9 @@ class Contact(ABC):
     def evaluate(self, state: RobotState, out: TaskSample) -> TaskSample:
         """Write the rows: J, J', and the acceleration that brings it to rest."""
         self.constrain(state.frame(self.frame), out)
-        out.error_rate[:] = -(out.jacobian @ state.v)
-        out.acceleration[:] = self.damping * out.error_rate
+        come_to_rest(
+            out.jacobian, state.v, self.damping, out.error_rate, out.acceleration
+        )
         return out
 
     @abstractmethod
@@ -88,6 +90,17 @@ class Contact(ABC):
     @abstractmethod
     def arms(self, frame: FrameKinematics) -> Array:
         """Return where forces act, from the frame's origin, in world axes, (k, 3)."""
+
+
+@kernel
+def come_to_rest(J: Array, v: Array, damping: float, e_dot: Array, a: Array) -> None:
+    """Write e' = -J v and the acceleration Kd e' that brings it to rest."""
+    for k in range(J.shape[0]):
+        total = 0.0
+        for i in range(J.shape[1]):
+            total += J[k, i] * v[i]
+        e_dot[k] = -total
+        a[k] = -damping * total
 
 
 def plane_axes(normal: Sequence[float], name: str) -> Array:
