@@ -1,10 +1,12 @@
 """The centre of mass and the angular momentum about it, with their exact Jacobians."""
 
+from functools import partial
+
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
+from hsp_control.kernels import bind, kernel
 
 
 class CentroidalMotion:
@@ -20,21 +22,20 @@ class CentroidalMotion:
         momentum_matrix_dot: A' along v, exact, shape (3, nv).
     """
 
-    def __init__(self, model: pin.Model) -> None:
-        """Allocate; `RobotState.centroidal` fills it."""
+    def __init__(self, model: pin.Model, data: pin.Data, q: Array, v: Array) -> None:
+        """Allocate; `RobotState.centroidal` updates it, at whatever q and v hold."""
+        # Pinocchio makes its vectors when they are first asked for: views on them then.
+        pin.computeCentroidalMapTimeVariation(model, data, q, v)
         self.mass: float = pin.computeTotalMass(model)
-        self.position: Array = np.zeros(3)
+        self.position: Array = data.com[0]
         self.velocity: Array = np.zeros(3)
         self.jacobian: Array = np.zeros((3, model.nv))
         self.jacobian_dot: Array = np.zeros((3, model.nv))
         self.momentum_matrix: Array = np.zeros((3, model.nv))
         self.momentum_matrix_dot: Array = np.zeros((3, model.nv))
-
-    def update(self, model: pin.Model, data: pin.Data, q: Array, v: Array) -> None:
-        """Compute everything at a configuration (nq,) and a velocity (nv,)."""
-        pin.computeCentroidalMapTimeVariation(model, data, q, v)
-        self.position[:] = data.com[0]
-        _divide(
+        self._move = partial(pin.computeCentroidalMapTimeVariation, model, data, q, v)
+        self._divide = bind(
+            _divide,
             data.Ag,
             data.dAg,
             self.mass,
@@ -45,6 +46,11 @@ class CentroidalMotion:
             self.momentum_matrix,
             self.momentum_matrix_dot,
         )
+
+    def update(self) -> None:
+        """Compute everything at the configuration and the velocity."""
+        self._move()
+        self._divide()
 
 
 @kernel

@@ -274,10 +274,8 @@ class RobotState:
         robot, own_q, own_v = self.robot, self.q, self.v
         t = float(t)
         try:
-            taken = (
-                q.shape == own_q.shape
-                and v.shape == own_v.shape
-                and _take(t, q, v, own_q, own_v, self._unit_blocks)
+            taken = q.ndim == v.ndim == 1 and _take(
+                t, q, v, own_q, own_v, self._unit_blocks
             )
         except AttributeError:  # lists are welcome, too
             taken = False
@@ -317,9 +315,11 @@ class RobotState:
     def centroidal(self) -> CentroidalMotion:
         """The centre of mass, the angular momentum about it, and their Jacobians."""
         if self._centroidal is None:
-            self._centroidal = CentroidalMotion(self.robot.model)
+            self._centroidal = CentroidalMotion(
+                self.robot.model, self.data, self.q, self.v
+            )
         if self._centroidal_stamp != self._stamp:
-            self._centroidal.update(self.robot.model, self.data, self.q, self.v)
+            self._centroidal.update()
             self._centroidal_stamp = self._stamp
         return self._centroidal
 
@@ -409,7 +409,9 @@ class WorldKinematics(NamedTuple):
 def _take(
     t: float, q_in: Array, v_in: Array, q: Array, v: Array, unit_blocks: Indices
 ) -> bool:
-    """Copy q and v if all is finite and each unit block is of norm 1; were they?"""
+    """Copy q and v if they fit, are finite and of norm 1 in unit blocks; were they?"""
+    if q_in.shape[0] != q.shape[0] or v_in.shape[0] != v.shape[0]:
+        return False
     total = t
     for i in range(q.shape[0]):
         total += q_in[i]

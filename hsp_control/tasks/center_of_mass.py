@@ -1,17 +1,20 @@
 """The centre of mass follows a trajectory."""
 
 from collections.abc import Sequence
+from functools import partial
 
-from hsp_control.arrays import Array
+from hsp_control.arrays import Array, Indices
+from hsp_control.bound import Bound
 from hsp_control.exceptions import TaskError
+from hsp_control.kernels import bind, kernel
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.axes import axis_indices
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample, track
+from hsp_control.tasks.task import CompiledTask, TaskSample, track
 from hsp_control.trajectories import Trajectory, TrajectorySample
 
 
-class CenterOfMass(Task):
+class CenterOfMass(CompiledTask):
     """Centre of mass in the world: e = c_d - c, exactly linear.
 
     Attributes:
@@ -50,26 +53,24 @@ class CenterOfMass(Task):
                 f"dimension {trajectory.dimension}, needs {self.rows}"
             )
         self.trajectory = trajectory
-        self._desired = TrajectorySample.allocate(self.rows)
 
-    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
-        """Return the rows of the tracked axes; see `Task.evaluate`."""
-        out = self._out(out)
-        mass = state.centroidal
-        desired = self.trajectory.sample(state.t, self._desired)
-        mass.jacobian.take(self._axes, axis=0, out=out.jacobian)
-        mass.jacobian_dot.take(self._axes, axis=0, out=out.jacobian_dot)
-        out.error[:] = desired.position - mass.position[self._axes]
-        out.error_rate[:] = desired.velocity - mass.velocity[self._axes]
-        track(
-            desired.acceleration,
+    def bind(self, state: RobotState, out: TaskSample) -> Bound:
+        """Return what `evaluate` does; see `Task.bind`."""
+        mass, desired = state.centroidal, TrajectorySample.allocate(self.rows)
+        write = bind(
+            _center_of_mass,
+            mass.jacobian,
+            mass.jacobian_dot,
+            mass.position,
+            mass.velocity,
+            self._axes,
+            *desired,
             self.Kp,
             self.Kv,
-            out.error,
-            out.error_rate,
-            out.acceleration,
+            *out,
         )
-        return out
+        centroidal = partial(getattr, state, "centroidal")
+        return Bound((self.trajectory.follow(desired),), (centroidal, write))
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return c_d' [m/s]."""
@@ -79,3 +80,33 @@ class CenterOfMass(Task):
         """Return desired and actual centre of mass along the tracked axes [m]."""
         desired = self.trajectory.sample(state.t)
         return desired.position, state.centroidal.position[self._axes]
+
+
+@kernel
+def _center_of_mass(
+    J_mass: Array,
+    J_mass_dot: Array,
+    c: Array,
+    c_dot: Array,
+    axes: Indices,
+    x_d: Array,
+    x_d_dot: Array,
+    x_d_ddot: Array,
+    Kp: Array,
+    Kv: Array,
+    J: Array,
+    J_dot: Array,
+    e: Array,
+    e_dot: Array,
+    a_x: Array,
+) -> None:
+    """Write the sample of the tracked axes."""
+    for k in range(axes.shape[0]):
+        axis = axes[k]
+        for j in range(J.shape[1]):
+            J[k, j] = J_mass[axis, j]
+            J_dot[k, j] = J_mass_dot[axis, j]
+        e[k] = x_d[k] - c[axis]
+        e_dot[k] = x_d_dot[k] - c_dot[axis]
+        a_x[k] = x_d_ddot[k]
+    track(a_x, Kp, Kv, e, e_dot, a_x)

@@ -9,11 +9,11 @@ from hsp_control.bound import Bound
 from hsp_control.kinematics import FrameKinematics
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample
+from hsp_control.tasks.task import CompiledTask, TaskSample
 from hsp_control.trajectories.following import Follower
 
 
-class FrameTask(Task):
+class FrameTask(CompiledTask):
     """A task of one frame: write `_bind`.
 
     Attributes:
@@ -33,7 +33,6 @@ class FrameTask(Task):
         robot.frame_id(frame)
         super().__init__(robot, rows, gains, name)
         self.frame = frame
-        self._bound: tuple[FrameKinematics, TaskSample] | None = None
 
     @abstractmethod
     def _bind(
@@ -48,21 +47,3 @@ class FrameTask(Task):
         """Return what `evaluate` does; see `Task.bind`."""
         follow, write = self._bind(state.frame(self.frame), out)
         return Bound((follow,), (partial(state.frame, self.frame), write))
-
-    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
-        """Return the rows of the frame; see `Task.evaluate`."""
-        if out is None:
-            out = TaskSample.allocate(self.rows, self.robot.nv)
-        frame = state.frame(self.frame)
-        bound = self._bound
-        if bound is None or bound[0] is not frame or bound[1] is not out:
-            self._bound = frame, out
-            self._follow, self._write = self._bind(frame, out)
-        self._follow(state.t)
-        self._write()
-        return out
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return all but what is bound to a state's memory."""
-        kept = self.__dict__ | {"_bound": None}
-        return {k: x for k, x in kept.items() if k not in ("_follow", "_write")}

@@ -1,23 +1,24 @@
 """Joints follow a posture that may move."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import atan2, cos, sin
 from typing import Any
 
 import numpy as np
 
 from hsp_control.arrays import Array, Indices
+from hsp_control.bound import Bound
 from hsp_control.configuration_space import joint_displacements
 from hsp_control.exceptions import TaskError
 from hsp_control.kernels import bind, kernel
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample, track
+from hsp_control.tasks.task import CompiledTask, TaskSample, track
 from hsp_control.trajectories import Trajectory, TrajectorySample
-from hsp_control.trajectories.following import Follower, stay
+from hsp_control.trajectories.following import stay
 
 
-class JointPosture(Task):
+class JointPosture(CompiledTask):
     """Posture of some joints: e = q_d ⊖ q, exactly linear for one-freedom joints.
 
     q_d(t) = reference ⊕ displacement(t).
@@ -82,55 +83,30 @@ class JointPosture(Task):
         # The rows of `single_joints` that are held, in the order of the task's.
         place = {int(row[0]): row for row in robot.single_joints}
         self._rows: Indices = np.array([place[i] for i in indices], dtype=np.int64)
-        self._sample = TrajectorySample.allocate(self.rows)
-        self._follow = self._follower()
-        self._bound: tuple[RobotState, TaskSample, Callable[[], Any]] | None = None
 
-    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
-        """Return one row a joint; see `Task.evaluate`."""
-        if out is None:
-            out = TaskSample.allocate(self.rows, self.robot.nv)
-        bound = self._bound
-        if bound is None or bound[0] is not state or bound[1] is not out:
-            self._bound = bound = state, out, self._bind(state, out)
-        self._follow(state.t)
-        bound[2]()
-        return out
-
-    def _bind(self, state: RobotState, out: TaskSample) -> Callable[[], Any]:
-        return bind(
+    def bind(self, state: RobotState, out: TaskSample) -> Bound:
+        """Return what `evaluate` does; see `Task.bind`."""
+        sample, displacement = TrajectorySample.allocate(self.rows), self.displacement
+        write = bind(
             _joint_posture,
             state.q,
             state.v,
             self._reference,
             self._rows,
-            *self._sample,
+            *sample,
             self.Kp,
             self.Kv,
             np.zeros(self.robot.nv),
             *out,
         )
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return all but what is bound to memory."""
-        return {k: x for k, x in self.__dict__.items() if k != "_follow"} | {
-            "_bound": None
-        }
-
-    def __setstate__(self, kept: dict[str, Any]) -> None:
-        """Follow anew."""
-        self.__dict__.update(kept)
-        self._follow = self._follower()
-
-    def _follower(self) -> Follower:
-        if self.displacement is None:
-            return stay
-        return self.displacement.follow(self._sample)
+        follow = stay if displacement is None else displacement.follow(sample)
+        return Bound((follow,), (write,))
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return the joints' desired rates [rad/s or m/s]."""
-        self._follow(state.t)
-        return self._sample.velocity.copy()
+        if self.displacement is None:
+            return np.zeros(self.rows)
+        return self.displacement.sample(state.t).velocity
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return desired and actual positions of the joints [rad or m]."""
@@ -141,8 +117,7 @@ class JointPosture(Task):
     def _desired(self, t: float) -> Array:
         if self.displacement is None:
             return self._reference
-        self._follow(t)
-        self._moved[self._indices] = self._sample.position
+        self._moved[self._indices] = self.displacement.sample(t).position
         return self.robot.integrate(self._reference, self._moved)
 
 

@@ -116,6 +116,36 @@ class Task(ABC):
         return TaskSample.allocate(self.rows, self.robot.nv) if out is None else out
 
 
+class CompiledTask(Task):
+    """A task of which `bind` says all: calls that write a sample, decided once."""
+
+    def __init__(self, robot: Robot, rows: int, gains: Gains, name: str) -> None:
+        """Set the task; see `Task`."""
+        super().__init__(robot, rows, gains, name)
+        self._bound: tuple[RobotState, TaskSample, Bound] | None = None
+
+    @abstractmethod
+    def bind(self, state: RobotState, out: TaskSample) -> Bound:
+        """Return what `evaluate` does with this state and this sample."""
+
+    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
+        """Return the sample; see `Task.evaluate`."""
+        if out is None:
+            out = TaskSample.allocate(self.rows, self.robot.nv)
+        bound = self._bound
+        if bound is None or bound[0] is not state or bound[1] is not out:
+            self._bound = bound = state, out, self.bind(state, out)
+        for follow in bound[2].follow:
+            follow(state.t)
+        for write in bound[2].write:
+            write()
+        return out
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but what is bound to a state's memory."""
+        return self.__dict__ | {"_bound": None}
+
+
 def named_after(frame: str) -> str:
     """Return a task's name for a frame's, without what a log's column may not have."""
     return re.sub("[^0-9A-Za-z_-]", "_", frame)
