@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from math import floor, inf, nan
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller, ControlOutput
@@ -25,6 +25,22 @@ ABOUT = {
     "age": ("s", "of the state"),
     "response": ("s", "from the state's arrival to its effort"),
 }
+
+
+class Row(NamedTuple):
+    """One row; see `Recorder.record`.
+
+    Attributes:
+        state: The state.
+        output: What the controller makes of it, if anything.
+        tau: The effort of the motors, shape (nv,).
+        readings: What else there is.
+    """
+
+    state: RobotState
+    output: ControlOutput | None
+    tau: Array
+    readings: Mapping[str, Reading]
 
 
 class LiveLog:
@@ -51,29 +67,30 @@ class LiveLog:
         self._meta = dict(meta or {})
         self._last_t = -inf
         self._journal = JournalWriter(path)
+
+    def rehearse(self, row: Row) -> None:
+        """Make a row, and write none: what it needs is compiled, its columns known."""
+        try:
+            self._recorder.record(*row)
+        finally:
+            self._recorder.forget()
         self._head()
 
-    def add(
-        self,
-        state: RobotState,
-        output: ControlOutput | None,
-        tau: Array,
-        readings: Mapping[str, Reading],
-    ) -> None:
-        """Write a row, see `Recorder.record`, if it is later than the last.
+    def add(self, row: Row) -> None:
+        """Write a row, if it is later than the last.
 
         Raises:
             LogError: If it cannot be written.
         """
-        if not state.t > self._last_t:
+        if not row.state.t > self._last_t:
             return
-        self._last_t = state.t
+        self._last_t = row.state.t
         try:
-            self._recorder.record(state, output, tau, readings)
-            row = self._recorder.rows(0)
-            if not self._journal.has(row):
+            self._recorder.record(*row)
+            columns = self._recorder.rows(0)
+            if not self._journal.has(columns):
                 self._head()
-            self._journal.append(row)
+            self._journal.append(columns)
         finally:
             self._recorder.forget()
 
@@ -143,6 +160,19 @@ class LoopLog:
             return
         periods = floor(state.t / self._period + 1e-6) + 1
         self._next, self._phase = (periods - 1e-6) * self._period, phase
+        log, self._log = self._log, None  # if it cannot be written, there is none
+        log.add(self._row(phase, intake, port, response))
+        self._log = log
+
+    def rehearse(self, intake: Intake, port: EffortPort) -> None:
+        """Do all once that a row takes."""
+        if self._log is not None:
+            self._log.rehearse(self._row(Phase.RUNNING, intake, port, 0.0))
+
+    def _row(
+        self, phase: Phase, intake: Intake, port: EffortPort, response: float
+    ) -> Row:
+        found, state = intake.found, intake.state
         readings = live_readings(
             phase=float(phase),
             sent=port.sent,
@@ -150,9 +180,7 @@ class LoopLog:
             age=nan if found is None else found.age,
             response=response,
         )
-        log, self._log = self._log, None
-        log.add(state, self._law(phase, state), port.acting, readings)
-        self._log = log
+        return Row(state, self._law(phase, state), port.acting, readings)
 
     def end(self, report: LoopReport) -> None:
         """Close the journal, if there is one that can be written.

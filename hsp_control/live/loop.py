@@ -95,6 +95,7 @@ def run_loop(
             safe_stop.effort(intake.state)
             port.begin(first.q)
         book = LoopLog(log, log_period, commander, scene, dict(meta or {}))
+        book.rehearse(intake, port)
         commander.restart()
         safe_stop.begin()
         end = np.inf if duration is None else start_time + duration - 0.5 * period
