@@ -20,9 +20,9 @@ class Guard:
         """Take the limits over: the controller's, or else the robot's own."""
         self._robot, self._tolerance = robot, tolerance
         limits = Limits(robot) if limits is None else limits
-        self._lower = limits.lower - tolerance.position
-        self._upper = limits.upper + tolerance.position
-        self._speed = limits.velocity * (1.0 + tolerance.velocity)
+        self._lower = limits.lower - tolerance.position_margin
+        self._upper = limits.upper + tolerance.position_margin
+        self._speed = limits.velocity * (1.0 + tolerance.velocity_margin)
         self.last: Measurement | None = None
 
     def news(self, found: Measurement | None) -> Measurement | None:

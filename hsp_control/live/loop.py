@@ -14,6 +14,7 @@ from hsp_control.exceptions import HardwareError, LiveError
 from hsp_control.latency import no_garbage_collection, real_time_priority
 from hsp_control.live.commander import Commander, as_commander
 from hsp_control.live.effort_port import EffortPort
+from hsp_control.live.from_config import check_fixed
 from hsp_control.live.hardware import Hardware
 from hsp_control.live.intake import Intake
 from hsp_control.live.live_log import LoopLog
@@ -114,11 +115,7 @@ def run_loop(
 def _check(
     robot: Robot, period: float, duration: float | None, log_period: float
 ) -> None:
-    if robot.unactuated:
-        raise LiveError(
-            f"{robot.name} has a floating base; a live loop is for fixed ones: damping "
-            "and holding its joints does not keep a robot from falling"
-        )
+    check_fixed(robot)
     if not 0.0 < period < np.inf:
         raise LiveError(f"the hardware's period is {period} s; must be positive")
     if duration is not None and not duration > 0.0:

@@ -12,14 +12,11 @@ from time import monotonic
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
-
 from hsp_control.config import Experiment
 from hsp_control.exceptions import HardwareError
 from hsp_control.live.faults import Faults
-from hsp_control.live.settings import EffortInterface
+from hsp_control.live.from_config import check_fixed, live_period
 from hsp_control.live.udp_hardware import UdpHardware
-from hsp_control.live.watched_robot import WATCHDOG
 
 
 class RobotProcess:
@@ -39,28 +36,25 @@ class RobotProcess:
         self,
         experiment: Experiment,
         *,
-        period: float | None = None,
-        interface: EffortInterface | None = None,
         faults: Faults | None = None,
-        watchdog: int = WATCHDOG,
         log: str | Path | None = None,
         log_period: float = 0.01,
     ) -> None:
         """Prepare it; entering the context starts it.
 
         Args:
-            experiment: Whose plant the robot is, and where it starts.
-            period: Time between two states [s]; None: the configuration's control
-                period, or a millisecond.
-            interface: How it wants its efforts.
+            experiment: Whose plant the robot is, where it starts, and whose section
+                ``live`` says how it wants its efforts and how patient it is.
             faults: What happens to packets, in both directions.
-            watchdog: Periods without a valid effort until it stops itself.
             log: The journal of its true states.
             log_period: Time between two rows of it [s].
+
+        Raises:
+            LiveError: If the robot has a floating base.
         """
-        if period is None:
-            period = experiment.scenario.simulation.control_period or 0.001
-        interface, faults = interface or EffortInterface(), faults or Faults()
+        check_fixed(experiment.robot)
+        faults = faults or Faults()
+        period = live_period(experiment)
         self.hardware = UdpHardware(experiment.robot, period, faults=faults)
         self._settings = {
             "config": experiment.scenario.model_dump(mode="json"),
@@ -68,10 +62,7 @@ class RobotProcess:
                 "name": f"{experiment.name}, the robot",
                 "title": experiment.scenario.title,
             },
-            "period": period,
-            "interface": {k: _plain(v) for k, v in vars(interface).items()},
             "faults": faults.as_json(),
-            "watchdog": watchdog,
             "log": None if log is None else str(Path(log).absolute()),
             "log_period": log_period,
             "peer": self.hardware.address,
@@ -178,7 +169,3 @@ class RobotProcess:
                 process.kill()
                 process.wait()
         self.hardware.drain()
-
-
-def _plain(value: Any) -> Any:
-    return np.asarray(value).tolist()

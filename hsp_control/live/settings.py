@@ -58,16 +58,16 @@ class Tolerance:
         age: Greatest age of a state [s].
         blind: How long a safe stop trusts the model where there is no state [s]; then
             the loop falls silent, and the robot's own watchdog has it.
-        position: How far beyond its position limits a joint may be measured [rad or m].
-        velocity: By what part a joint may be measured faster than its limit.
+        position_margin: How far beyond its limits a joint may be measured [rad or m].
+        velocity_margin: By what part a joint may be measured faster than its limit.
         start: How long the first state may take [s].
     """
 
-    missing: int = 10
+    missing: int = 20
     age: float = 0.02
     blind: float = 0.2
-    position: float = 0.02
-    velocity: float = 0.1
+    position_margin: float = 0.02
+    velocity_margin: float = 0.1
     start: float = 10.0
 
     def __post_init__(self) -> None:
@@ -81,7 +81,7 @@ class Tolerance:
         for name in ("age", "start"):
             if not getattr(self, name) > 0.0:
                 raise LiveError(f"{name} is {getattr(self, name)} s; must be positive")
-        for name in ("blind", "position", "velocity"):
+        for name in ("blind", "position_margin", "velocity_margin"):
             if not getattr(self, name) >= 0.0:
                 raise LiveError(f"{name} is {getattr(self, name)}; must be at least 0")
 

@@ -20,47 +20,18 @@ import numpy as np
 from hsp_control.arrays import Array
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.controller import ControlOutput
-from hsp_control.exceptions import HspControlError, LiveError
+from hsp_control.exceptions import HspControlError
 from hsp_control.live.faults import Faults
+from hsp_control.live.from_config import watched_robot
 from hsp_control.live.link import Link
 from hsp_control.live.live_log import LiveLog, Row, live_readings
-from hsp_control.live.settings import EffortInterface, StopSettings
-from hsp_control.live.udp_robot import serve
+from hsp_control.live.settings import StopSettings
+from hsp_control.live.udp_robot import BYE, serve
 from hsp_control.live.watched_robot import WatchedRobot
-from hsp_control.plants import (
-    ContinuousPlant,
-    Dop853,
-    IntegratedPlant,
-    Integrator,
-    Rk4,
-    SampledPlant,
-    differing_bodies,
-)
+from hsp_control.plants import differing_bodies
 from hsp_control.robot import RobotState
 
 READY = "ready"
-_LINGER = 0.5
-"""How long the robot is held before its process ends [s]."""
-
-
-def live_plant(experiment: Experiment, period: float) -> SampledPlant:
-    """Return an experiment's plant as one that moves on period by period.
-
-    A continuous one is carried by the experiment's integrator, or where that is
-    adaptive, and might take any time, by one Runge-Kutta step a period.
-
-    Raises:
-        LiveError: If it is neither continuous nor sampled.
-    """
-    plant = experiment.plant
-    integrator: Integrator = experiment.integrator
-    if isinstance(integrator, Dop853):
-        integrator = Rk4(period)
-    if isinstance(plant, ContinuousPlant):
-        return IntegratedPlant(plant, integrator)
-    if not isinstance(plant, SampledPlant):
-        raise LiveError(f"{type(plant).__name__} is no plant that can move")
-    return plant
 
 
 def main() -> int:
@@ -91,18 +62,7 @@ def main() -> int:
 
 def _live(settings: dict[str, Any], orphaned: Any) -> dict[str, Any]:
     experiment = load_experiment(settings["config"])
-    period = settings["period"]
-    interface = EffortInterface(**settings["interface"])
-    plant = live_plant(experiment, period)
-    robot = WatchedRobot(
-        plant,
-        experiment.q0,
-        experiment.v0,
-        period,
-        interface=interface,
-        watchdog=settings["watchdog"],
-        stop=StopSettings(hold=_LINGER),
-    )
+    robot = watched_robot(experiment)
     _rehearse(robot, experiment)
     link = Link(
         settings["session"],
@@ -127,7 +87,9 @@ def _live(settings: dict[str, Any], orphaned: Any) -> dict[str, Any]:
         "injected": link.injected,
     }
     if journal is not None:
-        journal.log.end("completed", reason, robot_process=told)
+        asked = reason == BYE
+        status = "completed" if asked else "stopped"
+        journal.log.end(status, reason, robot_process=told)
     link.close()
     return told
 

@@ -13,6 +13,9 @@ from hsp_control.live.packets import Kind
 from hsp_control.live.safe_stop import Phase
 from hsp_control.live.watched_robot import WatchedRobot
 
+BYE = "the loop said its end"
+"""Why a robot stops that has served well."""
+
 
 @dataclass
 class Served:
@@ -73,7 +76,7 @@ def serve(
             efforts = []
             for packet in link.receive(0.0):
                 if packet.kind is Kind.BYE:
-                    robot.halt("the loop said its end")
+                    robot.halt(BYE)
                 elif packet.kind is Kind.EFFORT and len(packet.payload) == nv:
                     if sequence_of_state - packet.answers > robot.watchdog:
                         served.outdated += 1
