@@ -6,11 +6,10 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from math import inf
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.table import Table
 
 from hsp_control.cli.consoles import out
@@ -40,7 +39,7 @@ _REHEARSED = 0.5
 
 def live(options: argparse.Namespace) -> int:
     """Run a loop against the clock, and say how it was and why it ended."""
-    faults = Faults.parse(options.faults)
+    faults, kill = Faults.parse(options.faults), _kill_of(options.kill)
     experiment = load_experiment(options.config, *options.overrides)
     check_fixed(experiment.robot)
     simulation = experiment.scenario.simulation
@@ -76,7 +75,7 @@ def live(options: argparse.Namespace) -> int:
                 log=own,
                 meta=_meta(experiment),
                 priority=options.priority,
-                on_period=_killer(options.kill, robot),
+                on_period=_killer(kill, robot),
                 **settings,
             )
             told = robot.wait()
@@ -125,17 +124,26 @@ def _signals(operator: Operator) -> Iterator[None]:
             signal.signal(kind, handler)
 
 
-def _killer(text: str | None, robot: RobotProcess) -> Callable[[float], None] | None:
-    """Return what kills a process at a time, from ``robot=1.5`` or ``controller=2``."""
+def _kill_of(text: str | None) -> tuple[str, float] | None:
+    """Return who is killed, and when [s], from ``robot=1.5`` or ``controller=2``."""
     if text is None:
         return None
     who, _, when = text.partition("=")
     try:
         time = float(when)
     except ValueError:
-        time = np.nan
+        time = nan
     if who not in {"robot", "controller"} or not time >= 0.0:
         raise LiveError(f"--kill {text!r}; needs robot=SECONDS or controller=SECONDS")
+    return who, time
+
+
+def _killer(
+    wanted: tuple[str, float] | None, robot: RobotProcess
+) -> Callable[[float], None] | None:
+    if wanted is None:
+        return None
+    who, time = wanted
     left = [True]
 
     def kill(t: float) -> None:

@@ -101,6 +101,7 @@ class RobotProcess:
         )
         assert self.process.stdin is not None
         assert self.process.stdout is not None
+        ready: list[Any] = [True]
         try:
             line = json.dumps(self._settings).encode() + b"\n"
             self.process.stdin.write(line)
@@ -110,12 +111,9 @@ class RobotProcess:
         except OSError:
             said = b""
         if said.strip() != b"ready":
-            late = self.process.poll() is None and not said
             self.close()
-            took = f"took longer than {timeout:g} s to start"
-            raise HardwareError(
-                f"the simulated robot {took if late else 'did not start'}"
-            )
+            why = "did not start" if ready else f"did not start in {timeout:g} s"
+            raise HardwareError(f"the simulated robot {why}")
 
     def wait(self, timeout: float = 15.0) -> dict[str, Any] | None:
         """Wait until the robot has stopped and its process ended.

@@ -62,9 +62,9 @@ def serve(
     """
     served, nv = Served(), robot.plant.robot.nv
     sequence_of_state = 0
-    give_up = monotonic() + patience
-    begin = monotonic()
     with no_garbage_collection():
+        begin = monotonic()
+        give_up = begin + patience
         while True:
             begin += robot.period
             now = monotonic()
