@@ -30,6 +30,10 @@ class Measurement(NamedTuple):
 class Hardware(Protocol):
     """A robot under effort control: write one such class for each kind of robot.
 
+    The loop reads once and then, for seconds, does nothing but compile. From the second
+    read on it reads once a period, and each read is followed by a write, until it is
+    done and closes.
+
     Attributes:
         period: Time between two measurements [s].
     """

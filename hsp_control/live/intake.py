@@ -83,10 +83,8 @@ class Intake:
         )
 
     def begin(self) -> None:
-        """Start the clock; what came meanwhile is old, and says nothing of the loop."""
-        found = self._guard.news(self._hardware.read(0.0))
-        if found is not None and self._guard.no_state(found) is None:
-            self._see(found)
+        """Start the clock; what was not seen meanwhile says nothing of the loop."""
+        self._guard.last = None
         self._arrived = self._clock()
         self._due = self._arrived + (1.0 + _SLACK) * self._period
 
@@ -106,8 +104,8 @@ class Intake:
             self._miss(acting)
             return
         self.trouble = self._guard.breach(found)
-        assert self._guard.last is not None
-        self.deadlines.unseen += found.sequence - self._guard.last.sequence - 1
+        if (last := self._guard.last) is not None:
+            self.deadlines.unseen += found.sequence - last.sequence - 1
         self._see(found)
 
     def answered(self) -> float:

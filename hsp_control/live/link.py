@@ -122,13 +122,13 @@ class Link:
                 self._socket.sendto(data, self.peer)
 
     def receive(self, timeout: float) -> list[Packet]:
-        """Return the accepted packets that came, oldest first.
+        """Return the accepted packets that came, oldest first; none once closed.
 
         Args:
             timeout: How long to wait for one if there is none [s]; 0: not at all.
         """
-        accepted = self._drain()
-        if accepted or timeout <= 0.0:
+        accepted = self._drain() if self._socket.fileno() >= 0 else []
+        if accepted or timeout <= 0.0 or self._socket.fileno() < 0:
             return accepted
         end = monotonic() + timeout
         while not accepted and (left := end - monotonic()) > 0.0:
