@@ -25,6 +25,7 @@ from hsp_control.live.faults import Faults
 from hsp_control.live.from_config import watched_robot
 from hsp_control.live.link import Link
 from hsp_control.live.live_log import LiveLog, Row, live_readings
+from hsp_control.live.packets import Kind
 from hsp_control.live.settings import StopSettings
 from hsp_control.live.udp_robot import BYE, serve
 from hsp_control.live.watched_robot import WatchedRobot
@@ -75,6 +76,7 @@ def _live(settings: dict[str, Any], orphaned: Any) -> dict[str, Any]:
     served = serve(
         robot, link, orphaned=orphaned, on_row=journal.row if journal else None
     )
+    link.send(Kind.BYE)  # by its number the loop knows what it never had
     reason = robot.reason or "no effort ever came"
     told: dict[str, Any] = {
         "phase": robot.phase.name.lower(),
