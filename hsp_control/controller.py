@@ -20,6 +20,7 @@ from hsp_control.composition import (
 from hsp_control.contacts import Contact
 from hsp_control.exceptions import ControllerError, NonFiniteError
 from hsp_control.fields import FieldSample, NullSpaceField, Rest
+from hsp_control.fields.crossfade import crossfade
 from hsp_control.limits import Limits
 from hsp_control.metrics import IdentityMetric, Metric
 from hsp_control.metrics.metric import CONSTANT
@@ -176,6 +177,7 @@ class Controller:
         self._mode: Mode | None = None
         self._mixed = np.zeros(robot.nv)
         self._ramps: list[GainRamp] = []
+        self._next_field: tuple[float, NullSpaceField] | None = None
         self._timeless = not self.schedules and all(
             contact.schedule.constant for contact in self.contacts
         )
@@ -197,6 +199,8 @@ class Controller:
             )
         if self._ramps:
             self._ramps = [ramp for ramp in self._ramps if not ramp.apply(state.t)]
+        if self._next_field is not None and state.t >= self._next_field[0]:
+            self.field, self._next_field = self._next_field[1], None
         mode = self._mode
         if mode is None or not self._timeless:
             a, damped, finite = self._scheduled(state)
@@ -438,6 +442,27 @@ class Controller:
         check_schedules({name: None}, [task.name for task in self.tasks])
         task = next(task for task in self.tasks if task.name == name)
         self._ramps.append(GainRamp(task, gains, start, ramp))
+
+    def change_field(self, field: NullSpaceField, *, start: float, ramp: float) -> None:
+        """Let another field take over smoothly; Proposition 2 holds throughout.
+
+        On the way the field is a `crossfade`, whose exact rate the law is told, so that
+        the null-space error goes on decaying as if nothing happened. A change that
+        comes before the last one has ended begins at whatever the field then is.
+
+        Args:
+            field: The field that it shall be.
+            start: When it begins to take over, now or later [s].
+            ramp: How long it takes [s].
+
+        Raises:
+            ControllerError: If the field is another robot's.
+            FieldError: If the ramp takes no time, or one of the two fields leaves the
+                null space uncontrolled: there is no way between g and no g.
+        """
+        check_parts(self.robot, self.levels, field)
+        self.field = crossfade(self.field, field, start=start, duration=ramp)
+        self._next_field = start + ramp, field
 
     def _explain_non_finite(self, state: RobotState) -> None:
         culprit = self.mode.culprit()

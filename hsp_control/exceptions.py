@@ -116,3 +116,11 @@ class ExportError(HspControlError, RuntimeError):
 
 class PlotError(HspControlError, ValueError):
     """A log that cannot be drawn, or a picture that cannot be written."""
+
+
+class LiveError(HspControlError, ValueError):
+    """Settings of a live loop that contradict each other, or a robot it is not for."""
+
+
+class HardwareError(HspControlError, RuntimeError):
+    """A robot that cannot be reached, or that is gone."""

@@ -2,16 +2,23 @@
 
 import re
 import shlex
+import sys
+from dataclasses import asdict
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
+from live_rigs import law, watched
 
 import hsp_control
 from hsp_control import load_experiment
 from hsp_control.cli.main import _parser
+from hsp_control.config.models.live import LiveModel
 from hsp_control.config.models.view import ShowModel
+from hsp_control.live import EffortInterface, StopSettings, Tolerance, run_loop
+from hsp_control.live.watched_robot import WATCHDOG
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -73,6 +80,7 @@ def test_the_readme_s_commands_exist() -> None:
     ]
     assert {command[0] for command in commands} == {
         "run", "view", "plot", "export", "check", "robots", "schema", "sweep", "bench",
+        "live",
     }  # fmt: skip
     for command in commands:
         _parser().parse_args(command)
@@ -156,3 +164,68 @@ def test_pictures_that_documents_show_exist() -> None:
         for target in re.findall(r"\]\(([^)#]+)\)", text):
             if "://" not in target:
                 assert (document.parent / target).exists(), f"{document.name}: {target}"
+
+
+class _FakeFranka:
+    """pylibfranka as far as the page uses it, around a simulated Panda."""
+
+    def __init__(self, address: str) -> None:
+        self.watched = watched(EffortInterface(True, 1000.0))
+        self.efforts: list[np.ndarray] = []
+        self.stopped = False
+
+    def read_once(self) -> SimpleNamespace:
+        return SimpleNamespace(q=self.watched.q.tolist(), dq=self.watched.v.tolist())
+
+    def start_torque_control(self) -> "_FakeFranka":
+        return self
+
+    def readOnce(self) -> tuple[SimpleNamespace, SimpleNamespace]:
+        self.watched.advance(self.efforts)
+        self.efforts = []
+        return self.read_once(), SimpleNamespace(to_sec=lambda: 0.001)
+
+    def writeOnce(self, torques: list[float]) -> None:
+        self.efforts.append(np.array(torques))
+
+    def stop(self) -> None:
+        self.stopped = True
+
+
+def test_the_live_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
+    (shell,) = blocks(text, "sh")
+    for line in shell.splitlines():
+        _parser().parse_args(shlex.split(line.split("#")[0])[1:])
+    example, panda = blocks(text, "python")
+    space: dict = {}
+    exec(compile(example, "live.md", "exec"), space)
+    assert space["report"].ended == "completed"
+    assert space["controller"].field is space["calm"]
+    assert space["run"].status == "completed"
+
+    module = SimpleNamespace(
+        Robot=_FakeFranka, Torques=list, FrankaException=type("F", (Exception,), {})
+    )
+    monkeypatch.setitem(sys.modules, "pylibfranka", module)
+    exec(compile(panda, "live.md", "exec"), space)
+    robot = space["Panda"]("fake")
+    interface = EffortInterface(True, 1000.0)
+    report = run_loop(law(), robot, duration=0.2, interface=interface)
+    assert report.ended == "completed", report.reason
+    assert robot._robot.stopped
+    assert robot._robot.watched.t > 0.2
+
+
+def test_the_live_page_s_defaults_are_the_code_s() -> None:
+    text = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
+    settings = LiveModel()
+    told = set(re.findall(r"`(\w+)`", text))
+    assert set(settings.model_dump()) | set(settings.stop.model_dump()) <= told
+    tolerance = Tolerance()
+    assert settings.missing == tolerance.missing == settings.watchdog == WATCHDOG == 20
+    assert settings.age == tolerance.age == 0.02
+    assert settings.position_margin == tolerance.position_margin == 0.02
+    assert settings.velocity_margin == tolerance.velocity_margin == 0.1
+    assert settings.stop.model_dump() == asdict(StopSettings())

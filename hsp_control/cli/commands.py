@@ -159,6 +159,13 @@ def bench(options: argparse.Namespace) -> int:
     return benches.bench(options)
 
 
+def live(options: argparse.Namespace) -> int:
+    """Control a simulated robot in another process, against the clock."""
+    from hsp_control.cli import live as lives
+
+    return lives.live(options)
+
+
 def robots(options: argparse.Namespace) -> int:
     """List all robots, or describe one."""
     if options.name is not None:

@@ -114,6 +114,9 @@ def _parser() -> argparse.ArgumentParser:
     _add_export(_command(commands, "export", "write a log as a page or as a film"))
     _add_sweep(_command(commands, "sweep", "run a configuration many times"))
     _add_bench(_command(commands, "bench", "measure a control loop on this machine"))
+    _add_live(
+        _command(commands, "live", "control a simulated robot in another process")
+    )
 
     robots = _command(commands, "robots", "list what can be loaded, or describe one")
     which = robots.add_mutually_exclusive_group()
@@ -273,6 +276,37 @@ def _add_bench(bench: argparse.ArgumentParser) -> None:
     )
     bench.add_argument(
         "--plot", type=Path, metavar="FILE", help="draw the distributions (.png, ...)"
+    )
+
+
+def _add_live(live: argparse.ArgumentParser) -> None:
+    _add_configuration(live)
+    live.add_argument(
+        "--duration",
+        type=float,
+        metavar="S",
+        help="default: the configuration's; inf: until Ctrl-C",
+    )
+    live.add_argument(
+        "--faults",
+        default="",
+        metavar="KIND=P,...",
+        help="probabilities of late, lost, duplicated and corrupted packets, in both "
+        "directions; delay=PACKETS of late ones, and seed=N",
+    )
+    live.add_argument(
+        "--kill",
+        metavar="WHO=S",
+        help="kill the process of the robot or of the controller after so long",
+    )
+    live.add_argument(
+        "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
+    )
+    live.add_argument(
+        "--priority",
+        type=int,
+        metavar="LEVEL",
+        help="real-time priority of the loop (SCHED_FIFO), 1 to 99",
     )
 
 

@@ -121,7 +121,7 @@ def read_document(source: str | PathLike[str] | dict[str, Any]) -> Document:
     if isinstance(source, dict):
         return Document(source, {}, "configuration")
     path = Path(source)
-    if path.suffix == ".npz":
+    if path.suffix in {".npz", ".journal"}:
         config = Rollout.load(path).config
         if config is None:
             raise ConfigError(

@@ -11,6 +11,7 @@ from pydantic import Field
 from hsp_control.config.models.base import Model
 from hsp_control.config.models.contacts import AnyContact
 from hsp_control.config.models.limits import LimitsModel
+from hsp_control.config.models.live import LiveModel
 from hsp_control.config.models.null_space import NullSpaceModel
 from hsp_control.config.models.plant import AnyPlant
 from hsp_control.config.models.robot import RobotModel, StartModel
@@ -47,6 +48,8 @@ class Scenario(Model):
     """What its efforts move, and how that differs from the controller's model."""
     simulation: SimulationModel = SimulationModel()
     """How it is simulated."""
+    live: LiveModel = LiveModel()
+    """How it is run live."""
     view: ViewModel = ViewModel()
     """How it is shown."""
 

@@ -16,7 +16,7 @@ from hsp_control.metrics import ConstantMetric, Metric
 from hsp_control.plants import Reading
 from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle, Scene
-from hsp_control.simulation.rollout import FORMAT, Rollout
+from hsp_control.simulation.rollout import FORMAT, Rollout, unwind
 from hsp_control.version import __version__
 
 _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
@@ -30,31 +30,21 @@ class Recorder:
         self._controller = controller
         self._scene = scene
         self._rows = 0
+        self._capacity = rows
         self._columns: dict[str, Array] = {}
         self._meaning: dict[str, dict[str, str]] = {}
         robot = controller.robot
         nv, units = robot.nv, dict.fromkeys(robot.units)
-        joint_unit = " or ".join(units)
+        self._joint_unit = joint_unit = " or ".join(units)
         effort_unit = " or ".join(_EFFORT_UNITS[unit] for unit in units)
-
-        def column(name: str, shape: tuple[int, ...], unit: str, meaning: str) -> None:
-            self._columns[name] = np.zeros((rows, *shape))
-            self._meaning[name] = {"unit": unit, "meaning": meaning}
-
+        column = self._open
         column("t", (), "s", "time")
         column("q", (robot.nq,), joint_unit, "configuration")
         column("v", (nv,), f"{joint_unit}/s", "velocity")
         column("tau", (nv,), effort_unit, "effort M a + N")
         column("acceleration", (nv,), f"({joint_unit})/s²", "commanded acceleration")
         column("joint_positions", (nv,), joint_unit, "joints' positions, unwound")
-        for task in controller.tasks:
-            m, prefix = task.rows, f"task.{task.name}"
-            width = len(task.measure(_probe(robot))[0])
-            unit = "m or rad"
-            column(f"{prefix}.error", (m,), unit, "e in the task's coordinates")
-            column(f"{prefix}.error_rate", (m,), f"{unit}/s", "e'")
-            column(f"{prefix}.reference", (width,), unit, "desired")
-            column(f"{prefix}.actual", (width,), unit, "measured")
+        self._open_tasks()
         column("field.g", (nv,), f"{joint_unit}/s", "null-space field")
         column("field.value", (), "-", "cost f, or norm of a vector field")
         column("null_space_error", (nv,), f"{joint_unit}/s", "e_N = (I - J#J)(g - v)")
@@ -77,20 +67,44 @@ class Recorder:
             )
         self._joints, self._edges = _skeleton(robot, controller)
         column("skeleton", (len(self._edges), 3), "m", "joints and task frames")
-        self._terms = _terms(controller)
-        for name, (_, field) in self._terms.items():
-            column(f"field.{name}.g", (nv,), f"{joint_unit}/s", "weighted contribution")
-            column(f"field.{name}.value", (), "-", "unweighted cost or norm")
-            if field.least_distance(_probe(robot)) is not None:
-                column(f"distance.{name}", (), "m", "least distance it watches")
+        self._open_terms()
         for obstacle in scene.values():
             column(f"obstacle.{obstacle.name}", (3,), "m", "its centre")
             column(f"obstacle.{obstacle.name}.quaternion", (4,), "-", "x, y, z, w")
 
+    def _open(self, name: str, shape: tuple[int, ...], unit: str, meaning: str) -> None:
+        """Open a column, if it is not; rows without a value of it hold NaN."""
+        if name not in self._columns:
+            self._columns[name] = np.full((self._capacity, *shape), np.nan)
+            self._meaning[name] = {"unit": unit, "meaning": meaning}
+
+    def _open_tasks(self) -> None:
+        """Open the columns of all tasks: some may have come while it runs."""
+        self._tasks = self._controller.tasks
+        probe, unit = _probe(self._controller.robot), "m or rad"
+        for task in self._tasks:
+            m, prefix = task.rows, f"task.{task.name}"
+            width = len(task.measure(probe)[0])
+            self._open(f"{prefix}.error", (m,), unit, "e in the task's coordinates")
+            self._open(f"{prefix}.error_rate", (m,), f"{unit}/s", "e'")
+            self._open(f"{prefix}.reference", (width,), unit, "desired")
+            self._open(f"{prefix}.actual", (width,), unit, "measured")
+
+    def _open_terms(self) -> None:
+        """Open the columns of the field's terms: it may have changed while it runs."""
+        controller, probe = self._controller, _probe(self._controller.robot)
+        self._field, self._terms = controller.field, _terms(controller)
+        shape, unit = (controller.robot.nv,), f"{self._joint_unit}/s"
+        for name, (_, field) in self._terms.items():
+            self._open(f"field.{name}.g", shape, unit, "weighted contribution")
+            self._open(f"field.{name}.value", (), "-", "unweighted cost or norm")
+            if field.least_distance(probe) is not None:
+                self._open(f"distance.{name}", (), "m", "least distance it watches")
+
     def record(
         self,
         state: RobotState,
-        output: ControlOutput,
+        output: ControlOutput | None,
         tau: Array,
         readings: Mapping[str, Reading],
     ) -> None:
@@ -98,28 +112,47 @@ class Recorder:
 
         Args:
             state: The true state.
-            output: What the controller makes of the true state.
+            output: What the controller makes of that state; None: nothing, and what
+                only the law tells is not a number in this row.
             tau: The effort that it commands, of what it is shown, shape (nv,).
             readings: What the plant tells of itself.
         """
-        i, columns, controller = self._rows, self._columns, self._controller
-        robot = controller.robot
+        i, columns = self._rows, self._columns
+        robot = self._controller.robot
+        if self._controller.tasks is not self._tasks:
+            self._open_tasks()
+        if self._controller.field is not self._field:
+            self._open_terms()
         columns["t"][i] = state.t
         columns["q"][i] = state.q
         columns["v"][i] = state.v
         columns["tau"][i] = tau
-        columns["acceleration"][i] = output.acceleration
         columns["joint_positions"][i] = robot.joint_positions(state.q)
-        for task in controller.tasks:
-            prefix = f"task.{task.name}"
+        for task in self._tasks:
             reference, actual = task.measure(state)
-            rows = controller.task_rows.get(task.name)
-            on = rows is not None  # a task that does not count has no error
-            columns[f"{prefix}.error"][i] = output.task.error[rows] if on else np.nan
-            rate = output.task.error_rate[rows] if on else np.nan
-            columns[f"{prefix}.error_rate"][i] = rate
-            columns[f"{prefix}.reference"][i] = reference
-            columns[f"{prefix}.actual"][i] = actual
+            columns[f"task.{task.name}.reference"][i] = reference
+            columns[f"task.{task.name}.actual"][i] = actual
+        for k, (frame, joint) in enumerate(self._joints):
+            columns["skeleton"][i, k] = (
+                state.position(frame) if frame else state.data.oMi[joint].translation
+            )
+        for obstacle in self._scene.values():
+            placement = pin.SE3ToXYZQUAT(obstacle.placement(state.t))
+            columns[f"obstacle.{obstacle.name}"][i] = placement[:3]
+            columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
+        if output is not None:
+            self._record_law(state, output)
+        for name, reading in readings.items():
+            self._open(name, np.shape(reading.value), reading.unit, reading.meaning)
+            columns[name][i] = reading.value
+        self._rows += 1
+
+    def _record_law(self, state: RobotState, output: ControlOutput) -> None:
+        i, columns, controller = self._rows, self._columns, self._controller
+        columns["acceleration"][i] = output.acceleration
+        for name, rows in controller.task_rows.items():  # those that count
+            columns[f"task.{name}.error"][i] = output.task.error[rows]
+            columns[f"task.{name}.error_rate"][i] = output.task.error_rate[rows]
         diagnostics = controller.diagnose(state)
         columns["field.g"][i] = output.field.g
         columns["field.value"][i] = diagnostics.field_value
@@ -127,35 +160,21 @@ class Recorder:
         columns["null_space_norm"][i] = diagnostics.null_space_norm
         columns["manipulability"][i] = diagnostics.manipulability
         values = diagnostics.singular_values
-        columns["singular_values"][i] = np.nan
+        if (more := len(values) - columns["singular_values"].shape[1]) > 0:
+            old = columns["singular_values"]
+            columns["singular_values"] = np.pad(
+                old, ((0, 0), (0, more)), constant_values=np.nan
+            )
         columns["singular_values"][i, : len(values)] = values
         columns["damped"][i] = output.damped
         columns["status"][i] = output.status
         columns["relaxation"][i] = output.relaxation
         self._record_contacts(output)
-        for k, (frame, joint) in enumerate(self._joints):
-            columns["skeleton"][i, k] = (
-                state.position(frame) if frame else state.data.oMi[joint].translation
-            )
         for name, (sample, field) in self._terms.items():
             columns[f"field.{name}.g"][i] = (sample or output.field).g
             columns[f"field.{name}.value"][i] = field.value(state)
             if f"distance.{name}" in columns:
                 columns[f"distance.{name}"][i] = field.least_distance(state)
-        for obstacle in self._scene.values():
-            placement = pin.SE3ToXYZQUAT(obstacle.placement(state.t))
-            columns[f"obstacle.{obstacle.name}"][i] = placement[:3]
-            columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
-        for name, reading in readings.items():
-            if name not in columns:
-                shape = np.shape(reading.value)
-                columns[name] = np.zeros((len(columns["t"]), *shape))
-                self._meaning[name] = {
-                    "unit": reading.unit,
-                    "meaning": reading.meaning,
-                }
-            columns[name][i] = reading.value
-        self._rows += 1
 
     def _record_contacts(self, output: ControlOutput) -> None:
         columns, support = self._columns, self._controller.mode.support
@@ -182,49 +201,61 @@ class Recorder:
         """Return the columns from a row on, as far as they have come; no copies."""
         return {name: a[start : self._rows] for name, a in self._columns.items()}
 
+    def forget(self) -> None:
+        """Make room: the rows so far have another place."""
+        for column in self._columns.values():
+            column[: self._rows] = np.nan
+        self._rows = 0
+
     def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
         """Return the rows recorded so far as a rollout."""
-        controller, robot = self._controller, self._controller.robot
         columns = {name: array[: self._rows] for name, array in self._columns.items()}
-        positions = columns["joint_positions"]
-        circular = _continuous(robot)
-        positions[:, circular] = np.unwrap(positions[:, circular], axis=0)
-        return Rollout(
-            columns,
-            {
-                "format": FORMAT,
-                "status": status,
-                "message": message,
-                "columns": self._meaning,
-                "robot": {
-                    "name": robot.name,
-                    "nq": robot.nq,
-                    "nv": robot.nv,
-                    "freedoms": list(robot.freedom_names),
-                    "units": list(robot.units),
-                    "skeleton_parents": self._edges,
-                    "joint_coordinates": robot.source.joint_coordinates,
-                },
-                "tasks": {
-                    task.name: {
-                        "type": type(task).__name__,
-                        "rows": task.rows,
-                        "level": controller.level_of(task.name),
-                        "axes": getattr(task, "axes", None),
-                        "frame": getattr(task, "frame", None),
-                    }
-                    for task in controller.tasks
-                },
-                "field": controller.field.name,
-                "controls_null_space": controller.field.controls,
-                "null_space_gain": controller.null_space_gain.tolist(),
-                "metric": type(controller.metric).__name__,
-                "metric_matrix": _constant_matrix(controller.metric),
-                "obstacles": {o.name: _described(o) for o in self._scene.values()},
-                "versions": versions(),
-                **meta,
+        unwind(columns, continuous_freedoms(self._controller.robot))
+        return Rollout(columns, self.meta(status, message, **meta))
+
+    def meta(self, status: str, message: str, **meta: Any) -> dict[str, Any]:
+        """Return what a rollout of these rows says of itself, as JSON data."""
+        controller, robot = self._controller, self._controller.robot
+        return {
+            "format": FORMAT,
+            "status": status,
+            "message": message,
+            "columns": self._meaning,
+            "robot": {
+                "name": robot.name,
+                "nq": robot.nq,
+                "nv": robot.nv,
+                "freedoms": list(robot.freedom_names),
+                "units": list(robot.units),
+                "continuous": continuous_freedoms(robot),
+                "skeleton_parents": self._edges,
+                "joint_coordinates": robot.source.joint_coordinates,
             },
-        )
+            "tasks": {
+                task.name: {
+                    "type": type(task).__name__,
+                    "rows": task.rows,
+                    "level": controller.level_of(task.name),
+                    "axes": getattr(task, "axes", None),
+                    "frame": getattr(task, "frame", None),
+                }
+                for task in controller.tasks
+            },
+            "field": controller.field.name,
+            "controls_null_space": controller.field.controls,
+            "null_space_gain": controller.null_space_gain.tolist(),
+            "metric": type(controller.metric).__name__,
+            "metric_matrix": _constant_matrix(controller.metric),
+            "obstacles": {o.name: _described(o) for o in self._scene.values()},
+            "versions": versions(),
+            **meta,
+        }
+
+
+def continuous_freedoms(robot: Robot) -> list[int]:
+    """Return the freedoms of joints that turn without end, as (cos, sin)."""
+    joints = robot.single_joints
+    return [int(i) for i in joints[joints[:, 2] == 2, 0]]
 
 
 def versions() -> dict[str, str]:
@@ -297,7 +328,3 @@ def _skeleton(
         points.append((frame, joint))
         parents.append(index[joint])
     return points, parents
-
-
-def _continuous(robot: Robot) -> list[int]:
-    return [j.idx_v for j in robot.joints.values() if j.nq == 2 and j.nv == 1]

@@ -2,7 +2,7 @@
 
 import json
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
@@ -12,6 +12,7 @@ import numpy as np
 from hsp_control.arrays import Array
 from hsp_control.exceptions import LogError
 from hsp_control.robot import Robot, RobotState
+from hsp_control.simulation.journal import is_journal, read_journal
 from hsp_control.suggest import did_you_mean, listing
 
 FORMAT = "hsp_control rollout 1"
@@ -73,7 +74,7 @@ class Rollout:
 
     @property
     def status(self) -> str:
-        """``completed``, ``interrupted`` or ``diverged``."""
+        """``completed``, ``interrupted``, ``diverged``; ``stopped``: a safe stop."""
         return str(self.meta["status"])
 
     @property
@@ -124,16 +125,23 @@ class Rollout:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a log.
+        """Read a log: an ``.npz``, or a `journal` with all its whole rows.
 
         Raises:
             LogError: If the file is missing, truncated, or not a log of this package.
         """
         path = Path(path)
         try:
+            if is_journal(path):
+                columns, meta = read_journal(path)
+                unwind(columns, meta["robot"]["continuous"])
+                columns["meta"] = np.array(json.dumps(meta, ensure_ascii=False))
+                return cls(*_checked(path, columns))
             # Opened here, because NumPy leaves a broken archive open.
             with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
                 columns = {name: archive[name] for name in archive.files}
+        except LogError:
+            raise
         except FileNotFoundError:
             near = [file.name for file in path.parent.glob("*.npz")]
             raise LogError(
@@ -149,6 +157,12 @@ class Rollout:
                 f"{path}: not a whole .npz log: {type(error).__name__}: {error}"
             ) from error
         return cls(*_checked(path, columns))
+
+
+def unwind(columns: Mapping[str, Array], continuous: Sequence[int]) -> None:
+    """Let the positions of continuous joints pass ±π without a jump, in place."""
+    positions, where = columns["joint_positions"], list(continuous)
+    positions[:, where] = np.unwrap(positions[:, where], axis=0)
 
 
 def _checked(

@@ -1,0 +1,121 @@
+"""A network that loses, delays, repeats and corrupts: injected, and counted."""
+
+from collections import Counter
+from dataclasses import asdict, dataclass, fields
+
+import numpy as np
+
+from hsp_control.exceptions import LiveError
+from hsp_control.suggest import did_you_mean
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What happens to packets: the probability of each fault, at most one a packet.
+
+    Attributes:
+        late: It is sent after some later ones.
+        lost: It is not sent.
+        duplicated: It is sent twice.
+        corrupted: One of its bits is turned over.
+        delay: How many packets later a late one is sent.
+        seed: Of the random numbers.
+    """
+
+    late: float = 0.0
+    lost: float = 0.0
+    duplicated: float = 0.0
+    corrupted: float = 0.0
+    delay: int = 3
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what are no probabilities.
+
+        Raises:
+            LiveError: Names the value.
+        """
+        for name in _KINDS:
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise LiveError(
+                    f"{name} is {getattr(self, name)}; needs a probability, 0 to 1"
+                )
+        if sum(getattr(self, name) for name in _KINDS) > 1.0 + 1e-12:
+            raise LiveError("the probabilities of the faults add up to more than 1")
+        if self.delay < 1:
+            raise LiveError(f"delay is {self.delay}; needs at least 1 packet")
+
+    @classmethod
+    def parse(cls, text: str) -> "Faults":
+        """Return the faults of a text such as ``late=0.01,lost=0.02,seed=3``.
+
+        Raises:
+            LiveError: If it is not such a text.
+        """
+        known = {field.name: field.type for field in fields(cls)}
+        values: dict[str, float | int] = {}
+        for part in filter(None, text.split(",")):
+            name, _, number = (piece.strip() for piece in part.partition("="))
+            if name not in known:
+                raise LiveError(
+                    f"no fault {name!r}{did_you_mean(name, known)} "
+                    f"(there are {', '.join(known)})"
+                )
+            try:
+                kind = int if name in {"delay", "seed"} else float
+                values[name] = kind(number)
+            except ValueError:
+                raise LiveError(
+                    f"fault {name} is {number!r}; needs a number, as {name}=0.01"
+                ) from None
+        return cls(**values)  # type: ignore[arg-type]
+
+    def as_json(self) -> dict[str, float]:
+        """Return the settings as JSON data."""
+        return asdict(self)
+
+
+_KINDS = ("late", "lost", "duplicated", "corrupted")
+
+
+class FaultInjector:
+    """Does to packets what `Faults` say.
+
+    Attributes:
+        injected: How many of each fault there were.
+    """
+
+    def __init__(self, faults: Faults, stream: int = 0) -> None:
+        """Seed it; each sender has a stream of its own."""
+        self._faults = faults
+        self._rng = np.random.default_rng((faults.seed, stream))
+        shares = np.cumsum([getattr(faults, kind) for kind in _KINDS])
+        self._shares = shares
+        self._waiting: list[tuple[int, bytes]] = []
+        self.injected: Counter[str] = Counter(dict.fromkeys(_KINDS, 0))
+
+    def pass_on(self, data: bytes) -> list[bytes]:
+        """Return what is really sent when this packet is, in order."""
+        released = [late for left, late in self._waiting if left <= 1]
+        self._waiting = [(left - 1, late) for left, late in self._waiting if left > 1]
+        which = int(np.searchsorted(self._shares, self._rng.random(), side="right"))
+        if which == len(_KINDS):
+            return [data, *released]
+        kind = _KINDS[which]
+        self.injected[kind] += 1
+        if kind == "late":
+            self._waiting.append((self._faults.delay, data))
+            return released
+        if kind == "lost":
+            return released
+        if kind == "duplicated":
+            return [data, data, *released]
+        broken = bytearray(data)
+        bit = int(self._rng.integers(8 * len(data)))
+        broken[bit // 8] ^= 1 << (bit % 8)
+        return [bytes(broken), *released]
+
+    def rest(self) -> list[bytes]:
+        """Return the late packets that still wait: nothing else will be sent."""
+        waiting, self._waiting = self._waiting, []
+        return [data for _, data in waiting]
