@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import pinocchio as pin
 
+from hsp_control.access import ANYWHERE, Access
 from hsp_control.arrays import Array, Indices
 from hsp_control.centroidal import CentroidalMotion
 from hsp_control.combining import Part, combine
@@ -76,6 +77,7 @@ class Robot(ConfigurationSpace):
         tool_frames: Mapping[str, ToolFrame] | None = None,
         gravity: Sequence[float] | None = None,
         mimic: bool = True,
+        access: Access = ANYWHERE,
     ) -> Self:
         """Load a bundled robot, one of example-robot-data, or a URDF file.
 
@@ -88,14 +90,17 @@ class Robot(ConfigurationSpace):
             tool_frames: Frames to add, by name.
             gravity: Acceleration of gravity [m/s²], shape (3,). None: -9.81 along z.
             mimic: Honour ``<mimic>`` joints, or load them as free ones.
+            access: Where a URDF given by path, and the meshes that it names, may lie:
+                `access.only_within` for files of strangers.
 
         Raises:
             RobotNotFoundError: If there is no such robot.
+            AccessError: If a file is not allowed.
             ModelError: If the URDF does not parse or moves no mass somewhere.
             JointNotFoundError: If a joint to lock does not exist.
             FrameNotFoundError: If a tool frame's parent does not exist.
         """
-        source = find_robot(name)
+        source = find_robot(name, access)
         model = load_model(
             source,
             root=root,

@@ -1,5 +1,6 @@
 """Fills a rollout's columns, one row at a time, into memory that is there already."""
 
+import math
 import platform
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -11,11 +12,13 @@ import pinocchio as pin
 
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller, ControlOutput
+from hsp_control.exceptions import SimulationError
 from hsp_control.fields import FieldSample, NullSpaceField, WeightedSum
 from hsp_control.metrics import ConstantMetric, Metric
 from hsp_control.plants import Reading
 from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle, Scene
+from hsp_control.simulation.log_file import MAX_SIZE
 from hsp_control.simulation.rollout import FORMAT, Rollout
 from hsp_control.version import __version__
 
@@ -37,7 +40,10 @@ class Recorder:
         joint_unit = " or ".join(units)
         effort_unit = " or ".join(_EFFORT_UNITS[unit] for unit in units)
 
+        self._size = 0
+
         def column(name: str, shape: tuple[int, ...], unit: str, meaning: str) -> None:
+            self._reserve(rows, shape)
             self._columns[name] = np.zeros((rows, *shape))
             self._meaning[name] = {"unit": unit, "meaning": meaning}
 
@@ -86,6 +92,15 @@ class Recorder:
         for obstacle in scene.values():
             column(f"obstacle.{obstacle.name}", (3,), "m", "its centre")
             column(f"obstacle.{obstacle.name}.quaternion", (4,), "-", "x, y, z, w")
+
+    def _reserve(self, rows: int, shape: tuple[int, ...]) -> None:
+        """Refuse a log that could not be read again, before memory is asked for it."""
+        self._size += 8 * rows * math.prod(shape)
+        if self._size > MAX_SIZE:
+            raise SimulationError(
+                f"a log of {rows} rows is larger than {MAX_SIZE / 1e9:g} GB; choose a "
+                "longer log_period or a shorter duration"
+            )
 
     def record(
         self,
@@ -149,6 +164,7 @@ class Recorder:
         for name, reading in readings.items():
             if name not in columns:
                 shape = np.shape(reading.value)
+                self._reserve(len(columns["t"]), shape)
                 columns[name] = np.zeros((len(columns["t"]), *shape))
                 self._meaning[name] = {
                     "unit": reading.unit,

@@ -2,7 +2,7 @@
 
 import json
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
@@ -12,6 +12,9 @@ import numpy as np
 from hsp_control.arrays import Array
 from hsp_control.exceptions import LogError
 from hsp_control.robot import Robot, RobotState
+from hsp_control.simulation.log_file import read_arrays, shortened, write_arrays
+from hsp_control.simulation.log_meta import complaint
+from hsp_control.simulation.salvage import read_whole_entries
 from hsp_control.suggest import did_you_mean, listing
 
 FORMAT = "hsp_control rollout 1"
@@ -103,6 +106,8 @@ class Rollout:
         """Write one ``.npz`` that NumPy alone reads, without pickles.
 
         Written beside its place and moved there, so that no half file bears its name.
+        Where the disk fills, as much as fits stays beside it for `salvage`, if that has
+        the motion; the message names it.
 
         Raises:
             LogError: If the file cannot be written.
@@ -113,27 +118,28 @@ class Rollout:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with part.open("wb") as file:
-                np.savez_compressed(file, allow_pickle=False, meta=meta, **self.columns)
+                write_arrays(file, {"meta": meta, **self.columns})
             part.replace(path)
         except OSError as error:
-            with suppress(OSError):  # its folder may be no folder
-                part.unlink(missing_ok=True)
+            kept = _keep_part(part, path)
             reason = error.strerror or str(error)
-            raise LogError(f"{path}: cannot write the log: {reason}") from error
+            raise LogError(f"{path}: cannot write the log: {reason}{kept}") from error
+        except BaseException:  # a second Ctrl-C: then without it
+            _remove(part)
+            raise
         return path
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a log.
+        """Read a log, which may be a stranger's: nothing in it is ever executed.
 
         Raises:
-            LogError: If the file is missing, truncated, or not a log of this package.
+            LogError: If the file is missing, truncated, too large, not a log of this
+                package, or one that contradicts itself.
         """
         path = Path(path)
         try:
-            # Opened here, because NumPy leaves a broken archive open.
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-                columns = {name: archive[name] for name in archive.files}
+            columns = read_arrays(path)
         except FileNotFoundError:
             near = [file.name for file in path.parent.glob("*.npz")]
             raise LogError(
@@ -143,6 +149,7 @@ class Rollout:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise LogError(
                 f"{path}: not a whole .npz log (cut short, or another file): {reason}"
+                f"{_salvageable(path)}"
             ) from error
         except Exception as error:  # zlib.error, struct.error, NotImplementedError...
             raise LogError(
@@ -150,9 +157,71 @@ class Rollout:
             ) from error
         return cls(*_checked(path, columns))
 
+    @classmethod
+    def salvage(cls, path: str | Path) -> Self:
+        """Read what is whole of a log that was cut; ``meta["lost"]`` names the rest.
+
+        Raises:
+            LogError: If not even the motion (t, q, v, tau) is whole, or what is whole
+                is no log.
+        """
+        path = Path(path)
+        try:
+            columns, cut = read_whole_entries(path)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise LogError(f"{path}: cannot be read: {reason}") from error
+        described = _described(columns)
+        lost = [name for name in described if name not in columns]
+        missing = [name for name in ("meta", *_REQUIRED) if name not in columns]
+        if missing:
+            where = f": it is cut in {cut!r}" if cut else ""
+            raise LogError(
+                f"{path}: nothing to salvage{where}; {missing[0]!r} is not whole"
+            )
+        return cls(*_checked(path, columns, lost))
+
+
+def _keep_part(part: Path, path: Path) -> str:
+    """Keep a half-written log if it has the motion; say where, or nothing."""
+    kept = path.with_suffix(".cut.npz")
+    try:
+        columns, _ = read_whole_entries(part)
+        if {"meta", *_REQUIRED} <= set(columns):
+            part.replace(kept)
+            return f"; what fits is in {kept}: hsp salvage {kept}"
+    except OSError:
+        pass
+    _remove(part)
+    return ""
+
+
+def _remove(part: Path) -> None:
+    with suppress(OSError):  # its folder may be no folder
+        part.unlink(missing_ok=True)
+
+
+def _salvageable(path: Path) -> str:
+    """Return what to do with a log that is cut, if something can be done."""
+    try:
+        columns, _ = read_whole_entries(path)
+    except OSError:
+        return ""
+    whole = {"meta", *_REQUIRED} <= set(columns)
+    return f"; its motion is whole: hsp salvage {path}" if whole else ""
+
+
+def _described(columns: dict[str, Array]) -> list[str]:
+    """Return the columns that the entry 'meta' describes, as far as it can be read."""
+    try:
+        described = json.loads(str(columns["meta"]))["columns"]
+    except (KeyError, TypeError, ValueError, RecursionError):
+        return []
+    return list(described) if isinstance(described, dict) else []
+
 
 def _checked(
-    path: Path, columns: dict[str, Array]
+    path: Path, columns: dict[str, Array], lost: Sequence[str] = ()
 ) -> tuple[dict[str, Array], dict[str, Any]]:
     if "meta" not in columns or columns["meta"].dtype.kind != "U":
         raise LogError(
@@ -161,19 +230,24 @@ def _checked(
         )
     try:
         meta = json.loads(str(columns.pop("meta")))
-    except json.JSONDecodeError as error:
+    except (json.JSONDecodeError, RecursionError) as error:
         raise LogError(f"{path}: its entry 'meta' is not JSON: {error}") from error
     if not isinstance(meta, dict) or meta.get("format") != FORMAT:
         found = meta.get("format") if isinstance(meta, dict) else meta
         raise LogError(
-            f"{path}: its format is {found!r}; this version reads {FORMAT!r}"
+            f"{path}: its format is {shortened(found)}; this version reads {FORMAT!r}"
         )
+    if lost:
+        kept = {n: d for n, d in meta["columns"].items() if n not in lost}
+        meta = {**meta, "columns": kept, "lost": list(lost)}
     described = meta.get("columns")
     wanted = [*_REQUIRED, *(described if isinstance(described, dict) else ())]
     missing = [name for name in wanted if name not in columns]
     if missing:
-        raise LogError(f"{path}: the log lacks the column {missing[0]!r}")
+        raise LogError(f"{path}: the log lacks the column {shortened(missing[0])}")
     rows = {name: np.shape(column)[:1] for name, column in columns.items()}
     if any(length != rows["t"] for length in rows.values()):
         raise LogError(f"{path}: the log's columns differ in length")
+    if reason := complaint(meta, columns):
+        raise LogError(f"{path}: {reason}")
     return columns, meta
