@@ -222,7 +222,12 @@ class Robot(ConfigurationSpace):
             return np.array(pin.aba(self.model, self._data, q, v, tau))
         mass_matrix = pin.crba(self.model, self._data, q)
         effects = pin.nonLinearEffects(self.model, self._data, q, v)
-        return np.asarray(np.linalg.solve(mass_matrix, tau - effects))
+        try:
+            return np.asarray(np.linalg.solve(mass_matrix, tau - effects))
+        except np.linalg.LinAlgError:
+            raise ModelError(
+                f"{self.name}: the mass matrix is singular at this configuration"
+            ) from None
 
 
 class RobotState:

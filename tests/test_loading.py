@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 import yaml
 
-from hsp_control import HspControlError, Robot, ToolFrame, loading, resources
+from hsp_control import HspControlError, Robot, ToolFrame, resources
 from hsp_control.exceptions import (
     FrameNotFoundError,
     JointNotFoundError,

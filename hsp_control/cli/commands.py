@@ -17,6 +17,7 @@ from rich.table import Table
 from hsp_control.cli import robot_table
 from hsp_control.cli.consoles import errors as _errors
 from hsp_control.cli.consoles import out as _out
+from hsp_control.cli.consoles import told
 from hsp_control.cli.interrupts import FirstInterruptWaits
 from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.config import Experiment, json_schema, load_experiment
@@ -66,7 +67,7 @@ def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") ->
             if not isinstance(error.rollout, Rollout) or not len(error.rollout):
                 raise
             rollout, status = error.rollout, 2
-            print(f"hsp: {error}", file=sys.stderr)
+            print(f"hsp: {told(error)}", file=sys.stderr)
         if rollout.status == "interrupted":
             at = f" at t = {rollout.t[-1]:g} s" if len(rollout) else ""
             print(f"hsp: stopped by the user{at}", file=sys.stderr)
@@ -97,7 +98,7 @@ def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:
         elsewhere = rollout.save(Path(tempfile.mkdtemp(prefix="hsp-")) / log.name)
     except (LogError, OSError):
         raise error from None
-    print(f"hsp: {error}; it is in another place", file=sys.stderr)
+    print(f"hsp: {told(error)}; it is in another place", file=sys.stderr)
     return elsewhere
 
 

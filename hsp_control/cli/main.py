@@ -23,14 +23,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.print_help()
         return 0
     # Commands are imported when they are asked for: `hsp --help` answers at once.
-    from hsp_control.cli import commands
+    from hsp_control.cli import commands, consoles
 
     try:
         if signal.getsignal(signal.SIGINT) is end_quietly:  # from here on: below
             signal.signal(signal.SIGINT, signal.default_int_handler)
         return int(getattr(commands, options.command)(options))
     except HspControlError as error:
-        print(f"hsp: {error}", file=sys.stderr)
+        print(f"hsp: {consoles.told(error)}", file=sys.stderr)
     except BrokenPipeError:  # `hsp schema | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:

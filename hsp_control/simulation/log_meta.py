@@ -5,12 +5,21 @@ and a user's own data may say more.
 """
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hsp_control.arrays import Array
+
+_MOTION = ("t", "q", "v", "tau")
+_PLACED = {*_MOTION, "joint_positions", "skeleton"}
+"""What is drawn in space or over time: it needs a place."""
+_FARTHEST, _LARGEST = 1e12, 1e100
+"""What the axes of a picture can tell apart; motion that diverges ends long before."""
+
+_NORM = 1e-6
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
@@ -89,9 +98,13 @@ def _wrong_columns(columns: dict[str, Array]) -> str:
     for name, column in columns.items():
         if column.dtype.kind not in "fiub":
             return f"its column {name!r} holds no numbers"
-    for name in ("t", "q", "v", "tau"):
-        if not np.isfinite(columns[name]).all():
+        placed = name in _PLACED or name.startswith("obstacle.")
+        if placed and not np.isfinite(column).all():
             return f"its column {name!r} holds a NaN or an infinity"
+        largest = np.abs(column[np.isfinite(column)], dtype=float).max(initial=0.0)
+        if largest > (_FARTHEST if placed else _LARGEST):
+            return f"its column {name!r} holds {largest:.3g}, no number of a robot"
+    for name in _MOTION:
         dimensions = 1 if name == "t" else 2
         if columns[name].ndim != dimensions:
             return f"its column {name!r} has {columns[name].ndim} dimensions"
@@ -155,12 +168,27 @@ def _wrong_robot(told: _Meta, columns: dict[str, Array]) -> str:
     matrix = told.metric_matrix
     if matrix is not None and not _definite(np.array(matrix)):
         return "its metric_matrix is not symmetric positive definite"
+    for name, part in _quaternions(told, columns):
+        if not (np.abs(np.linalg.norm(part, axis=1) - 1.0) < _NORM).all():
+            return f"its column {name!r} holds what is no orientation"
     for name, obstacle in told.obstacles.items():
         if obstacle.radius is not None and not 0.0 <= obstacle.radius < math.inf:
             return f"its obstacle {name!r} has the radius {obstacle.radius}"
         if f"obstacle.{name}" not in columns:
             return f"the log lacks the column 'obstacle.{name}'"
     return ""
+
+
+def _quaternions(told: _Meta, columns: dict[str, Array]) -> Iterator[tuple[str, Array]]:
+    """Yield the columns that hold quaternions, and where in them."""
+    for name, column in columns.items():
+        if name.startswith("obstacle.") and name.endswith(".quaternion"):
+            yield name, column
+    for task, about in told.tasks.items():
+        for what in ("reference", "actual"):
+            name = f"task.{task}.{what}"
+            if name in columns and _width(about) in (4, 7):
+                yield name, columns[name][:, -4:]
 
 
 def _definite(matrix: Array) -> bool:

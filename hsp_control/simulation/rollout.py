@@ -18,6 +18,7 @@ from hsp_control.simulation.salvage import read_whole_entries
 from hsp_control.suggest import did_you_mean, listing
 
 FORMAT = "hsp_control rollout 1"
+_LONGEST = 1000  # characters of a name: an archive has room for 65535 bytes
 _REQUIRED = ("t", "q", "v", "tau")
 
 
@@ -114,6 +115,11 @@ class Rollout:
         """
         path = Path(path)
         part = path.with_name(f".{path.name}.part")
+        if any(len(name) > _LONGEST for name in self.columns):
+            raise LogError(
+                f"{path}: cannot write the log: a column's name has more than "
+                f"{_LONGEST} characters"
+            )
         meta = np.array(json.dumps(self.meta, ensure_ascii=False))
         try:
             path.parent.mkdir(parents=True, exist_ok=True)

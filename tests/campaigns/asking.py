@@ -8,8 +8,7 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from types import FrameType
 from typing import Any
 
-from hsp_control.cli import commands, main
-from hsp_control.cli import consoles
+from hsp_control.cli import commands, consoles, main
 
 LONGEST = 2000
 """Characters of a message: what is longer is no clear error."""

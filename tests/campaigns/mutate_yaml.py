@@ -6,6 +6,7 @@ from random import Random
 from typing import Any
 
 import yaml
+
 from campaigns.texts import TRICKS
 
 LONG = "x" * 70_000
@@ -23,8 +24,8 @@ TAGS = [
     '!!python/object/apply:os.system ["touch {canary}"]',
     '!!python/object/new:os.system ["touch {canary}"]',
     '!!python/object/apply:subprocess.check_output [["touch", "{canary}"]]',
-    '!!python/name:os.system',
-    '!!python/module:os',
+    "!!python/name:os.system",
+    "!!python/module:os",
     "!!python/object/apply:builtins.eval [\"open('{canary}', 'w')\"]",
     "!!binary aGVsbG8=",
     "!!set {{a, b}}",
@@ -58,10 +59,14 @@ def override(data: bytes, random: Random) -> str:
     places = list(_places(yaml.safe_load(data)))
     path = [*random.choice(places)]
     if random.random() < 0.3:
-        path[random.randrange(len(path))] = random.choice(("x", "0", "99", "", "a b", "-1"))
+        path[random.randrange(len(path))] = random.choice(
+            ("x", "0", "99", "", "a b", "-1")
+        )
     key = ".".join(map(str, path))
     value = random.choice([*NUMBERS, *TEXTS, {}, [], None, True])
-    text = yaml.safe_dump(value, default_flow_style=True).removesuffix("\n...\n").strip()
+    text = (
+        yaml.safe_dump(value, default_flow_style=True).removesuffix("\n...\n").strip()
+    )
     whole = f"{key}={text}"[:100_000].replace("\0", "\\0")
     if random.random() < 0.2:
         at = random.randrange(len(whole) + 1)
@@ -98,26 +103,32 @@ def _change(tree: Any, random: Random) -> None:
         case 3:
             holder[key] = random.choice(TEXTS)
         case 4:
-            holder[key] = random.choice(({}, [], None, True, False, [[]], {"a": 1}, [None]))
+            holder[key] = random.choice(
+                ({}, [], None, True, False, [[]], {"a": 1}, [None])
+            )
         case 5:
             del holder[key]
         case 6 if isinstance(holder, dict):
             name = str(key)
-            holder[random.choice((name[:-1], name + "s", name.upper(), "", LONG))] = holder.pop(key)
+            holder[random.choice((name[:-1], name + "s", name.upper(), "", LONG))] = (
+                holder.pop(key)
+            )
         case 7 if isinstance(holder, dict):
-            holder[random.choice(("nonsense", "type", "name", "file", "robot"))] = random.choice(
-                (1, "mesh", "/etc/passwd", {}, [])
+            holder[random.choice(("nonsense", "type", "name", "file", "robot"))] = (
+                random.choice((1, "mesh", "/etc/passwd", {}, []))
             )
         case 8:
             other = random.choice(places)
             theirs, name = _at(tree, other[:-1]), other[-1]
             holder[key] = copy.deepcopy(theirs[name])
         case 9:
-            holder[key] = _deep(random.choice((5, 49, 60, 400)), random)
+            holder[key] = _deep(random.choice((5, 30, 60, 90)), random)
         case 10:
             count = random.choice((2, 3, 6, 7, 100, 5000, 30_000))
             old = holder[key]
-            holder[key] = [old] * count if isinstance(old, int | float | str) else [1.0] * count
+            holder[key] = (
+                [old] * count if isinstance(old, int | float | str) else [1.0] * count
+            )
         case _:
             value = holder[key]
             if isinstance(value, int | float) and not isinstance(value, bool):

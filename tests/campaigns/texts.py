@@ -62,7 +62,9 @@ def lines_moved(data: bytes, random: Random) -> bytes:
 def recoded(data: bytes, random: Random) -> bytes:
     """Write the text in another encoding."""
     text = data.decode("utf-8", "replace")
-    codec = random.choice(("utf-16", "utf-32", "latin-1", "utf-8-sig", "cp037", "utf-7"))
+    codec = random.choice(
+        ("utf-16", "utf-32", "latin-1", "utf-8-sig", "cp037", "utf-7")
+    )
     return text.encode(codec, "replace")
 
 

@@ -4,6 +4,7 @@ A case is a function of (seed, index): the parent sends both, the process makes 
 from them and answers with one line. A process that dies is replaced.
 """
 
+import faulthandler
 import importlib
 import json
 import os
@@ -12,6 +13,7 @@ import select
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -54,6 +56,7 @@ class Worker:
         self._function, self._timeout = function, timeout
         self._process: subprocess.Popen[bytes] | None = None
         self._first = True
+        self._trace = tempfile.TemporaryFile()
 
     def ask(self, seed: int, index: int) -> Answer:
         """Return what came of a case."""
@@ -66,13 +69,20 @@ class Worker:
         self._first = False
         seconds = time.monotonic() - start
         if line is None:
+            process.send_signal(signal.SIGUSR1)  # says where it stands
+            time.sleep(0.5)
             self.close()
-            return Answer(index, "hang", f"not over after {seconds:.0f} s", seconds)
+            self._trace.seek(0)
+            where = self._trace.read().decode(errors="replace")[-3000:]
+            text = f"not over after {seconds:.0f} s:\n{where}"
+            return Answer(index, "hang", text, seconds)
         if not line:
             code = process.wait()
             self.close()
             name = signal.Signals(-code).name if code < 0 else f"status {code}"
-            return Answer(index, "crash", name, seconds)
+            self._trace.seek(0)
+            where = self._trace.read().decode(errors="replace")[-3000:]
+            return Answer(index, "crash", f"{where}{name}", seconds)
         kind, text = json.loads(line)
         return Answer(index, kind, text, seconds)
 
@@ -101,11 +111,12 @@ class Worker:
         root = Path(__file__).resolve().parents[2]
         paths = [str(root), str(root / "tests"), os.environ.get("PYTHONPATH", "")]
         self._first = True
+        self._trace.truncate(0)
         self._process = subprocess.Popen(
             [sys.executable, "-m", "campaigns.worker", self._function],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
+            stderr=self._trace,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
         )
         return self._process
@@ -133,6 +144,8 @@ def serve(name: str) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     answers = os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # what native code prints is no answer
+    faulthandler.register(signal.SIGUSR1)
+    faulthandler.enable()
     for line in sys.stdin.buffer:
         seed, index = json.loads(line)
         answers.write(json.dumps(case(seed, index)).encode() + b"\n")

@@ -6,7 +6,6 @@ from random import Random
 
 from campaigns.asking import ask
 from campaigns.mutate_yaml import mutated, override
-
 from hsp_control.resources import bundled_configs
 
 STOP = 0.3
@@ -23,7 +22,7 @@ def case(seed: int, index: int) -> list[str]:
         canary, file = folder / "canary", folder / "mutated.yaml"
         sets: list[str] = []
         if random.random() < 0.15:
-            sets = ["--set", override(data, random)]
+            sets = ["--set=" + override(data, random)]
         else:
             data = mutated(data, random, str(canary))
         file.write_bytes(data)
@@ -32,6 +31,8 @@ def case(seed: int, index: int) -> list[str]:
         if answer[0] == "fine":
             out = str(folder / "out")
             answer = ask(["run", *arguments, "--out", out], stop_after=STOP)
+            if answer[1].startswith("stopped by the user"):
+                answer = ["fine", answer[1]]
         if canary.exists():
             return ["unclear", "code from the configuration has run"]
     return answer
