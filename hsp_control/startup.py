@@ -2,7 +2,8 @@
 
 Python takes its time to import what the command line needs. Where this process is
 ``hsp``, Ctrl-C ends it meanwhile with the one line that it gets later, too, not with a
-traceback through other people's imports. A program that imports the package is left
+traceback through other people's imports; and so it does later, while a command has
+nothing to save. A program that imports the package is left
 alone.
 """
 

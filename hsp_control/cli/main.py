@@ -11,6 +11,8 @@ from hsp_control.exceptions import HspControlError
 from hsp_control.startup import end_quietly
 from hsp_control.version import __version__
 
+_OWN_INTERRUPTS = {"bench", "export", "sweep", "view"}
+"""Commands that have processes, pages or rows to look after when Ctrl-C comes."""
 FAILURE = 2
 """Exit status of anything that did not go as asked."""
 
@@ -26,7 +28,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from hsp_control.cli import commands, consoles
 
     try:
-        if signal.getsignal(signal.SIGINT) is end_quietly:  # from here on: below
+        # Elsewhere Ctrl-C ends the process at once, as while it was starting: there is
+        # nothing to save, and an exception may get lost in other people's callbacks.
+        if (
+            options.command in _OWN_INTERRUPTS or getattr(options, "view", False)
+        ) and signal.getsignal(signal.SIGINT) is end_quietly:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         return int(getattr(commands, options.command)(options))
     except HspControlError as error:

@@ -69,7 +69,8 @@ def read_array(stream: IO[bytes], size: int, name: str) -> Array:
         raise ValueError(
             f"its entry {shortened(name)} is a pickle, which is never opened"
         )
-    if dtype.kind not in _KINDS or dtype.fields is not None or dtype.subdtype:
+    plain = dtype.kind in _KINDS and (dtype.kind == "U" or dtype.itemsize <= 8)
+    if not plain or dtype.fields is not None or dtype.subdtype:
         raise ValueError(f"its entry {shortened(name)} is neither numbers nor text")
     content = math.prod(shape) * dtype.itemsize
     if min(shape, default=0) < 0 or stream.tell() + content != size:

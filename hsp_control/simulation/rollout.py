@@ -1,5 +1,6 @@
 """A rollout: what happened, as named columns that describe themselves, and its file."""
 
+import errno
 import json
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
@@ -12,12 +13,18 @@ import numpy as np
 from hsp_control.arrays import Array
 from hsp_control.exceptions import LogError
 from hsp_control.robot import Robot, RobotState
-from hsp_control.simulation.log_file import read_arrays, shortened, write_arrays
+from hsp_control.simulation.log_file import (
+    MAX_SIZE,
+    read_arrays,
+    shortened,
+    write_arrays,
+)
 from hsp_control.simulation.log_meta import complaint
 from hsp_control.simulation.salvage import read_whole_entries
 from hsp_control.suggest import did_you_mean, listing
 
 FORMAT = "hsp_control rollout 1"
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _LONGEST = 1000  # characters of a name: an archive has room for 65535 bytes
 _REQUIRED = ("t", "q", "v", "tau")
 
@@ -127,7 +134,8 @@ class Rollout:
                 write_arrays(file, {"meta": meta, **self.columns})
             part.replace(path)
         except OSError as error:
-            kept = _keep_part(part, path)
+            kept = _keep_part(part, path) if error.errno in _FULL else ""
+            _remove(part)
             reason = error.strerror or str(error)
             raise LogError(f"{path}: cannot write the log: {reason}{kept}") from error
         except BaseException:  # a second Ctrl-C: then without it
@@ -198,7 +206,6 @@ def _keep_part(part: Path, path: Path) -> str:
             return f"; what fits is in {kept}: hsp salvage {kept}"
     except OSError:
         pass
-    _remove(part)
     return ""
 
 
@@ -245,7 +252,12 @@ def _checked(
         )
     if lost:
         kept = {n: d for n, d in meta["columns"].items() if n not in lost}
-        meta = {**meta, "columns": kept, "lost": list(lost)}
+        seen = {
+            name: about
+            for name, about in meta.get("obstacles", {}).items()
+            if f"obstacle.{name}" not in lost
+        }
+        meta = {**meta, "columns": kept, "obstacles": seen, "lost": list(lost)}
     described = meta.get("columns")
     wanted = [*_REQUIRED, *(described if isinstance(described, dict) else ())]
     missing = [name for name in wanted if name not in columns]
@@ -254,6 +266,8 @@ def _checked(
     rows = {name: np.shape(column)[:1] for name, column in columns.items()}
     if any(length != rows["t"] for length in rows.values()):
         raise LogError(f"{path}: the log's columns differ in length")
+    if 8 * sum(column.size for column in columns.values()) > MAX_SIZE:
+        raise LogError(f"{path}: larger than {MAX_SIZE / 1e9:g} GB in memory")
     if reason := complaint(meta, columns):
         raise LogError(f"{path}: {reason}")
-    return columns, meta
+    return {name: np.asarray(c, dtype=float) for name, c in columns.items()}, meta

@@ -7,13 +7,12 @@ what was interrupted is told as far as it went.
 import argparse
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import asdict
+
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from campaigns import document, faults, random_states, soak
 from campaigns.cases import KINDS, Count, count_cases
 from campaigns.results import keep
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
 from hsp_control.resources import bundled_robots
 
 STEPS, OTHER_STEPS = 1_000_000, 20_000
@@ -25,7 +24,9 @@ def states(progress: Progress, seed: int, share: float) -> bool:
     """Drive every bundled robot, and those of some bundled configurations."""
     good = True
     runs = [(name, STEPS, random_states.bundled) for name in bundled_robots()]
-    runs += [(name, OTHER_STEPS, random_states.configured) for name in random_states.OTHERS]
+    runs += [
+        (name, OTHER_STEPS, random_states.configured) for name in random_states.OTHERS
+    ]
     for name, steps, drive in runs:
         wanted = max(1, round(share * steps))
         bar = progress.add_task(f"states {name}", total=wanted)
@@ -33,7 +34,7 @@ def states(progress: Progress, seed: int, share: float) -> bool:
         for k, tally in enumerate(drive(name, seed, wanted)):
             progress.update(bar, completed=tally.steps)
             if k % 10 == 0 or tally.steps == wanted:
-                counts = asdict(tally) | {"wanted": steps, "seed": seed}
+                counts = vars(tally) | {"wanted": steps, "seed": seed}
                 keep(f"states-{name.replace('/', '_')}", counts)
         good &= tally.good
     return good
@@ -47,7 +48,7 @@ def cases(progress: Progress, seed: int, share: float, kind: str) -> bool:
     def show(count: Count) -> None:
         progress.update(bar, completed=count.cases)
         if count.cases % 20 == 0 or count.cases == wanted:
-            keep(f"files-{kind}", asdict(count) | {"wanted": CASES[kind], "seed": seed})
+            keep(f"files-{kind}", vars(count) | {"wanted": CASES[kind], "seed": seed})
 
     return count_cases(KINDS[kind], seed, wanted, show).good
 

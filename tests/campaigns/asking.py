@@ -9,6 +9,7 @@ from types import FrameType
 from typing import Any
 
 from hsp_control.cli import commands, consoles, main
+from hsp_control.cli.interrupts import FirstInterruptWaits
 
 LONGEST = 2000
 """Characters of a message: what is longer is no clear error."""
@@ -66,11 +67,16 @@ def _ctrl_c(after: float | None) -> Iterator[None]:
         return
 
     def press(_: int, __: FrameType | None) -> None:
-        signal.raise_signal(signal.SIGINT)
+        # Before the run begins `hsp` would simply end; this process must not.
+        if isinstance(
+            getattr(signal.getsignal(signal.SIGINT), "__self__", None),
+            FirstInterruptWaits,
+        ):
+            signal.raise_signal(signal.SIGINT)
 
     kept = signal.signal(signal.SIGALRM, press)
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.setitimer(signal.ITIMER_REAL, after, 1.0)
+    signal.setitimer(signal.ITIMER_REAL, after, 0.1)
     try:
         yield
     finally:

@@ -10,6 +10,7 @@ are drawn, too; and where the rate of efforts is limited, the last effort was an
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from time import monotonic
 
 import numpy as np
@@ -207,7 +208,7 @@ def drawn_velocities(robot: hsp.Robot, rng: np.random.Generator, count: int) -> 
 
 
 def drawn_controller(robot: hsp.Robot, rng: np.random.Generator) -> hsp.Controller:
-    """Return a controller for a fixed arm; half of them are limited."""
+    """Return a controller for a fixed arm; a quarter of them is limited."""
     return hsp.Controller(
         robot,
         _tasks(robot, rng),
@@ -215,7 +216,7 @@ def drawn_controller(robot: hsp.Robot, rng: np.random.Generator) -> hsp.Controll
         null_space_gain=10.0 ** rng.uniform(-1.0, 2.0),
         metric=hsp.MassMatrixMetric() if rng.random() < 0.3 else None,
         singularity_threshold=10.0 ** rng.uniform(-4.0, -1.0),
-        limits=_limits(robot, rng) if rng.random() < 0.5 else None,
+        limits=_limits(robot, rng) if rng.random() < 0.25 else None,
     )
 
 
@@ -280,18 +281,15 @@ def _posture(robot: hsp.Robot, rng: np.random.Generator) -> hsp.Task:
 def _field(robot: hsp.Robot, rng: np.random.Generator) -> hsp.NullSpaceField | None:
     frame = robot.end_effector
     limited = np.isfinite(robot.position_limits()[0]).all()
-    path = _trajectory(np.array([0.3, 0.0, 0.3]), rng)
-    ball = hsp.Obstacle("ball", hsp.Sphere(float(rng.uniform(0.0, 0.3))), path)
     choices: list[Callable[[], hsp.NullSpaceField]] = [
         lambda: hsp.TargetPosture(robot, drawn_configurations(robot, rng, 1)[0]),
-        lambda: hsp.PointDistance(robot, [frame], ball),
-        lambda: hsp.ObstacleClearance(robot, [ball]),
+        lambda: hsp.PointDistance(robot, [frame], _ball(rng)),
+        lambda: _clearances(robot)[rng.integers(len(_clearances(robot)))],
     ]
     if limited:
         choices += [
             lambda: hsp.JointCentering(robot),
             lambda: hsp.LimitBarrier(robot),
-            lambda: hsp.SelfClearance(robot),
             lambda: hsp.Manipulability(robot, frame),
         ]
     else:
@@ -306,6 +304,21 @@ def _field(robot: hsp.Robot, rng: np.random.Generator) -> hsp.NullSpaceField | N
         term = weight * choices[k]()
         total = term if total is None else total + term
     return total
+
+
+@cache
+def _clearances(robot: hsp.Robot) -> list[hsp.NullSpaceField]:
+    """Return fields that read meshes: made once."""
+    rng = np.random.default_rng(0)
+    return [
+        hsp.SelfClearance(robot),
+        *(hsp.ObstacleClearance(robot, [_ball(rng)]) for _ in range(8)),
+    ]
+
+
+def _ball(rng: np.random.Generator) -> hsp.Obstacle:
+    path = _trajectory(np.array([0.3, 0.0, 0.3]), rng)
+    return hsp.Obstacle("ball", hsp.Sphere(float(rng.uniform(0.0, 0.3))), path)
 
 
 def _limits(robot: hsp.Robot, rng: np.random.Generator) -> hsp.Limits:

@@ -7,13 +7,13 @@ simulated half minute, after a warm-up.
 
 import gc
 import tracemalloc
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 
 import psutil
-from campaigns.results import keep
 from rich.progress import Progress
 
 import hsp_control as hsp
+from campaigns.results import keep
 from hsp_control.plants import IntegratedPlant, Rk4
 from hsp_control.robot import RobotState
 
@@ -98,5 +98,5 @@ def campaign(progress: Progress, seed: int, share: float) -> bool:
         seconds, 20, lambda so_far: progress.update(bar, completed=so_far.steps)
     )
     progress.update(bar, completed=found.steps)
-    keep("soak", asdict(found) | {"wanted": round(MINUTES * 60.0 / PERIOD)})
+    keep("soak", vars(found) | {"wanted": round(MINUTES * 60.0 / PERIOD)})
     return found.good
