@@ -23,6 +23,20 @@ from hsp_control.shapes import (
 )
 
 
+def located_scene(model: s.SceneModel, folder: Path) -> s.SceneModel:
+    """Return the scene with its meshes' paths made absolute, for a log to name them."""
+
+    def located(obstacle: s.ObstacleModel) -> s.ObstacleModel:
+        if not isinstance(obstacle.shape, s.MeshModel):
+            return obstacle
+        file = str(folder / obstacle.shape.file)
+        shape = obstacle.shape.model_copy(update={"file": file})
+        return obstacle.model_copy(update={"shape": shape})
+
+    obstacles = {name: located(each) for name, each in model.obstacles.items()}
+    return model.model_copy(update={"obstacles": obstacles})
+
+
 def build_scene(document: Document, model: s.SceneModel, folder: Path) -> Scene:
     """Return the scene; files are looked up beside the configuration."""
     obstacles = []

@@ -14,7 +14,7 @@ from hsp_control.composition import check_support
 from hsp_control.config.build_null_space import build_fields, build_metric
 from hsp_control.config.build_plant import build_plant
 from hsp_control.config.build_robot import build_robot, build_start
-from hsp_control.config.build_scene import build_scene
+from hsp_control.config.build_scene import build_scene, located_scene
 from hsp_control.config.build_support import (
     build_contacts,
     build_limits,
@@ -184,6 +184,8 @@ def build(document: Document) -> Experiment:
     start = robot.state(0.0, q0, np.zeros(robot.nv))
 
     scene = build_scene(document, scenario.scene, folder)
+    located = located_scene(scenario.scene, folder)
+    scenario = scenario.model_copy(update={"scene": located})
     tasks = [
         build_task(document, name, task, start) for name, task in scenario.tasks.items()
     ]

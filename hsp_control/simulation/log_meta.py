@@ -20,6 +20,7 @@ _FARTHEST, _LARGEST = 1e12, 1e100
 """What the axes of a picture can tell apart; motion that diverges ends long before."""
 
 _NORM = 1e-6
+_LONGEST = 1e4
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
@@ -98,7 +99,11 @@ def _wrong_columns(columns: dict[str, Array]) -> str:
     for name, column in columns.items():
         if column.dtype.kind not in "fiub":
             return f"its column {name!r} holds no numbers"
-        placed = name in _PLACED or name.startswith("obstacle.")
+        placed = (
+            name in _PLACED
+            or name.startswith("obstacle.")
+            or (name.startswith("task.") and name.endswith((".reference", ".actual")))
+        )
         if placed and not np.isfinite(column).all():
             return f"its column {name!r} holds a NaN or an infinity"
         largest = np.abs(column[np.isfinite(column)], dtype=float).max(initial=0.0)
@@ -174,6 +179,8 @@ def _wrong_robot(told: _Meta, columns: dict[str, Array]) -> str:
     for name, obstacle in told.obstacles.items():
         if obstacle.radius is not None and not 0.0 <= obstacle.radius < math.inf:
             return f"its obstacle {name!r} has the radius {obstacle.radius}"
+        if not _drawable(obstacle.parameters):
+            return f"its obstacle {name!r} has parameters that no obstacle has"
         if f"obstacle.{name}" not in columns:
             return f"the log lacks the column 'obstacle.{name}'"
     return ""
@@ -189,6 +196,15 @@ def _quaternions(told: _Meta, columns: dict[str, Array]) -> Iterator[tuple[str, 
             name = f"task.{task}.{what}"
             if name in columns and _width(about) in (4, 7):
                 yield name, columns[name][:, -4:]
+
+
+def _drawable(value: Any) -> bool:
+    """Say whether all numbers in plain data are lengths of an obstacle [m]."""
+    if isinstance(value, dict):
+        return all(_drawable(inner) for inner in value.values())
+    if isinstance(value, list):
+        return all(_drawable(inner) for inner in value)
+    return not isinstance(value, int | float) or abs(value) <= _LONGEST
 
 
 def _definite(matrix: Array) -> bool:

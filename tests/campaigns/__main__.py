@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from campaigns import document, faults, random_states, soak
-from campaigns.cases import KINDS, Count, count_cases
+from campaigns.cases import KINDS, Count, count_cases, warm_up
 from campaigns.results import keep
 from hsp_control.resources import bundled_robots
 
@@ -50,6 +50,7 @@ def cases(progress: Progress, seed: int, share: float, kind: str) -> bool:
         if count.cases % 20 == 0 or count.cases == wanted:
             keep(f"files-{kind}", vars(count) | {"wanted": CASES[kind], "seed": seed})
 
+    warm_up()
     return count_cases(KINDS[kind], seed, wanted, show).good
 
 

@@ -1,10 +1,14 @@
 """Count what came of many mutated files."""
 
+import tempfile
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from campaigns.asking import ask
 from campaigns.worker import Worker
+
+from hsp_control.resources import bundled_configs
 
 KINDS = {
     "yaml": "campaigns.yaml_case:case",
@@ -37,6 +41,15 @@ class Count:
     def good(self) -> bool:
         """Whether each was answered with success or one clear error."""
         return set(self.kinds) <= {"fine", "refused"}
+
+
+def warm_up() -> None:
+    """Compile what cases need: afterwards a case that takes a minute hangs."""
+    for config in bundled_configs():
+        with tempfile.TemporaryDirectory() as folder:
+            arguments = ["run", config, "--out", folder]
+            if ask(["check", config])[0] == "fine":
+                ask(arguments, stop_after=0.01)
 
 
 def count_cases(
