@@ -16,7 +16,9 @@ from hsp_control.exceptions import ModelError, RobotNotFoundError
 from hsp_control.xml_files import XmlError, read_xml
 
 MAX_LINKS = 1000
-"""Links of a robot: matrices and recursions grow with them."""
+"""Links of a robot: recursions grow with them."""
+MAX_FREEDOMS = 200
+"""Joints that move: Pinocchio's memory and time grow with their cube."""
 MAX_NUMBER = 1e9
 """The largest length, angle, mass or inertia in a URDF, in SI units."""
 
@@ -72,6 +74,9 @@ def read_urdf(urdf: Path) -> Element:
     count = sum(1 for _ in robot.iter("link"))
     if count > MAX_LINKS:
         raise ModelError(f"{urdf}: {count} links; at most {MAX_LINKS}")
+    count = sum(joint.get("type") != "fixed" for joint in robot.iter("joint"))
+    if count > MAX_FREEDOMS:
+        raise ModelError(f"{urdf}: {count} joints that move; at most {MAX_FREEDOMS}")
     for owner, element in _owned(robot):
         complaint = _complaint(element)
         if complaint:

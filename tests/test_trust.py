@@ -26,7 +26,7 @@ from hsp_control.exceptions import (
     SimulationError,
 )
 from hsp_control.simulation import Rollout, log_file
-from hsp_control.urdf_checks import MAX_LINKS
+from hsp_control.urdf_checks import MAX_FREEDOMS, MAX_LINKS
 from hsp_control.viewer.mesh_files import collada_object
 from hsp_control.xml_files import MAX_DEPTH, XmlError, parse_xml, refuse_document_type
 
@@ -271,6 +271,12 @@ def test_links_are_bounded(home: Path) -> None:
     links = "".join(f'<link name="l{k}"/>' for k in range(MAX_LINKS))
     (home / "arm.urdf").write_text(ARM.replace("</robot>", links + "</robot>"))
     with pytest.raises(ModelError, match=r"1004 links; at most 1000"):
+        Robot.load(home / "arm.urdf")
+    joints = "".join(
+        f'<joint name="j{k}" type="floating"/>' for k in range(MAX_FREEDOMS)
+    )
+    (home / "arm.urdf").write_text(ARM.replace("</robot>", joints + "</robot>"))
+    with pytest.raises(ModelError, match=r"203 joints that move; at most 200"):
         Robot.load(home / "arm.urdf")
 
 

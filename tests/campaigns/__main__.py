@@ -6,13 +6,15 @@ what was interrupted is told as far as it went.
 
 import argparse
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable
+from functools import partial
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from campaigns import document, faults, random_states, soak
 from campaigns.cases import KINDS, Count, count_cases, warm_up
-from campaigns.results import keep
+from campaigns.results import keep, kept
 from hsp_control.resources import bundled_robots
 
 STEPS, OTHER_STEPS = 1_000_000, 20_000
@@ -40,7 +42,7 @@ def states(progress: Progress, seed: int, share: float) -> bool:
     return good
 
 
-def cases(progress: Progress, seed: int, share: float, kind: str) -> bool:
+def cases(progress: Progress, seed: int, share: float, kind: str, resume: bool) -> bool:
     """Answer mutated files of one kind."""
     wanted = max(1, round(share * CASES[kind]))
     bar = progress.add_task(f"mutated {kind}", total=wanted)
@@ -51,19 +53,18 @@ def cases(progress: Progress, seed: int, share: float, kind: str) -> bool:
             keep(f"files-{kind}", vars(count) | {"wanted": CASES[kind], "seed": seed})
 
     warm_up()
-    return count_cases(KINDS[kind], seed, wanted, show).good
+    before, so_far = kept().get(f"files-{kind}"), Count()
+    if resume and before is not None and before["seed"] == seed:
+        so_far = Count(**{name: before[name] for name in vars(so_far)})
+        so_far.kinds = Counter(so_far.kinds)
+    return count_cases(KINDS[kind], seed, wanted, show, so_far).good
 
 
 def main(arguments: Iterable[str] | None = None) -> int:
     """Run what is named, write the document, and say whether all was well."""
     stages: dict[str, Callable[[Progress, int, float], bool]] = {
         "states": states,
-        **{
-            kind: lambda progress, seed, share, kind=kind: cases(  # type: ignore[misc]
-                progress, seed, share, kind
-            )
-            for kind in CASES
-        },
+        **{kind: partial(cases, kind=kind, resume=False) for kind in CASES},
         "soak": soak.campaign,
         "faults": faults.campaign,
     }
@@ -72,7 +73,12 @@ def main(arguments: Iterable[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--share", type=float, default=1.0, help="of the full counts")
     parser.add_argument("--no-document", action="store_true", help="keep counts only")
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with mutated files where it ended"
+    )
     options = parser.parse_args(None if arguments is None else list(arguments))
+    if options.resume:
+        stages |= {kind: partial(cases, kind=kind, resume=True) for kind in CASES}
     unknown = [name for name in options.names if name not in stages]
     if unknown:
         parser.error(f"no campaign {unknown[0]!r}; there are {', '.join(stages)}")

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 from campaigns.asking import ask
 from campaigns.worker import Worker
-
 from hsp_control.resources import bundled_configs
 
 KINDS = {
@@ -53,12 +52,16 @@ def warm_up() -> None:
 
 
 def count_cases(
-    function: str, seed: int, cases: int, show: Callable[[Count], None] | None = None
+    function: str,
+    seed: int,
+    cases: int,
+    show: Callable[[Count], None] | None = None,
+    so_far: Count | None = None,
 ) -> Count:
-    """Return what came of the first cases of a seed."""
-    count = Count()
+    """Return what came of the first cases of a seed, going on from some of them."""
+    count = so_far or Count()
     with Worker(function, TIMEOUT) as worker:
-        for answer in worker.answers(seed, range(cases)):
+        for answer in worker.answers(seed, range(count.cases, cases)):
             count.cases += 1
             count.kinds[answer.kind] += 1
             count.seconds += answer.seconds

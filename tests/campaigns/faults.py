@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 import zipfile
 from collections import Counter
 from dataclasses import dataclass, field
@@ -88,7 +89,10 @@ def full_disk(rollout: Rollout, size: int, random: Random, folder: Path) -> Faul
     if random.random() < 0.1:
         room = 0
         (folder / ".log.npz.part").symlink_to("/dev/full")
-    message, child = folder / "message", os.fork()
+    message = folder / "message"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of threads: the child only saves
+        child = os.fork()
     if child == 0:
         _save_and_leave(rollout, path, room, message)
     os.waitpid(child, 0)

@@ -36,9 +36,11 @@ def case(seed: int, index: int) -> list[str]:
         file.write_bytes(mutated(data, random, str(canary)))
         answers: list[list[str]] = [_salvaged(file)]
         answers.append(ask(["plot", str(file), "--out", str(folder)]))
-        answers.append(_viewed(file))
         page = str(folder / "page.html")
-        answers.append(ask(["export", str(file), "--html", page]))
+        if random.random() < 0.5:
+            answers.append(_viewed(file))
+        else:  # by the same way, and farther
+            answers.append(ask(["export", str(file), "--html", page]))
         if random.random() < 0.3:
             answers.append(ask(["run", str(file), "--out", name], stop_after=0.3))
         if canary.exists():

@@ -100,7 +100,7 @@ def mutated(data: bytes, random: Random) -> bytes:
     for _ in range(random.choice((1, 1, 1, 2, 3))):
         _change(root, random)
     text = ElementTree.tostring(root)
-    for count in (50, 300, 3000):  # deeper than Python itself can write
+    for count in (50, 150, 300, 3000):  # deeper than Python itself can write
         nested = b"<x>" * count + b"</x>" * count
         text = text.replace(f"<deep{count} />".encode(), nested)
     return text
@@ -165,7 +165,7 @@ def _number(text: str, random: Random) -> str:
 
 def _grow(root: Element, random: Random) -> None:
     """Make it deep, long or wide."""
-    count = random.choice((50, 300, 3000))
+    count = random.choice((50, 150, 300, 3000))
     kind = random.choice(("deep", "chain", "materials"))
     if kind == "deep":
         root.append(Element(f"deep{count}"))

@@ -56,7 +56,7 @@ class Worker:
         self._function, self._timeout = function, timeout
         self._process: subprocess.Popen[bytes] | None = None
         self._first = True
-        self._trace = tempfile.TemporaryFile()
+        self._trace = tempfile.TemporaryFile()  # noqa: SIM115: until the worker ends
 
     def ask(self, seed: int, index: int) -> Answer:
         """Return what came of a case."""
@@ -106,6 +106,7 @@ class Worker:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+        self._trace.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
         root = Path(__file__).resolve().parents[2]
