@@ -36,7 +36,8 @@ def _of(done: int, wanted: int) -> str:
 
 def _states(found: dict[str, dict[str, Any]]) -> str:
     rows = [
-        "| robot, or configuration | steps | with limited efforts | near a singularity | "
+        "| robot, or configuration | steps | with limited efforts | near a "
+        "singularity | "
         "not finite | beyond a limit | refused | largest part of an effort's limit |",
         "|---|--:|--:|--:|--:|--:|--:|--:|",
     ]
@@ -44,8 +45,10 @@ def _states(found: dict[str, dict[str, Any]]) -> str:
         if name.startswith("states-"):
             refused = sum(c["raised"].values())
             rows.append(
-                f"| `{name.removeprefix('states-')}` | {_of(c['steps'], c['wanted'])} | "
-                f"{_number(c['limited'])} | {_number(c['damped'])} | {c['not_finite']} | "
+                f"| `{name.removeprefix('states-')}` | "
+                f"{_of(c['steps'], c['wanted'])} | "
+                f"{_number(c['limited'])} | {_number(c['damped'])} | "
+                f"{c['not_finite']} | "
                 f"{c['beyond']} | {refused} | {c['worst']:.9g} |"
             )
     return "\n".join([*rows, ""]) if len(rows) > 2 else ""
@@ -91,7 +94,8 @@ def _soak(found: dict[str, dict[str, Any]]) -> str:
         return ""
     python, process = (c[of][-1] - c[of][0] for of in ("python", "process"))
     return (
-        f"Soak: {_of(c['steps'], c['wanted'])} steps of 1 ms. After the warm-up Python's "
+        f"Soak: {_of(c['steps'], c['wanted'])} steps of 1 ms. After the warm-up "
+        "Python's "
         f"own memory grew by {python / 1e3:.1f} kB, the process by "
         f"{process / 1e6:.2f} MB; the largest component of the task's error after the "
         f"first second was {c['worst_error']:.2g}.\n"

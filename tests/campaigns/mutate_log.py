@@ -133,7 +133,7 @@ def _meta(text: str, random: Random) -> Any:
 
 
 def _lying(data: bytes, random: Random) -> bytes:
-    """Change sizes: in the archive's directory, its local headers, or an array's own."""
+    """Change sizes: in the directory, in local headers, or in an array's own."""
     match random.randrange(4):
         case 0:
             return _bomb(random.choice((10**6, 10**8, 3 * 10**9)))

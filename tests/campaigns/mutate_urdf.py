@@ -26,8 +26,10 @@ NAMES = [
 ]
 FILES = [
     "", "nowhere.stl", "/etc/passwd", "../../../../etc/passwd", "package://", "package://../x",
-    "file:///etc/passwd", "http://127.0.0.1/x.stl", "/dev/zero", "/", ".", "bad.stl", "bad.obj",
-    "bad.dae", "laughs.dae", "x" * 5000, "package://panda/../../../../etc/passwd", "pipe.stl",
+    "file:///etc/passwd", "http://127.0.0.1/x.stl", "/dev/zero", "/", ".",
+    "bad.stl", "bad.obj",
+    "bad.dae", "laughs.dae", "x" * 5000, "package://panda/../../../../etc/passwd",
+    "pipe.stl",
 ]  # fmt: skip
 KINDS = [
     "revolute",
@@ -113,7 +115,8 @@ def _change(root: Element, random: Random) -> None:
     match random.randrange(12):
         case 0 | 1 | 2 | 3:
             with_numbers = [
-                e for e in elements if e.tag in ("origin", "mass", "inertia", "limit", "axis",
+                e for e in elements if e.tag in ("origin", "mass", "inertia",
+                "limit", "axis",
                 "box", "sphere", "cylinder", "mesh", "color", "mimic", "dynamics")
             ]  # fmt: skip
             chosen = random.choice(with_numbers or elements)
@@ -182,7 +185,8 @@ def _grow(root: Element, random: Random) -> None:
 
 def _link(k: int) -> str:
     return (
-        f'<link name="more{k}"><inertial><mass value="0.1"/><inertia ixx="0.01" ixy="0" '
+        f'<link name="more{k}"><inertial><mass value="0.1"/>'
+        '<inertia ixx="0.01" ixy="0" '
         'ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>'
     )
 

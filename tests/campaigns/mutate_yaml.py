@@ -11,14 +11,19 @@ from campaigns.texts import TRICKS
 
 LONG = "x" * 70_000
 NUMBERS: list[Any] = [
-    0, -1, 1, 2, 7, 0.0, -0.0, 0.5, -1e-3, 1e-300, 5e-324, 1e300, -1e300, 1e9, 1e-9, 1e6,
+    0, -1, 1, 2, 7, 0.0, -0.0, 0.5, -1e-3, 1e-300, 5e-324, 1e300, -1e300, 1e9,
+    1e-9, 1e6,
     float("nan"), float("inf"), -float("inf"), 2**31, 2**63, -(2**63), 10**400, 100_000,
 ]  # fmt: skip
 TEXTS: list[Any] = [
-    "", " ", "nan", "inf", "1e3", "yes", "null", "0x10", "start", "home", "panda", "world",
-    "panda_hand", "../../../../etc/passwd", "/etc/passwd", "/dev/zero", "/", ".", "~nobody",
-    "no.urdf", "x" * 300 + ".urdf", "a\0b.urdf", "file:///etc/passwd", LONG, "\u202e", "é",
-    "%s%n", "{0}", "[bold]x[/]", "$(id)", "`id`", "!!python/object/apply:os.system [id]",
+    "", " ", "nan", "inf", "1e3", "yes", "null", "0x10", "start", "home", "panda",
+    "world",
+    "panda_hand", "../../../../etc/passwd", "/etc/passwd", "/dev/zero", "/", ".",
+    "~nobody",
+    "no.urdf", "x" * 300 + ".urdf", "a\0b.urdf", "file:///etc/passwd", LONG,
+    "\u202e", "é",
+    "%s%n", "{0}", "[bold]x[/]", "$(id)", "`id`",
+    "!!python/object/apply:os.system [id]",
 ]  # fmt: skip
 TAGS = [
     '!!python/object/apply:os.system ["touch {canary}"]',

@@ -1,10 +1,11 @@
 """Random states and references through the public step: no NaN, no effort too great.
 
 A batch is a controller that is drawn (a position, a pose or several levels, one of many
-fields, a metric, limits) and a thousand states that nobody would choose: anywhere within
-the joints' limits, on them, beyond, stretched out; at rest or at ten times the greatest
-speed. References are near, far, fast or out of reach, since the trajectory and the time
-are drawn, too; and where the rate of efforts is limited, the last effort was any.
+fields, a metric, limits) and a thousand states that nobody would choose: anywhere
+within the joints' limits, on them, beyond, stretched out; at rest or at ten times the
+greatest speed. References are near, far, fast or out of reach, since the trajectory and
+the time are drawn, too; and where the rate of efforts is limited, the last effort was
+any.
 """
 
 from collections import Counter

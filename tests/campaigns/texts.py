@@ -3,9 +3,11 @@
 from collections.abc import Callable
 from random import Random
 
-JUNK = ["\0", "\t", "\ufeff", "\u2028", "\u202e", "\x7f", "\x85", "é", "漢", "\U0001f916",
+JUNK = ["\0", "\t", "\ufeff", "\u2028", "\u202e", "\x7f", "\x85", "é", "漢",
+    "\U0001f916",
         "\ufffe", "'", '"', "{", "}", "[", "]", ":", "&a", "*a", "!x", "|", ">", "%",
-        "<", "&lt;", "]]>", "<!--", "\\", "\r", "-", "#", ",", "0", "e", ".", "nan"]  # fmt: skip
+        "<", "&lt;", "]]>", "<!--", "\\", "\r", "-", "#", ",", "0", "e", ".",
+        "nan"]  # fmt: skip
 
 
 def flipped(data: bytes, random: Random) -> bytes:

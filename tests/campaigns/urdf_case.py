@@ -1,4 +1,4 @@
-"""One mutated URDF, with its meshes, through ``check``, ``robots``, ``run`` and a page."""
+"""One mutated URDF, with meshes, through ``check``, ``robots``, ``run``, ``export``."""
 
 import os
 import struct
@@ -26,15 +26,21 @@ OBJ = b"mtllib ../../etc/passwd\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 
 DAE = """<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset><unit meter="1"/><up_axis>Z_UP</up_axis></asset>
-<library_images><image id="i"><init_from>/etc/passwd</init_from></image></library_images>
+<library_images><image
+id="i"><init_from>/etc/passwd</init_from></image></library_images>
 <library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="9">
-0 0 0 1 0 0 0 1 0</float_array><technique_common><accessor source="#a" count="3" stride="3">
-<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>
+0 0 0 1 0 0 0 1 0</float_array><technique_common><accessor source="#a" count="3"
+stride="3">
+<param name="X" type="float"/><param name="Y" type="float"/><param name="Z"
+type="float"/>
 </accessor></technique_common></source><vertices id="v"><input semantic="POSITION"
-source="#p"/></vertices><triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/>
+source="#p"/></vertices><triangles count="1"><input semantic="VERTEX" source="#v"
+offset="0"/>
 <p>0 1 2</p></triangles></mesh></geometry></library_geometries>
-<library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/></node>
-</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>
+<library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry
+url="#g"/></node>
+</visual_scene></library_visual_scenes><scene><instance_visual_scene
+url="#s"/></scene></COLLADA>
 """
 
 CONFIG = """robot: {name: mutated.urdf, root: ROOT}
@@ -46,7 +52,8 @@ null_space:
     - {type: joint_centering, weight: 1}
     - {type: self_clearance, weight: 1}
 PLANT
-simulation: {duration: 0.02, control_period: 0.001, integrator: {type: rk4, step: 0.001}}
+simulation:
+  {duration: 0.02, control_period: 0.001, integrator: {type: rk4, step: 0.001}}
 """
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 MEMORY = 12_000_000_000
-"""Address space of a worker [bytes]: what asks for more is told so, and is a failure."""
+"""Address space of a worker [bytes]: to ask for more is a failure."""
 
 
 class Answer(NamedTuple):
@@ -56,7 +56,7 @@ class Worker:
         self._function, self._timeout = function, timeout
         self._process: subprocess.Popen[bytes] | None = None
         self._first = True
-        self._trace = tempfile.TemporaryFile()  # noqa: SIM115: until the worker ends
+        self._trace = tempfile.TemporaryFile()  # noqa: SIM115
 
     def ask(self, seed: int, index: int) -> Answer:
         """Return what came of a case."""

@@ -1,4 +1,4 @@
-"""One mutated configuration, through ``hsp check`` and, if that is fine, ``hsp run``."""
+"""One mutated configuration, through ``hsp check`` and, if fine, ``hsp run``."""
 
 import tempfile
 from pathlib import Path
