@@ -49,6 +49,9 @@ bench: $(STAMP) ## compare with other controllers, in .venv-peers (TSID builds: 
 	  benchmarks/whole_body_side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/scaling.py
 
+fuzz: $(STAMP) ## random states, mutated files, faults, soak: hours; writes docs/fuzz.md
+	@PYTHONPATH=tests nice $(BIN)/python -m campaigns $(ARGS)
+
 wheel-test: $(STAMP) ## build the wheel, install it elsewhere, use it from there
 	@dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; mkdir "$$dir/cwd"; \
 	echo "Building the wheel and installing it into a fresh environment ..."; \
@@ -89,7 +92,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help figures animations demo test lint coverage wheel-test format constraints clean
+.PHONY: help figures animations demo test lint coverage fuzz wheel-test format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

@@ -5,6 +5,8 @@ e'' + Kv e' + Kp e = 0 exactly, and the null-space velocity converges to the pro
 of a field that may move in time.
 """
 
+from . import startup as startup  # isort: skip: before what takes a second
+
 from .config import Experiment as Experiment
 from .config import load_experiment as load_experiment
 from .contacts import BallContact as BallContact

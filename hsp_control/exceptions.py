@@ -32,6 +32,10 @@ class RobotNotFoundError(HspControlError, FileNotFoundError):
     """Neither a bundled robot, nor one of example-robot-data, nor a URDF file."""
 
 
+class AccessError(HspControlError, PermissionError):
+    """A file outside the folders that may be read: see `hsp_control.access`."""
+
+
 class ModelError(HspControlError, ValueError):
     """A URDF that does not parse, or a model that no dynamics can be computed for."""
 

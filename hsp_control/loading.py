@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
-from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
@@ -19,11 +18,12 @@ from hsp_control.exceptions import (
     JointNotFoundError,
     ModelError,
     NonFiniteError,
-    RobotNotFoundError,
     ShapeError,
 )
+from hsp_control.mesh_files import check_named
 from hsp_control.sources import RobotSource, Root
 from hsp_control.suggest import did_you_mean, listing
+from hsp_control.urdf_checks import named_files, read_urdf
 
 _ROOT_JOINTS = {
     "planar": pin.JointModelPlanar,
@@ -71,10 +71,11 @@ def load_model(
     Raises:
         ModelError: If the URDF does not parse, has a joint whose limits are reversed,
             or gives a singular mass matrix.
+        AccessError: If it names a file that the source's access does not allow.
         JointNotFoundError: If a joint to lock does not exist.
         FrameNotFoundError: If a tool frame's parent does not exist.
     """
-    model = _parse(source.urdf, root or source.root, mimic=mimic)
+    model = _parse(source, root or source.root, mimic=mimic)
     locks = source.locked if locked is None else locked
     if locks:
         model = _lock(model, locks)
@@ -135,8 +136,12 @@ def end_effector_frame(model: pin.Model) -> str:
     return str((hands or links)[-1])
 
 
-def _parse(urdf: Path, root: Root, *, mimic: bool) -> pin.Model:
-    _refuse_malformed_xml(urdf)
+def _parse(source: RobotSource, root: Root, *, mimic: bool) -> pin.Model:
+    urdf = source.urdf
+    xml = read_urdf(urdf)
+    if source.access.strict:
+        for name, where in named_files(xml):
+            check_named(source, name, f"{urdf}: {where}", source.access)
     if root not in get_args(Root):
         roots = get_args(Root)
         raise ModelError(
@@ -183,7 +188,7 @@ def _errors_said(said: list[str]) -> Iterator[None]:
 def _explain_mimic(urdf: Path) -> str:
     """Name the joint that Pinocchio cannot let follow another, and say why."""
     order = list(pin.buildModelFromUrdf(str(urdf), mimic=False).names)
-    for joint in ElementTree.parse(urdf).iter("joint"):
+    for joint in read_urdf(urdf).iter("joint"):
         mimic, follower = joint.find("mimic"), joint.get("name")
         if mimic is None or follower not in order:
             continue
@@ -196,25 +201,6 @@ def _explain_mimic(urdf: Path) -> str:
                 "tree, and Pinocchio wants the leader first"
             )
     return ""
-
-
-def _refuse_malformed_xml(urdf: Path) -> None:
-    """Say where the XML breaks; the parser underneath only says that it does."""
-    try:
-        tree = ElementTree.parse(urdf)
-    except ElementTree.ParseError as error:
-        line, column = error.position
-        raise ModelError(
-            f"{urdf}:{line}:{column + 1}: malformed XML: {error}"
-        ) from error
-    except OSError as error:
-        raise RobotNotFoundError(f"{urdf}: {error.strerror}") from error
-    except (LookupError, ValueError) as error:  # an encoding that nobody knows
-        raise ModelError(f"{urdf}: malformed XML: {error}") from error
-    if tree.getroot().tag != "robot":
-        raise ModelError(
-            f"{urdf}: the top element is <{tree.getroot().tag}>, a URDF's is <robot>"
-        )
 
 
 def _lock(model: pin.Model, locks: Mapping[str, float]) -> pin.Model:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import pinocchio as pin
 
+from hsp_control.access import ANYWHERE, Access
 from hsp_control.arrays import Array, Indices
 from hsp_control.centroidal import CentroidalMotion
 from hsp_control.combining import Part, combine
@@ -77,6 +78,7 @@ class Robot(ConfigurationSpace):
         tool_frames: Mapping[str, ToolFrame] | None = None,
         gravity: Sequence[float] | None = None,
         mimic: bool = True,
+        access: Access = ANYWHERE,
     ) -> Self:
         """Load a bundled robot, one of example-robot-data, or a URDF file.
 
@@ -89,14 +91,17 @@ class Robot(ConfigurationSpace):
             tool_frames: Frames to add, by name.
             gravity: Acceleration of gravity [m/s²], shape (3,). None: -9.81 along z.
             mimic: Honour ``<mimic>`` joints, or load them as free ones.
+            access: Where a URDF given by path, and the meshes that it names, may lie:
+                `access.only_within` for files of strangers.
 
         Raises:
             RobotNotFoundError: If there is no such robot.
+            AccessError: If a file is not allowed.
             ModelError: If the URDF does not parse or moves no mass somewhere.
             JointNotFoundError: If a joint to lock does not exist.
             FrameNotFoundError: If a tool frame's parent does not exist.
         """
-        source = find_robot(name)
+        source = find_robot(name, access)
         model = load_model(
             source,
             root=root,
@@ -218,7 +223,12 @@ class Robot(ConfigurationSpace):
             return np.array(pin.aba(self.model, self._data, q, v, tau))
         mass_matrix = pin.crba(self.model, self._data, q)
         effects = pin.nonLinearEffects(self.model, self._data, q, v)
-        return np.asarray(np.linalg.solve(mass_matrix, tau - effects))
+        try:
+            return np.asarray(np.linalg.solve(mass_matrix, tau - effects))
+        except np.linalg.LinAlgError:
+            raise ModelError(
+                f"{self.name}: the mass matrix is singular at this configuration"
+            ) from None
 
 
 class RobotState:

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import coal
 import numpy as np
 
+from hsp_control import mesh_files
 from hsp_control.arrays import Array
 from hsp_control.exceptions import SceneError
 
@@ -190,8 +191,10 @@ class Mesh(Shape):
         return float(np.linalg.norm(self._load()[1], axis=1).max())
 
     def _load(self) -> tuple[Any, Array]:
-        if not Path(self.file).is_file():
+        if "\0" in str(self.file) or not Path(self.file).is_file():
             raise SceneError(f"mesh: no file {self.file}")
+        if reason := mesh_files.complaint(Path(self.file)):
+            raise SceneError(f"mesh: {self.file}: {reason}")
         try:
             mesh = coal.MeshLoader().load(str(self.file), np.full(3, self.scale))
         except (RuntimeError, ValueError) as error:

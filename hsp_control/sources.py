@@ -3,12 +3,14 @@
 import importlib.util
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 import yaml
 
+from hsp_control.access import ANYWHERE, Access
 from hsp_control.exceptions import RobotNotFoundError
 from hsp_control.resources import bundled_robots
 from hsp_control.suggest import did_you_mean, listing
@@ -45,6 +47,7 @@ class RobotSource:
         posture: The SRDF's name of a posture to stand in, if known.
         joint_coordinates: The matrix A of coordinates theta = A q that the literature
             uses for this robot (``absolute`` for the planar arm), if any.
+        access: Which files its URDF may name.
     """
 
     name: str
@@ -58,20 +61,23 @@ class RobotSource:
     home: tuple[float, ...] | None = None
     posture: str | None = None
     joint_coordinates: str | None = None
+    access: Access = ANYWHERE
 
 
-def find_robot(name: str | Path) -> RobotSource:
+def find_robot(name: str | Path, access: Access = ANYWHERE) -> RobotSource:
     """Find a robot by bundled name, name of example-robot-data, or path to a URDF.
 
     Args:
         name: For example ``"panda"``, ``"talos_arm"`` or ``"my_arm/arm.urdf"``.
+        access: Where a URDF that is named by path, and its meshes, may lie.
 
     Raises:
         RobotNotFoundError: If there is no such robot; the message names the nearest.
+        AccessError: If the path is not allowed.
     """
     text = os.fspath(name)
     if text.endswith((".urdf", ".xml")) or os.sep in text:
-        return _from_path(Path(text).expanduser())
+        return _from_path(Path(text), access)
     bundled = bundled_robots()
     if text in bundled:
         return _from_bundle(text, bundled[text])
@@ -121,7 +127,21 @@ def examples_without_urdf() -> tuple[str, ...]:
     return tuple(name for name in _example_loaders() if name not in found)
 
 
-def _from_path(path: Path) -> RobotSource:
+def packaged_folders() -> list[Path]:
+    """Return the folders of the robots that can be loaded by name."""
+    if importlib.util.find_spec("example_robot_data") is None:
+        return []
+    with suppress(RobotNotFoundError):  # installed without its data
+        return [_example_robot_data_folder()]
+    return []
+
+
+def _from_path(path: Path, access: Access) -> RobotSource:
+    if "\0" in str(path):
+        raise RobotNotFoundError(f"{str(path)!r}: no path has a null character")
+    with suppress(RuntimeError):  # a user that nobody knows: then it is no such file
+        path = path.expanduser()
+    access.check(path, "robot")
     if path.is_dir():
         raise RobotNotFoundError(f"{path}: is a folder; name the .urdf file in it")
     if not path.is_file():
@@ -130,10 +150,12 @@ def _from_path(path: Path) -> RobotSource:
     # `package://<folder>/...` names a folder somewhere above the URDF.
     above = tuple(path.resolve().parents)[:5]
     ros = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
+    packages = (*above, *(Path(folder) for folder in ros if folder))
     return RobotSource(
         name=path.stem,
         urdf=path,
-        package_dirs=(*above, *(Path(folder) for folder in ros if folder)),
+        package_dirs=tuple(folder for folder in packages if access.allows(folder)),
+        access=access,
     )
 
 

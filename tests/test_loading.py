@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 import yaml
 
-from hsp_control import HspControlError, Robot, ToolFrame, loading, resources
+from hsp_control import HspControlError, Robot, ToolFrame, resources
 from hsp_control.exceptions import (
     FrameNotFoundError,
     JointNotFoundError,
@@ -634,11 +634,11 @@ def test_missing_file_names_its_neighbour(write: Callable[..., Path]) -> None:
 def test_file_that_may_not_be_read(
     write: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(_: Any) -> Any:
+    def refuse(*_: Any) -> Any:
         raise PermissionError(13, "Permission denied")
 
     path = write(ARM)
-    monkeypatch.setattr(loading.ElementTree, "parse", refuse)
+    monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(RobotNotFoundError, match=r"arm\.urdf: Permission denied"):
         Robot.load(path)
 

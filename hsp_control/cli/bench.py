@@ -26,7 +26,12 @@ def bench(options: argparse.Namespace) -> int:
         raise SimulationError(
             f"--rate {options.rate:g}; must be positive, 100000 Hz at most"
         )
-    experiment = load_experiment(options.config, *options.overrides)
+    experiment = load_experiment(
+        options.config,
+        *options.overrides,
+        strict=options.strict or bool(options.allow),
+        allow=options.allow,
+    )
     loop = ControlLoop(
         experiment.controller,
         experiment.q0,

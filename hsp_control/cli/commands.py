@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+import tempfile
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -16,9 +17,11 @@ from rich.table import Table
 from hsp_control.cli import robot_table
 from hsp_control.cli.consoles import errors as _errors
 from hsp_control.cli.consoles import out as _out
+from hsp_control.cli.consoles import told
+from hsp_control.cli.interrupts import FirstInterruptWaits
 from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.config import Experiment, json_schema, load_experiment
-from hsp_control.exceptions import SimulationError
+from hsp_control.exceptions import LogError, SimulationError
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import Recorder
@@ -28,9 +31,17 @@ if TYPE_CHECKING:
     from hsp_control.cli.screen import Screen
 
 
+def load(options: argparse.Namespace) -> Experiment:
+    """Return the experiment that a command is about."""
+    strict = options.strict or bool(options.allow)
+    return load_experiment(
+        options.config, *options.overrides, strict=strict, allow=options.allow
+    )
+
+
 def run(options: argparse.Namespace) -> int:
     """Simulate, save the log, say what it shows; keep what was computed."""
-    experiment = load_experiment(options.config, *options.overrides)
+    experiment = load(options)
     log = options.out / f"{experiment.name}.npz"
     log.parent.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
     if not options.view:
@@ -47,19 +58,26 @@ def run(options: argparse.Namespace) -> int:
 def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") -> int:
     status = 0
     stopwatch = Stopwatch()
-    try:
-        rollout = _run_with_progress(
-            experiment, stopwatch, screen.on_row if screen else None
-        )
-    except SimulationError as error:
-        if not isinstance(error.rollout, Rollout) or not len(error.rollout):
-            raise
-        rollout, status = error.rollout, 2
-        print(f"hsp: {error}", file=sys.stderr)
-    if rollout.status == "interrupted":
-        print(f"hsp: stopped by the user at t = {rollout.t[-1]:g} s", file=sys.stderr)
-        status = 2
-    rollout.save(log)
+    with FirstInterruptWaits() as interrupts:
+        try:
+            rollout = _run_with_progress(
+                experiment, stopwatch, interrupts, screen.on_row if screen else None
+            )
+        except SimulationError as error:
+            if not isinstance(error.rollout, Rollout) or not len(error.rollout):
+                raise
+            rollout, status = error.rollout, 2
+            print(f"hsp: {told(error)}", file=sys.stderr)
+        if rollout.status == "interrupted":
+            at = f" at t = {rollout.t[-1]:g} s" if len(rollout) else ""
+            print(f"hsp: stopped by the user{at}", file=sys.stderr)
+            status = 2
+        if not len(rollout):
+            return status
+        try:
+            log = rollout.save(log)
+        except LogError as error:
+            log, status = _saved_elsewhere(rollout, log, error), 2
     summary = _summary(rollout)
     for line in stopwatch.told(rollout):
         summary.add_row(*line)
@@ -68,6 +86,36 @@ def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") ->
     if screen is not None:
         screen.finish(rollout)
     return status
+
+
+def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:
+    """Save a log among temporary files: what took hours to compute is not dropped.
+
+    Raises:
+        LogError: The first error, if that fails, too.
+    """
+    try:
+        elsewhere = rollout.save(Path(tempfile.mkdtemp(prefix="hsp-")) / log.name)
+    except (LogError, OSError):
+        raise error from None
+    print(f"hsp: {told(error)}; it is in another place", file=sys.stderr)
+    return elsewhere
+
+
+def salvage(options: argparse.Namespace) -> int:
+    """Read what is whole of a cut log, write it as a log, and say what is lost."""
+    rollout = Rollout.salvage(options.log)
+    stem = options.log.name.removesuffix(".npz").removesuffix(".cut")
+    out = options.out or options.log.with_name(f"{stem}-salvaged.npz")
+    log = rollout.save(out)
+    lost = rollout.meta.get("lost", [])
+    _out.print(
+        f"{len(rollout)} rows of {len(rollout.columns)} columns are whole, "
+        + (f"lost: {', '.join(lost)}" if lost else "nothing is lost"),
+        markup=False,
+    )
+    _out.print(f"Log: {log}", markup=False)
+    return 0
 
 
 def view(options: argparse.Namespace) -> int:
@@ -81,6 +129,8 @@ def view(options: argparse.Namespace) -> int:
         speed=options.speed,
         loop=options.loop,
         port=options.port,
+        strict=options.strict or bool(options.allow),
+        allow=options.allow,
     ) as viewer:
         _out.print(f"View: {viewer.url}")
         attend(viewer, opened=options.browser and viewer.open_browser())
@@ -89,7 +139,7 @@ def view(options: argparse.Namespace) -> int:
 
 def check(options: argparse.Namespace) -> int:
     """Build everything, evaluate the law once, and say what was found."""
-    experiment = load_experiment(options.config, *options.overrides)
+    experiment = load(options)
     robot, controller = experiment.robot, experiment.controller
     state = robot.state(0.0, experiment.q0, experiment.v0)
     output = controller.compute(state)
@@ -98,10 +148,13 @@ def check(options: argparse.Namespace) -> int:
     rows = sum(task.rows for task in controller.tasks)
     table.add_row("robot", f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}")
     for task in controller.tasks:
-        error = np.linalg.norm(output.task.error[controller.task_rows[task.name]])
+        rows_on = controller.task_rows.get(task.name)  # none before its schedule
+        error = "not yet on"
+        if rows_on is not None:
+            error = f"|e| = {np.linalg.norm(output.task.error[rows_on]):.3g}"
         table.add_row(
             f"task {task.name}",
-            f"{type(task).__name__}, {task.rows} rows, |e| = {error:.3g} at the start",
+            f"{type(task).__name__}, {task.rows} rows, {error} at the start",
         )
     table.add_row("null space", f"{robot.nv - rows} freedoms, {controller.field.name}")
     table.add_row("plant", experiment.plant.describe()["type"])
@@ -206,6 +259,7 @@ def schema(options: argparse.Namespace) -> int:
 def _run_with_progress(
     experiment: Experiment,
     stopwatch: Stopwatch,
+    interrupts: FirstInterruptWaits,
     on_row: Callable[[Recorder], None] | None = None,
 ) -> Rollout:
     with Progress(
@@ -220,6 +274,7 @@ def _run_with_progress(
         bar = progress.add_task(experiment.name, total=1.0)
 
         def show(done: float) -> None:
+            interrupts.check()
             stopwatch.lap()
             progress.update(bar, completed=done)
 

@@ -17,7 +17,7 @@ from hsp_control.simulation import Rollout
 def export(options: argparse.Namespace) -> int:
     """Write every file that is asked for; one that fails does not stop the others."""
     from hsp_control.viewer.export import FilmStyle, export_film, export_html
-    from hsp_control.viewer.replay import act_of
+    from hsp_control.viewer.replay import access_for, act_of
 
     films = [path for path in (options.mp4, options.gif, options.webp) if path]
     if not options.html and not films:
@@ -27,7 +27,10 @@ def export(options: argparse.Namespace) -> int:
     for kind in ("mp4", "gif", "webp"):
         _check_ending(getattr(options, kind), f".{kind}")
     rollout = Rollout.load(options.log)
-    act = act_of(rollout, options.log.name)
+    access = access_for(
+        [options.log], options.strict or bool(options.allow), options.allow
+    )
+    act = act_of(rollout, options.log.name, access)
     style = FilmStyle(
         size=options.size,
         frame_rate=options.fps,

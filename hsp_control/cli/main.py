@@ -2,13 +2,17 @@
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from hsp_control.exceptions import HspControlError
+from hsp_control.startup import end_quietly
 from hsp_control.version import __version__
 
+_OWN_INTERRUPTS = {"bench", "export", "sweep", "view"}
+"""Commands that have processes, pages or rows to look after when Ctrl-C comes."""
 FAILURE = 2
 """Exit status of anything that did not go as asked."""
 
@@ -21,16 +25,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.print_help()
         return 0
     # Commands are imported when they are asked for: `hsp --help` answers at once.
-    from hsp_control.cli import commands
+    from hsp_control.cli import commands, consoles
 
     try:
+        # Elsewhere Ctrl-C ends the process at once, as while it was starting: there is
+        # nothing to save, and an exception may get lost in other people's callbacks.
+        if (
+            options.command in _OWN_INTERRUPTS or getattr(options, "view", False)
+        ) and signal.getsignal(signal.SIGINT) is end_quietly:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         return int(getattr(commands, options.command)(options))
     except HspControlError as error:
-        print(f"hsp: {error}", file=sys.stderr)
+        print(f"hsp: {consoles.told(error)}", file=sys.stderr)
     except BrokenPipeError:  # `hsp schema | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
-        print(f"hsp: {error.filename}: {error.strerror}", file=sys.stderr)
+        where = f"{error.filename}: " if error.filename is not None else ""
+        print(f"hsp: {where}{error.strerror or error}", file=sys.stderr)
+    except MemoryError:
+        print("hsp: not enough memory for what was asked", file=sys.stderr)
     except KeyboardInterrupt:
         print("hsp: stopped by the user", file=sys.stderr)
     return FAILURE
@@ -91,6 +104,7 @@ def _parser() -> argparse.ArgumentParser:
         help="play again and again; default: as the log says",
     )
     _add_page(view)
+    _add_strict(view)
 
     plot = _command(commands, "plot", "draw the figures of a log or a sweep")
     plot.add_argument(
@@ -109,6 +123,12 @@ def _parser() -> argparse.ArgumentParser:
         "--relative",
         action="store_true",
         help="draw joint angles, not absolute ones, where the robot has both",
+    )
+
+    salvage = _command(commands, "salvage", "read what is whole of a log that was cut")
+    salvage.add_argument("log", type=Path, metavar="LOG", help="a log that is cut")
+    salvage.add_argument(
+        "--out", type=Path, metavar="FILE", help="default: LOG's name, -salvaged.npz"
     )
 
     _add_export(_command(commands, "export", "write a log as a page or as a film"))
@@ -137,6 +157,7 @@ def _command(
 
 def _add_export(export: argparse.ArgumentParser) -> None:
     export.add_argument("log", type=Path, metavar="LOG", help="written by hsp run")
+    _add_strict(export)
     files = {
         "html": "a page that plays offline, with the plots",
         "mp4": "a film",
@@ -262,6 +283,7 @@ def _add_bench(bench: argparse.ArgumentParser) -> None:
         help="as for hsp run; default: panda_obstacle",
     )
     _add_overrides(bench)
+    _add_strict(bench)
     bench.add_argument(
         "--seconds", type=float, default=60.0, metavar="S", help="default: 60"
     )
@@ -317,6 +339,23 @@ def _add_configuration(parser: argparse.ArgumentParser) -> None:
         help="a bundled name such as paper/4_moving_obstacle, a YAML file, or a log",
     )
     _add_overrides(parser)
+    _add_strict(parser)
+
+
+def _add_strict(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="for files of strangers: read only what lies beside them or is bundled",
+    )
+    parser.add_argument(
+        "--allow",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="DIR",
+        help="another folder to read from; means --strict; may be repeated",
+    )
 
 
 def _add_overrides(parser: argparse.ArgumentParser) -> None:

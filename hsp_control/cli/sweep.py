@@ -19,6 +19,7 @@ from rich.progress import (
 from rich.table import Table
 
 from hsp_control.cli.consoles import errors, out
+from hsp_control.config import load_experiment
 from hsp_control.exceptions import SweepError
 from hsp_control.sweeps import Sensitivity, Sweep, sensitivity
 from hsp_control.sweeps import sweep as run_sweep
@@ -29,6 +30,10 @@ _NUMBER = re.compile(r"-?[0-9][0-9.]*(e[-+]?[0-9]+)?")
 
 def sweep(options: argparse.Namespace) -> int:
     """Run a configuration many times, save and tell what came of it."""
+    if options.strict or options.allow:  # the runs name no other files than this one
+        load_experiment(
+            options.config, *options.overrides, strict=True, allow=options.allow
+        )
     file = options.out or Path("out") / f"{Path(options.config).stem}-sweep.parquet"
     start = perf_counter()
     with Progress(

@@ -53,9 +53,16 @@ def build_robot(
 def located_model(model: Loaded, folder: Path) -> Loaded:
     """Return the model with the path of a URDF beside the configuration."""
     name = model.name or ""
-    if name.endswith((".urdf", ".xml")) and (folder / name).is_file():
+    if name.endswith((".urdf", ".xml")) and _is_file(folder / name):
         return model.model_copy(update={"name": str(folder / name)})
     return model
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # longer than a path may be, a null character
+        return False
 
 
 def load_robot(
@@ -76,6 +83,7 @@ def load_robot(
             tool_frames=tools,
             gravity=gravity,
             mimic=model.mimic,
+            access=document.access,
         )
 
 

@@ -6,7 +6,9 @@ import numpy as np
 
 from hsp_control.config.build_motion import orientation_trajectory, position_trajectory
 from hsp_control.config.document import Document
+from hsp_control.config.keys import KeyPath
 from hsp_control.config.models import scene as s
+from hsp_control.mesh_files import check_inside
 from hsp_control.scene import Obstacle, Scene
 from hsp_control.shapes import (
     Box,
@@ -21,6 +23,20 @@ from hsp_control.shapes import (
 )
 
 
+def located_scene(model: s.SceneModel, folder: Path) -> s.SceneModel:
+    """Return the scene with its meshes' paths made absolute, for a log to name them."""
+
+    def located(obstacle: s.ObstacleModel) -> s.ObstacleModel:
+        if not isinstance(obstacle.shape, s.MeshModel):
+            return obstacle
+        file = str(folder / obstacle.shape.file)
+        shape = obstacle.shape.model_copy(update={"file": file})
+        return obstacle.model_copy(update={"shape": shape})
+
+    obstacles = {name: located(each) for name, each in model.obstacles.items()}
+    return model.model_copy(update={"obstacles": obstacles})
+
+
 def build_scene(document: Document, model: s.SceneModel, folder: Path) -> Scene:
     """Return the scene; files are looked up beside the configuration."""
     obstacles = []
@@ -28,6 +44,10 @@ def build_scene(document: Document, model: s.SceneModel, folder: Path) -> Scene:
         where = ("scene", "obstacles", name)
         with document.at(*where):
             with document.at(*where, "shape"):
+                if isinstance(obstacle.shape, s.MeshModel):
+                    _check_mesh(
+                        document, (*where, "shape", "file"), obstacle.shape, folder
+                    )
                 shape = build_shape(obstacle.shape, folder)
                 shape.geometry()  # fails here, where it can be located
             with document.at(*where, "center"):
@@ -40,6 +60,15 @@ def build_scene(document: Document, model: s.SceneModel, folder: Path) -> Scene:
                     )
             obstacles.append(Obstacle(name, shape, center, orientation))
     return Scene(obstacles)
+
+
+def _check_mesh(
+    document: Document, at: KeyPath, model: s.MeshModel, folder: Path
+) -> None:
+    """Refuse a mesh that the document may not name."""
+    with document.at(*at):
+        document.access.check(folder / model.file, "mesh")
+        check_inside(folder / model.file, "mesh", document.access)
 
 
 def build_shape(model: s.AnyShape, folder: Path) -> Shape:

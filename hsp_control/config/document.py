@@ -7,6 +7,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
+from hsp_control.access import ANYWHERE
 from hsp_control.config.keys import KeyPath, split_assignment
 from hsp_control.config.located import locate, located
 from hsp_control.config.overrides import assign
@@ -28,6 +29,7 @@ class Document:
 
     Attributes:
         name: The file's path as it was given, for messages.
+        access: Which files it may name.
     """
 
     def __init__(
@@ -35,6 +37,7 @@ class Document:
     ) -> None:
         """Take what `Document.parse` found."""
         self.name = name
+        self.access = ANYWHERE
         self._data = data
         self._origins: dict[KeyPath, Mark | str] = dict(marks)
 

@@ -1,6 +1,6 @@
 """An experiment: a configuration turned into objects, ready to run."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from hsp_control.access import only_within
 from hsp_control.arrays import Array
 from hsp_control.composition import check_support
 from hsp_control.config.build_null_space import build_fields, build_metric
 from hsp_control.config.build_plant import build_plant
 from hsp_control.config.build_robot import build_robot, build_start
-from hsp_control.config.build_scene import build_scene
+from hsp_control.config.build_scene import build_scene, located_scene
 from hsp_control.config.build_support import (
     build_contacts,
     build_limits,
@@ -23,6 +24,7 @@ from hsp_control.config.build_support import (
 )
 from hsp_control.config.build_tasks import build_task
 from hsp_control.config.document import Document
+from hsp_control.config.models.plant import MujocoPlantModel
 from hsp_control.config.models.simulation import Dop853Model, Rk4Model
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
@@ -34,6 +36,8 @@ from hsp_control.robot import Robot
 from hsp_control.scene import Scene
 from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.recorder import Recorder
+from hsp_control.simulation.simulate import check_steps, planned
+from hsp_control.sources import packaged_folders
 from hsp_control.suggest import did_you_mean, listing
 
 
@@ -91,7 +95,10 @@ class Experiment:
 
 
 def load_experiment(
-    source: str | PathLike[str] | dict[str, Any], *overrides: str
+    source: str | PathLike[str] | dict[str, Any],
+    *overrides: str,
+    strict: bool = False,
+    allow: Sequence[str | PathLike[str]] = (),
 ) -> Experiment:
     """Build an experiment from a configuration.
 
@@ -99,25 +106,44 @@ def load_experiment(
         source: The name of a bundled configuration, a path to a YAML file or to a log
             (whose own configuration is then repeated), or the data itself.
         overrides: Values to change, each ``key.path=value``.
+        strict: For files of strangers: what they name must lie in the source's own
+            folder, among what is bundled, or in a folder that is allowed.
+        allow: Further folders for strict reading.
 
     Raises:
         ConfigError: If the configuration does not follow the schema.
+        AccessError: If it is read strictly and names a file elsewhere.
         HspControlError: If it names what does not exist or does not fit; the message
             says where.
     """
-    document = read_document(source)
+    document = read_document(source, strict=strict, allow=allow)
     for assignment in overrides:
         document.override(assignment)
     return build(document)
 
 
-def read_document(source: str | PathLike[str] | dict[str, Any]) -> Document:
+def read_document(
+    source: str | PathLike[str] | dict[str, Any],
+    *,
+    strict: bool = False,
+    allow: Sequence[str | PathLike[str]] = (),
+) -> Document:
     """Return the configuration's data with the place that each key came from.
+
+    See `load_experiment` for the arguments.
 
     Raises:
         ConfigError: If there is no such configuration or it is not plain YAML.
         LogError: If it is a log that cannot be read.
     """
+    document = _read(source)
+    if strict:
+        own = [] if isinstance(source, dict) else [Path(document.name).parent]
+        document.access = only_within([*own, *packaged_folders(), *allow])
+    return document
+
+
+def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
     if isinstance(source, dict):
         return Document(source, {}, "configuration")
     path = Path(source)
@@ -129,7 +155,7 @@ def read_document(source: str | PathLike[str] | dict[str, Any]) -> Document:
             )
         return Document(config, {}, str(path))
     known = bundled_configs()
-    if path.suffix in {".yaml", ".yml"} or path.is_file():
+    if path.suffix in {".yaml", ".yml"} or _is_file(path):
         return Document.read(path)
     if str(source) in known:
         return Document.read(known[str(source)])
@@ -137,6 +163,13 @@ def read_document(source: str | PathLike[str] | dict[str, Any]) -> Document:
         f"no configuration {str(source)!r}{did_you_mean(str(source), known)} "
         f"(a path to a .yaml file, or one of: {listing(known)})"
     )
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # no name that a file can have
+        return False
 
 
 def build(document: Document) -> Experiment:
@@ -151,6 +184,8 @@ def build(document: Document) -> Experiment:
     start = robot.state(0.0, q0, np.zeros(robot.nv))
 
     scene = build_scene(document, scenario.scene, folder)
+    located = located_scene(scenario.scene, folder)
+    scenario = scenario.model_copy(update={"scene": located})
     tasks = [
         build_task(document, name, task, start) for name, task in scenario.tasks.items()
     ]
@@ -199,12 +234,17 @@ def build(document: Document) -> Experiment:
 
 def _integrator(document: Document, scenario: Scenario) -> Integrator:
     settings = scenario.simulation
+    with document.at("simulation"):
+        planned(settings.duration, settings.log_period, settings.control_period)
+        if isinstance(plant := scenario.plant, MujocoPlantModel):
+            check_steps(settings.duration, plant.timestep, "plant.timestep")
     model = settings.integrator
     if isinstance(model, Dop853Model):
         return Dop853(model.rtol, model.atol)
     whole = settings.control_period or settings.log_period
     ratio = whole / model.step
     with document.at("simulation", "integrator", "step"):
+        check_steps(settings.duration, model.step, "step")
         if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6 * ratio:
             period = "control_period" if settings.control_period else "log_period"
             raise SimulationError(

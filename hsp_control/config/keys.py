@@ -40,5 +40,5 @@ def _written_part(part: str | int) -> str:
     if isinstance(part, int):
         return str(part)
     if part and part.isprintable() and not _NEEDS_QUOTES.search(part):
-        return part
+        return shortened(part)
     return repr(shortened(part))

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from hsp_control.config.models.base import Model
+from hsp_control.config.models.base import Model, Name
 from hsp_control.config.models.contacts import AnyContact
 from hsp_control.config.models.limits import LimitsModel
 from hsp_control.config.models.live import LiveModel
@@ -34,9 +34,11 @@ class Scenario(Model):
     """Where it starts."""
     scene: SceneModel = SceneModel()
     """What else there is."""
-    tasks: Annotated[dict[str, AnyTask], Field(min_length=1)]
+    tasks: Annotated[dict[Name, AnyTask], Field(min_length=1, max_length=100)]
     """Tasks by name; those of one priority are stacked at one level."""
-    contacts: dict[str, AnyContact] = Field(default_factory=dict)
+    contacts: Annotated[dict[Name, AnyContact], Field(max_length=100)] = Field(
+        default_factory=dict
+    )
     """Where a robot with a free-flyer root rests, by name."""
     base: Literal["flying", "driven"] | None = None
     """What moves a free-flyer root where no contact does."""

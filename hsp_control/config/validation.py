@@ -5,7 +5,7 @@ from typing import TypeVar
 from pydantic import BaseModel, ValidationError
 
 from hsp_control.config.document import Document
-from hsp_control.config.findings import Finding, findings
+from hsp_control.config.findings import Finding, Pending, findings
 from hsp_control.config.schema import shape
 from hsp_control.config.wording import explained
 from hsp_control.exceptions import ConfigError
@@ -13,6 +13,8 @@ from hsp_control.exceptions import ConfigError
 Model = TypeVar("Model", bound=BaseModel)
 
 _OTHERS = 5
+_MANY = 2000
+_ENTRIES = 20
 
 
 def validate(document: Document, model: type[Model]) -> Model:
@@ -25,9 +27,23 @@ def validate(document: Document, model: type[Model]) -> Model:
     try:
         return model.model_validate(document.to_dict())
     except ValidationError as error:
-        pending = [(each["loc"], each) for each in error.errors(include_url=False)]
+        pending = _first_entries(
+            [(each["loc"], each) for each in error.errors(include_url=False)]
+        )
         found = findings(document, shape(model), pending)
     raise _summary(document, sorted(found, key=lambda f: _order(document, f)))
+
+
+def _first_entries(pending: list[Pending]) -> list[Pending]:
+    """Leave out what is wrong far down in long lists, if very much is wrong."""
+    if len(pending) <= _MANY:
+        return pending
+    first = [
+        (path, error)
+        for path, error in pending
+        if all(part < _ENTRIES for part in path if isinstance(part, int))
+    ]
+    return first or pending[:1]
 
 
 def _order(document: Document, finding: Finding) -> tuple[bool, tuple[int, ...]]:

@@ -10,11 +10,14 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
+from hsp_control import mesh_files
 from hsp_control.arrays import Array
 from hsp_control.combining import Part
 from hsp_control.exceptions import ModelError
 from hsp_control.geometry.capsule_fit import enclosing_capsule
 from hsp_control.robot import Robot
+from hsp_control.sources import RobotSource
+from hsp_control.urdf_checks import read_urdf
 
 Proxy = Literal["capsules", "spheres", "hulls", "meshes"]
 
@@ -90,6 +93,8 @@ def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
     the name of the frame that it is fixed to.
     """
     source = part.source
+    for name in _collision_meshes(source):
+        _refuse_bad_mesh(source, name)
     full = pin.buildModelFromUrdf(str(source.urdf), mimic=False)
     try:
         geometry = pin.buildGeomFromUrdf(
@@ -98,8 +103,8 @@ def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
             pin.GeometryType.COLLISION,
             package_dirs=[str(folder) for folder in source.package_dirs],
         )
-    except ValueError as error:
-        reason = str(error).strip().splitlines()[0]
+    except (ValueError, RuntimeError) as error:
+        reason = (str(error).strip() or type(error).__name__).splitlines()[0]
         raise ModelError(f"{source.urdf}: a collision mesh: {reason}") from error
     shapes = []
     for item in geometry.geometryObjects:
@@ -116,6 +121,20 @@ def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
             )
         )
     return shapes
+
+
+def _collision_meshes(source: RobotSource) -> list[str]:
+    elements = read_urdf(source.urdf).iter("collision")
+    meshes = (mesh for element in elements for mesh in element.iter("mesh"))
+    return list(dict.fromkeys(mesh.get("filename", "") for mesh in meshes))
+
+
+def _refuse_bad_mesh(source: RobotSource, name: str) -> None:
+    """Look at a mesh before Assimp does; one that is missing is Pinocchio's to tell."""
+    found = (file for file in mesh_files.candidates(source, name) if file.is_file())
+    file = next(found, None)
+    if file is not None and (reason := mesh_files.complaint(file)):
+        raise ModelError(f"{source.urdf}: a collision mesh: {file}: {reason}")
 
 
 def _between_joints(robot: Robot, part: Part) -> list[LinkShape]:

@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
+from hsp_control.exceptions import ModelError
 from hsp_control.geometry.links import LinkShape, part_of
 from hsp_control.robot import Robot
+from hsp_control.xml_files import XmlError, read_xml
 
 
 def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]]:
@@ -46,7 +48,11 @@ def _disabled(robot: Robot) -> set[frozenset[str]]:
     for part in robot.parts:
         if part.source.srdf is None:
             continue
-        for pair in ElementTree.parse(part.source.srdf).iter("disable_collisions"):
+        try:
+            srdf = read_xml(part.source.srdf)
+        except (XmlError, ElementTree.ParseError, OSError) as error:
+            raise ModelError(f"{part.source.srdf}: not read: {error}") from error
+        for pair in srdf.iter("disable_collisions"):
             links = (pair.get("link1", ""), pair.get("link2", ""))
             disabled.add(frozenset(part.prefix + link for link in links))
     return disabled

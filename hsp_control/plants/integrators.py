@@ -47,7 +47,13 @@ class Chart:
         J_r = pin.dIntegrate(
             self.robot.model, self.base, delta, pin.ArgumentPosition.ARG1
         )
-        return np.concatenate([np.linalg.solve(J_r, v), a])
+        try:
+            return np.concatenate([np.linalg.solve(J_r, v), a])
+        except np.linalg.LinAlgError:
+            raise SimulationError(
+                "the motion diverged: within one step a root turns so far that its "
+                "coordinates end"
+            ) from None
 
     def equation(self, dynamics: Dynamics) -> Equation:
         """Return the ordinary differential equation (t, y) ↦ y'."""

@@ -1,5 +1,6 @@
 """Fills a rollout's columns, one row at a time, into memory that is there already."""
 
+import math
 import platform
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -11,11 +12,13 @@ import pinocchio as pin
 
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller, ControlOutput
+from hsp_control.exceptions import SimulationError
 from hsp_control.fields import FieldSample, NullSpaceField, WeightedSum
 from hsp_control.metrics import ConstantMetric, Metric
 from hsp_control.plants import Reading
 from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle, Scene
+from hsp_control.simulation.log_file import MAX_SIZE
 from hsp_control.simulation.rollout import FORMAT, Rollout, unwind
 from hsp_control.version import __version__
 
@@ -37,6 +40,7 @@ class Recorder:
         nv, units = robot.nv, dict.fromkeys(robot.units)
         self._joint_unit = joint_unit = " or ".join(units)
         effort_unit = " or ".join(_EFFORT_UNITS[unit] for unit in units)
+        self._size = 0
         column = self._open
         column("t", (), "s", "time")
         column("q", (robot.nq,), joint_unit, "configuration")
@@ -75,6 +79,7 @@ class Recorder:
     def _open(self, name: str, shape: tuple[int, ...], unit: str, meaning: str) -> None:
         """Open a column, if it is not; rows without a value of it hold NaN."""
         if name not in self._columns:
+            self._reserve(self._capacity, shape)
             self._columns[name] = np.full((self._capacity, *shape), np.nan)
             self._meaning[name] = {"unit": unit, "meaning": meaning}
 
@@ -100,6 +105,15 @@ class Recorder:
             self._open(f"field.{name}.value", (), "-", "unweighted cost or norm")
             if field.least_distance(probe) is not None:
                 self._open(f"distance.{name}", (), "m", "least distance it watches")
+
+    def _reserve(self, rows: int, shape: tuple[int, ...]) -> None:
+        """Refuse a log that could not be read again, before memory is asked for it."""
+        self._size += 8 * rows * math.prod(shape)
+        if self._size > MAX_SIZE:
+            raise SimulationError(
+                f"a log of {rows} rows is larger than {MAX_SIZE / 1e9:g} GB; choose a "
+                "longer log_period or a shorter duration"
+            )
 
     def record(
         self,

@@ -1,5 +1,6 @@
 """A rollout: what happened, as named columns that describe themselves, and its file."""
 
+import errno
 import json
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
@@ -13,9 +14,19 @@ from hsp_control.arrays import Array
 from hsp_control.exceptions import LogError
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.journal import is_journal, read_journal
+from hsp_control.simulation.log_file import (
+    MAX_SIZE,
+    read_arrays,
+    shortened,
+    write_arrays,
+)
+from hsp_control.simulation.log_meta import complaint
+from hsp_control.simulation.salvage import read_whole_entries
 from hsp_control.suggest import did_you_mean, listing
 
 FORMAT = "hsp_control rollout 1"
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_LONGEST = 1000  # characters of a name: an archive has room for 65535 bytes
 _REQUIRED = ("t", "q", "v", "tau")
 
 
@@ -104,31 +115,44 @@ class Rollout:
         """Write one ``.npz`` that NumPy alone reads, without pickles.
 
         Written beside its place and moved there, so that no half file bears its name.
+        Where the disk fills, as much as fits stays beside it for `salvage`, if that has
+        the motion; the message names it.
 
         Raises:
             LogError: If the file cannot be written.
         """
         path = Path(path)
         part = path.with_name(f".{path.name}.part")
+        if any(len(name) > _LONGEST for name in self.columns):
+            raise LogError(
+                f"{path}: cannot write the log: a column's name has more than "
+                f"{_LONGEST} characters"
+            )
         meta = np.array(json.dumps(self.meta, ensure_ascii=False))
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with part.open("wb") as file:
-                np.savez_compressed(file, allow_pickle=False, meta=meta, **self.columns)
+                write_arrays(file, {"meta": meta, **self.columns})
             part.replace(path)
         except OSError as error:
-            with suppress(OSError):  # its folder may be no folder
-                part.unlink(missing_ok=True)
+            kept = _keep_part(part, path) if error.errno in _FULL else ""
+            _remove(part)
             reason = error.strerror or str(error)
-            raise LogError(f"{path}: cannot write the log: {reason}") from error
+            raise LogError(f"{path}: cannot write the log: {reason}{kept}") from error
+        except BaseException:  # a second Ctrl-C: then without it
+            _remove(part)
+            raise
         return path
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read a log: an ``.npz``, or a `journal` with all its whole rows.
 
+        It may be a stranger's: nothing in it is ever executed.
+
         Raises:
-            LogError: If the file is missing, truncated, or not a log of this package.
+            LogError: If the file is missing, truncated, too large, not a log of this
+                package, or one that contradicts itself.
         """
         path = Path(path)
         try:
@@ -136,10 +160,8 @@ class Rollout:
                 columns, meta = read_journal(path)
                 unwind(columns, meta["robot"]["continuous"])
                 columns["meta"] = np.array(json.dumps(meta, ensure_ascii=False))
-                return cls(*_checked(path, columns))
-            # Opened here, because NumPy leaves a broken archive open.
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-                columns = {name: archive[name] for name in archive.files}
+            else:
+                columns = read_arrays(path)
         except LogError:
             raise
         except FileNotFoundError:
@@ -151,12 +173,74 @@ class Rollout:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise LogError(
                 f"{path}: not a whole .npz log (cut short, or another file): {reason}"
+                f"{_salvageable(path)}"
             ) from error
         except Exception as error:  # zlib.error, struct.error, NotImplementedError...
             raise LogError(
                 f"{path}: not a whole .npz log: {type(error).__name__}: {error}"
             ) from error
         return cls(*_checked(path, columns))
+
+    @classmethod
+    def salvage(cls, path: str | Path) -> Self:
+        """Read what is whole of a log that was cut; ``meta["lost"]`` names the rest.
+
+        Raises:
+            LogError: If not even the motion (t, q, v, tau) is whole, or what is whole
+                is no log.
+        """
+        path = Path(path)
+        try:
+            columns, cut = read_whole_entries(path)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise LogError(f"{path}: cannot be read: {reason}") from error
+        described = _described(columns)
+        lost = [name for name in described if name not in columns]
+        missing = [name for name in ("meta", *_REQUIRED) if name not in columns]
+        if missing:
+            where = f": it is cut in {cut!r}" if cut else ""
+            raise LogError(
+                f"{path}: nothing to salvage{where}; {missing[0]!r} is not whole"
+            )
+        return cls(*_checked(path, columns, lost))
+
+
+def _keep_part(part: Path, path: Path) -> str:
+    """Keep a half-written log if it has the motion; say where, or nothing."""
+    kept = path.with_suffix(".cut.npz")
+    try:
+        columns, _ = read_whole_entries(part)
+        if {"meta", *_REQUIRED} <= set(columns):
+            part.replace(kept)
+            return f"; what fits is in {kept}: hsp salvage {kept}"
+    except OSError:
+        pass
+    return ""
+
+
+def _remove(part: Path) -> None:
+    with suppress(OSError):  # its folder may be no folder
+        part.unlink(missing_ok=True)
+
+
+def _salvageable(path: Path) -> str:
+    """Return what to do with a log that is cut, if something can be done."""
+    try:
+        columns, _ = read_whole_entries(path)
+    except OSError:
+        return ""
+    whole = {"meta", *_REQUIRED} <= set(columns)
+    return f"; its motion is whole: hsp salvage {path}" if whole else ""
+
+
+def _described(columns: dict[str, Array]) -> list[str]:
+    """Return the columns that the entry 'meta' describes, as far as it can be read."""
+    try:
+        described = json.loads(str(columns["meta"]))["columns"]
+    except (KeyError, TypeError, ValueError, RecursionError):
+        return []
+    return list(described) if isinstance(described, dict) else []
 
 
 def unwind(columns: Mapping[str, Array], continuous: Sequence[int]) -> None:
@@ -166,7 +250,7 @@ def unwind(columns: Mapping[str, Array], continuous: Sequence[int]) -> None:
 
 
 def _checked(
-    path: Path, columns: dict[str, Array]
+    path: Path, columns: dict[str, Array], lost: Sequence[str] = ()
 ) -> tuple[dict[str, Array], dict[str, Any]]:
     if "meta" not in columns or columns["meta"].dtype.kind != "U":
         raise LogError(
@@ -175,19 +259,31 @@ def _checked(
         )
     try:
         meta = json.loads(str(columns.pop("meta")))
-    except json.JSONDecodeError as error:
+    except (json.JSONDecodeError, RecursionError) as error:
         raise LogError(f"{path}: its entry 'meta' is not JSON: {error}") from error
     if not isinstance(meta, dict) or meta.get("format") != FORMAT:
         found = meta.get("format") if isinstance(meta, dict) else meta
         raise LogError(
-            f"{path}: its format is {found!r}; this version reads {FORMAT!r}"
+            f"{path}: its format is {shortened(found)}; this version reads {FORMAT!r}"
         )
+    if lost:
+        kept = {n: d for n, d in meta["columns"].items() if n not in lost}
+        seen = {
+            name: about
+            for name, about in meta.get("obstacles", {}).items()
+            if f"obstacle.{name}" not in lost
+        }
+        meta = {**meta, "columns": kept, "obstacles": seen, "lost": list(lost)}
     described = meta.get("columns")
     wanted = [*_REQUIRED, *(described if isinstance(described, dict) else ())]
     missing = [name for name in wanted if name not in columns]
     if missing:
-        raise LogError(f"{path}: the log lacks the column {missing[0]!r}")
+        raise LogError(f"{path}: the log lacks the column {shortened(missing[0])}")
     rows = {name: np.shape(column)[:1] for name, column in columns.items()}
     if any(length != rows["t"] for length in rows.values()):
         raise LogError(f"{path}: the log's columns differ in length")
-    return columns, meta
+    if 8 * sum(column.size for column in columns.values()) > MAX_SIZE:
+        raise LogError(f"{path}: larger than {MAX_SIZE / 1e9:g} GB in memory")
+    if reason := complaint(meta, columns):
+        raise LogError(f"{path}: {reason}")
+    return {name: np.asarray(c, dtype=float) for name, c in columns.items()}, meta

@@ -23,6 +23,11 @@ from hsp_control.simulation.loops import continuous_loop, sampled_loop
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.rollout import Rollout
 
+MAX_ROWS = 10_000_000
+"""Rows of a log; see also `log_file.MAX_SIZE`."""
+MAX_STEPS = 1e9
+"""Control periods, or steps of an integrator, in a run: at 50 µs each, 14 hours."""
+
 
 def simulate(
     controller: Controller,
@@ -71,12 +76,7 @@ def simulate(
     robot = controller.robot
     plant = RigidBodyPlant(robot) if plant is None else plant
     integrator = Dop853() if integrator is None else integrator
-    rows = _whole(duration, log_period, "duration", "log_period") + 1
-    periods = (
-        0
-        if control_period is None
-        else _whole(log_period, control_period, "log_period", "control_period")
-    )
+    rows, periods = planned(duration, log_period, control_period)
     check_plant(plant, robot)
     q = robot.check_configuration(q0).copy()
     v = robot.check_tangent(np.zeros(robot.nv) if v0 is None else v0, "velocity v0")
@@ -112,6 +112,40 @@ def simulate(
         failure.rollout = recorder.rollout("diverged", str(error), **meta)
         raise failure from error
     return recorder.rollout(status, message, **meta)
+
+
+def planned(
+    duration: float, log_period: float, control_period: float | None
+) -> tuple[int, int]:
+    """Return how many rows a run has, and control periods a row; 0 without any.
+
+    Raises:
+        SimulationError: If the periods do not fit, or the run would never end.
+    """
+    rows = _whole(duration, log_period, "duration", "log_period") + 1
+    if rows > MAX_ROWS:
+        raise SimulationError(
+            f"duration = {duration:g} s with log_period = {log_period:g} s is "
+            f"{rows:.3g} rows; at most {MAX_ROWS:.0e}"
+        )
+    if control_period is None:
+        return rows, 0
+    periods = _whole(log_period, control_period, "log_period", "control_period")
+    check_steps(duration, control_period, "control_period")
+    return rows, periods
+
+
+def check_steps(duration: float, step: float, name: str) -> None:
+    """Refuse a run of more steps than anybody waits for.
+
+    Raises:
+        SimulationError: If it has.
+    """
+    if duration / step > MAX_STEPS:
+        raise SimulationError(
+            f"duration = {duration:g} s with {name} = {step:g} s is "
+            f"{duration / step:.3g} steps; at most {MAX_STEPS:.0e}"
+        )
 
 
 def _whole(total: float, part: float, total_name: str, part_name: str) -> int:

@@ -10,6 +10,9 @@ import numpy as np
 from hsp_control.viewer.commands import Json, typed_array
 from hsp_control.viewer.threejs import unique_name
 
+_PICTURES = {".bmp", ".gif", ".jpeg", ".jpg", ".png", ".tga", ".tif", ".tiff", ".webp"}
+"""What a surface may be covered with: a page must not carry other files away."""
+
 
 def mesh_geometry(file: Path) -> Json:
     """Return an OBJ or STL file as a geometry, to be given a surface."""
@@ -48,9 +51,13 @@ def _textures(file: Path, text: str) -> dict[str, str]:
     """Return the images that a Collada file names, as data addresses."""
     if "<init_from>" not in text:
         return {}
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError):  # the page will say so
+        return {}
     names = {
         (element.text or "").strip()
-        for images in ElementTree.fromstring(text).iter()
+        for images in root.iter()
         if images.tag.endswith("library_images")
         for element in images.iter()
         if element.tag.endswith("init_from")
@@ -58,7 +65,7 @@ def _textures(file: Path, text: str) -> dict[str, str]:
     found = {}
     for name in names:
         image = file.parent / name.removeprefix("file://")
-        if image.is_file():
+        if image.suffix.lower() in _PICTURES and image.is_file():
             kind = mimetypes.guess_type(image.name)[0] or "image/png"
             content = base64.b64encode(image.read_bytes()).decode()
             found[name] = f"data:{kind};base64,{content}"

@@ -2,16 +2,19 @@
 
 import logging
 from collections.abc import Sequence
+from os import PathLike
 from pathlib import Path
 
+from hsp_control.access import ANYWHERE, Access, only_within
 from hsp_control.config.build_robot import build_robot
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
-from hsp_control.exceptions import HspControlError, ViewerError
+from hsp_control.exceptions import AccessError, HspControlError, ViewerError
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
+from hsp_control.sources import packaged_folders
 from hsp_control.viewer.comparison import Act
 from hsp_control.viewer.transport import Transport
 from hsp_control.viewer.viewer import Viewer
@@ -19,13 +22,26 @@ from hsp_control.viewer.viewer import Viewer
 _log = logging.getLogger(__name__)
 
 
-def robot_of(rollout: Rollout) -> Robot:
+def access_for(
+    logs: Sequence[Path], strict: bool, allow: Sequence[str | PathLike[str]]
+) -> Access:
+    """Return which files logs may name: told to be strict, those beside them."""
+    if not strict:
+        return ANYWHERE
+    return only_within([*(log.parent for log in logs), *packaged_folders(), *allow])
+
+
+def robot_of(rollout: Rollout, access: Access = ANYWHERE) -> Robot:
     """Return the robot of a log, built anew from the configuration that it holds.
+
+    Args:
+        rollout: The log.
+        access: Which files it may name.
 
     Raises:
         ViewerError: If the log holds none, or its robot cannot be found again.
     """
-    document = _document(rollout)
+    document = _document(rollout, access)
     try:
         robot, _ = build_robot(document, validate(document, Scenario), Path())
     except HspControlError as error:
@@ -33,18 +49,29 @@ def robot_of(rollout: Rollout) -> Robot:
     return robot
 
 
-def act_of(rollout: Rollout, name: str) -> Act:
+def act_of(rollout: Rollout, name: str, access: Access = ANYWHERE) -> Act:
     """Return a log with its robot and, if that can be built anew, its controller.
 
     A line in the log says so if it cannot.
 
+    Args:
+        rollout: The log.
+        name: What to call it.
+        access: Which files it may name.
+
     Raises:
         ViewerError: If the log holds no configuration, or its robot is gone.
+        AccessError: If it names a file that is not allowed.
     """
+    for obstacle, about in rollout.meta.get("obstacles", {}).items():
+        if file := about.get("parameters", {}).get("file"):
+            access.check(Path(str(file)), f"{name}: obstacle {obstacle!r}: mesh")
     try:
-        experiment = build(_document(rollout))
+        experiment = build(_document(rollout, access))
+    except AccessError:
+        raise
     except HspControlError as error:
-        robot = robot_of(rollout)
+        robot = robot_of(rollout, access)
         _log.warning("%s: only what its columns tell is drawn: %s", name, error)
         return Act(name, robot, rollout)
     return Act(name, experiment.robot, rollout, experiment.controller)
@@ -58,6 +85,8 @@ def view_logs(
     loop: bool | None = None,
     port: int | None = None,
     transport: Transport | None = None,
+    strict: bool = False,
+    allow: Sequence[str | PathLike[str]] = (),
 ) -> Viewer:
     """Open a viewer that plays one log, or several together; it stays open.
 
@@ -70,13 +99,17 @@ def view_logs(
         loop: Play it again and again; None: as the log says.
         port: See `Viewer`.
         transport: See `Viewer`.
+        strict: For logs of strangers: see `load_experiment`.
+        allow: Further folders for strict reading.
 
     Raises:
         LogError: If a log cannot be read.
         ViewerError: If a log is empty, its robot cannot be found again, or the view
             cannot be opened.
     """
-    acts = [_act(path, name) for path, name in zip(logs, _names(logs), strict=True)]
+    access = access_for(logs, strict, allow)
+    names = zip(logs, _names(logs), strict=True)
+    acts = [_act(path, name, access) for path, name in names]
     first = acts[0]
     view = (first.rollout.config or {}).get("view", {})
     viewer = Viewer(first.robot, port=port, transport=transport, **view)
@@ -93,21 +126,23 @@ def view_logs(
     return viewer
 
 
-def _act(path: Path, name: str) -> Act:
+def _act(path: Path, name: str, access: Access) -> Act:
     try:
-        return act_of(Rollout.load(path), name)
+        return act_of(Rollout.load(path), name, access)
     except ViewerError as error:
         raise ViewerError(f"{path}: {error}") from error
 
 
-def _document(rollout: Rollout) -> Document:
+def _document(rollout: Rollout, access: Access) -> Document:
     if rollout.config is None:
         name = rollout.meta.get("robot", {}).get("name", "?")
         raise ViewerError(
             f"this log was made from Python and does not say how its robot {name!r} "
             "was built; give the robot, as in Viewer(robot).play(rollout)"
         )
-    return Document(rollout.config, {}, "the log's configuration")
+    document = Document(rollout.config, {}, "the log's configuration")
+    document.access = access
+    return document
 
 
 def _names(logs: Sequence[Path]) -> list[str]:

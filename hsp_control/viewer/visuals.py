@@ -3,15 +3,18 @@
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.arrays import Array
 from hsp_control.combining import Part
+from hsp_control.exceptions import ModelError, RobotNotFoundError
+from hsp_control.mesh_files import complaint
 from hsp_control.robot import Robot
 from hsp_control.sources import RobotSource
+from hsp_control.urdf_checks import read_urdf
 
 _GREY = (0.72, 0.74, 0.76, 1.0)
 _MESHES = {".dae", ".obj", ".stl"}  # what the page can read
@@ -54,8 +57,8 @@ def read_visuals(robot: Robot) -> list[Visual]:
 
 def _of_part(robot: Robot, part: Part) -> Iterator[Visual]:
     try:
-        tree = ElementTree.parse(part.source.urdf).getroot()
-    except (OSError, ElementTree.ParseError):
+        tree = read_urdf(part.source.urdf)
+    except (ModelError, RobotNotFoundError):
         return
     materials = dict(_materials(tree))
     for link in tree.iter("link"):
@@ -72,7 +75,7 @@ def _of_part(robot: Robot, part: Part) -> Iterator[Visual]:
 def _visual(
     source: RobotSource,
     frame: pin.Frame,
-    element: ElementTree.Element,
+    element: Element,
     materials: dict[str, tuple[float, ...]],
 ) -> Visual | None:
     shape = next(iter(element.find("geometry") or ()), None)
@@ -91,7 +94,7 @@ def _visual(
 
 
 def _materials(
-    tree: ElementTree.Element,
+    tree: Element,
 ) -> Iterator[tuple[str, tuple[float, ...]]]:
     """Yield the named colours, wherever in the file they are given."""
     for material in tree.iter("material"):
@@ -101,7 +104,7 @@ def _materials(
 
 
 def _color(
-    material: ElementTree.Element | None, named: dict[str, tuple[float, ...]]
+    material: Element | None, named: dict[str, tuple[float, ...]]
 ) -> tuple[float, ...] | None:
     if material is None:
         return None
@@ -111,7 +114,7 @@ def _color(
     return named.get(material.get("name", ""))
 
 
-def _pose(origin: ElementTree.Element | None) -> Array:
+def _pose(origin: Element | None) -> Array:
     if origin is None:
         return np.eye(4)
     rpy = np.array(_numbers(origin.get("rpy")) or (0.0, 0.0, 0.0))
@@ -135,7 +138,9 @@ def _mesh_file(source: RobotSource, name: str) -> Path | None:
         (
             file
             for file in candidates
-            if file.suffix.lower() in _MESHES and file.is_file()
+            if file.suffix.lower() in _MESHES
+            and not complaint(file)
+            and source.access.allows(file)
         ),
         None,
     )

@@ -10,6 +10,10 @@ NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Vector = list[Number]
 Vector3 = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Gain = Positive | Annotated[list[Positive], Field(min_length=1)] | list[Vector]
+Name = Annotated[
+    str, Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$")
+]
+"""What a user calls a part of the configuration: it becomes part of columns' names."""
 Weights = NonNegative | list[NonNegative]
 
 

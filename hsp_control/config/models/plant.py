@@ -22,6 +22,7 @@ from hsp_control.config.models.scene import (
 
 Share = Annotated[float, Field(ge=0.0, lt=1.0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0)]
+Periods = Annotated[int, Field(ge=0, le=100_000)]
 
 
 class InertiasModel(Model):
@@ -81,7 +82,7 @@ class PushModel(Model):
 class SensorsModel(Model):
     """What the controller is shown, in this order."""
 
-    delay: Count = 0
+    delay: Periods = 0
     """Control periods that a measurement is old."""
     position_noise: Weights = 0.0
     """Standard deviation of positions [rad or m]: of all joints, or of each freedom."""
@@ -98,7 +99,7 @@ class DrivesModel(Model):
 
     dropped: Share = 0.0
     """Probability that an effort is lost, and the last one goes on."""
-    delay: Count = 0
+    delay: Periods = 0
     """Control periods that an effort comes late."""
     jitter: NonNegative = 0.0
     """The longest further lateness [s], drawn for each period."""

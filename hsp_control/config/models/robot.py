@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from hsp_control.config.models.base import Model, Number, Vector, Vector3
+from hsp_control.config.models.base import Model, Name, Number, Vector, Vector3
 from hsp_control.sources import Root
 
 
@@ -26,7 +26,7 @@ class LoadModel(Model):
     """How it stands in the world; as its source says by default."""
     locked: dict[str, Number] | None = None
     """Joints held still, name to value [rad or m]; as its source says by default."""
-    tool_frames: dict[str, ToolFrameModel] = {}
+    tool_frames: dict[Name, ToolFrameModel] = {}
     """Frames to add, by name."""
     mimic: bool = True
     """Whether joints that mimic others follow them, or are free."""
@@ -44,7 +44,7 @@ class PartModel(LoadModel):
 class RobotModel(LoadModel):
     """Which robot, and how it stands in the world."""
 
-    parts: dict[str, PartModel] | None = None
+    parts: dict[Name, PartModel] | None = None
     """Instead of a name: several robots, whose frames are then ``<part>_<frame>``."""
     gravity: Vector3 | None = None
     """Acceleration of gravity in the world [m/s²]; -9.81 along z by default."""

@@ -4,7 +4,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from hsp_control.config.models.base import Model, NonNegative, Positive, Vector, Vector3
+from hsp_control.config.models.base import (
+    Model,
+    Name,
+    NonNegative,
+    Positive,
+    Vector,
+    Vector3,
+)
 from hsp_control.config.models.motion import OrientationModel, PointTrajectory
 
 
@@ -109,5 +116,5 @@ class ObstacleModel(Model):
 class SceneModel(Model):
     """What stands or moves in the robot's world."""
 
-    obstacles: dict[str, ObstacleModel] = {}
+    obstacles: Annotated[dict[Name, ObstacleModel], Field(max_length=1000)] = {}
     """Obstacles by name."""
