@@ -61,7 +61,7 @@ class _Obstacle(_Model):
 
 class _Meta(_Model):
     format: str
-    status: Literal["completed", "interrupted", "diverged"] | None = None
+    status: Literal["completed", "interrupted", "stopped", "diverged"] | None = None
     message: str = ""
     name: str = ""
     title: str = ""

@@ -19,7 +19,7 @@ from hsp_control.plants import Reading
 from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle, Scene
 from hsp_control.simulation.log_file import MAX_SIZE
-from hsp_control.simulation.rollout import FORMAT, Rollout, unwind
+from hsp_control.simulation.rollout import FORMAT, Rollout, settle
 from hsp_control.version import __version__
 
 _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
@@ -224,7 +224,7 @@ class Recorder:
     def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
         """Return the rows recorded so far as a rollout."""
         columns = {name: array[: self._rows] for name, array in self._columns.items()}
-        unwind(columns, continuous_freedoms(self._controller.robot))
+        settle(columns, continuous_freedoms(self._controller.robot))
         return Rollout(columns, self.meta(status, message, **meta))
 
     def meta(self, status: str, message: str, **meta: Any) -> dict[str, Any]:

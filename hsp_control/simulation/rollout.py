@@ -158,7 +158,7 @@ class Rollout:
         try:
             if is_journal(path):
                 columns, meta = read_journal(path)
-                unwind(columns, meta["robot"]["continuous"])
+                settle(columns, meta["robot"]["continuous"])
                 columns["meta"] = np.array(json.dumps(meta, ensure_ascii=False))
             else:
                 columns = read_arrays(path)
@@ -243,10 +243,21 @@ def _described(columns: dict[str, Array]) -> list[str]:
     return list(described) if isinstance(described, dict) else []
 
 
-def unwind(columns: Mapping[str, Array], continuous: Sequence[int]) -> None:
-    """Let the positions of continuous joints pass ±π without a jump, in place."""
+def settle(columns: Mapping[str, Array], continuous: Sequence[int]) -> None:
+    """Make rows that were written one by one a whole, in place.
+
+    Positions of continuous joints pass ±π without a jump. Tasks that came on the way
+    are, before that, where they first were: what is drawn needs a place. Their errors
+    stay NaN there.
+    """
     positions, where = columns["joint_positions"], list(continuous)
     positions[:, where] = np.unwrap(positions[:, where], axis=0)
+    for name, column in columns.items():
+        if name.startswith("task.") and name.endswith((".reference", ".actual")):
+            known = np.asarray(np.isfinite(column).all(axis=1))
+            came = int(known.argmax())
+            if known.any() and not known[:came].any():
+                column[:came] = column[came]
 
 
 def _checked(
