@@ -61,12 +61,26 @@ def test_towards_a_joint_limit() -> None:
     assert free["q"][:, 3].max() > limits.upper[3] + 0.5
     assert ours["q"][:, 3].max() > limits.upper[3] - 0.006  # up to the margin
     first, second, home = (np.searchsorted(ours.t, t) for t in (2.9, 4.9, 7.9))
-    assert error(ours)[first] < 1e-5
+    # What a weight of 1e-3 leaves of strict order; below, that it is this weight's.
+    assert error(ours)[first] < 5e-4
     assert ours["null_space_norm"][first] > 1.0
     assert 5e-3 < error(ours)[second] < 0.05
+    waiting = (ours.t > 4.6) & (ours.t < 5.0)
+    assert np.abs(ours["v"][waiting]).max() < 0.1  # at rest beyond its reach
     assert error(ours)[home] < 1e-5  # and on the way back all is as it was
     assert ours["null_space_norm"][home] < 1e-3
     assert ours["status"][home] == 0
+
+
+def test_strict_order() -> None:
+    """With the least weight of the null space its giving way costs the hand nothing."""
+    strict, _ = run(
+        "panda_towards_limit",
+        "limits.null_space_weight=null",
+        "simulation.duration=2.9",
+    )
+    assert strict["null_space_norm"][-1] > 1.0
+    assert error(strict)[-1] < 1e-5
 
 
 @pytest.mark.parametrize("name", ["panda_half_strength", "panda_towards_limit"])

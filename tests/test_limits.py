@@ -33,7 +33,7 @@ from hsp_control import (
 from hsp_control.actuation import EXACT, LIMITED
 from hsp_control.actuation.actuation import _relax
 from hsp_control.actuation.programme import Rows, solve
-from hsp_control.actuation.yielding import yielding_metric
+from hsp_control.actuation.yielding import yielding
 from hsp_control.exceptions import LimitError
 from hsp_control.limits.acceleration_bounds import acceleration_bounds
 
@@ -156,7 +156,7 @@ def test_without_an_active_limit_the_programme_is_the_law(seed: int) -> None:
     assert same.status == EXACT
     np.testing.assert_array_equal(same.tau, out.tau)
     # And solving it all the same gives nothing else.
-    H = yielding_metric(free.mode.resolution, supported=False)
+    H = yielding(free.mode.resolution, supported=False).metric
     M, a = state.mass_matrix, out.acceleration
     tau = state.inverse_dynamics(a)
     rows = Rows(np.vstack([M, np.eye(7)]), *np.split(np.full(28, 0.0), 2))
@@ -340,6 +340,9 @@ def test_effort_rate_needs_to_know_what_went_out() -> None:
         ({"position_margin": 5.0}, "leave no room"),
         ({"velocity_margin": 1.0}, "velocity_margin is 1.0"),
         ({"bandwidth": 0.0}, "bandwidth is 0.0; must be positive"),
+        ({"static_effort": 0.0}, "static_effort is 0.0; must be a part of the effort"),
+        ({"null_space_speed": 0.0}, "null_space_speed limit is .* greater than 0"),
+        ({"null_space_weight": 1.0}, "null_space_weight is 1.0; must be between"),
         ({"velocity": np.nan}, "velocity holds a NaN"),
     ],
 )

@@ -51,6 +51,34 @@ def test_talos_on_two_feet() -> None:
     check_forces(rollout)
 
 
+def test_talos_with_a_weak_arm() -> None:
+    """The arm is at its torque limit, the hand gives way and comes back, all else on.
+
+    Without the two bounds joints reach 15 rad/s and the hand loses 36 cm.
+    """
+    name, shorter = "talos_weak_arm", "simulation.duration=3.4"
+    rollout = run(name, shorter, "simulation.log_period=0.001")
+    assert rollout.meta["status"] == "completed"
+    limits = load_experiment(f"whole_body/{name}").controller.limits
+    assert limits is not None
+    used = np.abs(rollout["tau"]) / limits.effort
+    names = rollout.meta["robot"]["freedoms"]
+    elbow = names.index("arm_right_4_joint")
+    assert used.max() <= 1.0 + 1e-9
+    assert (used[:, elbow] > 0.999).sum() > 50  # it is met, for a while
+    assert rollout["status"].max() == LIMITED
+    assert (rollout["status"] == LIMITED).mean() > 0.3
+    mass = np.linalg.norm(rollout["task.center_of_mass.error"], axis=1)
+    hand = np.linalg.norm(rollout["task.hand.error"], axis=1)
+    assert mass.max() < 5e-4
+    assert rms(rollout, "trunk") < 1e-3
+    assert 0.01 < hand.max() < 0.04
+    assert hand[rollout.t > 3.2].max() < 1e-3
+    assert np.abs(rollout["v"]).max() < 3.5
+    assert rollout["null_space_norm"].max() < 2.0 * np.sqrt(38.0)
+    check_forces(rollout)
+
+
 def test_solo_lifts_a_foot_and_puts_it_down() -> None:
     rollout = run("solo12_swing")
     assert rollout.meta["status"] == "completed"

@@ -13,6 +13,8 @@ the order of their priority. The rows are affine in (δ, f):
     contacts    J_c δ = 0, f within friction cones
     motion      bounds on a from position, velocity and acceleration limits
     distances   ∇d·a ≥ what the barriers of least distances ask for
+    holding     ∇G·a ≤ what the barriers of static efforts ask for
+    null space  |P δ| ≤ λ s: how far it goes before tasks do
 
 Where a* violates no row it is the optimum, and nothing is solved. ``law.md`` §5, §6.
 """
@@ -24,7 +26,7 @@ import numpy as np
 from hsp_control.actuation.programme import Rows, solve, stacked
 from hsp_control.actuation.status import EXACT, LIMITED, REDISTRIBUTED, RELAXED
 from hsp_control.actuation.support import Support
-from hsp_control.actuation.yielding import yielding_metric
+from hsp_control.actuation.yielding import null_space_rows, yielding
 from hsp_control.arrays import Array, Indices
 from hsp_control.contacts import Contact
 from hsp_control.kernels import bind
@@ -36,8 +38,15 @@ from hsp_control.robot import Robot, RobotState
 _FORCE_COST = 1e-6
 """Of forces in robot weights squared, beside accelerations: it decides what nothing
 else does. With 1e-8 and less the solver takes Talos' programmes for infeasible."""
-_ORDER = {"contacts": 1e3, "distances": 30.0, "motion": 1.0}
-"""What yields last has the greatest cost, where limits contradict each other."""
+_ORDER = {
+    "contacts": 1e3,
+    "distances": 30.0,
+    "motion": 1.0,
+    "holding": 0.1,
+    "null space": 1.0,
+}
+"""What yields last has the greatest cost, where limits contradict each other. The null
+space's bound is relaxed alone, before all others."""
 _INDIFFERENT, _ROUNDS = 1e-4, 4
 """Cost of all else, while the least violation is looked for; and how often it is
 looked for about what the last round found: the cost is of the difference, so it fades.
@@ -83,11 +92,12 @@ class Actuation:
         self._least, self._greatest = np.full(nv, -np.inf), np.full(nv, np.inf)
         self._low, self._high = np.full(nv, -np.inf), np.full(nv, np.inf)
         self._no_forces = np.zeros(0)
-        self._nothing = Rows(np.zeros((0, nv)), np.zeros(0), np.zeros(0))
         self._no_support = Support((), nv, self._weight)
         self._bound: tuple[RobotState, Array] | None = None
         self._check: Callable[[], tuple[bool, bool]]
-        self._only_boxes = not self._floats and not (limits and limits.distances)
+        self._only_boxes = not self._floats and (
+            limits is None or not (limits.distances or limits.static_effort)
+        )
         self.forget()
 
     def support(self, contacts: Sequence[Contact]) -> Support:
@@ -136,9 +146,9 @@ class Actuation:
         if support.size:
             support.update(state)
             forces, tau = support.least_forces(self.base, wanted)
-        apart = self._apart(state)
-        if apart is not self._nothing:
-            moves = moves and bool((apart.A @ a >= apart.lower).all())
+        barriers = self._barriers(state, support)
+        for rows in barriers.values():
+            moves = moves and bool((rows.A @ a >= rows.lower).all())
         bears = not support.size or support.bears(forces)
         if moves and bears and within(tau, self._low, self._high):
             if self._floats:
@@ -148,7 +158,7 @@ class Actuation:
             shared = self._redistribute(wanted, forces, support)
             if shared is not None:
                 return self._finish(wanted, a, shared, support, REDISTRIBUTED, 0.0)
-        return self._limit(state, wanted, a, forces, resolution, support, apart)
+        return self._limit(state, wanted, a, forces, resolution, support, barriers)
 
     def _keeps_limits(self, state: RobotState, a: Array) -> tuple[bool, bool]:
         """Write the bounds on the acceleration.
@@ -181,16 +191,22 @@ class Actuation:
             )
         return self._check()
 
-    def _apart(self, state: RobotState) -> Rows:
-        """Return the rows that keep distances, A a ≥ lower."""
+    def _barriers(self, state: RobotState, support: Support) -> dict[str, Rows]:
+        """Return the rows A a ≥ lower that keep distances and postures."""
         limits = self.limits
-        if limits is None or not limits.distances:
-            return self._nothing
-        parts = [each.rows(state, limits.bandwidth) for each in limits.distances]
-        lower = np.concatenate([b for _, b in parts])
-        return Rows(
-            np.vstack([A for A, _ in parts]), lower, np.full(len(lower), np.inf)
-        )
+        found: dict[str, Rows] = {}
+        if limits is None:
+            return found
+        if limits.distances:
+            parts = [each.rows(state, limits.bandwidth) for each in limits.distances]
+            A, lower = (np.concatenate(each) for each in zip(*parts, strict=True))
+            found["distances"] = Rows(A, lower, np.full(len(lower), np.inf))
+        if limits.static_effort is not None:
+            A, lower = limits.static_effort.rows(
+                state, limits.bandwidth, support.carrying
+            )
+            found["holding"] = Rows(A, lower, np.full(len(lower), np.inf))
+        return found
 
     def _redistribute(
         self, wanted: Array, forces: Array, support: Support
@@ -214,13 +230,16 @@ class Actuation:
         forces: Array,
         resolution: Resolution,
         support: Support,
-        apart: Rows,
+        barriers: Mapping[str, Rows],
     ) -> Delivered:
         """Return the acceleration nearest to the law's that the limits permit."""
         n, p, scale = len(a), support.size, self._weight
         M, F = state.mass_matrix, support.map * scale
+        limits = self.limits
+        weight = None if limits is None else limits.null_space_weight
+        order = yielding(resolution, len(support.contacts) > 0, weight)
         H = np.zeros((n + p, n + p))
-        H[:n, :n] = yielding_metric(resolution, len(support.contacts) > 0)
+        H[:n, :n] = order.metric
         # Beside directions that cost nothing else, a force costs next to nothing.
         H[n:, n:] = np.diag(_FORCE_COST / np.maximum(support.ease, 1e-6))
         f = np.zeros(n + p)
@@ -239,15 +258,20 @@ class Actuation:
             (self._least - a)[bounded],
             (self._greatest - a)[bounded],
         )
-        distances = Rows(
-            np.pad(apart.A, ((0, 0), (0, p))), apart.lower - apart.A @ a, apart.upper
-        )
-        soft = {"contacts": contacts, "distances": distances, "motion": motion}
-        x = solve(H, f, stacked(*hard, *soft.values()))
+        soft = {"contacts": contacts, "motion": motion}
+        for kind, rows in barriers.items():
+            A = np.pad(rows.A, ((0, 0), (0, p)))
+            soft[kind] = Rows(A, rows.lower - rows.A @ a, rows.upper)
+        kept = stacked(*hard, *soft.values())
+        bound = None
+        if limits is not None and limits.null_space_speed is not None:
+            speed = limits.null_space_speed
+            bound = null_space_rows(resolution, order.projector, speed, n + p)
+        x = _nearest(H, f, kept, bound)
         status, relaxation = LIMITED, 0.0
         if x is None:
             widened, least, relaxation = _relax(stacked(*hard), soft)
-            x = solve(H, f, stacked(*hard, widened))
+            x = _nearest(H, f, stacked(*hard, widened), bound)
             x = least if x is None else x
             status = RELAXED
         if x is None:  # beyond what the solver can do: still no effort beyond limits
@@ -318,6 +342,18 @@ class Actuation:
 def _padded(rows: Rows, before: int, after: int) -> Rows:
     """Return rows with columns of zeros on either side."""
     return rows._replace(A=np.pad(rows.A, ((0, 0), (before, after))))
+
+
+def _nearest(H: Array, f: Array, kept: Rows, bound: Rows | None) -> Array | None:
+    """Return the optimum within rows and a bound, which is widened where it must be."""
+    if bound is None:
+        return solve(H, f, kept)
+    x = solve(H, f, stacked(kept, bound))
+    if x is None:
+        widened, least, _ = _relax(kept, {"null space": bound})
+        x = None if least is None else solve(H, f, stacked(kept, widened))
+        x = least if x is None else x
+    return x
 
 
 def _relax(hard: Rows, soft: Mapping[str, Rows]) -> tuple[Rows, Array | None, float]:

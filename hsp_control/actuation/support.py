@@ -25,6 +25,8 @@ class Support:
         cone: Rows with cone f ≥ 0, four a point, shape (4 size/3, size).
         least: Least force, shape (size,) [N].
         greatest: Greatest force, shape (size,) [N].
+        carrying: Freedoms between the root and a contact, whose efforts depend on
+            forces.
         ease: How readily each force is used, shape (size,): the norm that the closed
             form makes least is Σ f²/ease.
     """
@@ -43,6 +45,7 @@ class Support:
         self.least[2::3] = 0.0
         self.ease = np.ones(self.size)
         self._weight = weight
+        self.carrying = _carrying(contacts)
         ends = np.cumsum([0, *counts])
         self.points = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         for contact, where in zip(self.contacts, self.points, strict=True):
@@ -118,3 +121,15 @@ class Support:
             local = forces.reshape(-1, 3)[where]
             out[where] = local @ contact.axes.T
         return out
+
+
+def _carrying(contacts: Sequence[Contact]) -> Indices:
+    """Return the freedoms that move a contact."""
+    found: set[int] = set()
+    for contact in contacts:
+        model = contact.robot.model
+        joint = model.frames[contact.robot.frame_id(contact.frame)].parentJoint
+        for k in model.supports[joint]:
+            start = model.joints[k].idx_v
+            found.update(range(start, start + model.joints[k].nv))
+    return np.array(sorted(i for i in found if i >= 0), dtype=np.int64)

@@ -10,7 +10,7 @@ from hsp_control.config.models import contacts as c
 from hsp_control.config.models import limits as l
 from hsp_control.config.models.tasks import AnyTask, ScheduleModel
 from hsp_control.contacts import BallContact, Contact, PointContact, SurfaceContact
-from hsp_control.exceptions import ContactError
+from hsp_control.exceptions import ContactError, LimitError
 from hsp_control.fields import Clearance, ObstacleClearance, SelfClearance
 from hsp_control.limits import Limits, MinimumDistance
 from hsp_control.robot import Robot
@@ -114,15 +114,20 @@ def build_limits(
         own = Limits(robot, position=None)
         return Limits(
             robot,
-            effort=_greatest(model.effort, own.effort),
+            effort=_greatest(document, "effort", model.effort, own.effort, robot),
             effort_rate=model.effort_rate,
-            velocity=_greatest(model.velocity, own.velocity),
+            velocity=_greatest(
+                document, "velocity", model.velocity, own.velocity, robot
+            ),
             acceleration=model.acceleration,
             position=position,
             position_margin=model.position_margin,
             velocity_margin=model.velocity_margin,
             distances=distances,
             bandwidth=model.bandwidth,
+            static_effort=model.static_effort,
+            null_space_speed=model.null_space_speed,
+            null_space_weight=model.null_space_weight,
         )
 
 
@@ -137,9 +142,21 @@ def _distance(model: l.AnyDistance, robot: Robot, scene: Scene) -> MinimumDistan
     return MinimumDistance(field.proximity, model.least)
 
 
-def _greatest(model: l.Greatest, own: Array) -> Any:
+def _greatest(
+    document: Document, key: str, model: l.Greatest, own: Array, robot: Robot
+) -> Any:
+    """Return a greatest effort or speed in numbers, None for none."""
     if isinstance(model, l.ScaledModel):
-        return model.scale * own
+        if not isinstance(model.scale, dict):
+            return model.scale * own
+        scaled = own.copy()
+        for joint, scale in model.scale.items():
+            with document.at("limits", key, "scale", joint):
+                where = robot.velocity_index(joint)
+                if not np.isfinite(own[where]).all():
+                    raise LimitError(f"{joint} has no {key} limit of its own to scale")
+                scaled[where] *= scale
+        return scaled
     if isinstance(model, str):
         return own if model == "robot" else None
     return np.asarray(model)

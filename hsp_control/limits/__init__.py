@@ -2,3 +2,4 @@
 
 from .limits import Limits as Limits
 from .minimum_distance import MinimumDistance as MinimumDistance
+from .static_effort import StaticEffort as StaticEffort

@@ -8,6 +8,7 @@ import numpy as np
 from hsp_control.arrays import Array
 from hsp_control.exceptions import LimitError
 from hsp_control.limits.minimum_distance import MinimumDistance
+from hsp_control.limits.static_effort import StaticEffort
 from hsp_control.robot import Robot
 
 Default = Literal["robot"]
@@ -26,9 +27,17 @@ class Limits:
         acceleration    a ≤ a_max
 
     and alike from below, the velocity's four times as steep within its margin.
-    Distances have barriers of their own, see `MinimumDistance`. Where limits contradict
-    each other, acceleration yields to velocity, velocity to position, position to
+    Distances have barriers of their own, see `MinimumDistance`, and so have postures
+    that motors can hold, see `StaticEffort`. Where limits contradict each other, these
+    yield first, acceleration yields to velocity, velocity to position, position to
     distance, and all of them to the effort.
+
+    Where a limit binds the null space gives way first, and then the tasks. How far the
+    null space gives way before the tasks do is bounded, if `null_space_speed` is given:
+    with δ the deviation from the law's acceleration, s this speed and λ the rate of
+    K_N, |(P δ)_j| ≤ λ s_j. Then e_N' = -K_N e_N - P δ stays a stable system with a
+    bounded input, and ‖e_N‖_W ≤ ‖s‖_|W| for ever (docs/limits.md). Of all bounds it is
+    the first to give way.
 
     Attributes:
         robot: The robot.
@@ -43,6 +52,10 @@ class Limits:
         guarded_upper: The position that the barriers keep, within its margin.
         bandwidth: α of the barriers [1/s].
         distances: What must keep how far apart.
+        static_effort: What keeps postures to those that motors can hold, if anything.
+        null_space_speed: s, shape (nv,) [rad/s or m/s]; None: no bound.
+        null_space_weight: What null-space motion costs beside the first task, where
+            limits bind; None: as little as rounding permits.
     """
 
     def __init__(
@@ -58,6 +71,9 @@ class Limits:
         velocity_margin: float = 0.02,
         distances: Sequence[MinimumDistance] = (),
         bandwidth: float = 10.0,
+        static_effort: float | None = None,
+        null_space_speed: Any | None = None,
+        null_space_weight: float | None = None,
     ) -> None:
         """Set the limits; each is a number, one per freedom, or None for no limit.
 
@@ -75,6 +91,14 @@ class Limits:
             distances: What must keep how far apart.
             bandwidth: α [1/s]. 5 to 20 is what a motor follows: faster barriers ask at
                 the last moment for more than the effort's rate can give.
+            static_effort: The part of an effort that gravity may take; for motors that
+                bear no contact. None: any.
+            null_space_speed: s [rad/s or m/s]: how fast the null space may leave the
+                field, before tasks give way.
+            null_space_weight: What null-space motion costs beside the first task,
+                between 0 and 1. None: 1e-6, and 1e-8 where tasks have priorities. 1e-3
+                brings to rest a robot that cannot reach its target, at 1e-3 of the
+                null space's deviation in the task's.
 
         Raises:
             LimitError: If a limit is not positive, lower is not below upper, or the
@@ -123,6 +147,21 @@ class Limits:
         if not 0.0 < bandwidth < np.inf:
             raise LimitError(f"bandwidth is {bandwidth}; must be positive")
         self.bandwidth = float(bandwidth)
+        self.static_effort = (
+            None
+            if static_effort is None
+            else StaticEffort(robot, self.effort, static_effort)
+        )
+        self.null_space_speed = (
+            None
+            if null_space_speed is None
+            else _greatest(robot, null_space_speed, "null_space_speed", None)
+        )
+        if null_space_weight is not None and not 0.0 < null_space_weight < 1.0:
+            raise LimitError(
+                f"null_space_weight is {null_space_weight}; must be between 0 and 1"
+            )
+        self.null_space_weight = null_space_weight
         self.distances = tuple(distances)
         if any(each.proximity.robot is not robot for each in self.distances):
             raise LimitError("a least distance was built for another robot object")

@@ -10,8 +10,9 @@ from hsp_control.config.models.base import Model, NonNegative, Number, Positive,
 class ScaledModel(Model):
     """The robot's own limit, times a number."""
 
-    scale: Positive
-    """The number; 0.5 for a robot of half its strength."""
+    scale: Positive | Annotated[dict[str, Positive], Field(min_length=1)]
+    """The number; 0.5 for a robot of half its strength. Or a number for each of some
+    joints, by name: the others keep their own limits."""
 
 
 Greatest = Literal["robot", "none"] | ScaledModel | Positive | list[Positive]
@@ -72,3 +73,12 @@ class LimitsModel(Model):
     """What must keep how far apart."""
     bandwidth: Positive = 10.0
     """Of the barriers before position and velocity limits [1/s]."""
+    static_effort: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
+    """The part of an effort that gravity may take, so that an arm goes only where its
+    motors can hold it; for motors that bear no contact."""
+    null_space_speed: Positive | list[Positive] | None = None
+    """How fast the null space may leave the field, where limits bind, before tasks give
+    way [rad/s or m/s]."""
+    null_space_weight: Annotated[Number, Field(gt=0.0, lt=1.0)] | None = None
+    """What null-space motion costs beside the first task, where limits bind: 1e-6, and
+    1e-8 where tasks have priorities."""
