@@ -1,6 +1,6 @@
 """The controller: tasks, a null-space field and a metric make one effort."""
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -77,6 +77,12 @@ class Diagnostics(NamedTuple):
     null_space_norm: float
     singular_values: Array
     manipulability: float
+
+
+Amendment = Callable[[RobotState, Mode, Array], tuple[Array, Array | None]]
+"""(state, mode, a) ↦ the acceleration to be delivered, shape (nv,), and what effort
+that takes besides M a + N, shape (nv,) or None: what remedies put between the law and
+the limits."""
 
 
 class Controller:
@@ -176,8 +182,15 @@ class Controller:
 
     # -- the step ---------------------------------------------------------------------
 
-    def compute(self, state: RobotState) -> ControlOutput:
+    def compute(
+        self, state: RobotState, amendment: Amendment | None = None
+    ) -> ControlOutput:
         """Return the effort at a state.
+
+        Args:
+            state: The robot's state.
+            amendment: What is done about the law's acceleration before it is delivered
+                within the limits; None: nothing.
 
         Raises:
             NonFiniteError: If a task or the field gave something that is not finite;
@@ -199,8 +212,11 @@ class Controller:
             resolved = mode.resolve(state, self.metric, self.field)
         if not resolved.finite:
             self._explain_non_finite(state)
+        a, offset = resolved.acceleration, None
+        if amendment is not None:
+            a, offset = amendment(state, mode, a)
         delivered = self._actuation.deliver(
-            state, resolved.acceleration, mode.resolution, mode.support
+            state, a, mode.resolution, mode.support, offset
         )
         return ControlOutput(
             delivered.tau,
@@ -226,8 +242,10 @@ class Controller:
         self._actuation.applied(tau, period)
 
     def restart(self) -> None:
-        """Forget the last effort: what follows is another run."""
+        """Forget the last effort and all offsets: what follows is another run."""
         self._actuation.forget()
+        for task in self.tasks:
+            task.offset[:] = 0.0
 
     def _scheduled(self, state: RobotState) -> Resolved:
         """Return the law's acceleration with what the schedules have on.

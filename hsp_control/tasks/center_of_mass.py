@@ -65,6 +65,7 @@ class CenterOfMass(Task):
             desired.acceleration,
             self.Kp,
             self.Kv,
+            self.offset,
             out.error,
             out.error_rate,
             out.acceleration,

@@ -107,6 +107,7 @@ class JointPosture(Task):
             *self._sample,
             self.Kp,
             self.Kv,
+            self.offset,
             np.zeros(self.robot.nv),
             *out,
         )
@@ -157,6 +158,7 @@ def _joint_posture(
     moved_ddot: Array,
     Kp: Array,
     Kv: Array,
+    offset: Array,
     away: Array,
     J: Array,
     J_dot: Array,
@@ -175,4 +177,4 @@ def _joint_posture(
         if held[k, 2] == 2:
             e[k] = atan2(sin(e[k]), cos(e[k]))
         e_dot[k] = moved_dot[k] - v[i]
-    track(moved_ddot, Kp, Kv, e, e_dot, a_x)
+    track(moved_ddot, Kp, Kv, offset, e, e_dot, a_x)
