@@ -55,35 +55,47 @@ class VelocityFilter:
             RemedyError: If the sampling is too slow for the filter.
         """
         if self._past is None:
-            self._past = tuple(v.copy() for _ in range(2 * self.order))
-            return self._past[0].copy()
-        if self.order == 1:
-            share = 1.0 - exp(-2.0 * pi * self.cutoff * period)
-            passed = self._past[0] + share * (v - self._past[0])
-            self._past = passed, self._past[0]
-            return np.array(passed)
-        # The bilinear transform of 1/(1 + √2 s + s²), with the cut-off where it was.
-        check_order_two(self.cutoff, period)
-        w = tan(pi * self.cutoff * period)
-        scale = 1.0 + sqrt(2.0) * w + w * w
-        in1, in2, out1, out2 = self._past
-        passed = (
-            w * w * (v + 2.0 * in1 + in2)
-            - 2.0 * (w * w - 1.0) * out1
-            - (1.0 - sqrt(2.0) * w + w * w) * out2
-        ) / scale
-        self._past = v.copy(), in1, passed, out1
+            self._past = tuple(v.copy() for _ in range(4))
+            return v.copy()
+        passed, self._past = self.step(v, self._past, period)
         return passed.copy()
 
+    def step(
+        self, v: Array, past: tuple[Array, ...], period: float
+    ) -> tuple[Array, tuple[Array, ...]]:
+        """Return what passes, and the past that the next step is to be given.
 
-def check_order_two(cutoff: float, period: float) -> None:
-    """Refuse what no filter of second order can do at a period [s].
+        Args:
+            v: Input, of any shape.
+            past: The last two inputs and the last two outputs, each the latest first.
+            period: Time since the last input [s].
+        """
+        b, a = self.coefficients(period)
+        in1, in2, out1, out2 = past
+        out = b[0] * v + b[1] * in1 + b[2] * in2 - a[0] * out1 - a[1] * out2
+        return out, (np.array(v), in1, out, out1)
 
-    Raises:
-        RemedyError: If the cut-off [Hz] is not below half of the rate.
-    """
-    if cutoff * period >= 0.5:
-        raise RemedyError(
-            f"cutoff is {cutoff:g} Hz; at a period of {period:g} s a filter of second "
-            f"order needs less than {0.5 / period:g} Hz, half of the rate"
-        )
+    def coefficients(
+        self, period: float
+    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return b_0..b_2 and a_1, a_2 of y_k = Σ b_i v_(k-i) - Σ a_i y_(k-i).
+
+        The first order is exact for a velocity that is held; the second is the bilinear
+        transform of 1/(1 + √2 s + s²), with the cut-off where it was.
+
+        Raises:
+            RemedyError: If a cut-off of second order is not below half of the rate.
+        """
+        if self.order == 1:
+            kept = exp(-2.0 * pi * self.cutoff * period)
+            return (1.0 - kept, 0.0, 0.0), (-kept, 0.0)
+        if self.cutoff * period >= 0.5:
+            raise RemedyError(
+                f"cutoff is {self.cutoff:g} Hz; at a period of {period:g} s a filter "
+                f"of second order needs less than {0.5 / period:g} Hz, half of the rate"
+            )
+        w = tan(pi * self.cutoff * period)
+        scale = 1.0 + sqrt(2.0) * w + w * w
+        b = w * w / scale
+        a = 2.0 * (w * w - 1.0) / scale, (1.0 - sqrt(2.0) * w + w * w) / scale
+        return (b, 2.0 * b, b), a
