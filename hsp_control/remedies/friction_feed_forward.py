@@ -6,9 +6,11 @@ import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import RemedyError, SimulationError
+from hsp_control.metrics.metric import VARYING
 from hsp_control.mode import Mode
 from hsp_control.plants import JointFriction
 from hsp_control.remedies.checks import positive
+from hsp_control.resolution.pseudo_inverse import weighted_pseudo_inverse
 from hsp_control.robot import Robot, RobotState
 
 
@@ -73,25 +75,26 @@ class FrictionFeedForward:
 def wanted_velocity(state: RobotState, mode: Mode) -> Array:
     """Return v_d = J# x_d' + P g = v + e_N + J#(x_d' - J v), shape (nv,).
 
-    Near a singularity J# is bounded as the law's own is, by its threshold. Rows of a
+    J# is the law's own, bounded near singularities by the law's threshold. Rows of a
     floating base that nothing pushes ask for nothing.
     """
     resolution, v = mode.resolution, state.v
-    problem = resolution.problem
-    J = problem.task.jacobian
-    missing = -J @ v
+    task, metric = resolution.problem.task, resolution.problem.metric
+    missing = -task.jacobian @ v
     missing[sum(contact.rows for contact in mode.contacts) : mode.first_task_row] = 0.0
     for level in mode.levels:
-        for task in level:
-            missing[mode.task_rows[task.name]] += task.reference_rate(state)
-    B = np.linalg.solve(problem.metric.W, J.T)
-    values, U = np.linalg.eigh(J @ B)
-    least = resolution.threshold**2
-    # 1/s, and its continuation of bounded slope below the threshold (law.md §4).
-    inverse = np.where(
-        values >= least,
-        1.0 / np.maximum(values, least),
-        (2.0 - values / least) / least,
+        for each in level:
+            missing[mode.task_rows[each.name]] += each.reference_rate(state)
+    m, n = task.jacobian.shape
+    if m > n:  # levels in conflict: the least squares of them all
+        B = np.linalg.solve(metric.L, task.jacobian.T)
+        least = np.linalg.pinv(B.T, rcond=resolution.threshold) @ missing
+        raised = np.linalg.solve(metric.L.T, least)
+        return np.asarray(v + resolution.null_space_error + raised)
+    scratch = np.zeros((3 * n + 2 * m, m))
+    parts = np.split(scratch, [n, 2 * n, 3 * n, 3 * n + m])
+    B, Q, J_sharp, R, V = parts
+    weighted_pseudo_inverse(
+        task.jacobian, metric.L, VARYING, resolution.threshold, B, Q, R, V, J_sharp
     )
-    wanted = v + resolution.null_space_error + B @ (U @ (inverse * (U.T @ missing)))
-    return np.asarray(wanted)
+    return np.asarray(v + resolution.null_space_error + J_sharp @ missing)
