@@ -2,8 +2,8 @@
 
 The figures are column D of robots/iiwa14/README.md, R. Krug's lbr_iiwa (also in
 iiwa_stack and bullet3): masses, centres of mass and moments of inertia in the axes of
-the base at q = 0. Gravity torques and mass matrix differ from the bundled ones, Drake's,
-by a third.
+the base at q = 0. Gravity torques and mass matrix differ by a third from the bundled
+ones, which are Drake's.
 """
 
 import xml.etree.ElementTree as ET

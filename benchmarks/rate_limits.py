@@ -68,7 +68,7 @@ def also(
     return lambda x, h: {**settings(x, h), **beside}
 
 
-def K_N(x: float, h: float) -> tuple[str, float]:  # noqa: N802
+def K_N(x: float, h: float) -> tuple[str, float]:
     """Return K_N h."""
     return "K_N h", x * h
 

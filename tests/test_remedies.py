@@ -1,7 +1,6 @@
 """Each remedy by itself, and what they are worth together."""
 
 import pickle
-from pathlib import Path
 from typing import Any
 
 import numpy as np
