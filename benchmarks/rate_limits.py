@@ -4,12 +4,14 @@
 
 For each case the check's own limit of one setting is found by bisection. Then the
 nonlinear robot is let go near its target with the setting 3 % below and 3 % above it.
+Writes the table of docs/robustness.md.
 """
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from marked import DOCS, replace_part
 from rich.progress import track
 
 from hsp_control import Rollout, load_experiment
@@ -201,20 +203,24 @@ def growth(case: Case, x: float) -> float:
 
 
 def main() -> None:
-    """Print the table."""
-    print("| loop | robot | rate | limit | 3 % below | 3 % above |")
-    print("|---|---|--:|--:|--:|--:|")
+    """Write the table of docs/robustness.md."""
+    lines = [
+        "| loop | robot | rate | limit | 3 % below | 3 % above |",
+        "|---|---|--:|--:|--:|--:|",
+    ]
     for case in track(CASES, transient=True):
         x = limit(case)
         name, value = case.unit(x, 1.0 / case.frequency)
         below, above = (growth(case, (1.0 + s * BESIDE) * x) for s in (-1.0, 1.0))
-        ok = below < 1.0 < above
-        print(
+        if not below < 1.0 < above:
+            print(f"WRONG: {case.name}: {below:.3g}, {above:.3g}")
+        grown = "∞" if np.isinf(above) else f"{above:.2g}"
+        lines.append(
             f"| {case.name} | {case.robot} | {case.frequency:g} Hz | "
-            f"{name} < {value:.3f} | × {below:.2g} | × {above:.2g} |"
-            f"{'' if ok else ' WRONG'}",
-            flush=True,
+            f"{name} < {value:.3f} | {below:.2g} | {grown} |"
         )
+    replace_part(DOCS / "robustness.md", "rates", "\n".join(lines) + "\n")
+    print("\n".join(lines))
 
 
 if __name__ == "__main__":

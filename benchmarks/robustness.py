@@ -309,12 +309,11 @@ def tables() -> str:
 
 def _shown(pair: list[float | None]) -> str:
     """Return both engines' numbers, as one where they agree to 5 %."""
-    first, second = pair
     given = [each for each in pair if each is not None]
     if not given:
         return "·"
     if len(given) == 1:
-        return f"{given[0]:.2g} / –" if second is None else f"– / {given[0]:.2g}"
+        return f"{given[0]:.2g} / –" if pair[1] is None else f"– / {given[0]:.2g}"
     low, high = sorted(given)
     if low == high or high - low <= 0.05 * high:
         return f"{given[0]:.2g}"

@@ -42,6 +42,7 @@ from hsp_control import (
     StickingPlant,
     Task,
     VelocityFilter,
+    load_experiment,
     simulate,
 )
 from hsp_control.actuation.status import EXACT, LIMITED
@@ -56,17 +57,24 @@ PANDA = Robot.load("panda")
 Q0 = PANDA.home()
 
 
-def circle(robot: Robot = PANDA, frequency: float = 20.0) -> FramePosition:
+def circle(
+    robot: Robot = PANDA, frequency: float = 20.0, away: float = 0.05
+) -> FramePosition:
+    """Return a circle of 5 cm that begins ``away`` [m] from where the hand is."""
     start = robot.state(0.0, robot.home(), np.zeros(robot.nv)).position("panda_tcp")
-    path = Circle(start, 0.05, 2.0, normal=[0.0, 0.0, 1.0])
+    center = start + np.array([away - 0.05, 0.0, 0.0])
+    path = Circle(center, 0.05, 2.0, axes=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     return FramePosition(
         robot, "panda_tcp", path, Gains.from_frequency(frequency), name="hand"
     )
 
 
-def controller(robot: Robot = PANDA, **options: Any) -> Controller:
+def controller(robot: Robot = PANDA, away: float = 0.05, **options: Any) -> Controller:
     return Controller(
-        robot, [circle(robot)], 2.0 * TargetPosture(robot, robot.home()), **options
+        robot,
+        [circle(robot, away=away)],
+        2.0 * TargetPosture(robot, robot.home()),
+        **options,
     )
 
 
@@ -240,39 +248,30 @@ def test_known_friction_costs_nothing_and_the_observer_leaves_it_alone() -> None
     What the observer would cancel, were it told of the feed-forward, is all of it: the
     friction here is some 0.5 N·m.
     """
-    made = controller()
+    made = controller(away=0.0)
     oil = StickingPlant(PANDA, JointFriction.of(PANDA, viscous=2.0), H / 2.0)
     known = FrictionFeedForward(viscous=2.0)
-    bare, alone = run(made), run(made, plant=oil)
+    flow = {"v0": made.flow(0.0, Q0)}  # no transient
+    bare, alone = run(made, **flow), run(made, plant=oil, **flow)
     off = np.abs(alone["task.hand.error"] - bare["task.hand.error"]).max()
-    assert off > 1e-3
-    late = slice(
-        100, None
-    )  # what is paid for is the wanted velocity's, not the start's
+    assert off > 8e-4  # [m]
+    late = slice(1, None)
     for remedies in (
         Remedies(friction_feed_forward=known),
         Remedies(friction_feed_forward=known, momentum_observer=MomentumObserver(50.0)),
     ):
-        log = run(made, remedies, plant=oil)
+        log = run(made, remedies, plant=oil, **flow)
         friction = np.abs(2.0 * log.v[late]).max()
         np.testing.assert_allclose(
             log["friction.feed_forward"][late], 2.0 * log.v[late], atol=0.2 * friction
         )
         errors = log["task.hand.error"][late] - bare["task.hand.error"][late]
-        print(
-            off,
-            np.abs(errors).max(),
-            friction,
-            np.abs(log["observer.disturbance"][late]).max()
-            if remedies.momentum_observer
-            else 0,
-        )
         assert np.abs(errors).max() < 0.1 * off
         if remedies.momentum_observer is not None:
             assert np.abs(log["observer.disturbance"][late]).max() < 0.1 * friction
 
 
-@pytest.mark.parametrize("levels", [1, 2])
+@pytest.mark.parametrize("levels", [1, 2, 3])
 def test_the_wanted_velocity_is_the_law_s_flow(levels: int) -> None:
     """v_d = J# x_d' + P g whatever v is: what is measured, and its noise, cancel."""
     from hsp_control.remedies.friction_feed_forward import wanted_velocity
@@ -281,7 +280,14 @@ def test_the_wanted_velocity_is_the_law_s_flow(levels: int) -> None:
     turned = FrameOrientation(
         robot, "panda_tcp", HoldOrientation(np.eye(3)), Gains.from_frequency(5.0)
     )
-    tasks: list[Any] = [circle(), turned] if levels == 1 else [[circle()], [turned]]
+    again = FramePosition(
+        robot, "panda_tcp", circle().trajectory, Gains.from_frequency(5.0), name="more"
+    )
+    tasks: list[Any] = {
+        1: [circle(), turned],
+        2: [[circle()], [turned]],
+        3: [[circle()], [turned], [again]],  # nine rows on seven freedoms
+    }[levels]
     made = Controller(robot, tasks, TargetPosture(robot, np.zeros(7) + Q0 * 0.9))
     q = robot.integrate(Q0, rng.uniform(-0.3, 0.3, 7))
     flow = made.flow(0.4, q)
@@ -502,6 +508,60 @@ def test_the_ramp_leads_from_gravity_to_the_law(frequency: float) -> None:
     assert np.abs(smooth.q[40] - q).max() < (0.02 if frequency else 0.03)
 
 
+# ------------------------------------------------------------------------- together
+
+
+def test_random_bodies_and_friction_come_to_a_tenth_of_a_millimetre() -> None:
+    """The prototype came to 0.11 mm and 0.024 rad/s, 1.1 mm if the two fight.
+
+    The motion of docs/robustness.md: a circle of 10 cm at 2 rad/s, ω0 = 20, K_N = 10,
+    with ±20 % masses and inertias, centres of mass off by 1 cm, and Coulomb friction of
+    which the feed-forward knows 80 %; 1.2 s of it.
+    """
+    coulomb = [0.8, 0.8, 0.6, 0.6, 0.3, 0.3, 0.2]
+    blend = {"type": "circle", "origin": "start", "center": [0.0] * 3, "radius": 0.1,
+             "angular_rate": 2.0, "normal": [0.0, 0.0, 1.0]}  # fmt: skip
+    config = {
+        "robot": {"name": "panda"},
+        "tasks": {
+            "hand": {
+                "type": "frame_position",
+                "frame": "panda_tcp",
+                "trajectory": blend,
+                "gains": {"natural_frequency": 20.0},
+                "blend": 1.0,
+            }
+        },
+        "null_space": {
+            "gain": 10.0,
+            "fields": [{"type": "joint_centering", "weight": 2.0}],
+        },
+        "plant": {
+            "type": "rigid_body",
+            "inertias": {"random_mass": 0.2, "random_inertia": 0.2, "random_com": 0.01},
+            "friction": {"coulomb": coulomb, "viscous": 0.2},
+        },
+        "remedies": {
+            "momentum_observer": {"bandwidth": 50.0},
+            "friction_feed_forward": {
+                "coulomb": [0.8 * c for c in coulomb],
+                "viscous": 0.16,
+            },
+        },
+        "simulation": {
+            "duration": 2.7,
+            "control_period": H,
+            "log_period": 0.005,
+            "integrator": {"type": "rk4", "step": H},
+        },
+    }
+    log = load_experiment(config).run()
+    late = log.t > 1.5
+    error = np.linalg.norm(log["task.hand.error"][late], axis=1)
+    assert np.sqrt(np.mean(error**2)) < 0.11e-3
+    assert np.sqrt(np.mean(log["null_space_norm"][late] ** 2)) < 0.024
+
+
 # ------------------------------------------------------------------ what is refused
 
 
@@ -557,7 +617,7 @@ def on(part: Any) -> None:
 
 def test_two_guards_of_the_effort_rate_are_one_too_many() -> None:
     made = controller(limits=Limits(PANDA, effort_rate=500.0))
-    with pytest.raises(RemedyError, match="limits.effort_rate keeps the rate already"):
+    with pytest.raises(RemedyError, match=r"limits\.effort_rate keeps the rate"):
         Command(made, Remedies(effort_rate=EffortRateClip(500.0)))
     Command(controller(limits=Limits(PANDA)), Remedies(effort_rate=EffortRateClip(5.0)))
 

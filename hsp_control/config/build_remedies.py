@@ -69,15 +69,17 @@ def check_rates(
     delays = 0, 0
     if isinstance(plant, PlantModel):
         delays = plant.drives.delay, plant.sensors.delay
-    with document.at("remedies", "velocity_filter"):
-        found = rate_findings(
-            controller,
-            q0,
-            settings.control_period,
-            remedies,
-            effort_delay=delays[0],
-            sensor_delay=delays[1],
-        )
+    if remedies.velocity_filter is not None:
+        with document.at("remedies", "velocity_filter"):
+            remedies.velocity_filter.coefficients(settings.control_period)
+    found = rate_findings(
+        controller,
+        q0,
+        settings.control_period,
+        remedies,
+        effort_delay=delays[0],
+        sensor_delay=delays[1],
+    )
     for finding in found:
         if finding.unstable:
             with document.at(*finding.path):

@@ -91,9 +91,9 @@ def wanted_velocity(state: RobotState, mode: Mode) -> Array:
         least = np.linalg.pinv(B.T, rcond=resolution.threshold) @ missing
         raised = np.linalg.solve(metric.L.T, least)
         return np.asarray(v + resolution.null_space_error + raised)
-    scratch = np.zeros((3 * n + 2 * m, m))
-    parts = np.split(scratch, [n, 2 * n, 3 * n, 3 * n + m])
-    B, Q, J_sharp, R, V = parts
+    tall, square = np.zeros((3, n, m)), np.zeros((2, m, m))
+    B, Q, J_sharp = tall[0], tall[1], tall[2]
+    R, V = square[0], square[1]
     weighted_pseudo_inverse(
         task.jacobian, metric.L, VARYING, resolution.threshold, B, Q, R, V, J_sharp
     )

@@ -67,15 +67,19 @@ class LinearLoop:
         if own.velocity_filter is not None:
             v_seen, kept = own.velocity_filter.step(v_seen, tuple(past), h)
             past = [*kept]
+        else:
+            past = [0.0 * each for each in past]
         if own.momentum_observer is not None:
             disturbance = (v_seen - momentum) / h - sent[0]
             share = 1.0 - np.exp(-own.momentum_observer.bandwidth * h)
             r = r + share * (disturbance - r)
             momentum = v_seen
+        else:
+            r, momentum = 0.0 * r, 0.0 * momentum
         for u in sent[1:]:
             x_seen, v_seen = _moved(x_seen, v_seen, u + r, h)
         u = -self.kp @ x_seen - self.kv @ v_seen - self.ki @ z - r
-        z = z + h * x_seen
+        z = z + h * x_seen if self.ki.any() else 0.0 * z
         drives = [*drives, u]
         x, v = _moved(x, v, drives[0], h)
         rest = [*past, *sent[1:], u, *drives[1:], *sensors]

@@ -294,17 +294,20 @@ def _what_would_do(
             other = VelocityFilter(filter_.cutoff / s, filter_.order)
             return replace(loop, remedies=replace(own, velocity_filter=other))
 
-        if (s := _largest(wider)) is not None:
+        # Up to 0.45 of the rate: there a filter does next to nothing.
+        if (s := _largest(wider, filter_.cutoff * loop.period / 0.45)) is not None:
             choices.append(
                 f"velocity_filter.cutoff of at least {filter_.cutoff / s * 1.01:.3g} Hz"
             )
     return choices
 
 
-def _largest(of_scale: Callable[[float], LinearLoop]) -> float | None:
+def _largest(
+    of_scale: Callable[[float], LinearLoop], least: float = 1e-3
+) -> float | None:
     """Return the largest scale below 1 at which a loop is stable, if there is one.
 
-    Stable down to a thousandth of it, too: a gap in between would be no advice.
+    Stable at ``least``, too, and in between: a gap would be no advice.
     """
 
     def stable(s: float) -> bool:
@@ -313,7 +316,7 @@ def _largest(of_scale: Callable[[float], LinearLoop]) -> float | None:
         except RemedyError:  # a filter beyond half of the rate
             return False
 
-    tried = np.geomspace(1.0, 1e-3, 31)
+    tried = np.geomspace(1.0, min(least, 1.0), 31)
     good = [stable(float(s)) for s in tried]
     if not good[-1]:
         return None
@@ -329,4 +332,4 @@ def _rounded(value: float) -> str:
     """Return three digits, rounded down: what is advised must do."""
     exponent = int(np.floor(np.log10(value))) - 2
     unit = 10.0**exponent
-    return f"{np.floor(value / unit + 1e-9) * unit:.3g}"
+    return f"{np.floor(value / unit + 1e-6) * unit:.10g}"
