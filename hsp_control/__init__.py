@@ -62,6 +62,16 @@ from .plants import StickingPlant as StickingPlant
 from .plants.mujoco import ContactShape as ContactShape
 from .plants.mujoco import Ground as Ground
 from .plants.mujoco import MujocoPlant as MujocoPlant
+from .remedies import Command as Command
+from .remedies import EffortRateClip as EffortRateClip
+from .remedies import FrictionFeedForward as FrictionFeedForward
+from .remedies import IntegralAction as IntegralAction
+from .remedies import MomentumObserver as MomentumObserver
+from .remedies import Predictor as Predictor
+from .remedies import Remedies as Remedies
+from .remedies import StartUpRamp as StartUpRamp
+from .remedies import VelocityFilter as VelocityFilter
+from .remedies import check_rate as check_rate
 from .robot import Robot as Robot
 from .robot import RobotState as RobotState
 from .scene import Obstacle as Obstacle

@@ -1,6 +1,6 @@
 """The controller: tasks, a null-space field and a metric make one effort."""
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from itertools import pairwise
 from math import prod
 from typing import Any, NamedTuple
@@ -83,6 +83,12 @@ class Diagnostics(NamedTuple):
     null_space_norm: float
     singular_values: Array
     manipulability: float
+
+
+Amendment = Callable[[RobotState, Mode, Array], tuple[Array, Array | None]]
+"""(state, mode, a) ↦ the acceleration to be delivered, shape (nv,), and what effort
+that takes besides M a + N, shape (nv,) or None: what remedies put between the law and
+the limits."""
 
 
 class Controller:
@@ -175,7 +181,7 @@ class Controller:
         )
         self._modes: dict[tuple[Any, ...], Mode] = {}
         self._mode: Mode | None = None
-        self._mixed = np.zeros(robot.nv)
+        self._mixed, self._amended = np.zeros(robot.nv), np.zeros(robot.nv)
         self._ramps: list[GainRamp] = []
         self._next_field: tuple[float, NullSpaceField] | None = None
         self._timeless = not self.schedules and all(
@@ -184,8 +190,15 @@ class Controller:
 
     # -- the step ---------------------------------------------------------------------
 
-    def compute(self, state: RobotState) -> ControlOutput:
+    def compute(
+        self, state: RobotState, amendment: Amendment | None = None
+    ) -> ControlOutput:
         """Return the effort at a state.
+
+        Args:
+            state: The robot's state.
+            amendment: What is done about the law's acceleration before it is delivered
+                within the limits; None: nothing.
 
         Raises:
             NonFiniteError: If a task or the field gave something that is not finite;
@@ -210,9 +223,13 @@ class Controller:
             a = mode.resolution.acceleration
         if not finite:
             self._explain_non_finite(state)
+        offset = None
+        if amendment is not None:
+            self._amended[:], offset = amendment(state, mode, a)
+            a = self._amended
         resolution = mode.resolution
         tau, a, forces, status, relaxation = self._actuation.deliver(
-            state, a, resolution, mode.support
+            state, a, resolution, mode.support, offset
         )
         problem, e_N = resolution.problem, resolution.null_space_error
         return _output(
@@ -242,8 +259,10 @@ class Controller:
         self._actuation.applied(tau, period)
 
     def restart(self) -> None:
-        """Forget the last effort: what follows is another run."""
+        """Forget the last effort and all offsets: what follows is another run."""
         self._actuation.forget()
+        for task in self.tasks:
+            task.offset[:] = 0.0
 
     def _scheduled(self, state: RobotState) -> tuple[Array, bool, bool]:
         """Return the law's acceleration with what the schedules have on.

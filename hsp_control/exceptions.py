@@ -88,6 +88,14 @@ class ControllerError(HspControlError, ValueError):
     """Tasks, field and metric that do not fit together."""
 
 
+class RemedyError(HspControlError, ValueError):
+    """A remedy that this robot cannot have, or whose settings make no sense."""
+
+
+class UnstableRateError(HspControlError, ValueError):
+    """Gains, delays and a control period for which the sampled loop is unstable."""
+
+
 class SimulationError(HspControlError, RuntimeError):
     """A simulation that cannot start, or that diverged.
 

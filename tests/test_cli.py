@@ -118,6 +118,10 @@ def test_a_diverging_run_keeps_its_log(
 ) -> None:
     wild = ["--set", "simulation.control_period=0.01", "--set", "null_space.gain=900"]
     assert main(["run", MOVING, "--out", str(tmp_path), *wild]) == 2
+    assert "unstable at this rate: K_N times the period is 9" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+    wild += ["--set", "simulation.check_rate=false"]
+    assert main(["run", MOVING, "--out", str(tmp_path), *wild]) == 2
     assert "diverged" in capsys.readouterr().err
     with np.load(tmp_path / "4_moving_obstacle.npz", allow_pickle=False) as columns:
         assert len(columns["t"]) > 1

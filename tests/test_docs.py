@@ -52,7 +52,7 @@ def test_the_readme_s_python_runs(
     np.testing.assert_allclose(rollout["null_space_norm"], decay, rtol=1e-4, atol=1e-8)
 
 
-@pytest.mark.parametrize("page", ["sweeps", "latency"])
+@pytest.mark.parametrize("page", ["sweeps", "latency", "robustness"])
 def test_the_pages_python_runs_and_their_commands_exist(page: str) -> None:
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
     (snippet,) = blocks(text, "python")
@@ -84,6 +84,17 @@ def test_the_readme_s_commands_exist() -> None:
     }  # fmt: skip
     for command in commands:
         _parser().parse_args(command)
+
+
+def test_the_remedies_of_the_document_are_a_configuration() -> None:
+    text = (ROOT / "docs" / "robustness.md").read_text(encoding="utf-8")
+    (configuration,) = blocks(text, "yaml")
+    experiment = load_experiment(
+        yaml.safe_load(configuration), "simulation.duration=0.02"
+    )
+    told = re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE)
+    assert tuple(told) == experiment.remedies.names
+    assert experiment.run().status == "completed"
 
 
 def test_the_view_s_document_is_true(monkeypatch: pytest.MonkeyPatch) -> None:

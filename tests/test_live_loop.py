@@ -41,11 +41,11 @@ from hsp_control.live import (
     Measurement,
     Operator,
     Phase,
-    PlainCommander,
     StopSettings,
     Tolerance,
     run_loop,
 )
+from hsp_control.remedies import Command
 
 Array = NDArray[np.float64]
 AT_REST = 0.02
@@ -99,7 +99,7 @@ def test_it_is_the_simulation_then_stops(tmp_path: Path) -> None:
 
 
 def test_a_commander_of_ones_own_is_asked_and_restarted() -> None:
-    class Halved(PlainCommander):
+    class Halved(Command):
         restarts = 0
 
         def restart(self) -> None:
@@ -328,7 +328,7 @@ def test_a_law_that_fails_ends_in_the_safe_stop(what: Any, tmp_path: Path) -> No
 
 
 def test_a_commander_s_nan_never_goes_out() -> None:
-    class Broken(PlainCommander):
+    class Broken(Command):
         def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
             tau = super().effort(t, q, v, period)
             return np.full(7, np.nan) if t > 0.1 else tau

@@ -128,7 +128,12 @@ class Actuation:
             self._low[:], self._high[:] = -self.limits.effort, self.limits.effort
 
     def deliver(
-        self, state: RobotState, a: Array, resolution: Resolution, support: Support
+        self,
+        state: RobotState,
+        a: Array,
+        resolution: Resolution,
+        support: Support,
+        offset: Array | None = None,
     ) -> Delivered:
         """Return efforts and forces for an acceleration, or what is nearest to it.
 
@@ -137,10 +142,15 @@ class Actuation:
             a: The law's acceleration, shape (nv,).
             resolution: Where it comes from: whose tasks yield in which order.
             support: The contacts that bear; updated here.
+            offset: What the acceleration takes besides M a + N, as friction does,
+                shape (nv,) [N·m or N]; None: nothing. Limits are kept by the sum.
         """
         wanted = state.inverse_dynamics(a)  # M a + N
-        forces, tau = self._no_forces, wanted
         moves, affords = self._keeps_limits(state, a)
+        if offset is not None:
+            wanted = wanted + offset
+            affords = within(wanted, self._low, self._high)
+        forces, tau = self._no_forces, wanted
         if self._only_boxes and moves and affords:
             return wanted, a, forces, EXACT, 0.0
         if support.size:

@@ -42,6 +42,7 @@ def load(options: argparse.Namespace) -> Experiment:
 def run(options: argparse.Namespace) -> int:
     """Simulate, save the log, say what it shows; keep what was computed."""
     experiment = load(options)
+    _warn_of_rates(experiment)
     log = options.out / f"{experiment.name}.npz"
     log.parent.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
     if not options.view:
@@ -158,16 +159,24 @@ def check(options: argparse.Namespace) -> int:
         )
     table.add_row("null space", f"{robot.nv - rows} freedoms, {controller.field.name}")
     table.add_row("plant", experiment.plant.describe()["type"])
+    table.add_row("remedies", ", ".join(experiment.remedies.names) or "none")
     values = ", ".join(f"{value:.3g}" for value in diagnostics.singular_values)
     table.add_row("singular values", f"{values} at the start")
     table.add_row("largest effort", f"{np.abs(output.tau).max():.3g} at the start")
     _out.print(table)
+    _warn_of_rates(experiment)
     if output.damped:
         _out.print(
             "The tasks are singular at the start: the law is bounded there, not exact."
         )
     _out.print(f"{options.config}: fine")
     return 0
+
+
+def _warn_of_rates(experiment: Experiment) -> None:
+    for finding in experiment.rate_findings:
+        place = ".".join(finding.path)
+        print(f"hsp: {place}: {finding.message}", file=sys.stderr)
 
 
 def plot(options: argparse.Namespace) -> int:

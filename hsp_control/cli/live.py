@@ -31,6 +31,7 @@ from hsp_control.live.from_config import (
     tolerance_of,
     watched_robot,
 )
+from hsp_control.remedies import Command
 from hsp_control.simulation import Rollout
 
 _REHEARSED = 0.5
@@ -57,10 +58,11 @@ def live(options: argparse.Namespace) -> int:
         "scene": experiment.scene,
         "log_period": simulation.log_period,
     }
+    command = Command(experiment.controller, experiment.remedies)
     with _signals(operator):
         rehearsal = InProcessRobot(watched_robot(experiment))
         run_loop(
-            experiment.controller,
+            command,
             rehearsal,
             duration=min(duration, _REHEARSED),
             **settings,
@@ -69,7 +71,7 @@ def live(options: argparse.Namespace) -> int:
             experiment, faults=faults, log=robots, log_period=simulation.log_period
         ) as robot:
             report = run_loop(
-                experiment.controller,
+                command,
                 robot.hardware,
                 duration=None if duration == inf else duration,
                 log=own,

@@ -13,6 +13,7 @@ from hsp_control.arrays import Array
 from hsp_control.composition import check_support
 from hsp_control.config.build_null_space import build_fields, build_metric
 from hsp_control.config.build_plant import build_plant
+from hsp_control.config.build_remedies import build_remedies, check_rates
 from hsp_control.config.build_robot import build_robot, build_start
 from hsp_control.config.build_scene import build_scene, located_scene
 from hsp_control.config.build_support import (
@@ -31,6 +32,7 @@ from hsp_control.config.validation import validate
 from hsp_control.controller import Controller
 from hsp_control.exceptions import ConfigError, SimulationError
 from hsp_control.plants import Dop853, Integrator, Plant, Rk4, SemiImplicitEuler
+from hsp_control.remedies import RateFinding, Remedies
 from hsp_control.resources import bundled_configs
 from hsp_control.robot import Robot
 from hsp_control.scene import Scene
@@ -55,6 +57,8 @@ class Experiment:
         v0: Start velocity, shape (nv,).
         integrator: How the simulation moves on.
         plant: What the controller's efforts move.
+        remedies: What is done about what the plant has beside the model.
+        rate_findings: Gains that are high for the control period.
     """
 
     name: str
@@ -66,6 +70,8 @@ class Experiment:
     v0: Array
     integrator: Integrator
     plant: Plant
+    remedies: Remedies
+    rate_findings: tuple[RateFinding, ...]
 
     def run(
         self,
@@ -83,6 +89,7 @@ class Experiment:
             log_period=settings.log_period,
             integrator=self.integrator,
             plant=self.plant,
+            remedies=self.remedies,
             scene=self.scene,
             on_progress=on_progress,
             on_row=on_row,
@@ -219,6 +226,8 @@ def build(document: Document) -> Experiment:
             limits.check_start(q0, v0)
     integrator = _integrator(document, scenario)
     plant, scenario = build_plant(document, scenario, folder, robot, integrator)
+    remedies = build_remedies(document, scenario, controller)
+    rates = check_rates(document, scenario, controller, remedies, q0)
     return Experiment(
         name=Path(document.name).stem,
         scenario=scenario,
@@ -229,6 +238,8 @@ def build(document: Document) -> Experiment:
         v0=v0.copy(),
         integrator=integrator,
         plant=plant,
+        remedies=remedies,
+        rate_findings=rates,
     )
 
 

@@ -14,6 +14,7 @@ from hsp_control.config.models.limits import LimitsModel
 from hsp_control.config.models.live import LiveModel
 from hsp_control.config.models.null_space import NullSpaceModel
 from hsp_control.config.models.plant import AnyPlant
+from hsp_control.config.models.remedies import RemediesModel
 from hsp_control.config.models.robot import RobotModel, StartModel
 from hsp_control.config.models.scene import SceneModel
 from hsp_control.config.models.simulation import SimulationModel
@@ -48,6 +49,8 @@ class Scenario(Model):
     """Where self-motion goes."""
     plant: AnyPlant = "rigid_body"
     """What its efforts move, and how that differs from the controller's model."""
+    remedies: RemediesModel = RemediesModel()
+    """What is done about that difference."""
     simulation: SimulationModel = SimulationModel()
     """How it is simulated."""
     live: LiveModel = LiveModel()

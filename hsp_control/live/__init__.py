@@ -1,7 +1,6 @@
 """A live loop: a controller on a robot, period by period, with a safe stop."""
 
 from .commander import Commander as Commander
-from .commander import PlainCommander as PlainCommander
 from .deadlines import Deadlines as Deadlines
 from .faults import Faults as Faults
 from .hardware import Hardware as Hardware

@@ -4,6 +4,7 @@ from typing import Protocol
 
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller, ControlOutput
+from hsp_control.remedies import Command
 from hsp_control.robot import RobotState
 
 
@@ -41,35 +42,12 @@ class Commander(Protocol):
             period: How long the effort will be held [s].
         """
 
-
-class PlainCommander:
-    """A controller that takes measurements as they are."""
-
-    def __init__(self, controller: Controller) -> None:
-        """Set the controller."""
-        self.controller = controller
-        self.state = RobotState(controller.robot)
-        self._output: ControlOutput | None = None
-
-    @property
-    def output(self) -> ControlOutput:
-        """What the controller said last."""
-        if self._output is None:
-            self._output = self.controller.compute(self.state)
-        return self._output
-
-    def restart(self) -> None:
-        """Forget the last effort."""
-        self.controller.restart()
-
-    def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
-        """Return the law's effort, shape (nv,)."""
-        self._output = self.controller.compute(self.state.update(t, q, v))
-        return self._output.tau
+    def applied(self, tau: Array, period: float) -> None:
+        """Take note of the effort that acts in fact, and of when the next one will."""
 
 
 def as_commander(commander: "Controller | Commander") -> Commander:
     """Return a controller as a commander, and a commander as it is."""
     if isinstance(commander, Controller):
-        return PlainCommander(commander)
+        return Command(commander)
     return commander

@@ -179,7 +179,7 @@ class _Loop:
             self.stop("fault", f"the effort is not finite: {tau.tolist()}")
         self.send()
         response = intake.answered()
-        self.commander.controller.applied(port.acting, self.hardware.period)
+        self.commander.applied(port.acting, self.hardware.period)
         try:
             self.book.row(self.phase, intake, port, response, last=self.over)
             if self.phase == Phase.RUNNING:

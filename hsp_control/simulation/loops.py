@@ -1,6 +1,6 @@
 """The closed loop, row by row: the law in the integrator's stages, or sampled."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +8,8 @@ import numpy as np
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller, ControlOutput
 from hsp_control.exceptions import SimulationError
-from hsp_control.plants import ContinuousPlant, Integrator, SampledPlant
+from hsp_control.plants import ContinuousPlant, Integrator, Reading, SampledPlant
+from hsp_control.remedies import Command
 from hsp_control.robot import RobotState
 
 RUNAWAY_SPEED = 1e4
@@ -22,11 +23,13 @@ class Instant(NamedTuple):
         state: The true state.
         output: What the controller makes of the true state.
         tau: The effort that it commands, of what it is shown, shape (nv,).
+        readings: What its remedies tell of themselves.
     """
 
     state: RobotState
     output: ControlOutput
     tau: Array
+    readings: Mapping[str, Reading]
 
 
 def continuous_loop(
@@ -54,11 +57,11 @@ def continuous_loop(
             q, v = integrator.advance(plant.robot, feedback, times[k - 1], t, q, v)
             _stop_runaway(t, q, v)
         output = controller.compute(state.update(t, q, v))
-        yield Instant(state, output, output.tau)
+        yield Instant(state, output, output.tau, {})
 
 
 def sampled_loop(
-    controller: Controller,
+    command: Command,
     plant: SampledPlant,
     periods: int,
     times: Sequence[float],
@@ -70,22 +73,26 @@ def sampled_loop(
     Raises:
         SimulationError: If the motion diverges.
     """
-    state = RobotState(controller.robot)
     plant.reset(times[0], q, v)
-    controller.restart()
+    command.restart()
+    period = (times[1] - times[0]) / periods
     for start, end in zip(times, (*times[1:], times[-1]), strict=True):
+        if end > start:
+            period = (end - start) / periods
         for k in range(periods):
             t = start + k * (end - start) / periods
-            shown = plant.measure(t, q, v)
-            output = controller.compute(state.update(t, *shown))
-            tau = output.tau.copy()
+            tau = command.effort(t, *plant.measure(t, q, v), period).copy()
             if k == 0:
-                if not (shown[0] is q and shown[1] is v):
-                    output = controller.compute(state.update(t, q, v))
-                yield Instant(state, output, tau)
+                output, state = command.output, command.state
+                if not (
+                    t == state.t
+                    and np.array_equal(state.q, q)
+                    and np.array_equal(state.v, v)
+                ):
+                    output = command.at(t, q, v)
+                yield Instant(state, output, tau, command.readings())
             if end == start:  # the last row: nobody waits for what comes next
                 return
-            controller.applied(tau, (end - start) / periods)
             stop = start + (k + 1) * (end - start) / periods
             q, v = plant.advance(t, stop, tau)
         _stop_runaway(end, q, v)

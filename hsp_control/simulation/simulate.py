@@ -18,6 +18,7 @@ from hsp_control.plants import (
     check_plant,
     differing_bodies,
 )
+from hsp_control.remedies import Command, Remedies
 from hsp_control.scene import Scene
 from hsp_control.simulation.loops import continuous_loop, sampled_loop
 from hsp_control.simulation.recorder import Recorder
@@ -39,6 +40,7 @@ def simulate(
     log_period: float = 0.01,
     integrator: Integrator | None = None,
     plant: Plant | None = None,
+    remedies: Remedies | None = None,
     scene: Scene | None = None,
     start_time: float = 0.0,
     on_progress: Callable[[float], None] | None = None,
@@ -58,6 +60,8 @@ def simulate(
         integrator: How a continuous plant moves on; None: `Dop853`.
         plant: What the effort moves; None: the controller's own model. One that is
             sampled has an integrator of its own, and needs a control period.
+        remedies: What is done about what the plant has beside the model; they need a
+            control period.
         scene: Obstacles to log.
         start_time: Time of the first row [s].
         on_progress: Called with the fraction done at every row.
@@ -83,10 +87,16 @@ def simulate(
     times = [start_time + row * log_period for row in range(rows)]
     if isinstance(plant, ContinuousPlant) and periods:
         plant = IntegratedPlant(plant, integrator)
+    if remedies is not None and remedies.names and not periods:
+        raise SimulationError(
+            f"remedies ({', '.join(remedies.names)}) are computed once a period: they "
+            "need a control_period [s], for example 0.001"
+        )
     if isinstance(plant, ContinuousPlant):
         loop = continuous_loop(controller, plant, integrator, times, q, v)
     elif isinstance(plant, SampledPlant) and periods:
-        loop = sampled_loop(controller, plant, periods, times, q, v)
+        command = Command(controller, remedies)
+        loop = sampled_loop(command, plant, periods, times, q, v)
     else:
         raise SimulationError(
             f"{type(plant).__name__} holds the effort it is given: it needs a "
@@ -98,9 +108,9 @@ def simulate(
 
     status, message = "completed", ""
     try:
-        for row, (state, output, tau) in enumerate(loop):
+        for row, (state, output, tau, remembered) in enumerate(loop):
             readings = plant.readings(state.t, state.q, state.v, tau)
-            recorder.record(state, output, tau, readings)
+            recorder.record(state, output, tau, {**remembered, **readings})
             if on_progress is not None:
                 on_progress(row / (rows - 1) if rows > 1 else 1.0)
             if on_row is not None:

@@ -60,7 +60,7 @@ class AngularMomentum(Task):
         np.divide(mass.momentum_matrix_dot, mass.mass, out=out.jacobian_dot)
         out.error[:] = desired.position - out.jacobian @ state.v
         out.error_rate[:] = -self.rate * out.error
-        out.acceleration[:] = desired.velocity - out.error_rate
+        out.acceleration[:] = desired.velocity - out.error_rate + self.offset
         return out
 
     def reference_rate(self, state: RobotState) -> Array:

@@ -67,6 +67,7 @@ class CenterOfMass(CompiledTask):
             *desired,
             self.Kp,
             self.Kv,
+            self.offset,
             *out,
         )
         centroidal = partial(getattr, state, "centroidal")
@@ -94,6 +95,7 @@ def _center_of_mass(
     x_d_ddot: Array,
     Kp: Array,
     Kv: Array,
+    offset: Array,
     J: Array,
     J_dot: Array,
     e: Array,
@@ -109,4 +111,4 @@ def _center_of_mass(
         e[k] = x_d[k] - c[axis]
         e_dot[k] = x_d_dot[k] - c_dot[axis]
         a_x[k] = x_d_ddot[k]
-    track(a_x, Kp, Kv, e, e_dot, a_x)
+    track(a_x, Kp, Kv, offset, e, e_dot, a_x)

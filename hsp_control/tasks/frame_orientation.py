@@ -82,6 +82,7 @@ class FrameOrientation(FrameTask):
             *desired,
             self.Kp,
             self.Kv,
+            self.offset,
             np.zeros((ORIENTATION_SCRATCH, 3)),
             *out,
         )
@@ -187,6 +188,7 @@ def _frame_orientation(
     w_d_dot: Array,
     Kp: Array,
     Kv: Array,
+    offset: Array,
     scratch: Array,
     J: Array,
     J_dot: Array,
@@ -199,5 +201,5 @@ def _frame_orientation(
     orientation_error(R, w, R_d, w_d, scratch, e, e_dot)
     for i in range(3):
         a_x[i] = 0.0
-    track(a_x, Kp, Kv, e, e_dot, a_x)
+    track(a_x, Kp, Kv, offset, e, e_dot, a_x)
     orientation_acceleration(R, w, w_d, w_d_dot, e, e_dot, scratch, a_x)

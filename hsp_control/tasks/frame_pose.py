@@ -73,6 +73,7 @@ class FramePose(FrameTask):
             desired,
             self.Kp,
             self.Kv,
+            self.offset,
             np.zeros((ORIENTATION_SCRATCH, 3)),
             *out,
         )
@@ -110,6 +111,7 @@ def pose_error_equation(
     desired: Array,
     Kp: Array,
     Kv: Array,
+    offset: Array,
     scratch: Array,
     J: Array,
     J_dot: Array,
@@ -130,5 +132,5 @@ def pose_error_equation(
     R_d, w_d, w_d_dot = desired[3:6], desired[6], desired[7]
     w, angle, angle_dot, turning = velocity[3:], e[3:], e_dot[3:], a_x[3:]
     orientation_error(R, w, R_d, w_d, scratch, angle, angle_dot)
-    track(a_x, Kp, Kv, e, e_dot, a_x)
+    track(a_x, Kp, Kv, offset, e, e_dot, a_x)
     orientation_acceleration(R, w, w_d, w_d_dot, angle, angle_dot, scratch, turning)

@@ -75,6 +75,7 @@ class FramePosition(FrameTask):
             *desired,
             self.Kp,
             self.Kv,
+            self.offset,
             *out,
         )
         return self.trajectory.follow(desired), write
@@ -101,6 +102,7 @@ def _frame_position(
     x_d_ddot: Array,
     Kp: Array,
     Kv: Array,
+    offset: Array,
     J: Array,
     J_dot: Array,
     e: Array,
@@ -115,4 +117,4 @@ def _frame_position(
             J_dot[k, j] = J_frame_dot[i, j]
         e[k] = x_d[k] - position[i]
         e_dot[k] = x_d_dot[k] - velocity[i]
-    track(x_d_ddot, Kp, Kv, e, e_dot, a_x)
+    track(x_d_ddot, Kp, Kv, offset, e, e_dot, a_x)

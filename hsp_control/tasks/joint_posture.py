@@ -96,6 +96,7 @@ class JointPosture(CompiledTask):
             *sample,
             self.Kp,
             self.Kv,
+            self.offset,
             np.zeros(self.robot.nv),
             *out,
         )
@@ -132,6 +133,7 @@ def _joint_posture(
     moved_ddot: Array,
     Kp: Array,
     Kv: Array,
+    offset: Array,
     away: Array,
     J: Array,
     J_dot: Array,
@@ -150,4 +152,4 @@ def _joint_posture(
         if held[k, 2] == 2:
             e[k] = atan2(sin(e[k]), cos(e[k]))
         e_dot[k] = moved_dot[k] - v[i]
-    track(moved_ddot, Kp, Kv, e, e_dot, a_x)
+    track(moved_ddot, Kp, Kv, offset, e, e_dot, a_x)

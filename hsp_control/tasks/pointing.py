@@ -88,6 +88,7 @@ class Pointing(FrameTask):
             *desired,
             self.Kp,
             self.Kv,
+            self.offset,
             np.zeros((14, 3)),
             *out,
         )
@@ -117,6 +118,7 @@ def _pointing(
     w_d_dot: Array,
     Kp: Array,
     Kv: Array,
+    offset: Array,
     scratch: Array,
     J: Array,
     J_dot: Array,
@@ -178,7 +180,7 @@ def _pointing(
         moved[i] -= turn[i]
     rotate_back(R_d, moved, rest)
 
-    # s e and s e', which stay bounded, and what Kv and Kp make of them.
+    # s e and s e', which stay bounded, and what Kv, Kp and the offset make of them.
     s = max(1.0 + n[2], NEAREST_TO_ANTIPODE)
     e_scaled, e_dot_scaled, wanted, zero = (
         scratch[10, :2],
@@ -193,7 +195,9 @@ def _pointing(
         e_dot[k] = e_dot_scaled[k] / s
         zero[k] = 0.0
     _stereographic(n, e)
-    track(zero, Kp, Kv, e_scaled, e_dot_scaled, wanted)
+    track(zero, Kp, Kv, zero, e_scaled, e_dot_scaled, wanted)
+    for k in range(2):
+        wanted[k] += s * offset[k]
 
     # The tangent vectors R_dᵀc0 and R_dᵀc1: w' along c1 moves n along the first, w'
     # along c0 against the second.

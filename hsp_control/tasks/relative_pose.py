@@ -97,7 +97,13 @@ class RelativePose(Task):
         out = self._out(out)
         self._follow(state.t)
         pose_error_equation(
-            *self._seen(state), self._desired, self.Kp, self.Kv, self._scratch, *out
+            *self._seen(state),
+            self._desired,
+            self.Kp,
+            self.Kv,
+            self.offset,
+            self._scratch,
+            *out,
         )
         return out
 

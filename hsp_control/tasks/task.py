@@ -52,7 +52,7 @@ class Task(ABC):
     """Something that the robot shall track, with an exactly linear error equation.
 
     To implement one: call ``super().__init__``, and write `evaluate`, which fills every
-    array of ``out`` such that e'' + Kv e' + Kp e = 0 follows *exactly* from
+    array of ``out`` such that e'' + Kv e' + Kp e + offset = 0 follows *exactly* from
     J a + J'v = a_x in the error coordinates that it reports, `reference_rate` and
     `measure`.
 
@@ -62,6 +62,9 @@ class Task(ABC):
         rows: Number of rows m.
         Kp: Stiffness, shape (m, m) [1/s²].
         Kv: Damping, shape (m, m) [1/s].
+        offset: What the error equation has besides, shape (m,) [m/s² or rad/s²]:
+            e'' + Kv e' + Kp e + offset = 0. Zero, unless something that remembers
+            writes it, as integral action does.
     """
 
     def __init__(self, robot: Robot, rows: int, gains: Gains, name: str) -> None:
@@ -84,6 +87,7 @@ class Task(ABC):
         self.name = name
         self.rows = rows
         self.Kp, self.Kv = gains.matrices(rows)
+        self.offset: Array = np.zeros(rows)
 
     def __init_subclass__(cls, **arguments: Any) -> None:
         """Let an `evaluate` that is overridden count, also of a ready task."""
@@ -164,11 +168,17 @@ def copy_rows(
 
 @kernel
 def track(
-    feed_forward: Array, Kp: Array, Kv: Array, e: Array, e_dot: Array, out: Array
+    feed_forward: Array,
+    Kp: Array,
+    Kv: Array,
+    offset: Array,
+    e: Array,
+    e_dot: Array,
+    out: Array,
 ) -> None:
-    """Write feed_forward + Kv e' + Kp e; ``out`` may be ``feed_forward``."""
+    """Write feed_forward + offset + Kv e' + Kp e; ``out`` may be ``feed_forward``."""
     for i in range(e.shape[0]):
-        total = feed_forward[i]
+        total = feed_forward[i] + offset[i]
         for j in range(e.shape[0]):
             total += Kv[i, j] * e_dot[j] + Kp[i, j] * e[j]
         out[i] = total

@@ -47,5 +47,7 @@ class SimulationModel(Model):
     """Time between two rows of the log [s]."""
     control_period: Positive | None = None
     """How long an effort is held [s]; none: evaluated in the integrator's stages."""
+    check_rate: bool = True
+    """Whether a loop that is unstable at its control period is refused."""
     integrator: AnyIntegrator = Dop853Model(type="dop853")
     """How the robot moves on."""

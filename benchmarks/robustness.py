@@ -1,0 +1,334 @@
+"""What each remedy is worth on each imperfect plant: two arms, two engines.
+
+    .venv/bin/python benchmarks/robustness.py [--fresh] [--tables]
+
+Runs the motion of docs/plants.md with the nominal model, on Pinocchio's plant and on
+MuJoCo's; writes docs/robustness.csv, and of it the tables of docs/robustness.md. What
+the CSV has is not run again, so that it may be stopped and go on; ``--fresh`` forgets
+it, ``--tables`` only writes the page. Half an hour of two cores.
+"""
+
+import csv
+import sys
+import tempfile
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from iiwa_inertias import write_urdf
+from imperfect_plants import SETTLED, configuration
+from marked import DOCS, replace_part
+from rich.progress import track
+
+from hsp_control import ContinuousPlant, IntegratedPlant, SampledPlant, load_experiment
+from hsp_control.remedies import Command
+from hsp_control.robot import RobotState
+
+PROCESSES = 3
+CSV = DOCS / "robustness.csv"
+HANDS = {"panda": "panda_tcp", "iiwa14": "iiwa_link_ee"}
+ENGINES = {"rigid_body": "Pinocchio", "mujoco": "MuJoCo"}
+MEASURES = {"error": "task error [mm]", "e_N": "‖e_N‖ [rad/s]", "rate": "rate [N·m/s]"}
+
+RANDOM = {"inertias": {"random_mass": 0.2, "random_inertia": 0.2, "random_com": 0.01}}
+COULOMB, VISCOUS = [0.8, 0.8, 0.6, 0.6, 0.3, 0.3, 0.2], 0.2
+FRICTION = {"friction": {"coulomb": COULOMB, "viscous": VISCOUS}}
+NOISE = {"sensors": {"velocity_noise": 0.02}}
+ENCODER = {
+    "sensors": {
+        "encoder_resolution": 2.0 * np.pi / 2**19,
+        "differenced_velocity": True,
+    }
+}
+SHARE = 0.8  # of the friction that the feed-forward knows of
+FEED_FORWARD = {"coulomb": [SHARE * c for c in COULOMB], "viscous": SHARE * VISCOUS}
+
+
+@dataclass(frozen=True)
+class Row:
+    """A plant.
+
+    Attributes:
+        name: What is wrong with it.
+        plant: The same for the configuration.
+        frequency: Of the loop [Hz].
+        seeds: Of what is random; several are one root mean square.
+        imagined: Whether the feed-forward pays for friction that is not there.
+        robot: The only one that it is for, if it is.
+    """
+
+    name: str
+    plant: dict[str, Any] = field(default_factory=dict)
+    frequency: int = 1000
+    seeds: tuple[int, ...] = (1,)
+    imagined: bool = False
+    robot: str | None = None
+
+    @property
+    def delay(self) -> int:
+        """Periods that its efforts are late."""
+        return int(self.plant.get("drives", {}).get("delay", 0))
+
+    @property
+    def noisy(self) -> bool:
+        """Whether its sensors are."""
+        return "sensors" in self.plant
+
+    @property
+    def friction(self) -> dict[str, Any] | None:
+        """What the feed-forward is told."""
+        known = self.imagined or "friction" in self.plant
+        return FEED_FORWARD if known else None
+
+
+SEEDS = (0, 1, 2)
+ROWS = [
+    Row("exact"),
+    Row("masses +20 %", {"inertias": {"mass_factor": 1.2}}),
+    Row("masses -20 %", {"inertias": {"mass_factor": 0.8}}),
+    Row("random ±20 %", RANDOM, seeds=SEEDS),
+    Row("friction", FRICTION),
+    Row("random ±20 %, friction", {**RANDOM, **FRICTION}, seeds=SEEDS),
+    Row("payload of 2 kg", {"payload": {"mass": 2.0}}),
+    Row("another source's inertias", robot="iiwa14"),
+    Row("velocity noise 0.02 rad/s", NOISE),
+    Row("random, friction, noise", {**RANDOM, **FRICTION, **NOISE}),
+    Row("random, friction, 19-bit encoder", {**RANDOM, **FRICTION, **ENCODER}),
+    Row("one period late", {"drives": {"delay": 1}}),
+    Row("two periods late", {"drives": {"delay": 2}}),
+    Row("500 Hz", frequency=500),
+    Row("200 Hz", frequency=200),
+    Row("100 Hz", frequency=100),
+    Row("random, friction, 200 Hz", {**RANDOM, **FRICTION}, 200),
+    Row("random, friction, 100 Hz", {**RANDOM, **FRICTION}, 100),
+    Row("random, friction, noise, one late, 500 Hz",
+        {**RANDOM, **FRICTION, **NOISE, "drives": {"delay": 1}}, 500),
+    Row("exact, friction imagined", imagined=True),
+]  # fmt: skip
+
+Remedies = dict[str, Any]
+COLUMNS: dict[str, Callable[[Row], Remedies | None]] = {
+    "law alone": lambda row: {},
+    "integral": lambda row: {"integral_action": {"rate": 10.0}},
+    "observer": lambda row: {"momentum_observer": {"bandwidth": 50.0}},
+    "feed-forward": lambda row: _if(row.friction, "friction_feed_forward"),
+    "feed-forward + observer": lambda row: _if(
+        row.friction,
+        "friction_feed_forward",
+        momentum_observer={"bandwidth": 50.0},
+    ),
+    "filter": lambda row: _if(
+        {"cutoff": 50.0} if row.noisy or row == ROWS[0] else None, "velocity_filter"
+    ),
+    "predictor": lambda row: _if(
+        {"effort_delay": row.delay} if row.delay else None, "predictor"
+    ),
+    "rate limit": lambda row: _if(
+        1000.0 if row.noisy or row == ROWS[0] else None, "effort_rate"
+    ),
+    "all": lambda row: {
+        "velocity_filter": {"cutoff": 50.0},
+        "momentum_observer": {"bandwidth": 20.0},
+        "integral_action": {"rate": 5.0},
+        "effort_rate": 1000.0,
+        "start_up_ramp": {"duration": 1.0},
+        **(_if(row.friction, "friction_feed_forward") or {}),
+        **(_if({"effort_delay": row.delay} if row.delay else None, "predictor") or {}),
+    },
+}
+"""What is on in each column; None where the remedy has nothing to do."""
+
+
+def _if(settings: Any, name: str, **beside: Any) -> Remedies | None:
+    return None if settings is None else {name: settings, **beside}
+
+
+@dataclass(frozen=True)
+class Job:
+    """One cell: a robot, an engine, a row, a column and a seed."""
+
+    robot: str
+    engine: str
+    row: int
+    column: str
+    seed: int
+
+
+def jobs(robots: list[str], engines: list[str]) -> list[Job]:
+    """Return all cells that have something to do."""
+    return [
+        Job(robot, engine, k, column, seed)
+        for robot in robots
+        for k, row in enumerate(ROWS)
+        if row.robot in (None, robot)
+        for engine in engines
+        for column, remedies in COLUMNS.items()
+        if remedies(row) is not None
+        for seed in row.seeds
+    ]
+
+
+def experiment(job: Job, folder: Path) -> dict[str, Any]:
+    """Return the configuration of a cell."""
+    row, remedies = ROWS[job.row], COLUMNS[job.column](ROWS[job.row])
+    plant = {"type": job.engine, "seed": job.seed, **row.plant}
+    if row.robot == "iiwa14":
+        folder.mkdir(exist_ok=True)
+        plant["robot"] = {"name": str(write_urdf(folder))}
+    config = configuration(job.robot, HANDS[job.robot], plant)
+    config["simulation"]["control_period"] = 1.0 / row.frequency
+    config["simulation"]["log_period"] = 1.0 / row.frequency
+    config["remedies"] = remedies
+    return config
+
+
+def measured(config: dict[str, Any]) -> tuple[float, float, float]:
+    """Return the root mean squares of a run, inf if it diverges.
+
+    Of the hand's error [mm], of ‖e_N‖ [rad/s] and of the efforts' rates [N·m/s], from
+    1.5 s to the end; without a log, which would cost most of the time.
+    """
+    made = load_experiment(config)
+    settings, plant = made.scenario.simulation, made.plant
+    period = settings.control_period
+    assert period is not None
+    if isinstance(plant, ContinuousPlant):
+        plant = IntegratedPlant(plant, made.integrator)
+    assert isinstance(plant, SampledPlant)
+    command, state = Command(made.controller, made.remedies), RobotState(made.robot)
+    q, v, last = made.q0, made.v0, np.zeros(made.robot.nv)
+    plant.reset(0.0, q, v)
+    sums, efforts, rows = np.zeros(2), 0.0, 0
+    steps = round(settings.duration / period)
+    settled = round(SETTLED / period)
+    for k in range(steps):
+        t = k * period
+        tau = command.effort(t, *plant.measure(t, q, v), period)
+        if k > settled:
+            efforts += float(np.mean(((tau - last) / period) ** 2)) / (steps - settled)
+        if k > settled and k % max(1, round(0.005 / period)) == 0:
+            output = made.controller.compute(state.update(t, q, v))
+            e, e_N = output.task.error, output.null_space_error
+            sums += 1e6 * (e @ e), e_N @ e_N
+            rows += 1
+        last = tau.copy()
+        q, v = plant.advance(t, t + period, tau)
+        if not np.abs(v).max() < 100.0:
+            return np.inf, np.inf, np.inf
+    error, e_N = np.sqrt(sums / rows)
+    return float(error), float(e_N), float(np.sqrt(efforts))
+
+
+def run(job: Job) -> tuple[float, float, float]:
+    """Run a cell."""
+    with tempfile.TemporaryDirectory() as folder:
+        return measured(experiment(job, Path(folder)))
+
+
+def run_all() -> None:
+    """Run what the CSV does not have yet, and append it: what matters most first."""
+    done = set(read()) if CSV.is_file() else set()
+    todo = [job for job in jobs([*HANDS], [*ENGINES]) if _place(job) not in done]
+    todo.sort(key=_lateness)
+    if not CSV.is_file():
+        names = ["robot", "engine", "plant", "remedies", "seed", *MEASURES]
+        CSV.write_text(",".join(names) + "\n", encoding="utf-8")
+    with ProcessPoolExecutor(PROCESSES) as pool:
+        results = pool.map(run, todo)
+        for job, result in zip(todo, track(results, total=len(todo)), strict=True):
+            with CSV.open("a", encoding="utf-8", newline="") as file:
+                numbers = (f"{x:.4g}" for x in result)
+                csv.writer(file, lineterminator="\n").writerow([*_place(job), *numbers])
+
+
+def _place(job: Job) -> tuple[str, str, str, str, str]:
+    """Return what names a cell in the CSV."""
+    engine, plant = ENGINES[job.engine], ROWS[job.row].name
+    return job.robot, engine, plant, job.column, str(job.seed)
+
+
+def _lateness(job: Job) -> tuple[int, int]:
+    """Return what a cell waits for: a first seed, and what frames a table, go first."""
+    ends = ("law alone", "feed-forward + observer", "all")
+    return (
+        2 * (job.seed != ROWS[job.row].seeds[0]) + (job.column not in ends),
+        (job.robot != "panda") + (job.engine != "rigid_body"),
+    )
+
+
+def read() -> dict[tuple[str, ...], dict[str, float]]:
+    """Return what was measured, by robot, engine, plant, remedies and seed."""
+    names = ("robot", "engine", "plant", "remedies", "seed")
+    with CSV.open(encoding="utf-8") as file:
+        return {
+            tuple(row[name] for name in names): {
+                name: float(row[name]) for name in MEASURES
+            }
+            for row in csv.DictReader(file)
+        }
+
+
+def means() -> dict[tuple[str, ...], dict[str, float]]:
+    """Return root mean squares over the seeds, by robot, engine, plant, remedies."""
+    cells: dict[tuple[str, ...], list[dict[str, float]]] = {}
+    for place, values in read().items():
+        cells.setdefault(place[:4], []).append(values)
+    return {
+        place: {
+            name: float(np.sqrt(np.mean([each[name] ** 2 for each in values])))
+            for name in MEASURES
+        }
+        for place, values in cells.items()
+    }
+
+
+def tables() -> str:
+    """Return the tables in Markdown: one for each arm and measure."""
+    cells, lines = means(), []
+    for robot in HANDS:
+        for measure, heading in MEASURES.items():
+            lines += ["", f"### {robot}: {heading}", ""]
+            lines += [f"| plant | {' | '.join(COLUMNS)} |"]
+            lines += [f"|---|{'--:|' * len(COLUMNS)}"]
+            for row in ROWS:
+                if (robot, "Pinocchio", row.name, "law alone") not in cells:
+                    continue
+                shown = []
+                for column in COLUMNS:
+                    pair = [
+                        cells.get((robot, engine, row.name, column), {}).get(measure)
+                        for engine in ENGINES.values()
+                    ]
+                    shown.append(_shown(pair))
+                lines.append(f"| {row.name} | {' | '.join(shown)} |")
+    return "\n".join(lines[1:]) + "\n"
+
+
+def _shown(pair: list[float | None]) -> str:
+    """Return both engines' numbers, as one where they agree to 5 %."""
+    given = [each for each in pair if each is not None]
+    if not given:
+        return "·"
+    if len(given) == 1:
+        return f"{given[0]:.2g} / –" if pair[1] is None else f"– / {given[0]:.2g}"
+    low, high = sorted(given)
+    if low == high or high - low <= 0.05 * high:
+        return f"{given[0]:.2g}"
+    return f"{given[0]:.2g} / {given[1]:.2g}"
+
+
+def main() -> None:
+    """Run, and write the page's tables."""
+    if "--fresh" in sys.argv:
+        CSV.unlink(missing_ok=True)
+    if "--tables" not in sys.argv:
+        run_all()
+    replace_part(DOCS / "robustness.md", "tables", tables())
+    print(f"Wrote {CSV} and docs/robustness.md")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,74 @@
+"""The picture of docs/robustness.md: every plant beside every remedy, both measures.
+
+.venv/bin/python benchmarks/robustness_figure.py
+"""
+
+import numpy as np
+from marked import DOCS
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.image import AxesImage
+from robustness import COLUMNS, ROWS, means
+
+from hsp_control.plots import new_figure, styled
+
+FILE = DOCS / "figures" / "robustness.png"
+SHOWN = {"error": "task error [mm]", "e_N": "‖e_N‖ [rad/s]"}
+RANGES = {"error": (3e-3, 30.0), "e_N": (1e-3, 3.0)}
+ROBOTS = {"panda": "Panda", "iiwa14": "iiwa 14"}
+
+
+def main() -> None:
+    """Draw it."""
+    cells = means()
+    with styled():
+        figure = new_figure(15.0, 13.0)
+        panels = figure.subplots(2, 2)
+        for row, (robot, title) in zip(panels, ROBOTS.items(), strict=True):
+            for axes, measure in zip(row, SHOWN, strict=True):
+                image = draw(axes, cells, robot, measure)
+                axes.set_title(f"{title}: {SHOWN[measure]}")
+                figure.colorbar(image, ax=axes, label=SHOWN[measure], shrink=0.8)
+        for axes in panels[:, 1]:
+            axes.set_yticklabels([])
+        figure.savefig(FILE, dpi=80)
+    print(f"Wrote {FILE}")
+
+
+def draw(
+    axes: Axes,
+    cells: dict[tuple[str, ...], dict[str, float]],
+    robot: str,
+    measure: str,
+) -> AxesImage:
+    """Draw one arm's measure on Pinocchio's plant, on MuJoCo's where only that ran."""
+    rows = [row.name for row in ROWS if row.robot in (None, robot)]
+    values = np.full((len(rows), len(COLUMNS)), np.nan)
+    for i, name in enumerate(rows):
+        for j, column in enumerate(COLUMNS):
+            for engine in ("MuJoCo", "Pinocchio"):
+                if (found := cells.get((robot, engine, name, column))) is not None:
+                    values[i, j] = found[measure]
+    low, high = RANGES[measure]
+    image = axes.imshow(
+        np.clip(values, low, high),
+        cmap="RdYlGn_r",
+        norm=LogNorm(low, high),
+        aspect="auto",
+        alpha=0.85,
+    )
+    for (i, j), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            axes.text(j, i, f"{value:.2g}", ha="center", va="center", fontsize=8)
+    axes.set_xticks(range(len(COLUMNS)), [*COLUMNS], rotation=35, ha="right")
+    axes.set_yticks(range(len(rows)), rows)
+    axes.grid(visible=False)
+    axes.set_xticks(np.arange(len(COLUMNS) - 1) + 0.5, minor=True)
+    axes.set_yticks(np.arange(len(rows) - 1) + 0.5, minor=True)
+    axes.grid(which="minor", color="white", linewidth=1.0)
+    axes.tick_params(which="minor", length=0)
+    return image
+
+
+if __name__ == "__main__":
+    main()
