@@ -47,6 +47,23 @@ def test_damping_takes_energy_whatever_the_inertia(seed: int, limited: bool) -> 
         np.testing.assert_allclose(power, -20.0 * v @ M @ v, rtol=1e-9)
 
 
+def test_a_share_of_the_damping_brakes_where_clipped_damping_would_drive() -> None:
+    rng = np.random.default_rng(0)
+    driven = 0
+    state = panda().state(0.0, start(), np.zeros(7))
+    for _ in range(1000):
+        q = panda().random_configuration(rng)
+        v = rng.standard_normal(7) * rng.choice([0.0, 1.0, 3.0], 7)
+        most = np.abs(gravity(q)) + rng.uniform(0.5, 20.0, 7)  # little is left to brake
+        stop = SafeStop(panda(), StopSettings(rest_speed=1e-9), most, PERIOD)
+        tau = stop.effort(state.update(0.0, q, v))
+        assert v @ (tau - gravity(q)) <= 1e-9
+        assert (np.abs(tau) <= most * (1.0 + 1e-12)).all()
+        clipped = np.clip(gravity(q) - 20.0 * state.mass_matrix @ v, -most, most)
+        driven += v @ (clipped - gravity(q)) > 1.0  # [W]
+    assert driven > 0
+
+
 @pytest.mark.parametrize(("seed", "factor"), [(0, 0.6), (1, 1.0), (2, 1.6)])
 def test_it_stops_a_robot_that_is_not_the_model(seed: int, factor: float) -> None:
     """Wrong masses: it comes to rest, and the hold keeps it within gravity's error."""
