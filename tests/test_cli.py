@@ -129,12 +129,13 @@ def test_a_diverging_run_keeps_its_log(
 
 
 def test_ctrl_c_keeps_what_was_computed(tmp_path: Path) -> None:
+    main(["run", MOVING, "--out", str(tmp_path / "short"), *SHORT])  # compiles
     command = [sys.executable, "-m", "hsp_control", "run", MOVING, "--out"]
     long = ["--set", "simulation.duration=10000", "--set", "simulation.log_period=0.1"]
     process = subprocess.Popen(
         [*command, str(tmp_path), *long], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
-    time.sleep(8.0)  # well into the run, compilation included
+    time.sleep(8.0)  # well into the run
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 2, errors.decode()

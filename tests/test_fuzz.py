@@ -21,39 +21,24 @@ SEED = 2
 
 @pytest.mark.parametrize("robot", bundled_robots())
 def test_random_states(robot: str) -> None:
-    for tally in random_states.bundled(robot, SEED, 3000):
+    for tally in random_states.bundled(robot, SEED, 2000):
         assert tally.good, tally.examples
-    assert tally.steps == 3000
+    assert tally.steps == 2000
     assert tally.limited > 0
     assert tally.damped > 0
     assert tally.status[2] > 0  # limits were met
 
 
-@pytest.mark.parametrize(("kind", "cases"), [("yaml", 40), ("urdf", 8), ("logs", 8)])
+@pytest.mark.parametrize(("kind", "cases"), [("yaml", 30), ("urdf", 5), ("logs", 5)])
 def test_mutated_files(kind: str, cases: int) -> None:
     count = count_cases(KINDS[kind], SEED, cases)
     assert count.good, "\n".join(count.examples)
-    assert count.kinds["refused"] > cases // 5
-
-
-def crash(seed: int, index: int) -> list[str]:
-    """Do what a case must not, by its number."""
-    import os
-    import time
-
-    match index:
-        case 0:
-            os.abort()
-        case 1:
-            time.sleep(60.0)
-        case 2:
-            raise RuntimeError("unforeseen")
-    return ["fine", ""]
+    assert count.kinds["refused"] > 0
 
 
 def test_crashes_and_hangs_are_noticed() -> None:
     """The harness sees what it looks for, and goes on after it."""
-    with Worker("test_fuzz:crash", 2.0) as worker:
+    with Worker("campaigns.crash_case:case", 1.0) as worker:
         assert worker.ask(0, 3).kind == "fine"  # the first has a minute more
         kinds = [worker.ask(0, index).kind for index in (1, 0, 2, 3)]
     assert kinds == ["hang", "crash", "crash", "fine"]
@@ -109,7 +94,7 @@ def test_a_log_cut_anywhere(run: Rollout, log: Path, tmp_path: Path) -> None:
 
 
 def test_ctrl_c_at_any_moment(log: Path) -> None:
-    sample(5, lambda r, f: faults.interrupted(r, f, log, 6.0))
+    sample(3, lambda r, f: faults.interrupted(r, f, log, 6.0))
 
 
 def test_salvage_names_what_is_lost(

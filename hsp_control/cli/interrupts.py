@@ -14,7 +14,8 @@ from typing import Any, Self
 class FirstInterruptWaits:
     """Within this block the first Ctrl-C is kept for `check`; a second one interrupts.
 
-    Outside the main thread, which alone gets signals, it does nothing.
+    Outside the main thread, which alone gets signals, it does nothing, nor where
+    whoever started the process has it ignore them.
     """
 
     def __init__(self) -> None:
@@ -33,7 +34,8 @@ class FirstInterruptWaits:
             raise KeyboardInterrupt
 
     def __enter__(self) -> Self:
-        if threading.current_thread() is threading.main_thread():
+        ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        if not ignored and threading.current_thread() is threading.main_thread():
             self._before = signal.signal(signal.SIGINT, self._keep)
         return self
 

@@ -37,7 +37,8 @@ def draw_manipulability(axes: Axes, rollout: Rollout) -> None:
         label=f"minimum {values[least]:.3g} at {t[least]:.2f} s",
     )
     mark_damped(axes, rollout)
-    axes.set_ylim(0.0, 1.08 * max(float(values.max()), 1e-12))
+    highest = float(values[np.isfinite(values)].max(initial=1e-12))
+    axes.set_ylim(0.0, 1.08 * highest)
     unit = column_unit(rollout, "manipulability")
     axes.set_ylabel(rf"$\det(J\,W^{{-1}}J^{{\mathsf{{T}}}})$ [{unit}]")
     time_axis(axes, t)

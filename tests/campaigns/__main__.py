@@ -5,6 +5,7 @@ what was interrupted is told as far as it went.
 """
 
 import argparse
+import signal
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -88,6 +89,8 @@ def main(arguments: Iterable[str] | None = None) -> int:
         TextColumn("{task.completed:.0f}/{task.total:.0f}"),
         TimeRemainingColumn(),
     )
+    # A shell may start this with Ctrl-C ignored, which all processes would inherit.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     good = True
     try:
         with Progress(*columns) as progress:

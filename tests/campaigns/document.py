@@ -1,6 +1,5 @@
 """docs/fuzz.md: the counts, as far as they went."""
 
-import json
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -103,4 +102,4 @@ def _soak(found: dict[str, dict[str, Any]]) -> str:
 
 
 if __name__ == "__main__":
-    print(json.dumps(kept(), indent=1))
+    write()

@@ -1,0 +1,16 @@
+"""Do what a case must not, by its number: the harness has to notice."""
+
+import os
+import time
+
+
+def case(seed: int, index: int) -> list[str]:
+    """Abort, hang, raise, or be fine."""
+    match index:
+        case 0:
+            os.abort()
+        case 1:
+            time.sleep(60.0)
+        case 2:
+            raise RuntimeError("unforeseen")
+    return ["fine", ""]
