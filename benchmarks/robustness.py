@@ -297,7 +297,10 @@ def tables() -> str:
                 if (robot, "Pinocchio", row.name, "law alone") not in cells:
                     continue
                 shown = []
-                for column in COLUMNS:
+                for column, remedies in COLUMNS.items():
+                    if remedies(row) is None:
+                        shown.append("·")
+                        continue
                     pair = [
                         cells.get((robot, engine, row.name, column), {}).get(measure)
                         for engine in ENGINES.values()
@@ -311,7 +314,7 @@ def _shown(pair: list[float | None]) -> str:
     """Return both engines' numbers, as one where they agree to 5 %."""
     given = [each for each in pair if each is not None]
     if not given:
-        return "·"
+        return "–"
     if len(given) == 1:
         return f"{given[0]:.2g} / –" if pair[1] is None else f"– / {given[0]:.2g}"
     low, high = sorted(given)
@@ -327,6 +330,7 @@ def main() -> None:
     if "--tables" not in sys.argv:
         run_all()
     replace_part(DOCS / "robustness.md", "tables", tables())
+    print("Draw it anew with benchmarks/robustness_figure.py")
     print(f"Wrote {CSV} and docs/robustness.md")
 
 
