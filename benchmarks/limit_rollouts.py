@@ -70,7 +70,7 @@ def draw(seed: int) -> tuple[hsp.Controller, hsp.Limits, Array]:
     70 to 100 % of the arm's efforts, 20 to 50 % of its speeds, 1000 N·m/s, its joint
     ranges; the hand is asked to go round a circle of 20 cm at 1 to 6 rad/s, up to a
     metre from where it is: mostly more than that allows, often out of reach. With odd
-    seeds the null space gives way within 2 rad/s, and gravity takes half of an effort.
+    seeds the null space gives way within 2 rad/s, and every posture can be held.
     """
     robot, rng = panda(), np.random.default_rng(seed)
     lower, upper = robot.position_limits()
@@ -82,7 +82,7 @@ def draw(seed: int) -> tuple[hsp.Controller, hsp.Limits, Array]:
         effort_rate=1000.0,
         velocity=own.velocity * rng.uniform(0.2, 0.5),
         null_space_speed=2.0 if seed % 2 else None,
-        static_effort=0.5 if seed % 2 else None,
+        static_effort=1.0 if seed % 2 else None,
     )
     start = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp")
     away = rng.uniform(0.0, 0.5) * rng.normal(size=3)
