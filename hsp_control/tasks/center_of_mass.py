@@ -54,8 +54,7 @@ class CenterOfMass(CompiledTask):
             )
         self.trajectory = trajectory
 
-    def bind(self, state: RobotState, out: TaskSample) -> Bound:
-        """Return what `evaluate` does; see `Task.bind`."""
+    def _calls(self, state: RobotState, out: TaskSample) -> Bound:
         mass, desired = state.centroidal, TrajectorySample.allocate(self.rows)
         write = bind(
             _center_of_mass,

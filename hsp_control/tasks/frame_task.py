@@ -43,7 +43,6 @@ class FrameTask(CompiledTask):
         Called whenever another state's frame, or another sample, is to be used.
         """
 
-    def bind(self, state: RobotState, out: TaskSample) -> Bound:
-        """Return what `evaluate` does; see `Task.bind`."""
+    def _calls(self, state: RobotState, out: TaskSample) -> Bound:
         follow, write = self._bind(state.frame(self.frame), out)
         return Bound((follow,), (partial(state.frame, self.frame), write))

@@ -84,8 +84,7 @@ class JointPosture(CompiledTask):
         place = {int(row[0]): row for row in robot.single_joints}
         self._rows: Indices = np.array([place[i] for i in indices], dtype=np.int64)
 
-    def bind(self, state: RobotState, out: TaskSample) -> Bound:
-        """Return what `evaluate` does; see `Task.bind`."""
+    def _calls(self, state: RobotState, out: TaskSample) -> Bound:
         sample, displacement = TrajectorySample.allocate(self.rows), self.displacement
         write = bind(
             _joint_posture,

@@ -121,7 +121,7 @@ class Task(ABC):
 
 
 class CompiledTask(Task):
-    """A task of which `bind` says all: calls that write a sample, decided once."""
+    """A task of which `_calls` says all: calls that write a sample, decided once."""
 
     def __init__(self, robot: Robot, rows: int, gains: Gains, name: str) -> None:
         """Set the task; see `Task`."""
@@ -129,8 +129,12 @@ class CompiledTask(Task):
         self._bound: tuple[RobotState, TaskSample, Bound] | None = None
 
     @abstractmethod
+    def _calls(self, state: RobotState, out: TaskSample) -> Bound:
+        """Return what writes a sample at whatever a state then is."""
+
     def bind(self, state: RobotState, out: TaskSample) -> Bound:
-        """Return what `evaluate` does with this state and this sample."""
+        """Return what `evaluate` does; see `Task.bind`."""
+        return self._calls(state, out)
 
     def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
         """Return the sample; see `Task.evaluate`."""
@@ -138,7 +142,7 @@ class CompiledTask(Task):
             out = TaskSample.allocate(self.rows, self.robot.nv)
         bound = self._bound
         if bound is None or bound[0] is not state or bound[1] is not out:
-            self._bound = bound = state, out, self.bind(state, out)
+            self._bound = bound = state, out, self._calls(state, out)
         for follow in bound[2].follow:
             follow(state.t)
         for write in bound[2].write:
