@@ -127,7 +127,8 @@ def figure(found: dict[str, Seen]) -> Figure:
         )
     efforts.axhline(100, color=INK, lw=1.0, ls="--")
     efforts.set_ylabel("effort\n[% of its limit]")
-    efforts.legend(loc="lower right", fontsize=8, ncols=3)
+    efforts.set_ylim(0.0, 108.0)
+    efforts.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8, ncols=3)
     for color, label in zip(SERIES, (BOTH, NEITHER), strict=False):
         seen = found[label]
         style = {"color": color, "lw": 1.2, "label": label}
