@@ -272,10 +272,21 @@ def read() -> dict[tuple[str, ...], dict[str, float]]:
 
 
 def means() -> dict[tuple[str, ...], dict[str, float]]:
-    """Return root mean squares over the seeds, by robot, engine, plant, remedies."""
+    """Return root mean squares over the seeds, by robot, engine, plant, remedies.
+
+    Of the seeds that all cells of an arm's row have: else columns would not compare.
+    """
+    found = read()
+    seeds: dict[tuple[str, ...], set[str]] = {}
+    for *place, seed in found:
+        seeds.setdefault(tuple(place), set()).add(seed)
+    shared: dict[tuple[str, str], set[str]] = {}
+    for (robot, _, plant, _), own in seeds.items():
+        shared[robot, plant] = shared.get((robot, plant), own) & own
     cells: dict[tuple[str, ...], list[dict[str, float]]] = {}
-    for place, values in read().items():
-        cells.setdefault(place[:4], []).append(values)
+    for place, values in found.items():
+        if place[4] in shared[place[0], place[2]]:
+            cells.setdefault(place[:4], []).append(values)
     return {
         place: {
             name: float(np.sqrt(np.mean([each[name] ** 2 for each in values])))
