@@ -174,11 +174,14 @@ def test_the_log_has_the_terms_of_both_and_of_tasks_that_come() -> None:
     assert run.meta["tasks"]["elbow"]["rows"] == 1
     for name, first in (
         ("field.target_posture.g", 3),
-        ("task.elbow.actual", 5),
+        ("task.elbow.error", 5),
     ):
         seen = np.isfinite(run[name]).all(axis=1)
         assert not seen[:first].any()
         assert seen[first + 1 :].all()
+    # What is drawn has a place before it came: where it first was.
+    place = run["task.elbow.actual"]
+    assert (place[:5] == place[5]).all()
     # The old field's share is gone from the log when it is gone from the sum.
     assert np.isnan(run["field.joint_centering.g"][-1]).all()
     assert np.isfinite(run["field.g"]).all()

@@ -254,10 +254,9 @@ def settle(columns: Mapping[str, Array], continuous: Sequence[int]) -> None:
     positions[:, where] = np.unwrap(positions[:, where], axis=0)
     for name, column in columns.items():
         if name.startswith("task.") and name.endswith((".reference", ".actual")):
-            known = np.asarray(np.isfinite(column).all(axis=1))
-            came = int(known.argmax())
-            if known.any() and not known[:came].any():
-                column[:came] = column[came]
+            known = np.flatnonzero(np.isfinite(column).all(axis=1))
+            if known.size:
+                column[: known[0]] = column[known[0]]
 
 
 def _checked(
