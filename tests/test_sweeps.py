@@ -599,7 +599,8 @@ def test_the_command_tells_and_draws_what_it_found(
 def test_reasons_that_differ_in_numbers_alone_are_told_once(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    settings = [*QUICK, "simulation.control_period=0.01"]
+    # Not refused for their rate: the motion shall tell.
+    settings = [*QUICK, "simulation.control_period=0.01", "simulation.check_rate=false"]
     options = [word for setting in settings for word in ("--set", setting)]
     over = ["--over", "null_space.gain=10,900,1100,-1,-2.5"]
     out = ["--out", str(tmp_path / "failing.parquet"), "--workers", "1"]

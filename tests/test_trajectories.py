@@ -337,7 +337,9 @@ def test_uncompiled_equals_compiled(name: str, monkeypatch: pytest.MonkeyPatch) 
                 monkeypatch.setattr(module, member, value.py_func)
     for t, sample in zip(times, compiled, strict=True):
         for a, b in zip(flat(trajectory.sample(t)), sample, strict=True):
-            np.testing.assert_allclose(a, b, rtol=1e-14, atol=1e-14)
+            # Rounding, which differences of a Python function magnify.
+            slack = 1e-9 if name.startswith("callable") else 1e-13
+            np.testing.assert_allclose(a, b, rtol=slack, atol=slack)
 
 
 def test_paper_circle() -> None:
