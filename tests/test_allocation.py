@@ -1,0 +1,44 @@
+"""A step allocates its result and the vector in which Pinocchio returns the effort."""
+
+import os
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from hsp_control import RobotState, load_experiment
+
+MOST = 640
+"""Bytes at once: an array of seven numbers (168), the output's tuple, floats. One more
+vector of seven numbers would not fit."""
+
+
+@pytest.mark.skipif(
+    os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="plain Python makes floats"
+)
+@pytest.mark.parametrize(
+    "name", ["panda_obstacle", "panda_manipulability", "limits/panda_half_strength"]
+)
+def test_a_step_allocates_its_result_and_no_more(name: str) -> None:
+    experiment = load_experiment(name)
+    controller, robot = experiment.controller, experiment.robot
+    state, rng = RobotState(robot), np.random.default_rng(7)
+    v = 0.01 * rng.standard_normal((40, robot.nv))
+    paths = [(0.01 * k, robot.integrate(experiment.q0, v[k]), v[k]) for k in range(40)]
+    for path in paths:  # compile, bind, and see what limits let through
+        output = controller.compute(state.update(*path))
+        assert output.status == 0
+    tracemalloc.start()
+    try:
+        for path in paths:
+            del output
+            before = tracemalloc.get_traced_memory()[0]
+            tracemalloc.reset_peak()
+            output = controller.compute(state.update(*path))
+            assert tracemalloc.get_traced_memory()[1] - before <= MOST
+        before = tracemalloc.get_traced_memory()[0]
+        for path in 25 * paths:
+            controller.compute(state.update(*path))
+        assert tracemalloc.get_traced_memory()[0] - before <= MOST
+    finally:
+        tracemalloc.stop()
