@@ -39,11 +39,12 @@ def kernel(function: Function) -> Function:
     variable ``NUMBA_CACHE_DIR`` names another. Where nothing can be written, every
     start compiles anew.
 
-    It may return arrays to other kernels alone, not to Python: for that there is
-    `uncompiled`.
+    It may return arrays to other kernels alone, not to Python.
 
     Division by zero follows NumPy (inf, nan) instead of raising, so that no branch is
-    spent on it; finiteness is checked once, at the border (`RobotState.update`).
+    spent on it; finiteness is checked once, at the border (`RobotState.update`). Sums
+    may be added in another order and products fused, or no sum would be vectorised:
+    compiled and plain results differ by rounding.
     """
     function.__qualname__ += f"_{_PACKAGE_STATE}"
     # Without the reference counts of Numba's memory manager, handing over an array
@@ -62,11 +63,6 @@ def kernel(function: Function) -> Function:
         _warn_of_no_cache()
         compiled = numba.njit(**(options | {"cache": False}))(function)
     return cast("Function", compiled)
-
-
-def uncompiled(function: Function) -> Function:
-    """Return a kernel as plain Python, for what runs once and gives views."""
-    return cast("Function", getattr(function, "py_func", function))
 
 
 def bind(
