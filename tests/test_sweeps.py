@@ -259,7 +259,7 @@ def test_anything_in_the_configuration_can_vary() -> None:
 
 def test_failures_are_rows_with_their_reason() -> None:
     over = {"null_space.gain": [10.0, -1.0, 900.0]}
-    held = [*QUICK, "simulation.control_period=0.01"]
+    held = [*QUICK, "simulation.control_period=0.01", "simulation.check_rate=false"]
     found = hsp.sweep(MOVING, over, overrides=held, workers=1)
     assert found["status"].tolist() == ["completed", "refused", "diverged"]
     assert "--over null_space.gain: null_space.gain" in found["message"][1]
