@@ -174,12 +174,13 @@ def parts_table(case: Standing, states: list[State]) -> str:
         controller.metric.evaluate(state, problem.metric)
         form = controller.metric.form
         controller.field.evaluate(state, problem.metric, form, problem.field)
-        return mode.resolution.resolve(state.v)
+        return mode._law()  # bound to its arrays, as in a step
 
     for t, q, v in states:
         timed("kinematics, one pass of Pinocchio", lambda: state.update(t, q, v))  # noqa: B023
         timed("rows of contacts and tasks", rows)
-        a = timed("field, metric and law", law).acceleration
+        timed("field, metric and law", law)
+        a = mode.resolution.acceleration
         wanted = timed("inverse dynamics", lambda: state.inverse_dynamics(a).copy())  # noqa: B023
         timed("map of the corner forces", lambda: support.update(state))
         base = actuation.base
