@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from functools import partial
 
-from hsp_control.arrays import Array, Indices
+from hsp_control.arrays import Array
 from hsp_control.bound import Bound
 from hsp_control.exceptions import TaskError
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import bind
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks.axes import axis_indices
+from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import CompiledTask, TaskSample, track
+from hsp_control.tasks.task import CompiledTask, TaskSample
 from hsp_control.trajectories import Trajectory, TrajectorySample
 
 
@@ -57,12 +57,12 @@ class CenterOfMass(CompiledTask):
     def _calls(self, state: RobotState, out: TaskSample) -> Bound:
         mass, desired = state.centroidal, TrajectorySample.allocate(self.rows)
         write = bind(
-            _center_of_mass,
+            track_axes,
+            self._axes,
             mass.jacobian,
             mass.jacobian_dot,
             mass.position,
             mass.velocity,
-            self._axes,
             *desired,
             self.Kp,
             self.Kv,
@@ -80,34 +80,3 @@ class CenterOfMass(CompiledTask):
         """Return desired and actual centre of mass along the tracked axes [m]."""
         desired = self.trajectory.sample(state.t)
         return desired.position, state.centroidal.position[self._axes]
-
-
-@kernel
-def _center_of_mass(
-    J_mass: Array,
-    J_mass_dot: Array,
-    c: Array,
-    c_dot: Array,
-    axes: Indices,
-    x_d: Array,
-    x_d_dot: Array,
-    x_d_ddot: Array,
-    Kp: Array,
-    Kv: Array,
-    offset: Array,
-    J: Array,
-    J_dot: Array,
-    e: Array,
-    e_dot: Array,
-    a_x: Array,
-) -> None:
-    """Write the sample of the tracked axes."""
-    for k in range(axes.shape[0]):
-        axis = axes[k]
-        for j in range(J.shape[1]):
-            J[k, j] = J_mass[axis, j]
-            J_dot[k, j] = J_mass_dot[axis, j]
-        e[k] = x_d[k] - c[axis]
-        e_dot[k] = x_d_dot[k] - c_dot[axis]
-        a_x[k] = x_d_ddot[k]
-    track(a_x, Kp, Kv, offset, e, e_dot, a_x)

@@ -3,15 +3,15 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from hsp_control.arrays import Array, Indices
+from hsp_control.arrays import Array
 from hsp_control.exceptions import TaskError
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import bind
 from hsp_control.kinematics import FrameKinematics
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks.axes import axis_indices
+from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import TaskSample, named_after, track
+from hsp_control.tasks.task import TaskSample, named_after
 from hsp_control.trajectories import Trajectory, TrajectorySample
 from hsp_control.trajectories.following import Follower
 
@@ -66,7 +66,7 @@ class FramePosition(FrameTask):
     ) -> tuple[Follower, Callable[[], Any]]:
         desired = TrajectorySample.allocate(self.rows)
         write = bind(
-            _frame_position,
+            track_axes,
             self._axes,
             frame.jacobian,
             frame.jacobian_dot,
@@ -88,33 +88,3 @@ class FramePosition(FrameTask):
         """Return desired and actual position of the tracked axes [m]."""
         desired = self.trajectory.sample(state.t)
         return desired.position, state.position(self.frame)[self._axes]
-
-
-@kernel
-def _frame_position(
-    axes: Indices,
-    J_frame: Array,
-    J_frame_dot: Array,
-    position: Array,
-    velocity: Array,
-    x_d: Array,
-    x_d_dot: Array,
-    x_d_ddot: Array,
-    Kp: Array,
-    Kv: Array,
-    offset: Array,
-    J: Array,
-    J_dot: Array,
-    e: Array,
-    e_dot: Array,
-    a_x: Array,
-) -> None:
-    """Write the sample; a_x = x_d'' + Kv e' + Kp e."""
-    for k in range(axes.shape[0]):
-        i = axes[k]
-        for j in range(J.shape[1]):
-            J[k, j] = J_frame[i, j]
-            J_dot[k, j] = J_frame_dot[i, j]
-        e[k] = x_d[k] - position[i]
-        e_dot[k] = x_d_dot[k] - velocity[i]
-    track(x_d_ddot, Kp, Kv, offset, e, e_dot, a_x)
