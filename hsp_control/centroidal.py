@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.arrays import Array
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
+from hsp_control.native import bind
 
 
 class CentroidalMotion:

@@ -25,7 +25,7 @@ from hsp_control.limits import Limits
 from hsp_control.metrics import IdentityMetric, Metric
 from hsp_control.metrics.metric import CONSTANT
 from hsp_control.mode import Mode
-from hsp_control.resolution import Resolution
+from hsp_control.resolution import DAMPED, NOT_FINITE, Resolution
 from hsp_control.robot import Robot, RobotState
 from hsp_control.schedules import Schedule
 from hsp_control.tasks import Gains, Task, TaskSample
@@ -216,12 +216,12 @@ class Controller:
             self.field, self._next_field = self._next_field[1], None
         mode = self._mode
         if mode is None or not self._timeless:
-            a, damped, finite = self._scheduled(state)
+            a, how = self._scheduled(state)
             mode = self.mode
         else:
-            damped, finite = mode.resolve(state, self.metric, self.field)
+            how = mode.resolve(state, self.metric, self.field)
             a = mode.resolution.acceleration
-        if not finite:
+        if how == NOT_FINITE:
             self._explain_non_finite(state)
         offset = None
         if amendment is not None:
@@ -240,7 +240,7 @@ class Controller:
                 mode.stack,
                 problem.field,
                 e_N,
-                damped,
+                how == DAMPED,
                 forces,
                 status,
                 relaxation,
@@ -264,10 +264,10 @@ class Controller:
         for task in self.tasks:
             task.offset[:] = 0.0
 
-    def _scheduled(self, state: RobotState) -> tuple[Array, bool, bool]:
+    def _scheduled(self, state: RobotState) -> tuple[Array, float]:
         """Return the law's acceleration with what the schedules have on.
 
-        And whether it was damped, and is finite.
+        And what became of the law, see `Mode.resolve`.
 
         A task that comes or goes has a weight between 0 and 1. With w1 ≥ w2 ≥ ... the
         weights of such tasks, the acceleration is
@@ -290,15 +290,16 @@ class Controller:
         shares = [1.0, *(weights[name] for name in coming), 0.0]
         mixed = self._mixed
         mixed[:] = 0.0
+        how = 0.0
         for k, (share, following) in enumerate(pairwise(shares)):
             self._mode = self._mode_without(state, off - set(coming[:k]))
-            damped, finite = self._mode.resolve(state, self.metric, self.field)
+            how = max(how, self._mode.resolve(state, self.metric, self.field))
             a = self._mode.resolution.acceleration
             if not coming:
                 break
             mixed += (share - following) * a
             a = mixed
-        return a, damped, finite
+        return a, how
 
     def _mode_without(self, state: RobotState, off: Set[str]) -> Mode:
         """Return the mode of the contacts that bear now, without some tasks."""

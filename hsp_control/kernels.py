@@ -9,7 +9,7 @@ debugging and coverage.
 import hashlib
 import warnings
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -46,6 +46,11 @@ def kernel(function: Function) -> Function:
     may be added in another order and products fused, or no sum would be vectorised:
     compiled and plain results differ by rounding.
     """
+    return cast("Function", compiled(numba.njit, function))
+
+
+def compiled(by: Callable[..., Any], function: Callable[..., Any]) -> Any:
+    """Return a function as ``by``, a decorator of Numba's, compiles it, and keep it."""
     function.__qualname__ += f"_{_PACKAGE_STATE}"
     # Without the reference counts of Numba's memory manager, handing over an array
     # costs 6 ns instead of 27, a slice nothing; and what allocates does not compile.
@@ -56,37 +61,12 @@ def kernel(function: Function) -> Function:
         "fastmath": {"reassoc", "contract"},
     }
     try:
-        compiled = numba.njit(**options)(function)
+        return by(**options)(function)
     except RuntimeError as error:  # Numba found no folder to keep the code in
         if "cannot cache" not in str(error):
             raise
         _warn_of_no_cache()
-        compiled = numba.njit(**(options | {"cache": False}))(function)
-    return cast("Function", compiled)
-
-
-def bind(
-    function: Callable[..., Any], *arguments: Any, free: tuple[Any, ...] = ()
-) -> Callable[..., Any]:
-    """Return a call of a kernel with these very arguments, decided once.
-
-    Each call of a compiled function looks its arguments' types up anew, which costs as
-    much as handing them over or more: 0.14 of 0.2 µs for eight arrays. Arrays that stay
-    have types that stay.
-
-    Args:
-        function: The kernel.
-        arguments: Its first arguments. Arrays are followed, numbers stay as they are.
-        free: Numbers of the types that the last arguments will have, which are left to
-            the call.
-    """
-    if not hasattr(function, "overloads"):  # uncompiled
-        return partial(function, *arguments)
-    compiled = cast("Any", function)
-    typeof = cast("Callable[[Any], Any]", numba.typeof)
-    types = tuple(typeof(argument) for argument in (*arguments, *free))
-    compiled.compile(types)
-    return partial(compiled.overloads[types].entry_point, *arguments)
+        return by(**(options | {"cache": False}))(function)
 
 
 @cache

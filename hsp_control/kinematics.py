@@ -1,17 +1,21 @@
 """Where joints and frames are and how they move: Jacobians, exact rates and drift."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import ModelError
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
+from hsp_control.native import bind
 
 
 class FrameKinematics:
     """Where a frame is and how it moves, in world axes, linear before angular.
 
     Attributes:
+        compute: Brings everything below up to the state, if it is not.
         rotation: World ← frame, shape (3, 3).
         position: Its origin in the world [m], shape (3,).
         jacobian: J with (velocity of the origin, angular velocity) = J v, (6, nv).
@@ -21,8 +25,7 @@ class FrameKinematics:
     """
 
     __slots__ = (
-        "_compute",
-        "_stamp",
+        "compute",
         "drift",
         "jacobian",
         "jacobian_dot",
@@ -31,8 +34,18 @@ class FrameKinematics:
         "velocity",
     )
 
-    def __init__(self, model: pin.Model, data: pin.Data, v: Array, index: int) -> None:
-        """Allocate; `RobotState.frame` fills it, with ``v`` for the velocity."""
+    def __init__(
+        self, model: pin.Model, data: pin.Data, v: Array, instant: Indices, index: int
+    ) -> None:
+        """Allocate; `compute` fills it.
+
+        Args:
+            model: The model.
+            data: Its data, where joints and their Jacobians are found.
+            v: The velocity, shape (nv,).
+            instant: A number that changes whenever they do, shape (1,).
+            index: The frame's place in the model.
+        """
         nv, frame = model.nv, model.frames[index]
         joint = data.oMi[frame.parentJoint]  # its parts are views: they follow the data
         self.rotation: Array = np.zeros((3, 3))
@@ -41,9 +54,10 @@ class FrameKinematics:
         self.jacobian_dot: Array = np.zeros((6, nv))
         self.velocity: Array = np.zeros(6)
         self.drift: Array = np.zeros(6)
-        self._stamp = -1
-        self._compute = bind(
+        self.compute: Callable[[], object] = bind(
             frame_kinematics,
+            instant,
+            np.array([-1]),
             data.J,
             data.dJ,
             joint.rotation,
@@ -63,6 +77,8 @@ class FrameKinematics:
 
 @kernel
 def frame_kinematics(
+    instant: Indices,
+    computed: Indices,
     J_world: Array,
     J_world_dot: Array,
     R_joint: Array,
@@ -84,8 +100,12 @@ def frame_kinematics(
     The joints' Jacobian and its rate are moved from the world's origin to the frame's.
     A column (l, w) at the origin reads (l + w × p, w) at the point p, and its rate
     (l' + w' × p + w × p', w'). Only joints that carry the frame have columns; those of
-    joints that mimic add to their leader's.
+    joints that mimic add to their leader's. What has been computed at this instant is
+    left as it is.
     """
+    if computed[0] == instant[0]:
+        return
+    computed[0] = instant[0]
     for i in range(3):
         p[i] = p_joint[i]
         for j in range(3):

@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control.actuation.support import Support
 from hsp_control.arrays import Array, Indices
-from hsp_control.bound import Bound
+from hsp_control.bound import Bound, steps
 from hsp_control.contacts import Contact
 from hsp_control.contacts.unactuated import UnactuatedRows, unactuated_count
 from hsp_control.fields import NullSpaceField
@@ -15,7 +15,6 @@ from hsp_control.metrics import Metric
 from hsp_control.resolution import Resolution
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
-from hsp_control.trajectories.following import stay
 
 
 class Mode:
@@ -78,20 +77,19 @@ class Mode:
 
     def resolve(
         self, state: RobotState, metric: Metric, field: NullSpaceField
-    ) -> tuple[bool, bool]:
+    ) -> float:
         """Resolve contacts, tasks and field: see `resolution` for what comes out.
 
         Returns:
-            Whether the law was damped, and whether all is finite.
+            `EXACT`, `DAMPED` or `NOT_FINITE`.
         """
         bound = self._bound
         if bound is None or bound[0] is not state or bound[2] is not field:
             self._bind(state, metric, field)
-        for follow in self._follow:
-            follow(state.t)
-        for write, arguments in self._write:
-            write(*arguments)
-        return self._law()
+        t, outcome = state.t, 0.0
+        for step in self._steps:
+            outcome = step(t)
+        return outcome
 
     def _bind(self, state: RobotState, metric: Metric, field: NullSpaceField) -> None:
         """Collect what a step calls."""
@@ -102,14 +100,8 @@ class Mode:
             bounds.append(Bound(write=(rest,)))
         bounds.append(metric.bind(state, problem.metric))
         bounds.append(field.bind(state, problem.metric, metric.form, problem.field))
-        self._follow = [call for b in bounds for call in b.follow if call is not stay]
-        # Taken apart, partial calls need not put their arguments together each time.
-        self._write = [
-            (call.func, call.args) if type(call) is partial else (call, ())
-            for b in bounds
-            for call in b.write
-        ]
-        self._law = self.resolution.bind(state.v, controls=field.controls)
+        law = self.resolution.bind(state.v, controls=field.controls)
+        self._steps = steps(bounds, law)
         self._bound = state, metric, field
 
     def culprit(self) -> str | None:

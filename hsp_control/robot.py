@@ -243,6 +243,8 @@ class RobotState:
         t: Time [s].
         q: Configuration, shape (nq,).
         v: Velocity, shape (nv,).
+        instant: A number that changes with every `update`, shape (1,): what is computed
+            may be kept until then.
         data: Pinocchio's data at (q, v), for terms that are not offered here.
     """
 
@@ -266,7 +268,7 @@ class RobotState:
         self._world: WorldKinematics | None = None
         self._unit_blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
         self._frames: dict[str, FrameKinematics] = {}
-        self._stamp = 0
+        self.instant: Indices = np.zeros(1, dtype=np.int64)
         self._mass_matrix_stamp = self._mass_matrix_rate_stamp = -1
         self._effects_stamp = self._centroidal_stamp = -1
         self._centroidal: CentroidalMotion | None = None
@@ -285,7 +287,7 @@ class RobotState:
         t = float(t)
         try:
             taken = q.ndim == v.ndim == 1 and _take(
-                t, q, v, own_q, own_v, self._unit_blocks
+                t, q, v, own_q, own_v, self._unit_blocks, self.instant
             )
         except AttributeError:  # lists are welcome, too
             taken = False
@@ -296,8 +298,8 @@ class RobotState:
             if not np.isfinite(t):
                 raise NonFiniteError(f"time t is {t}; needs a finite number of seconds")
             own_q[:], own_v[:] = q, v
+            self.instant[0] += 1
         self.t = t
-        self._stamp += 1
         self._move()
         return self
 
@@ -310,11 +312,11 @@ class RobotState:
         frame = self._frames.get(name)
         if frame is None:
             index = self.robot.frame_id(name)
-            frame = FrameKinematics(self.robot.model, self.data, self.v, index)
+            frame = FrameKinematics(
+                self.robot.model, self.data, self.v, self.instant, index
+            )
             self._frames[name] = frame
-        if frame._stamp != self._stamp:
-            frame._compute()
-            frame._stamp = self._stamp
+        frame.compute()
         return frame
 
     def position(self, frame: str) -> Array:
@@ -328,23 +330,23 @@ class RobotState:
             self._centroidal = CentroidalMotion(
                 self.robot.model, self.data, self.q, self.v
             )
-        if self._centroidal_stamp != self._stamp:
+        if self._centroidal_stamp != self.stamp:
             self._centroidal.update()
-            self._centroidal_stamp = self._stamp
+            self._centroidal_stamp = self.stamp
         return self._centroidal
 
     @property
     def mass_matrix(self) -> Array:
         """M(q), shape (nv, nv) (CRBA)."""
-        if self._mass_matrix_stamp != self._stamp:
+        if self._mass_matrix_stamp != self.stamp:
             pin.crba(self.robot.model, self.data, self.q)
-            self._mass_matrix_stamp = self._stamp
+            self._mass_matrix_stamp = self.stamp
         return self.data.M  # type: ignore[no-any-return]
 
     @property
     def mass_matrix_rate(self) -> Array:
         """M' = C + Cᵀ along v, shape (nv, nv)."""
-        if self._mass_matrix_rate_stamp != self._stamp:
+        if self._mass_matrix_rate_stamp != self.stamp:
             model = self.robot.model
             if self.robot.mimics:
                 self._mass_matrix_rate[:] = mass_matrix_difference(
@@ -353,15 +355,15 @@ class RobotState:
             else:
                 C = pin.computeCoriolisMatrix(model, self.data, self.q, self.v)
                 np.add(C, C.T, out=self._mass_matrix_rate)
-            self._mass_matrix_rate_stamp = self._stamp
+            self._mass_matrix_rate_stamp = self.stamp
         return self._mass_matrix_rate
 
     @property
     def nonlinear_effects(self) -> Array:
         """N(q, v): Coriolis, centrifugal and gravity efforts, shape (nv,) (RNEA)."""
-        if self._effects_stamp != self._stamp:
+        if self._effects_stamp != self.stamp:
             pin.nonLinearEffects(self.robot.model, self.data, self.q, self.v)
-            self._effects_stamp = self._stamp
+            self._effects_stamp = self.stamp
         return self.data.nle  # type: ignore[no-any-return]
 
     def inverse_dynamics(self, acceleration: Array) -> Array:
@@ -371,7 +373,7 @@ class RobotState:
     @property
     def stamp(self) -> int:
         """A number that changes with every `update`: what is computed may be kept."""
-        return self._stamp
+        return int(self.instant[0])
 
     @property
     def world(self) -> "WorldKinematics":
@@ -417,7 +419,13 @@ class WorldKinematics(NamedTuple):
 
 @kernel
 def _take(
-    t: float, q_in: Array, v_in: Array, q: Array, v: Array, unit_blocks: Indices
+    t: float,
+    q_in: Array,
+    v_in: Array,
+    q: Array,
+    v: Array,
+    unit_blocks: Indices,
+    instant: Indices,
 ) -> bool:
     """Copy q and v if they fit, are finite and of norm 1 in unit blocks; were they?"""
     if q_in.shape[0] != q.shape[0] or v_in.shape[0] != v.shape[0]:
@@ -438,4 +446,5 @@ def _take(
             q[i] = q_in[i]
         for i in range(v.shape[0]):
             v[i] = v_in[i]
+        instant[0] += 1
     return bool(ok)

@@ -33,6 +33,7 @@ from hsp_control import (
     Robot,
     RobotState,
     kernels,
+    native,
 )
 from hsp_control.fields import (
     EqualJointAngles,
@@ -197,16 +198,16 @@ def test_all_tasks_and_fields_are_the_same_without_the_compiler() -> None:
         )
 
 
-def test_a_bound_kernel_follows_its_arrays_and_takes_free_numbers() -> None:
+def test_a_bound_kernel_follows_its_arrays_and_takes_the_time() -> None:
     a, out = np.zeros(2), np.zeros(2)
-    call = kernels.bind(_scale, a, out, free=(1.0,))
+    call = native.bind(_scale, a, out, timed=True)
     a[:] = [1.0, 2.0]
-    call(3)
+    call(3.0)
     np.testing.assert_array_equal(out, [3.0, 6.0])
     call(0.5)
     np.testing.assert_array_equal(out, [0.5, 1.0])
     strided = np.arange(4.0)[::2]
-    kernels.bind(_scale, strided, out, 2.0)()
+    native.bind(_scale, strided, out, 2.0)()
     np.testing.assert_array_equal(out, [0.0, 4.0])
 
 
@@ -359,7 +360,7 @@ def test_no_allocation_in_a_task(name: str, chain: Robot) -> None:
     out = TaskSample.allocate(task.rows, JOINTS)
 
     def step() -> None:
-        state._stamp += 1  # the frame anew, too
+        state.instant[0] += 1  # the frame anew, too
         task.evaluate(state, out)
 
     peak, left = allocated(step, 2000)
@@ -385,7 +386,7 @@ def test_no_allocation_in_a_field(name: str, chain: Robot) -> None:
     metric, out = MetricSample.allocate(JOINTS), FieldSample.allocate(JOINTS)
 
     def step() -> None:
-        state._stamp += 1
+        state.instant[0] += 1
         field.evaluate(state, metric, 0, out)
 
     peak, left = allocated(step, 200 if name in SHAPES or name == "self" else 2000)

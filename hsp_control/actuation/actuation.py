@@ -29,9 +29,9 @@ from hsp_control.actuation.support import Support
 from hsp_control.actuation.yielding import null_space_rows, yielding
 from hsp_control.arrays import Array, Indices
 from hsp_control.contacts import Contact
-from hsp_control.kernels import bind
 from hsp_control.limits import Limits
-from hsp_control.limits.acceleration_bounds import keeps_limits, within
+from hsp_control.limits.acceleration_bounds import EFFORT, MOTION, keeps_limits, within
+from hsp_control.native import bind
 from hsp_control.resolution import Resolution
 from hsp_control.robot import Robot, RobotState
 
@@ -94,7 +94,7 @@ class Actuation:
         self._no_forces = np.zeros(0)
         self._no_support = Support((), nv, self._weight)
         self._bound: tuple[RobotState, Array] | None = None
-        self._check: Callable[[], tuple[bool, bool]]
+        self._check: Callable[[], float]
         self._only_boxes = not self._floats and (
             limits is None or not (limits.distances or limits.static_effort)
         )
@@ -146,13 +146,15 @@ class Actuation:
                 shape (nv,) [N·m or N]; None: nothing. Limits are kept by the sum.
         """
         wanted = state.inverse_dynamics(a)  # M a + N
-        moves, affords = self._keeps_limits(state, a)
+        broken = self._broken(state, a)
         if offset is not None:
             wanted = wanted + offset
-            affords = within(wanted, self._low, self._high)
+            broken = (broken == MOTION or broken == MOTION + EFFORT) * MOTION
+            broken += (not within(wanted, self._low, self._high)) * EFFORT
         forces, tau = self._no_forces, wanted
-        if self._only_boxes and moves and affords:
+        if self._only_boxes and not broken:
             return wanted, a, forces, EXACT, 0.0
+        moves = broken in (0, EFFORT)
         if support.size:
             support.update(state)
             forces, tau = support.least_forces(self.base, wanted)
@@ -170,16 +172,15 @@ class Actuation:
                 return self._finish(wanted, a, shared, support, REDISTRIBUTED, 0.0)
         return self._limit(state, wanted, a, forces, resolution, support, barriers)
 
-    def _keeps_limits(self, state: RobotState, a: Array) -> tuple[bool, bool]:
-        """Write the bounds on the acceleration.
+    def _broken(self, state: RobotState, a: Array) -> float:
+        """Write the bounds on the acceleration; return what is broken, if anything.
 
-        Returns:
-            Whether a is within them, and the effort without contacts, which Pinocchio's
-            data has just been given, within those of the effort.
+        `MOTION` if a is, `EFFORT` if the effort without contacts is, which Pinocchio's
+        data has just been given, or the sum of both.
         """
         limits, bound = self.limits, self._bound
         if limits is None:
-            return True, True
+            return 0.0
         if bound is None or bound[0] is not state or bound[1] is not a:
             self._bound = state, a
             self._check = bind(

@@ -5,12 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from hsp_control.arrays import Array
+from hsp_control.bound import Bound
 from hsp_control.differences import rate_along_flow
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.barrier import barrier
-from hsp_control.fields.cost import Cost
+from hsp_control.fields.cost import Cost, descend
+from hsp_control.fields.field import FieldSample
 from hsp_control.geometry import LinkShape, Proximity, Proxy, link_shapes, self_pairs
-from hsp_control.kernels import bind
+from hsp_control.metrics import MetricSample
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle
 from hsp_control.suggest import did_you_mean, listing
@@ -55,6 +58,18 @@ class Clearance(Cost):
         )
         self._own = np.zeros(robot.nv), np.zeros(robot.nv)
 
+    def bind(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> Bound:
+        """Return what `evaluate` does; see `NullSpaceField.bind`."""
+        formulas, distances = self.proximity.formulas, self.proximity.distances
+        if formulas is None or self.proximity.others is not None:
+            return super().bind(state, metric, form, out)
+        follow, measure = formulas.bind(state, distances)
+        derivatives = formulas.derivatives(state, self._slopes, self._bends, *out)
+        down = bind(descend, metric.L, metric.W_dot, form, *out)
+        return Bound(follow, (*measure, self._barrier, derivatives, down))
+
     def value(self, state: RobotState) -> float:
         """Return f."""
         self.proximity.measure(state)
@@ -73,11 +88,12 @@ class Clearance(Cost):
     def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
         """Write ∇f and (∇f)', shape (nv,) each."""
         self.value(state)
-        gradient.fill(0.0)
-        rate.fill(0.0)
         proximity, slopes = self.proximity, self._slopes
         if proximity.formulas is not None:
             proximity.formulas.differentiate(state, slopes, self._bends, gradient, rate)
+        else:
+            gradient.fill(0.0)
+            rate.fill(0.0)
         others = proximity.others
         # Out of influence the gradient is zero in a whole neighbourhood.
         if others is not None and slopes[others.places].any():

@@ -10,8 +10,8 @@ from hsp_control.arrays import Array
 from hsp_control.bound import Bound
 from hsp_control.fields.cost import Cost, descend
 from hsp_control.fields.field import FieldSample
-from hsp_control.kernels import bind
 from hsp_control.metrics import MetricSample
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 
 Derivatives = Callable[[], float]
@@ -32,18 +32,12 @@ class CompiledCost(Cost):
     def _bind(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
         """Return what writes ∇f and (∇f)' at whatever the state then is."""
 
-    def __init_subclass__(cls, **arguments: Any) -> None:
-        """Let a derivative that is overridden count."""
-        super().__init_subclass__(**arguments)
-        if {"differentiate", "gradient", "gradient_rate"} & vars(cls).keys():
-            cls.bind = Cost.bind  # type: ignore[method-assign]
-
     def bind(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> Bound:
         """Return what `evaluate` does; see `NullSpaceField.bind`."""
         derivatives = self._bind(state, out.g, out.g_dot)
-        down = bind(descend, metric.L, metric.W_dot, form, out.g, out.g_dot)
+        down = bind(descend, metric.L, metric.W_dot, form, *out)
         return Bound(write=(derivatives, down))
 
     def value(self, state: RobotState) -> float:

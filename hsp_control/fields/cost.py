@@ -10,9 +10,10 @@ from hsp_control.arrays import Array
 from hsp_control.differences import gradient, rate_along_flow
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.field import FieldSample, NullSpaceField
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
 from hsp_control.metrics import MetricSample
 from hsp_control.metrics.metric import VARYING, raise_covector
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 
 
@@ -33,6 +34,9 @@ class Cost(NullSpaceField):
         own = vars(cls)
         if "differentiate" not in own and {"gradient", "gradient_rate"} & own.keys():
             cls.differentiate = Cost.differentiate  # type: ignore[method-assign]
+        derivatives = {"differentiate", "gradient", "gradient_rate"}
+        if "bind" not in own and derivatives & own.keys():
+            cls.bind = Cost.bind  # type: ignore[method-assign]
 
     @abstractmethod
     def value(self, state: RobotState) -> float:
@@ -75,7 +79,7 @@ class Cost(NullSpaceField):
                 metric,
                 form,
                 out,
-                bind(descend, metric.L, metric.W_dot, form, out.g, out.g_dot),
+                bind(descend, metric.L, metric.W_dot, form, *out),
             )
         if not bound[3]():
             raise FieldError(

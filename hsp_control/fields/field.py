@@ -12,8 +12,9 @@ from hsp_control.arrays import Array
 from hsp_control.bound import Bound
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.weight import Product, Weight, as_weight
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
 from hsp_control.metrics import MetricSample
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 
 
@@ -138,10 +139,10 @@ class WeightedSum(NullSpaceField):
         bound = self._bound
         if bound is None or bound[0] is not out:
             self._bound = bound = out, self._bind(out)
-        for weight, field, sample, add in bound[1]:
-            w, w_dot = weight.sample(state)
+        for weight, field, sample, weigh, add in bound[1]:
             field.evaluate(state, metric, form, sample)
-            add(w, w_dot)
+            weigh[:] = weight.sample(state)
+            add()
         return out
 
     def bind(
@@ -150,19 +151,26 @@ class WeightedSum(NullSpaceField):
         """Return what `evaluate` does; see `NullSpaceField.bind`."""
         follow: list[Callable[[float], object]] = []
         write: list[Callable[[], object]] = []
-        for weight, field, sample, add in self._bind(out):
+        for weight, field, sample, weigh, add in self._bind(out):
             term = field.bind(state, metric, form, sample)
             follow += term.follow
-            write += [*term.write, partial(_add_weighted, weight, state, add)]
+            write += term.write
+            if weight.constant:
+                weigh[:] = weight.sample(state)
+            else:
+                write.append(partial(_weigh, weight, state, weigh))
+            write.append(add)
         return Bound(tuple(follow), tuple(write))
 
     def _bind(self, out: FieldSample) -> "list[_Term]":
-        return [
-            (weight, field, sample, bind(_add, k == 0, *sample, *out, free=(1.0, 1.0)))
-            for k, ((weight, field), sample) in enumerate(
-                zip(self.terms, self.samples, strict=True)
-            )
-        ]
+        terms = []
+        for k, ((weight, field), sample) in enumerate(
+            zip(self.terms, self.samples, strict=True)
+        ):
+            weigh = np.zeros(2)
+            add = bind(_add, k == 0, weigh, *sample, *out)
+            terms.append((weight, field, sample, weigh, add))
+        return terms
 
     def __getstate__(self) -> dict[str, Any]:
         """Return all but what is bound to another's memory."""
@@ -175,28 +183,25 @@ class WeightedSum(NullSpaceField):
         )
 
 
-_Term = tuple[Weight, NullSpaceField, FieldSample, Callable[[float, float], Any]]
-"""A weight, its field, what the field writes and what then adds it to the sum."""
+_Term = tuple[Weight, NullSpaceField, FieldSample, Array, Callable[[], object]]
+"""A weight, its field and what it writes; w and w', and what then adds to the sum."""
 
 
-def _add_weighted(
-    weight: Weight, state: RobotState, add: Callable[[float, float], Any]
-) -> None:
-    """Add a term whose sample has been written."""
-    add(*weight.sample(state))
+def _weigh(weight: Weight, state: RobotState, weigh: Array) -> None:
+    weigh[:] = weight.sample(state)
 
 
 @kernel
 def _add(
     first: bool,
+    weigh: Array,
     g: Array,
     g_dot: Array,
     sum_g: Array,
     sum_g_dot: Array,
-    w: float,
-    w_dot: float,
 ) -> None:
-    """Weight a sample, and add it to the sum, which the first one begins."""
+    """Weight a sample by w and w', and add it to the sum, begun by the first one."""
+    w, w_dot = weigh[0], weigh[1]
     for i in range(g.shape[0]):
         g_dot[i] = w * g_dot[i] + w_dot * g[i]
         g[i] *= w

@@ -16,15 +16,16 @@ in O(n), without the kinematic Hessian; and since J' is known exactly, so is the
 
 from abc import abstractmethod
 from collections.abc import Callable
-from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from hsp_control.arrays import Array, Indices
+from hsp_control.bound import InTurn
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.compiled_cost import CompiledCost, Derivatives
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 
 Rows = Literal["position", "orientation", "pose"]
@@ -136,8 +137,7 @@ class JacobianCost(CompiledCost):
             gradient,
             rate,
         )
-        bring = partial(state.frame, self.frame)
-        return partial(_in_turn, bring, select, terms, raise_slope)
+        return InTurn(frame.compute, select, terms, raise_slope, result=2)
 
 
 class CompiledJacobianCost(JacobianCost):
@@ -163,19 +163,6 @@ class CompiledJacobianCost(JacobianCost):
         function, parameters = self._kernel()
         scratch = np.zeros((8, *J.shape))
         return bind(function, *parameters, J, J_dot, slope, slope_rate, scratch)
-
-
-def _in_turn(
-    bring: Callable[[], Any],
-    select: Callable[[], Any],
-    terms: Derivatives,
-    raise_slope: Callable[[], Any],
-) -> float:
-    bring()
-    select()
-    value = terms()
-    raise_slope()
-    return value
 
 
 @kernel

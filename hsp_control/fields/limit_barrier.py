@@ -7,7 +7,8 @@ from hsp_control.exceptions import FieldError
 from hsp_control.fields.barrier import barrier_at
 from hsp_control.fields.compiled_cost import CompiledCost, Derivatives
 from hsp_control.fields.joint_centering import check_weights, limited_joints
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 
 

@@ -7,7 +7,8 @@ import numpy as np
 from hsp_control.arrays import Array
 from hsp_control.exceptions import FieldError
 from hsp_control.fields.compiled_cost import CompiledCost, Derivatives
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 from hsp_control.scene import Obstacle
 from hsp_control.trajectories import TrajectorySample

@@ -11,7 +11,13 @@ from hsp_control.robot import RobotState
 
 
 class Weight(ABC):
-    """A weight w(q, t) ≥ 0 that is continuous together with its rate."""
+    """A weight w(q, t) ≥ 0 that is continuous together with its rate.
+
+    Attributes:
+        constant: Whether it never changes.
+    """
+
+    constant: bool = False
 
     @abstractmethod
     def sample(self, state: RobotState) -> tuple[float, float]:
@@ -24,6 +30,8 @@ class ConstantWeight(Weight):
     Attributes:
         value: The number.
     """
+
+    constant = True
 
     def __init__(self, value: float) -> None:
         """Set the number.
@@ -97,6 +105,7 @@ class Product(Weight):
     def __init__(self, first: Weight, second: Weight) -> None:
         """Set the factors."""
         self.first, self.second = first, second
+        self.constant = first.constant and second.constant
 
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return the product and its rate."""

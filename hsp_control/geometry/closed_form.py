@@ -18,6 +18,7 @@ import coal
 import numpy as np
 
 from hsp_control.arrays import Array, Indices
+from hsp_control.bound import Bound
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.signed_distance import (
     BOX,
@@ -29,13 +30,14 @@ from hsp_control.geometry.signed_distance import (
     nearest_on_segments,
     nearest_rates,
 )
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
 from hsp_control.kinematics import joint_support
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 from hsp_control.rotations import cross, rotate, rotate_back
 from hsp_control.scene import Obstacle
 from hsp_control.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
-from hsp_control.trajectories.following import Follower, stay
+from hsp_control.trajectories.following import stay
 
 MOTION = 18
 """Numbers that say how an obstacle is and moves: R, c, c', ω; see `Obstacle.follow`."""
@@ -57,7 +59,11 @@ _Derived = tuple[RobotState, Array, Array, Array, Array, Callable[[], Any]]
 
 
 class ClosedForm:
-    """Distances of such pairs at one state, and sums of their gradients."""
+    """Distances of such pairs at one state, and sums of their gradients.
+
+    Attributes:
+        measurements: How often they were measured, at whatever state, shape (1,).
+    """
 
     def __init__(
         self,
@@ -84,7 +90,7 @@ class ClosedForm:
             for k, obstacle in enumerate(obstacles)
             if len(links) + k in used
         ]
-        self._moving: list[Follower] = [f for f in followers if f is not stay]
+        self._moving = tuple(follow for follow in followers if follow is not stay)
         solids = [_obstacle(obstacle.shape) for obstacle in obstacles]
         rows = [_link(link) for link in links] + [row for _, row in solids]
         self._sizes = np.array(rows).reshape(-1, 7)
@@ -105,31 +111,41 @@ class ClosedForm:
         self._segments = np.zeros((len(rows), 2, 3))
         self._cores = np.zeros((len(pairs), 3, 3))
         self._scratch = np.zeros((40, 3))
-        self._measured: tuple[RobotState, Array, Callable[[], Any]] | None = None
+        self.measurements: Indices = np.zeros(1, dtype=np.int64)
+        self._measured: tuple[RobotState, Array, Bound] | None = None
         self._derived: _Derived | None = None
 
     def measure(self, state: RobotState, distances: Array) -> None:
         """Write the distances, each in its place."""
-        for follower in self._moving:
-            follower(state.t)
-        bound = self._measured
-        if bound is None or bound[0] is not state or bound[1] is not distances:
-            measure = bind(
-                _measure,
-                state.world.placements,
-                self._motion,
-                self._kinds,
-                self._sizes,
-                self._used,
-                self._pairs,
-                self._places,
-                self._segments,
-                self._cores,
-                self._scratch,
-                distances,
-            )
-            self._measured = bound = state, distances, measure
-        bound[2]()
+        bound = self.bind(state, distances)
+        for follow in bound.follow:
+            follow(state.t)
+        for write in bound.write:
+            write()
+
+    def bind(self, state: RobotState, distances: Array) -> Bound:
+        """Return what `measure` does with this state and this array."""
+        measured = self._measured
+        if measured and measured[0] is state and measured[1] is distances:
+            return measured[2]
+        measure = bind(
+            _measure,
+            self.measurements,
+            state.world.placements,
+            self._motion,
+            self._kinds,
+            self._sizes,
+            self._used,
+            self._pairs,
+            self._places,
+            self._segments,
+            self._cores,
+            self._scratch,
+            distances,
+        )
+        bound = Bound(self._moving, (measure,))
+        self._measured = state, distances, bound
+        return bound
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
         """Return the points on both shapes, and the normal from first to second."""
@@ -163,28 +179,39 @@ class ClosedForm:
             or bound[3] is not gradient
             or bound[4] is not rate
         ):
-            world = state.world
-            differentiate = bind(
-                _differentiate,
-                world.jacobian,
-                world.jacobian_dot,
-                world.v,
-                self._motion,
-                self._kinds,
-                self._sizes,
-                self._columns,
-                self._freedoms,
-                self._pairs,
-                self._places,
-                self._segments,
-                self._scratch,
-                slopes,
-                bends,
-                gradient,
-                rate,
-            )
-            self._derived = bound = state, slopes, bends, gradient, rate, differentiate
+            arrays = slopes, bends, gradient, rate
+            self._derived = bound = state, *arrays, self.derivatives(state, *arrays)
         bound[5]()
+
+    def derivatives(
+        self,
+        state: RobotState,
+        slopes: Array,
+        bends: Array,
+        gradient: Array,
+        rate: Array,
+    ) -> Callable[[], Any]:
+        """Return what `differentiate` does with this state and these arrays."""
+        world = state.world
+        return bind(
+            _differentiate,
+            world.jacobian,
+            world.jacobian_dot,
+            world.v,
+            self._motion,
+            self._kinds,
+            self._sizes,
+            self._columns,
+            self._freedoms,
+            self._pairs,
+            self._places,
+            self._segments,
+            self._scratch,
+            slopes,
+            bends,
+            gradient,
+            rate,
+        )
 
 
 def _link(link: LinkShape) -> list[float]:
@@ -213,6 +240,7 @@ def _obstacle(shape: Shape) -> tuple[int, list[float]]:
 
 @kernel
 def _measure(
+    measurements: Indices,
     placements: Array,
     motion: Array,
     kinds: Indices,
@@ -226,6 +254,7 @@ def _measure(
     distances: Array,
 ) -> None:
     """Bring all segments into the world, write distances and (x, y, n) of each pair."""
+    measurements[0] += 1
     for k in range(used.shape[0]):
         i = used[k]
         _place(placements, motion, sizes, i, kinds[i, 1], segments)

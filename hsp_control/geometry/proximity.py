@@ -71,18 +71,23 @@ class Proximity:
             for k, has in enumerate(known)
         ]
         self._measured: RobotState | None = None
-        self._stamp = -1
+        self._stamp = -1, -1
 
     def measure(self, state: RobotState) -> Array:
         """Return all distances at a state, computing them once."""
-        if self._measured is state and self._stamp == state.stamp:
+        if self._measured is state and self._stamp == self._stamp_of(state):
             return self.distances  # the state itself: an id would be used again
         if self.formulas is not None:
             self.formulas.measure(state, self.distances)
         if self.others is not None:
             self.others.measure(state, self.distances)
-        self._measured, self._stamp = state, state.stamp
+        self._measured, self._stamp = state, self._stamp_of(state)
         return self.distances
+
+    def _stamp_of(self, state: RobotState) -> tuple[int, int]:
+        """Return what is another one once anything was measured at another state."""
+        count = 0 if self.formulas is None else int(self.formulas.measurements[0])
+        return state.stamp, count
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
         """Return what realises the k-th distance, world axes, shape (3,) each.

@@ -11,6 +11,10 @@ held for 1 ms that change at 1000 N·m/s the acceleration is wrong by M⁻¹·0.
 rad/s² on a Panda, for as long as they change: the margin must be enough for it."""
 
 
+MOTION, EFFORT = 1, 2
+"""What may be broken."""
+
+
 @kernel
 def acceleration_bounds(
     q: Array,
@@ -77,12 +81,16 @@ def keeps_limits(
     greatest: Array,
     low: Array,
     high: Array,
-) -> tuple[bool, bool]:
-    """Write the bounds, see `acceleration_bounds`; are a and tau within theirs?"""
+) -> int:
+    """Write the bounds, see `acceleration_bounds`; return which a and tau break.
+
+    None, `MOTION`, `EFFORT`, or the sum of both.
+    """
     acceleration_bounds(
         q, v, where, lower, upper, velocity, acceleration, bandwidth, least, greatest
     )
-    return within(a, least, greatest), within(tau, low, high)
+    broken = 0 if within(a, least, greatest) else MOTION
+    return broken if within(tau, low, high) else broken + EFFORT
 
 
 @kernel

@@ -6,12 +6,17 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.arrays import Array, Indices
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
 from hsp_control.linalg import gram, norm, orthogonalise_rows, orthonormalise_rows
+from hsp_control.native import bind
 from hsp_control.resolution.hierarchy import resolve_levels
 from hsp_control.resolution.law import acceleration, null_space_command
 from hsp_control.resolution.problem import Problem
 from hsp_control.resolution.pseudo_inverse import weighted_pseudo_inverse, whiten
+
+EXACT, DAMPED, NOT_FINITE = 0, 1, 2
+"""What became of the law: it is exact; a singular value was below the threshold, so
+that it was bounded instead; a is not made of numbers."""
 
 
 class Resolved(NamedTuple):
@@ -79,13 +84,15 @@ class Resolution:
             v: Velocity, shape (nv,).
             controls_null_space: False for φ_N = 0, the paper's first simulation.
         """
-        damped, finite = self.bind(v, controls=controls_null_space)()
-        return Resolved(self.acceleration, self.null_space_error, damped, finite)
+        how = self.bind(v, controls=controls_null_space)()
+        return Resolved(
+            self.acceleration, self.null_space_error, how == DAMPED, how != NOT_FINITE
+        )
 
-    def bind(self, v: Array, *, controls: bool) -> Callable[[], tuple[bool, bool]]:
+    def bind(self, v: Array, *, controls: bool) -> Callable[[], float]:
         """Return what `resolve` calls for a velocity, an array that is followed.
 
-        It returns whether the law was damped, and whether all is finite.
+        It returns `EXACT`, `DAMPED` or `NOT_FINITE`.
         """
         return bind(
             _resolve,
@@ -139,8 +146,8 @@ def _resolve(
     inner: Array,
     e_N: Array,
     a: Array,
-) -> tuple[bool, bool]:
-    """Write e_N and a; return whether it was damped, and whether a is finite.
+) -> int:
+    """Write e_N and a; return `EXACT`, `DAMPED` or `NOT_FINITE`.
 
     The first four arrays are those of a `Problem`, the next but the last two scratch.
     """
@@ -189,7 +196,9 @@ def _resolve(
     total = 0.0
     for i in range(n):
         total += a[i]
-    return damped, bool(np.isfinite(total))
+    if not np.isfinite(total):
+        return NOT_FINITE
+    return DAMPED if damped else EXACT
 
 
 @kernel

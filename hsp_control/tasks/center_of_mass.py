@@ -6,7 +6,7 @@ from functools import partial
 from hsp_control.arrays import Array
 from hsp_control.bound import Bound
 from hsp_control.exceptions import TaskError
-from hsp_control.kernels import bind
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.gains import Gains

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from hsp_control.arrays import Array
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
 from hsp_control.kinematics import FrameKinematics
 from hsp_control.linalg import multiply
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 from hsp_control.rotations import (
     compose_back,

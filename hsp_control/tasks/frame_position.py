@@ -5,8 +5,8 @@ from typing import Any
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import TaskError
-from hsp_control.kernels import bind
 from hsp_control.kinematics import FrameKinematics
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.frame_task import FrameTask

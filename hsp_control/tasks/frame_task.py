@@ -2,7 +2,6 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 from hsp_control.bound import Bound
@@ -44,5 +43,6 @@ class FrameTask(CompiledTask):
         """
 
     def _calls(self, state: RobotState, out: TaskSample) -> Bound:
-        follow, write = self._bind(state.frame(self.frame), out)
-        return Bound((follow,), (partial(state.frame, self.frame), write))
+        frame = state.frame(self.frame)
+        follow, write = self._bind(frame, out)
+        return Bound((follow,), (frame.compute, write))

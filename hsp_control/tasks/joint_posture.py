@@ -10,7 +10,8 @@ from hsp_control.arrays import Array, Indices
 from hsp_control.bound import Bound
 from hsp_control.configuration_space import joint_displacements
 from hsp_control.exceptions import TaskError
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import CompiledTask, TaskSample, track

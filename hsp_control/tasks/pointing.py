@@ -8,8 +8,9 @@ import numpy as np
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import TaskError
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
 from hsp_control.kinematics import FrameKinematics
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 from hsp_control.rotations import cross, rotate, rotate_back
 from hsp_control.tasks.frame_task import FrameTask

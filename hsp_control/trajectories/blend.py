@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.arrays import Array
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
+from hsp_control.native import bind
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Follower, follow_blended
 from hsp_control.trajectories.timing import smooth_step
@@ -80,7 +81,7 @@ class Blend(Trajectory):
     def follow(self, out: TrajectorySample) -> Follower:
         """Return the follower; see `Trajectory.follow`."""
         start, end = self.start_time, self.start_time + self.duration
-        blend = bind(_blend, start, self.duration, self._begin, *out, free=(0.0,))
+        blend = bind(_blend, start, self.duration, self._begin, *out, timed=True)
         return follow_blended(self.trajectory, out, blend, start, end)
 
 

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.arrays import Array
-from hsp_control.kernels import bind, kernel
+from hsp_control.kernels import kernel
+from hsp_control.native import bind
 from hsp_control.rotations import (
     compose_back,
     cross,
@@ -108,7 +109,7 @@ class BlendOrientation(OrientationTrajectory):
 
     def follow(self, out: OrientationSample) -> Follower:
         """Return the follower; see `Trajectory.follow`."""
-        blend = bind(_blend, *self._parameters(), *out, free=(0.0,))
+        blend = bind(_blend, *self._parameters(), *out, timed=True)
         end = self.start_time + self.duration
         return follow_blended(self.trajectory, out, blend, self.start_time, end)
 

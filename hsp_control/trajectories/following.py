@@ -5,7 +5,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from hsp_control.kernels import bind
+import numpy as np
+
+from hsp_control.bound import During, InTurn
+from hsp_control.native import bind
 
 Follower = Callable[[float], object]
 """A function of time [s] that brings a sample, its own, up to that time."""
@@ -23,12 +26,7 @@ def follow_all(*followers: Follower) -> Follower:
     moving = [follower for follower in followers if follower is not stay]
     if len(moving) < 2:
         return moving[0] if moving else stay
-
-    def follower(t: float) -> None:
-        for each in moving:
-            each(t)
-
-    return follower
+    return InTurn(*moving)
 
 
 def follow_by(sampler: Callable[[float, Any], Any], out: Any) -> Follower:
@@ -58,14 +56,7 @@ def follow_blended(
     lead_to = trajectory.follow(out)
     if lead_to is stay:  # but the blend does not leave it alone
         lead_to = partial(trajectory.sample, out=out)
-
-    def follower(t: float) -> None:
-        if t >= start:
-            lead_to(t)
-        if t < end:
-            blend(t)
-
-    return follower
+    return InTurn(During(lead_to, start, np.inf), During(blend, -np.inf, end))
 
 
 class Compiled(ABC):
@@ -89,4 +80,4 @@ class Compiled(ABC):
     def follow(self, out: Any) -> Follower:
         """Return the follower; see `Trajectory.follow`."""
         function, parameters = self._kernel()
-        return bind(function, *parameters, *out, free=(0.0,))
+        return bind(function, *parameters, *out, timed=True)
