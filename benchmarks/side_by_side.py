@@ -53,7 +53,8 @@ def peers() -> tuple[dict[str, Make], dict[str, tuple[str, Make]], dict[str, str
     compared: dict[str, Make] = {law: this_law.make, khatib: operational_space.make}
     timed: dict[str, tuple[str, Make]] = {
         "the Pinocchio calls alone": (law, _pinocchio_calls),
-        law: (law, partial(_this_law, name="centering")),
+        law: (law, _this_law),
+        "this law, and `diagnose`": (law, partial(_this_law, diagnoses=True)),
         "this law, manipulability": (law, partial(_this_law, name="manipulability")),
         "this law, one obstacle (capsules)": (law, partial(_this_law, name="obstacle")),
         KHATIB: (khatib, operational_space.make),
@@ -80,14 +81,16 @@ def peers() -> tuple[dict[str, Make], dict[str, tuple[str, Make]], dict[str, str
     return compared, timed, missing
 
 
-def _this_law(case: Case, name: str) -> Compute:
+def _this_law(
+    case: Case, name: str = "centering", *, diagnoses: bool = False
+) -> Compute:
     robot = case.robot
     fields: dict[str, hsp.NullSpaceField] = {
         "centering": hsp.JointCentering(robot, weights=2.0),
         "manipulability": Manipulability(robot, FRAME),
         "obstacle": hsp.TargetPosture(robot, case.q0) + 0.3 * case.clearance,
     }
-    return this_law.make(case, fields[name])
+    return this_law.make(case, fields[name], diagnoses=diagnoses)
 
 
 def _pinocchio_calls(case: Case) -> Compute:

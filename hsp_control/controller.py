@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence, Set
 from itertools import pairwise
-from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -363,12 +362,12 @@ class Controller:
     def diagnose(self, state: RobotState) -> Diagnostics:
         """Return what one would plot, after `compute` at the same state."""
         resolution = self.mode.resolution
-        singular_values = resolution.singular_values(self.mode.first_task_row)
+        singular_values, manipulability = resolution.spectrum(self.mode.first_task_row)
         return Diagnostics(
             self.field.value(state),
             resolution.null_space_norm(),
             singular_values,
-            prod(singular_values) ** 2,
+            manipulability,
         )
 
     def flow(self, t: float, q: Array) -> Array:

@@ -199,12 +199,14 @@ def least_singular_value_bound(X: Array) -> float:
 def orthogonalise_rows(Y: Array, U: Array) -> None:
     """Overwrite Y by U Y with orthogonal rows, U orthogonal (one-sided Jacobi).
 
+    Only as many columns of U are written as it has: none, for singular values alone.
+
     The rows' norms are then Y's singular values, small ones to high relative accuracy
     (Demmel and Veselić 1992). Rank loss is welcome.
     """
     m, n = Y.shape
     for i in range(m):
-        for j in range(m):
+        for j in range(U.shape[1]):
             U[i, j] = 1.0 if i == j else 0.0
     for _ in range(30):  # sweeps; about six are needed
         rotated = False
@@ -220,14 +222,14 @@ def orthogonalise_rows(Y: Array, U: Array) -> None:
                 rotated = True
                 zeta = (beta - alpha) / (2.0 * gamma)
                 sign = 1.0 if zeta >= 0.0 else -1.0
-                t = sign / (abs(zeta) + np.hypot(1.0, zeta))
-                c = 1.0 / np.hypot(1.0, t)
+                t = sign / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
+                c = 1.0 / np.sqrt(1.0 + t * t)
                 s = c * t
                 for i in range(n):
                     y = Y[p, i]
                     Y[p, i] = c * y - s * Y[q, i]
                     Y[q, i] = s * y + c * Y[q, i]
-                for i in range(m):
+                for i in range(U.shape[1]):
                     y = U[p, i]
                     U[p, i] = c * y - s * U[q, i]
                     U[q, i] = s * y + c * U[q, i]

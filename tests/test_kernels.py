@@ -21,12 +21,14 @@ from oracles import slope
 from hsp_control import (
     Circle,
     ConstantMetric,
+    Controller,
     FrameOrientation,
     FramePose,
     FramePosition,
     Gains,
     IdentityMetric,
     JointPosture,
+    Limits,
     MassMatrixMetric,
     Obstacle,
     Pointing,
@@ -35,6 +37,7 @@ from hsp_control import (
     kernels,
     native,
 )
+from hsp_control.actuation import EXACT
 from hsp_control.fields import (
     EqualJointAngles,
     FieldSample,
@@ -316,7 +319,7 @@ def chain(tmp_path_factory: pytest.TempPathFactory) -> Robot:
             f'<joint name="joint{k}" type="revolute"><parent link="link{k - 1}"/>'
             f'<child link="link{k}"/><axis xyz="{axes[k % 3]}"/>'
             '<origin xyz="0 0 0.02"/>'
-            '<limit lower="-2" upper="2" effort="9" velocity="9"/></joint>'
+            '<limit lower="-2" upper="2" effort="1e9" velocity="9"/></joint>'
             f'<link name="link{k}"><inertial><mass value="0.1"/>'
             '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
             f"</inertial>{collision}</link>"
@@ -391,6 +394,33 @@ def test_no_allocation_in_a_field(name: str, chain: Robot) -> None:
 
     peak, left = allocated(step, 200 if name in SHAPES or name == "self" else 2000)
     assert peak < VECTOR, name
+    assert left < 50
+
+
+def test_a_step_allocates_what_pinocchio_returns_and_nothing_else(
+    chain: Robot,
+) -> None:
+    """Pinocchio hands out a copy of its Jacobians' rates, and of the effort."""
+    name, q, v = f"link{JOINTS}", chain.home() + 0.1, np.full(JOINTS, 1e-3)
+    state = chain.state(0.1, q, v)
+    frame = state.frame(name)
+    here = HoldPose(pin.SE3(frame.rotation, frame.position))
+    pose = FramePose(chain, name, here, GAINS)
+    clearance = ObstacleClearance(chain, [obstacle(Sphere(0.1))], influence=9.0)
+    field = JointCentering(chain) + 0.1 * clearance
+    controller = Controller(chain, [pose], field, limits=Limits(chain))
+    assert controller.compute(state).status == EXACT
+
+    peak, left = allocated(lambda: state.update(0.1, q, v), 500)
+    assert 6 * VECTOR <= peak < 7 * VECTOR
+    assert left < 50
+
+    def compute() -> None:
+        state.instant[0] += 1
+        controller.compute(state)
+
+    peak, left = allocated(compute, 500)
+    assert VECTOR <= peak < 2 * VECTOR
     assert left < 50
 
 

@@ -12,8 +12,13 @@ def make(
     case: Case,
     field: hsp.NullSpaceField | None = None,
     metric: hsp.Metric | None = None,
+    *,
+    diagnoses: bool = False,
 ) -> Callable[[float, Array, Array], Array]:
-    """Return the controller; another field or metric for timing and comparison."""
+    """Return the controller; another field or metric for timing and comparison.
+
+    Like its peers it keeps effort limits, and those of motion besides.
+    """
     robot = case.robot
     task: hsp.Task
     if case.rows == 6:
@@ -26,10 +31,16 @@ def make(
         field or case.field,
         null_space_gain=case.null_space_gain,
         metric=metric,
+        limits=hsp.Limits(robot),
     )
     state = hsp.RobotState(robot)
 
     def compute(t: float, q: Array, v: Array) -> Array:
         return controller.compute(state.update(t, q, v)).tau
 
-    return compute
+    def compute_and_diagnose(t: float, q: Array, v: Array) -> Array:
+        tau = controller.compute(state.update(t, q, v)).tau
+        controller.diagnose(state)
+        return tau
+
+    return compute_and_diagnose if diagnoses else compute

@@ -75,7 +75,7 @@ class Resolution:
         self._levels_scratch = np.zeros((nv, m)), np.zeros((nv, nv))
         self.acceleration, self.null_space_error = np.zeros(nv), np.zeros(nv)
         self._norm = bind(norm, self.problem.metric.W, self.null_space_error)
-        self._spectra: dict[int, tuple[Callable[[], None], Array]] = {}
+        self._spectra: dict[int, tuple[Callable[[], float], Array]] = {}
 
     def resolve(self, v: Array, *, controls_null_space: bool = True) -> Resolved:
         """Return the acceleration that tracks the tasks and the field.
@@ -108,10 +108,10 @@ class Resolution:
             self.acceleration,
         )
 
-    def singular_values(self, first: int = 0) -> Array:
+    def spectrum(self, first: int = 0) -> tuple[Array, float]:
         """Return the singular values of J L⁻ᵀ from a row on, largest first.
 
-        Their product squared is det(J W⁻¹ Jᵀ), the manipulability of the paper.
+        And their product squared: det(J W⁻¹ Jᵀ), the manipulability of the paper.
         """
         values = self._spectra.get(first)
         if values is None:
@@ -120,8 +120,8 @@ class Resolution:
             wide, small, _ = self._scratch
             call = bind(_singular_values, J, L, self._form, wide, small, out)
             self._spectra[first] = values = call, out
-        values[0]()
-        return values[1].copy()
+        manipulability = values[0]()
+        return values[1].copy(), manipulability
 
     def null_space_norm(self) -> float:
         """Return ‖e_N‖_W, the square root of 2 V, at the last `resolve`."""
@@ -204,9 +204,14 @@ def _resolve(
 @kernel
 def _singular_values(
     J: Array, L: Array, form: int, wide: Array, small: Array, values: Array
-) -> None:
-    """Write the singular values of J L⁻ᵀ, largest first; J of any shape."""
+) -> float:
+    """Write the singular values of J L⁻ᵀ, largest first; J of any shape.
+
+    Returns:
+        Their product squared.
+    """
     m, n = J.shape
+    width = min(m, n)
     B, T, U = wide[0, :m], small[0, :m, :m], small[1, :m, :m]
     whiten(J, L, form, B)
     if m <= n:
@@ -215,14 +220,15 @@ def _singular_values(
         orthonormalise_rows(B, Q, U)
         gram(Q, B, False, T)
         for i in range(m):
-            for k in range(n):
-                B[i, k] = T[i, k] if k < m else 0.0
-    orthogonalise_rows(B, U)
+            for k in range(m):
+                B[i, k] = T[i, k]
+    orthogonalise_rows(B[:, :width], U[:, :0])
     squares = small[2, 0, :m]
     for k in range(m):
         squares[k] = 0.0
-        for i in range(n):
+        for i in range(width):
             squares[k] += B[k, i] * B[k, i]
+    product = 1.0
     for rank in range(values.shape[0]):
         best = rank
         for k in range(rank + 1, m):
@@ -230,3 +236,5 @@ def _singular_values(
                 best = k
         squares[rank], squares[best] = squares[best], squares[rank]
         values[rank] = np.sqrt(squares[rank])
+        product *= squares[rank]
+    return product
