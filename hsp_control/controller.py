@@ -494,6 +494,8 @@ class Controller:
             raise NonFiniteError(
                 f"field {self.field.name!r} is not finite at t = {state.t:.6g} s"
             )
+        problem = self.mode.resolution.problem
+        self.metric.evaluate(state, problem.metric)  # may say what is wrong with it
         raise NonFiniteError(
             f"the effort is not finite at t = {state.t:.6g} s, "
             f"q = {state.q.tolist()}, v = {state.v.tolist()}"

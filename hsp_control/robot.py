@@ -270,7 +270,7 @@ class RobotState:
         self._frames: dict[str, FrameKinematics] = {}
         self.instant: Indices = np.zeros(1, dtype=np.int64)
         self._mass_matrix_stamp = self._mass_matrix_rate_stamp = -1
-        self._effects_stamp = self._centroidal_stamp = -1
+        self._coriolis_stamp = self._effects_stamp = self._centroidal_stamp = -1
         self._centroidal: CentroidalMotion | None = None
         self._mass_matrix_rate: Array = np.zeros((robot.nv, robot.nv))
         self._displaced: RobotState | None = None
@@ -344,6 +344,14 @@ class RobotState:
         return self.data.M  # type: ignore[no-any-return]
 
     @property
+    def coriolis_matrix(self) -> Array:
+        """C(q, v), with C v the Coriolis and centrifugal efforts, shape (nv, nv)."""
+        if self._coriolis_stamp != self.stamp:
+            pin.computeCoriolisMatrix(self.robot.model, self.data, self.q, self.v)
+            self._coriolis_stamp = self.stamp
+        return self.data.C  # type: ignore[no-any-return]
+
+    @property
     def mass_matrix_rate(self) -> Array:
         """M' = C + Cᵀ along v, shape (nv, nv)."""
         if self._mass_matrix_rate_stamp != self.stamp:
@@ -353,7 +361,7 @@ class RobotState:
                     model, self.q, self.v
                 )
             else:
-                C = pin.computeCoriolisMatrix(model, self.data, self.q, self.v)
+                C = self.coriolis_matrix
                 np.add(C, C.T, out=self._mass_matrix_rate)
             self._mass_matrix_rate_stamp = self.stamp
         return self._mass_matrix_rate

@@ -1,5 +1,6 @@
 """Fields that ask for nothing: self-motion comes to rest, or is left alone."""
 
+from hsp_control.bound import Bound
 from hsp_control.fields.field import FieldSample, NullSpaceField
 from hsp_control.metrics import MetricSample
 from hsp_control.robot import Robot, RobotState
@@ -19,6 +20,13 @@ class Rest(NullSpaceField):
         out.g[:] = 0.0
         out.g_dot[:] = 0.0
         return out
+
+    def bind(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> Bound:
+        """Write zeros, which nothing changes, and return nothing to do."""
+        self.evaluate(state, metric, form, out)
+        return Bound()
 
     def value(self, state: RobotState) -> float:
         """Return 0."""

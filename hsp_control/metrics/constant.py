@@ -4,6 +4,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from hsp_control.bound import Bound
 from hsp_control.exceptions import MetricError
 from hsp_control.metrics.metric import CONSTANT, Metric, MetricSample
 from hsp_control.robot import RobotState
@@ -66,6 +67,11 @@ class ConstantMetric(Metric):
             raise MetricError(
                 f"metric has shape {self.W.shape}; the robot needs ({nv}, {nv})"
             )
+
+    def bind(self, state: RobotState, out: MetricSample) -> Bound:
+        """Write W and its factor, which stay, and return nothing to do."""
+        self.evaluate(state, out)
+        return Bound()
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Write W and its factor; W' stays zero."""

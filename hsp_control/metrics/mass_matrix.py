@@ -1,10 +1,17 @@
 """The kinetic-energy metric: Khatib's dynamically consistent inverse."""
 
+from functools import partial
 from typing import ClassVar
 
+import numpy as np
+
+from hsp_control.arrays import Array
+from hsp_control.bound import Bound
 from hsp_control.exceptions import MetricError
+from hsp_control.kernels import kernel
 from hsp_control.linalg import cholesky
 from hsp_control.metrics.metric import VARYING, Metric, MetricSample
+from hsp_control.native import bind
 from hsp_control.robot import RobotState
 
 
@@ -17,6 +24,19 @@ class MassMatrixMetric(Metric):
 
     form: ClassVar[int] = VARYING
 
+    def bind(self, state: RobotState, out: MetricSample) -> Bound:
+        """Return what `evaluate` does with this state and this sample.
+
+        Where M is singular L is NaN, so that the step is refused.
+        """
+        if state.robot.mimics:
+            return super().bind(state, out)
+        matrices = state.mass_matrix, state.coriolis_matrix
+        bring = [
+            partial(getattr, state, name) for name in ("mass_matrix", "coriolis_matrix")
+        ]
+        return Bound((), (*bring, bind(_write, *matrices, *out)))
+
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Write M, its factor and its rate."""
         out.W[:] = state.mass_matrix
@@ -24,3 +44,15 @@ class MassMatrixMetric(Metric):
             raise MetricError(f"the mass matrix is singular at q = {state.q.tolist()}")
         out.W_dot[:] = state.mass_matrix_rate
         return out
+
+
+@kernel
+def _write(M: Array, C: Array, W: Array, L: Array, W_dot: Array) -> None:
+    """Write W = M, its factor and W' = C + Cᵀ."""
+    n = M.shape[0]
+    for i in range(n):
+        for j in range(n):
+            W[i, j] = M[i, j]
+            W_dot[i, j] = C[i, j] + C[j, i]
+    if not cholesky(W, L):
+        L[0, 0] = np.nan

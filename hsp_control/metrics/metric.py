@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from functools import partial
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -48,6 +48,12 @@ class Metric(ABC):
 
     def check(self, nv: int) -> None:  # noqa: B027 (most metrics fit every robot)
         """Raise MetricError if the metric does not fit a robot of nv freedoms."""
+
+    def __init_subclass__(cls, **arguments: Any) -> None:
+        """Let an `evaluate` that is overridden count, also of a ready metric."""
+        super().__init_subclass__(**arguments)
+        if "evaluate" in vars(cls) and "bind" not in vars(cls):
+            cls.bind = Metric.bind  # type: ignore[method-assign]
 
     def bind(self, state: RobotState, out: MetricSample) -> Bound:
         """Return what `evaluate` does with this state and this sample."""

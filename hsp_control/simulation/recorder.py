@@ -206,7 +206,7 @@ class Recorder:
             force[:] = world[where].sum(axis=0)
             pressed = np.maximum(local[:, 2], 1e-9)
             place[:] = pressed @ support.places[where] / pressed.sum()
-            tangential = np.linalg.norm(local[:, :2], axis=1)
+            tangential = np.hypot(local[:, 0], local[:, 1])  # no square overflows
             loaded = local[:, 2] > 1e-3  # [N]: below it the ratio is of two zeros
             ratios = tangential[loaded] / (contact.friction * local[loaded, 2])
             used[self._rows] = ratios.max(initial=0.0)

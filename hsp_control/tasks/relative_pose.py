@@ -5,14 +5,17 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.arrays import Array
+from hsp_control.bound import Bound
 from hsp_control.exceptions import TaskError
 from hsp_control.kernels import kernel
+from hsp_control.kinematics import FrameKinematics
+from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
 from hsp_control.rotations import quaternion_from_rotation
 from hsp_control.tasks.frame_orientation import ORIENTATION_SCRATCH
 from hsp_control.tasks.frame_pose import pose_error_equation
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample, named_after
+from hsp_control.tasks.task import CompiledTask, TaskSample, named_after
 from hsp_control.trajectories import PoseSample, PoseTrajectory
 
 
@@ -33,8 +36,14 @@ class Relative(NamedTuple):
     position: Array
     velocity: Array
 
+    @classmethod
+    def allocate(cls, nv: int) -> "Relative":
+        """Return zeros."""
+        matrices = np.zeros((6, nv)), np.zeros((6, nv)), np.zeros((3, 3))
+        return cls(*matrices, np.zeros(3), np.zeros(6))
 
-class RelativePose(Task):
+
+class RelativePose(CompiledTask):
     """Pose of a frame in another frame's axes; both errors are exactly linear there.
 
     Position is R_rᵀ(p - p_r) and orientation R_rᵀR; the rest is `FramePose`.
@@ -79,33 +88,25 @@ class RelativePose(Task):
         self.frame = frame
         self.reference = reference
         self.trajectory = trajectory
-        nv = robot.nv
-        self._relative = Relative(
-            np.zeros((6, nv)),
-            np.zeros((6, nv)),
-            np.zeros((3, 3)),
-            np.zeros(3),
-            np.zeros(6),
-        )
-        desired = np.zeros((8, 3))
-        self._follow = trajectory.follow(PoseSample.over(desired))
-        self._desired = desired
-        self._scratch = np.zeros((ORIENTATION_SCRATCH, 3))
 
-    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
-        """Return the six rows; see `Task.evaluate`."""
-        out = self._out(out)
-        self._follow(state.t)
-        pose_error_equation(
-            *self._seen(state),
-            self._desired,
+    def _calls(self, state: RobotState, out: TaskSample) -> Bound:
+        frame, reference = state.frame(self.frame), state.frame(self.reference)
+        desired, relative = np.zeros((8, 3)), Relative.allocate(self.robot.nv)
+        relate = bind(
+            _relative_kinematics, *_kinematics(frame, reference), state.v, *relative
+        )
+        write = bind(
+            pose_error_equation,
+            *relative,
+            desired,
             self.Kp,
             self.Kv,
             self.offset,
-            self._scratch,
+            np.zeros((ORIENTATION_SCRATCH, 3)),
             *out,
         )
-        return out
+        follow = self.trajectory.follow(PoseSample.over(desired))
+        return Bound((follow,), (frame.compute, reference.compute, relate, write))
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' and w_d in the reference's axes [m/s, rad/s]."""
@@ -126,20 +127,27 @@ class RelativePose(Task):
         return desired, actual
 
     def _seen(self, state: RobotState) -> Relative:
-        frame, reference = state.frame(self.frame), state.frame(self.reference)
-        _relative_kinematics(
-            frame.jacobian,
-            frame.jacobian_dot,
-            frame.rotation,
-            frame.position,
-            reference.jacobian,
-            reference.jacobian_dot,
-            reference.rotation,
-            reference.position,
-            state.v,
-            *self._relative,
-        )
-        return self._relative
+        frames = state.frame(self.frame), state.frame(self.reference)
+        relative = Relative.allocate(self.robot.nv)
+        _relative_kinematics(*_kinematics(*frames), state.v, *relative)
+        return relative
+
+
+_Both = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
+
+
+def _kinematics(frame: FrameKinematics, reference: FrameKinematics) -> _Both:
+    """Return what the relative motion is made of."""
+    return (
+        frame.jacobian,
+        frame.jacobian_dot,
+        frame.rotation,
+        frame.position,
+        reference.jacobian,
+        reference.jacobian_dot,
+        reference.rotation,
+        reference.position,
+    )
 
 
 @kernel
