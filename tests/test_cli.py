@@ -1,16 +1,20 @@
 """The command line as a person uses it: output, exit status, one message an error."""
 
+import _thread
 import json
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hsp_control import Rollout
 from hsp_control.cli import main
+from hsp_control.cli.interrupts import PATIENCE, FirstInterruptWaits
 
 MOVING = "paper/4_moving_obstacle"
 SHORT = ["--set", "simulation.duration=0.1"]
@@ -149,6 +153,42 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path: Path) -> None:
     with np.load(log, allow_pickle=False) as columns:
         assert json.loads(str(columns["meta"]))["status"] == "interrupted"
         assert len(columns["t"]) > 1
+
+
+def test_ctrl_c_does_not_wait_for_a_row_that_never_comes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def press() -> None:
+        while not isinstance(
+            getattr(signal.getsignal(signal.SIGINT), "__self__", None),
+            FirstInterruptWaits,
+        ):
+            time.sleep(0.01)
+        time.sleep(0.3)
+        _thread.interrupt_main()
+
+    threading.Thread(target=press, daemon=True).start()
+    begun = time.monotonic()
+    for_ever = [
+        "--set",
+        "simulation.duration=1e4",
+        "--set",
+        "simulation.log_period=1e4",
+    ]
+    assert main(["run", MOVING, "--out", str(tmp_path), *for_ever]) == 2
+    assert time.monotonic() - begun < 60.0  # the row would take minutes
+    assert "stopped by the user at t = 0 s" in capsys.readouterr().err
+    log = Rollout.load(tmp_path / "4_moving_obstacle.npz")
+    assert log.status == "interrupted"
+    assert len(log) == 1
+
+
+def test_a_log_is_written_whatever_is_pressed_meanwhile() -> None:
+    with FirstInterruptWaits() as interrupts:
+        interrupts.settle()
+        _thread.interrupt_main()
+        time.sleep(1.5 * PATIENCE)
+    assert interrupts.asked
 
 
 def test_the_module_is_the_command() -> None:

@@ -601,6 +601,10 @@ def test_progress(planar_run: Rollout) -> None:
             r"^log_period = 0.01 s is not a whole multiple of control_period = 0.02 s$",
         ),
         (
+            {"duration": 1e300, "log_period": 1e-300},
+            r"^duration = 1e\+300 s is inf times log_period = 1e-300 s; at most ",
+        ),
+        (
             {"duration": 0.1, "control_period": -0.001},
             r"^control_period is -0.001 s; mu",
         ),

@@ -69,6 +69,7 @@ def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") ->
                 raise
             rollout, status = error.rollout, 2
             print(f"hsp: {told(error)}", file=sys.stderr)
+        interrupts.settle()
         if rollout.status == "interrupted":
             at = f" at t = {rollout.t[-1]:g} s" if len(rollout) else ""
             print(f"hsp: stopped by the user{at}", file=sys.stderr)

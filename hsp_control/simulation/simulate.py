@@ -168,6 +168,11 @@ def _whole(total: float, part: float, total_name: str, part_name: str) -> int:
         if not 0.0 < value < np.inf:
             raise SimulationError(f"{name} is {value} s; must be positive")
     ratio = total / part
+    if ratio > MAX_STEPS:
+        raise SimulationError(
+            f"{total_name} = {total:g} s is {ratio:.3g} times "
+            f"{part_name} = {part:g} s; at most {MAX_STEPS:.0e} times"
+        )
     if abs(ratio - round(ratio)) > 1e-6 * max(1.0, ratio) or round(ratio) < 1:
         raise SimulationError(
             f"{total_name} = {total:g} s is not a whole multiple of "

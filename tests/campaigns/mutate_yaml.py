@@ -138,7 +138,7 @@ def _change(tree: Any, random: Random) -> None:
             value = holder[key]
             if isinstance(value, int | float) and not isinstance(value, bool):
                 factor = random.choice((-1, 0, 1e-6, 1e3, 1e12, 0.9, 1.1, 3))
-                holder[key] = float(value) * factor
+                holder[key] = float(min(max(value, -1e300), 1e300)) * factor
             elif isinstance(value, list) and value:
                 value.append(random.choice(value))
             else:
