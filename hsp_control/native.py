@@ -32,16 +32,15 @@ class NativeCall(partial[float]):
     It is a `partial` because nothing is called faster from Python.
 
     Attributes:
-        address: Where the code is.
+        row: The code's address and that of the words, as `run` takes them.
         words: The arguments, as the code takes them.
-        arguments: Themselves: they must live as long.
-        timed: Whether the kernel's last argument is the time, which is left open.
+        recipe: What makes it, and of what: copies are made anew, of the copied arrays.
+            It also keeps the arrays alive.
     """
 
-    address: int
+    row: tuple[int, int]
     words: Array
-    arguments: tuple[Any, ...]
-    timed: bool
+    recipe: tuple[Callable[..., Any], tuple[Any, ...]]
 
     @classmethod
     def of(
@@ -51,12 +50,15 @@ class NativeCall(partial[float]):
         kinds, words = zip(*map(_packed, arguments), strict=True)
         table = np.concatenate(words)
         address = _adapter(kernel, kinds, timed)
-        row = np.array([[address, table.ctypes.data]], dtype=np.int64)
+        row = address, table.ctypes.data
         free = () if timed else (0.0,)
-        call = cls(_entry(), row, np.array([FOREVER]), *free)
-        call.address, call.words = address, table
-        call.arguments, call.timed = arguments, timed
+        call = cls(_entry(), np.array([row]), np.array([FOREVER]), *free)
+        call.row, call.words = row, table
+        call.recipe = cls.of, (kernel, arguments, timed)
         return call
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self.recipe
 
 
 class Timed(NamedTuple):
@@ -90,10 +92,9 @@ def bind(
 
 def sequence(calls: Sequence[Timed]) -> Callable[[float], float]:
     """Return one call, of the time, of several; it returns what the last returned."""
-    rows = [[each.call.address, each.call.words.ctypes.data] for each in calls]
     when = np.array([[each.start, each.end] for each in calls])
-    call = NativeCall(_entry(), np.array(rows, dtype=np.int64), when)
-    call.arguments = tuple(calls)
+    call = NativeCall(_entry(), np.array([each.call.row for each in calls]), when)
+    call.recipe = sequence, (calls,)
     return call
 
 

@@ -1,6 +1,8 @@
 """Calls that are packed once: the same as calling the kernels, in order, on time."""
 
+import copy
 import gc
+import pickle
 import weakref
 
 import numpy as np
@@ -99,6 +101,23 @@ def test_a_call_keeps_its_arrays_alive_and_lets_them_go() -> None:
     del call
     gc.collect()
     assert watched() is None
+
+
+@compiled
+@pytest.mark.parametrize("way", ["deepcopy", "pickle"])
+def test_a_copy_is_of_the_copied_arrays(way: str) -> None:
+    """And not of the addresses: the originals may be gone."""
+    log = np.zeros(4)
+    held = {"log": log, "call": bind(_note, log, 3.0)}
+    held["sequence"] = sequence([Timed(held["call"], -np.inf, 1.0)])
+    if way == "pickle":
+        copied = pickle.loads(pickle.dumps(held))
+    else:
+        copied = copy.deepcopy(held)
+    assert copied["call"]() == 3.0
+    assert copied["sequence"](0.0) == 3.0
+    assert called(copied["log"]) == [3.0, 3.0]
+    assert called(log) == []
 
 
 @compiled
