@@ -49,13 +49,21 @@ def kernel(function: Function) -> Function:
     return cast("Function", compiled(numba.njit, function))
 
 
-def compiled(by: Callable[..., Any], function: Callable[..., Any]) -> Any:
-    """Return a function as ``by``, a decorator of Numba's, compiles it, and keep it."""
+def compiled(
+    by: Callable[..., Any], function: Callable[..., Any], *, keep: bool = True
+) -> Any:
+    """Return a function as ``by``, a decorator of Numba's, compiles it.
+
+    Args:
+        by: The decorator.
+        function: The function.
+        keep: Whether to keep the machine code on disk.
+    """
     function.__qualname__ += f"_{_PACKAGE_STATE}"
     # Without the reference counts of Numba's memory manager, handing over an array
     # costs 6 ns instead of 27, a slice nothing; and what allocates does not compile.
     options: dict[str, Any] = {
-        "cache": True,
+        "cache": keep,
         "error_model": "numpy",
         "_nrt": False,
         "fastmath": {"reassoc", "contract"},

@@ -129,7 +129,9 @@ def _adapter(
     name = f"{kernel.__module__}_{kernel.__name__}_{digest}".replace(".", "_")
     function.__qualname__ = name
     signature = types.float64(types.int64, types.float64)
-    code = compiled(partial(numba.cfunc, signature), function)
+    # What is kept is not told of changes in somebody else's kernels.
+    own = kernel.__module__.split(".")[0] == __name__.split(".")[0]
+    code = compiled(partial(numba.cfunc, signature), function, keep=own)
     _codes.append(code)
     return int(code.address)
 
