@@ -7,6 +7,7 @@ import pinocchio as pin
 
 from hsp_control.arrays import Array
 from hsp_control.kernels import kernel
+from hsp_control.matrix_view import matrix_view
 from hsp_control.native import bind
 
 
@@ -37,8 +38,8 @@ class CentroidalMotion:
         self._move = partial(pin.computeCentroidalMapTimeVariation, model, data, q, v)
         self._divide = bind(
             _divide,
-            data.Ag,
-            data.dAg,
+            matrix_view(data.Ag),
+            matrix_view(data.dAg),
             self.mass,
             v,
             self.velocity,

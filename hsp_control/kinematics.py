@@ -8,6 +8,7 @@ import pinocchio as pin
 from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import ModelError
 from hsp_control.kernels import kernel
+from hsp_control.matrix_view import matrix_view
 from hsp_control.native import bind
 
 
@@ -58,8 +59,8 @@ class FrameKinematics:
             frame_kinematics,
             instant,
             np.array([-1]),
-            data.J,
-            data.dJ,
+            matrix_view(data.J),
+            matrix_view(data.dJ),
             joint.rotation,
             joint.translation,
             np.ascontiguousarray(frame.placement.rotation),

@@ -34,6 +34,7 @@ from hsp_control.loading import (
     load_model,
     standing,
 )
+from hsp_control.matrix_view import matrix_view
 from hsp_control.sources import RobotSource, Root, find_robot
 from hsp_control.suggest import did_you_mean, listing
 
@@ -388,7 +389,10 @@ class RobotState:
         """All joints seen from the world's origin; the arrays follow the state."""
         if self._world is None:
             self._world = WorldKinematics(
-                joint_placements(self.data), self.data.J, self.data.dJ, self.v
+                joint_placements(self.data),
+                matrix_view(self.data.J),
+                matrix_view(self.data.dJ),
+                self.v,
             )
         return self._world
 

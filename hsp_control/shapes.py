@@ -18,6 +18,7 @@ import numpy as np
 from hsp_control import mesh_files
 from hsp_control.arrays import Array
 from hsp_control.exceptions import SceneError
+from hsp_control.hulls import convex_hull
 
 
 class Shape(ABC):
@@ -203,10 +204,16 @@ class Mesh(Shape):
         vertices = np.array(mesh.vertices())
         if len(vertices) == 0:
             raise SceneError(f"mesh: {self.file} holds no triangle")
-        if self.convex:
-            mesh.buildConvexHull(True, "Qt")
-            return mesh.convex, vertices
-        return mesh, vertices
+        if not np.isfinite(vertices).all():
+            raise SceneError(f"mesh: {self.file} has a corner at a NaN or an infinity")
+        if not self.convex:
+            return mesh, vertices
+        hull = convex_hull(mesh)
+        if hull is None:
+            raise SceneError(
+                f"mesh: {self.file} is flat and has no convex hull; needs convex: false"
+            )
+        return hull, vertices
 
 
 @dataclass(frozen=True)

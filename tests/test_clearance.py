@@ -519,6 +519,55 @@ def test_a_mesh_of_the_robots_own_that_cannot_be_read(tmp_path: Path) -> None:
     assert abs(outside(points, *ends(capsule))) < 1e-6  # its numbers are single
 
 
+FLAT = {
+    "triangle": (OCTAHEDRON[[0, 2, 4]], [(0, 1, 2)]),
+    "rectangle": (np.eye(4, 3) * [0.1, 0.2, 0.0] + [0, 0, 0.1], [(0, 1, 3), (0, 3, 1)]),
+    "needle": (np.outer(np.arange(5.0), [0.1, 0.0, 0.0]), [(0, 1, 2), (2, 3, 4)]),
+}
+
+
+@pytest.mark.parametrize("proxy", ["capsules", "spheres", "hulls", "meshes"])
+@pytest.mark.parametrize("which", FLAT)
+def test_flat_meshes_are_links_too(which: str, proxy: Any, tmp_path: Path) -> None:
+    """They have no hull, at which Coal ends the process; a capsule holds them."""
+    vertices, triangles = FLAT[which]
+    write_stl(tmp_path / "flat.stl", vertices, triangles)
+    robot = odd_robot(tmp_path, collision('<mesh filename="flat.stl"/>'))
+    shapes = link_shapes(robot, proxy)
+    own = pin.SE3(turned(0.3, -0.2, 1.0), np.array([0.1, 0.02, -0.03]))
+    points = np.array([own.act(p) for p in vertices[np.unique(triangles)]])
+    if proxy == "capsules":
+        assert abs(outside(points, *ends(shapes[0]))) < 1e-6
+    elif proxy == "spheres":
+        assert len(shapes) <= 101
+        gaps = [
+            np.linalg.norm(points - b.placement.translation, axis=1) - b.geometry.radius
+            for b in shapes
+        ]
+        assert np.min(gaps, axis=0).max() < 1e-6
+    ball = Obstacle("ball", Sphere(0.05), Hold(own.act(np.array([0.0, 0.0, 0.9]))))
+    field = ObstacleClearance(robot, [ball], proxy=proxy)
+    state = robot.state(0.0, robot.neutral(), np.zeros(2))
+    assert 0.3 < field.least_distance(state) < 0.9
+
+
+def test_meshes_without_a_place_or_a_hull(tmp_path: Path) -> None:
+    file = write_stl(tmp_path / "odd.stl", OCTAHEDRON * [np.nan, 1.0, 1.0], FACES)
+    robot = odd_robot(tmp_path, collision('<mesh filename="odd.stl"/>'))
+    message = r"odd\.stl has a corner at a NaN or an infinity$"
+    for proxy in ("capsules", "meshes"):
+        with pytest.raises(
+            ModelError, match=rf"odd\.urdf: a collision mesh: .*{message}"
+        ):
+            link_shapes(robot, proxy)  # type: ignore[arg-type]
+    with pytest.raises(SceneError, match=message):
+        Mesh(file).geometry()
+    write_stl(file, *FLAT["triangle"])
+    Mesh(file).geometry()
+    with pytest.raises(SceneError, match=r"is flat and has no convex hull; needs conv"):
+        Mesh(file, convex=True).geometry()
+
+
 def test_unknown_proxies_are_named() -> None:
     with pytest.raises(ModelError) as caught:
         link_shapes(load("panda"), "capsule")  # type: ignore[arg-type]

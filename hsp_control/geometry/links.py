@@ -8,13 +8,13 @@ from weakref import WeakSet
 import coal
 import numpy as np
 import pinocchio as pin
-from scipy.spatial import ConvexHull
 
 from hsp_control import mesh_files
 from hsp_control.arrays import Array
 from hsp_control.combining import Part
 from hsp_control.exceptions import ModelError
 from hsp_control.geometry.capsule_fit import enclosing_capsule
+from hsp_control.hulls import convex_hull, hull_corners
 from hsp_control.robot import Robot
 from hsp_control.sources import RobotSource
 from hsp_control.urdf_checks import read_urdf
@@ -23,6 +23,9 @@ Proxy = Literal["capsules", "spheres", "hulls", "meshes"]
 
 FALLBACK_RADIUS = 0.05
 """Radius of the capsules between joints where a robot has no geometry [m]."""
+
+_MOST_BEADS = 100
+"""Along one capsule; a link's own geometry needs ten."""
 
 _log = logging.getLogger(__name__)
 _warned: "WeakSet[Robot]" = WeakSet()
@@ -110,6 +113,11 @@ def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
     for item in geometry.geometryObjects:
         frame = full.frames[item.parentFrame]
         name = part.prefix + frame.name
+        if not _finite(item.geometry):
+            raise ModelError(
+                f"{source.urdf}: a collision mesh: {item.meshPath} has a corner "
+                "at a NaN or an infinity"
+            )
         # What is fixed to a combined robot's root hangs on its universe's namesake.
         own = robot.model.frames[robot.frame_id(name)]
         shapes.append(
@@ -135,6 +143,13 @@ def _refuse_bad_mesh(source: RobotSource, name: str) -> None:
     file = next(found, None)
     if file is not None and (reason := mesh_files.complaint(file)):
         raise ModelError(f"{source.urdf}: a collision mesh: {file}: {reason}")
+
+
+def _finite(geometry: Any) -> bool:
+    """Return whether a mesh's corners are somewhere; other shapes have none."""
+    if not hasattr(geometry, "vertices"):
+        return True
+    return bool(np.isfinite(np.array(geometry.vertices())).all())
 
 
 def _between_joints(robot: Robot, part: Part) -> list[LinkShape]:
@@ -219,11 +234,15 @@ def _capsule(shape: LinkShape) -> LinkShape:
 
 
 def _beads(capsule: LinkShape) -> list[LinkShape]:
-    """Return balls along a capsule, no farther apart than its radius."""
+    """Return balls along a capsule, no farther apart than its radius.
+
+    Along a needle they are fewer, and grow to cover it.
+    """
     if isinstance(capsule.geometry, coal.Sphere):
         return [capsule]
     radius, half = capsule.geometry.radius, capsule.geometry.halfLength
-    number = max(int(np.ceil(2.0 * half / radius)), 1) + 1
+    apart = max(radius, 2.0 * half / _MOST_BEADS)
+    number = max(int(np.ceil(2.0 * half / apart)), 1) + 1
     # Half-way between two balls the capsule's side stands out by this factor.
     gap = 2.0 * half / (number - 1)
     grown = float(np.hypot(radius, 0.5 * gap))
@@ -240,8 +259,7 @@ def _points(shape: LinkShape) -> Array:
         signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
         return np.asarray(signs * np.asarray(geometry.halfSide))
     if hasattr(geometry, "vertices"):
-        vertices = np.array(geometry.vertices())
-        return np.asarray(vertices[ConvexHull(vertices, qhull_options="QJ").vertices])
+        return hull_corners(np.array(geometry.vertices()))
     if hasattr(geometry, "points"):
         return np.array(geometry.points())
     raise ModelError(
@@ -250,9 +268,9 @@ def _points(shape: LinkShape) -> Array:
 
 
 def _hull(geometry: Any) -> Any:
+    """Return a mesh's convex hull, or what has none as it is."""
     if hasattr(geometry, "buildConvexHull"):
-        geometry.buildConvexHull(True, "Qt")
-        return geometry.convex
+        return convex_hull(geometry) or geometry
     return geometry
 
 

@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from hsp_control.arrays import Array
 from hsp_control.exceptions import SimulationError
+from hsp_control.matrix_view import matrix_view
 from hsp_control.robot import Robot
 
 
@@ -79,5 +80,5 @@ class Pushes:
                     self._frames[push.frame],
                     pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
                 )
-                total += J.T @ np.concatenate([push.force, push.moment])
+                total += matrix_view(J).T @ np.concatenate([push.force, push.moment])
         return total

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.arrays import Array
+from hsp_control.matrix_view import matrix_view
 from hsp_control.robot import Robot
 from hsp_control.viewer.commands import Command, set_camera
 from hsp_control.viewer.stage import scene_size
@@ -96,7 +97,7 @@ def plane_normal(robot: Robot) -> Array | None:
     if any(joint.nv != 1 for joint in list(robot.model.joints)[1:]):
         return None
     data = robot.model.createData()
-    J = pin.computeJointJacobians(robot.model, data, robot.neutral())
+    J = matrix_view(pin.computeJointJacobians(robot.model, data, robot.neutral()))
     turns = np.linalg.norm(J[3:], axis=0) > 0.5
     if not turns.any():
         return None

@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull
 from hsp_control import shapes
 from hsp_control.arrays import Array
 from hsp_control.fields import ObstacleClearance
+from hsp_control.hulls import hull_corners
 from hsp_control.shapes import Shape
 from hsp_control.viewer import threejs
 from hsp_control.viewer.appearance import OBSTACLE, ZONE_OPACITY
@@ -96,9 +97,7 @@ def zone(shape: Shape, influence: float, extent: float) -> Json:
 
 def _rounded(points: Array, distance: float) -> Json:
     """Return the hull of balls of a radius [m] about points."""
-    if len(points) > 3:
-        points = points[ConvexHull(points, qhull_options="QJ").vertices]
-    cloud = (points[:, None, :] + distance * _ball()).reshape(-1, 3)
+    cloud = (hull_corners(points)[:, None, :] + distance * _ball()).reshape(-1, 3)
     hull = ConvexHull(cloud)
     corners = hull.points[hull.simplices]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

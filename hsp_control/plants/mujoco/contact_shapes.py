@@ -7,17 +7,19 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio as pin
-from scipy.spatial import ConvexHull
 
 from hsp_control.arrays import Array
 from hsp_control.combining import placement
 from hsp_control.exceptions import SimulationError
 from hsp_control.geometry import link_shapes
 from hsp_control.geometry.capsule_fit import enclosing_capsule
+from hsp_control.hulls import hull_corners
 from hsp_control.robot import Robot
 from hsp_control.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
 _KNOWN = (Box, Capsule, Cylinder, Sphere)
+_THINNEST = 1e-3
+"""Half the height of the box that a flat mesh becomes [m]; MuJoCo needs some."""
 
 
 @dataclass(frozen=True)
@@ -118,12 +120,12 @@ def _box_of_sole(points: Array, frame: pin.SE3) -> Geom | None:
     if (np.ptp(sole[:, :2], axis=0) < 0.5 * (high - low)[:2]).any():
         return None
     middle = pin.SE3(np.eye(3), 0.5 * (low + high))
-    return Geom("box", tuple(map(float, 0.5 * (high - low))), frame * middle)
+    half = np.maximum(0.5 * (high - low), _THINNEST)
+    return Geom("box", tuple(map(float, half)), frame * middle)
 
 
 def _capsule(points: Array, frame: pin.SE3) -> Geom:
-    hull = points[ConvexHull(points, qhull_options="QJ").vertices]
-    first, second, radius = enclosing_capsule(hull)
+    first, second, radius = enclosing_capsule(hull_corners(points))
     length = float(np.linalg.norm(second - first))
     if length < 1e-6:
         return Geom("sphere", (radius,), frame * pin.SE3(np.eye(3), first))
