@@ -342,7 +342,7 @@ class RobotState:
         if self._mass_matrix_stamp != self.stamp:
             pin.crba(self.robot.model, self.data, self.q)
             self._mass_matrix_stamp = self.stamp
-        return self.data.M  # type: ignore[no-any-return]
+        return matrix_view(self.data.M)
 
     @property
     def coriolis_matrix(self) -> Array:
@@ -350,7 +350,7 @@ class RobotState:
         if self._coriolis_stamp != self.stamp:
             pin.computeCoriolisMatrix(self.robot.model, self.data, self.q, self.v)
             self._coriolis_stamp = self.stamp
-        return self.data.C  # type: ignore[no-any-return]
+        return matrix_view(self.data.C)
 
     @property
     def mass_matrix_rate(self) -> Array:
