@@ -2,12 +2,13 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 
+from hsp_control.arrays import Array
 from hsp_control.bound import During, InTurn
+from hsp_control.kernels import kernel
 from hsp_control.native import bind
 
 Follower = Callable[[float], object]
@@ -53,10 +54,18 @@ def follow_blended(
         start: When the blend begins [s].
         end: When it ends [s].
     """
-    lead_to = trajectory.follow(out)
+    lead_to: Follower = trajectory.follow(out)
     if lead_to is stay:  # but the blend does not leave it alone
-        lead_to = partial(trajectory.sample, out=out)
+        parts = (bind(_put, part.copy(), part, timed=True) for part in out)
+        lead_to = InTurn(*parts)
     return InTurn(During(lead_to, start, np.inf), During(blend, -np.inf, end))
+
+
+@kernel
+def _put(kept: Array, out: Array, t: float) -> None:
+    """Write what was kept, whatever the time."""
+    for i in range(out.size):
+        out.flat[i] = kept.flat[i]
 
 
 class Compiled(ABC):
