@@ -79,6 +79,20 @@ def solve_lower_transposed(L: Array, x: Array) -> None:
 
 
 @kernel
+def solve_rows(L: Array, X: Array) -> None:
+    """Overwrite each row x of X by L⁻¹ x: X by X L⁻ᵀ."""
+    for i in range(X.shape[0]):
+        solve_lower(L, X[i])
+
+
+@kernel
+def solve_rows_transposed(L: Array, X: Array) -> None:
+    """Overwrite each row x of X by L⁻ᵀ x: X by X L⁻¹."""
+    for i in range(X.shape[0]):
+        solve_lower_transposed(L, X[i])
+
+
+@kernel
 def solve_columns(L: Array, X: Array) -> None:
     """Overwrite X by (L Lᵀ)⁻¹ X, row by row, in the order that they lie in memory."""
     m, n = X.shape

@@ -41,6 +41,8 @@ from hsp_control.linalg import (
     orthonormalise_rows,
     solve_lower,
     solve_lower_transposed,
+    solve_rows,
+    solve_rows_transposed,
 )
 from hsp_control.metrics.metric import CONSTANT, IDENTITY, raise_covector
 from hsp_control.resolution import law
@@ -169,6 +171,17 @@ def test_triangular_solves_read_the_lower_triangle_only() -> None:
         x = b.copy()
         solve(dirty, x)
         close(x, np.linalg.solve(matrix, b), 1e-13)
+
+
+def test_rows_are_solved_one_by_one() -> None:
+    L, X = np.tril(normal(2, 4, 4)) + 3 * np.eye(4), normal(3, 5, 4)
+    for solve, inverse in (
+        (solve_rows, np.linalg.inv(L.T)),
+        (solve_rows_transposed, np.linalg.inv(L)),
+    ):
+        solved = X.copy()
+        solve(L, solved)
+        close(solved, X @ inverse, 1e-13)
 
 
 @pytest.mark.parametrize("n", [1, 3, 7])
@@ -328,6 +341,8 @@ def arguments(name: str) -> tuple[Any, ...]:
         "cholesky": (spd, np.zeros((6, 6))),
         "solve_lower": (triangular(6), normal(17, 6)),
         "solve_lower_transposed": (triangular(6), normal(17, 6)),
+        "solve_rows": (triangular(6), normal(17, 4, 6)),
+        "solve_rows_transposed": (triangular(6), normal(17, 4, 6)),
         "solve_columns": (triangular(6), normal(21, 6, n)),
         "gram": (J, J_dot, True, np.zeros((m, m))),
         "norm": (spd, normal(17, 6)),
@@ -341,13 +356,14 @@ def arguments(name: str) -> tuple[Any, ...]:
             *(sample[0], sample[1][:m], sample[2], np.zeros((6, n)), np.zeros(n)),
         ),
         "frame_kinematics": (
-            *(*world, np.eye(3), normal(18, 3), turned, normal(22, 3)),
+            *(np.array([2]), np.array([1]), *world),
+            *(np.eye(3), normal(18, 3), turned, normal(22, 3)),
             *(normal(19, n - 1), index, shared, np.zeros((3, 3)), np.zeros(3)),
             *(np.zeros((6, n - 1)), np.zeros((6, n - 1)), np.zeros(6), np.zeros(6)),
         ),
         "_take": (
             *(0.5, np.array([0.6, 0.8, 3.0]), sample[0], np.zeros(3), np.zeros(n)),
-            np.array([[0, 2]]),
+            *(np.array([[0, 2]]), np.array([4])),
         ),
     }[name]
 

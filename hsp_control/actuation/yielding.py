@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from hsp_control.actuation.programme import Rows
 from hsp_control.arrays import Array
+from hsp_control.linalg import solve_rows, solve_rows_transposed
 from hsp_control.resolution import Resolution
 
 _SINGLE, _SEVERAL = 1e-6, 1e-8
@@ -40,7 +40,8 @@ def yielding(
     J = resolution.problem.task.jacobian
     L = resolution.problem.metric.L
     n = J.shape[1]
-    whitened = solve_triangular(L, J.T, lower=True)
+    whitened = J.copy()
+    solve_rows(L, whitened)
     levels = len(resolution.ends) - supported
     whole = weight or (_SINGLE if levels <= 1 else _SEVERAL)
     ratio = whole ** (1.0 / max(levels, 1))
@@ -48,7 +49,7 @@ def yielding(
     taken = np.zeros((n, 0))
     start = 0
     for level, end in enumerate(resolution.ends):
-        block = whitened[:, start:end]
+        block = whitened[start:end].T
         block = block - taken @ (taken.T @ block)
         U, s, _ = np.linalg.svd(block, full_matrices=False)
         N = U[:, s > resolution.threshold]
@@ -56,7 +57,9 @@ def yielding(
         H += (cost - whole) * (N @ N.T)
         taken = np.hstack([taken, N])
         start = end
-    P = np.eye(n) - solve_triangular(L, taken, lower=True, trans="T") @ (taken.T @ L.T)
+    raised = taken.T.copy()
+    solve_rows_transposed(L, raised)
+    P = np.eye(n) - raised.T @ (taken.T @ L.T)
     return Yielding(np.asarray(L @ H @ L.T), P)
 
 
@@ -88,5 +91,8 @@ def decay_rate(gain: Array, L: Array) -> float:
     if (gain == first * np.eye(len(gain))).all():
         return first
     lowered = L @ (L.T @ gain)
-    half = solve_triangular(L, 0.5 * (lowered + lowered.T), lower=True)
-    return float(np.linalg.eigvalsh(solve_triangular(L, half.T, lower=True))[0])
+    both = 0.5 * (lowered + lowered.T)
+    for _ in range(2):  # L⁻¹ from the left, then from the right
+        both = both.T.copy()
+        solve_rows(L, both)
+    return float(np.linalg.eigvalsh(both)[0])
