@@ -403,6 +403,10 @@ CONTRADICTIONS: dict[str, tuple[Callable[[Rollout], None], str]] = {
         lambda run: run.meta["robot"].update(skeleton_parents=None),
         "says nonsense at 'robot.skeleton_parents'",
     ),
+    "no skeleton": (
+        lambda run: run.columns.update(skeleton=run["skeleton"][:, :0]),
+        "its column 'skeleton' has no number in a row",
+    ),
     "no axes": (
         lambda run: run.meta["tasks"]["tip"].pop("axes"), "not say 'tasks.tip.axes'"
     ),

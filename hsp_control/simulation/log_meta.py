@@ -43,7 +43,7 @@ class _Robot(_Model):
     nv: Count | None = None
     freedoms: list[str]
     units: list[str]
-    skeleton_parents: list[Annotated[int, Field(ge=-1)]]
+    skeleton_parents: Annotated[list[Annotated[int, Field(ge=-1)]], Field(min_length=1)]
     joint_coordinates: str | None = None
 
 
@@ -103,6 +103,8 @@ def _wrong_columns(columns: dict[str, Array]) -> str:
     for name, column in columns.items():
         if column.dtype.kind not in "fiub":
             return f"its column {name!r} holds no numbers"
+        if 0 in column.shape[1:]:
+            return f"its column {name!r} has no number in a row"
         placed = (
             name in _PLACED
             or name.startswith("obstacle.")
