@@ -38,7 +38,11 @@ def predicted_decay(rollout: Rollout) -> Decay:
     if not rollout.meta.get("controls_null_space", True):
         why = "no prediction: self-motion is not controlled"
         return Decay(None, None, (0.0, 0.0), why)
-    K_N = np.asarray(rollout.meta["null_space_gain"], dtype=float)
+    gain = rollout.meta.get("null_space_gain")
+    if gain is None:
+        why = "no prediction: $K_N$ not in the log"
+        return Decay(None, None, (0.0, 0.0), why)
+    K_N = np.asarray(gain, dtype=float)
     multiple = K_N[0, 0] * np.eye(len(K_N))
     scalar = np.array_equal(K_N, multiple)
     W = np.eye(len(K_N)) if scalar else constant_metric(rollout)

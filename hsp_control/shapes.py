@@ -7,8 +7,9 @@ accordingly.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from inspect import signature
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -305,6 +306,25 @@ class HeightField(Shape):
         y = np.linspace(-0.5, 0.5, grid.shape[0]) * self.size[1]
         X, Y = np.meshgrid(x, y)
         return np.column_stack([X.ravel(), Y.ravel(), grid.ravel()])
+
+
+def described_shape(kind: str, parameters: Mapping[str, Any]) -> Shape | None:
+    """Return the shape that a log describes; None of a kind that is not one of these.
+
+    Raises:
+        SceneError: If a shape of this kind has other parameters.
+    """
+    form = globals().get(kind)
+    if not (isinstance(form, type) and issubclass(form, Shape) and form is not Shape):
+        return None
+    try:
+        known = {k: Path(v) if k == "file" else v for k, v in parameters.items()}
+        shape: Shape = form(**known)
+    except (TypeError, ValueError):
+        needed = ", ".join(signature(form).parameters) or "nothing"
+        found = f"{dict(parameters)!r}"[:60]
+        raise SceneError(f"{kind.lower()}: needs {needed}; found {found}") from None
+    return shape
 
 
 def _lengths(shape: Shape, values: dict[str, float], *, zero: bool = False) -> None:

@@ -164,7 +164,13 @@ def test_continuous_joints_are_unwound(tmp_path: Path) -> None:
     meta = {
         "format": "hsp_control rollout 1",
         "columns": about,
-        "robot": {"continuous": [0]},
+        "robot": {
+            "name": "wheel",
+            "freedoms": ["turn"],
+            "units": ["rad"],
+            "skeleton_parents": [-1],
+            "continuous": [0],
+        },
     }
     journal.head(columns, meta)
     for i in range(40):

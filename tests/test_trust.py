@@ -25,6 +25,7 @@ from hsp_control.exceptions import (
     SceneError,
     SimulationError,
 )
+from hsp_control.plots.figures import diagnostics_figure
 from hsp_control.simulation import Rollout, log_file
 from hsp_control.urdf_checks import MAX_FREEDOMS, MAX_LINKS
 from hsp_control.viewer.mesh_files import collada_object
@@ -394,6 +395,39 @@ CONTRADICTIONS: dict[str, tuple[Callable[[Rollout], None], str]] = {
         lambda run: run.meta.update(metric_matrix=np.diag([1.0, -1, 1]).tolist()),
         "metric_matrix is not symmetric positive definite",
     ),
+    "no status": (lambda run: run.meta.pop("status"), "does not say 'status'"),
+    "no robot": (lambda run: run.meta.pop("robot"), "does not say 'robot'"),
+    "no name": (lambda run: run.meta["robot"].pop("name"), "not say 'robot.name'"),
+    "no units": (lambda run: run.meta["robot"].pop("units"), "not say 'robot.units'"),
+    "no tree": (
+        lambda run: run.meta["robot"].update(skeleton_parents=None),
+        "says nonsense at 'robot.skeleton_parents'",
+    ),
+    "no skeleton": (
+        lambda run: run.columns.update(skeleton=run["skeleton"][:, :0]),
+        "its column 'skeleton' has no number in a row",
+    ),
+    "no axes": (
+        lambda run: run.meta["tasks"]["tip"].pop("axes"), "not say 'tasks.tip.axes'"
+    ),
+    "shape": (
+        lambda run: run.meta["obstacles"]["disk"].update(parameters={}),
+        r"its obstacle 'disk' is no shape: sphere: needs radius; found {}",
+    ),
+    "size": (
+        lambda run: run.meta["obstacles"]["disk"]["parameters"].update(radius=[1]),
+        r"'disk' is no shape: sphere: needs radius; found {'radius': \[1\]}",
+    ),
+    "file": (
+        lambda run: run.meta["obstacles"]["disk"].update(
+            shape="Mesh", parameters={"file": 3}
+        ),
+        "'disk' is no shape: mesh: needs file, scale, convex; found {'file': 3}",
+    ),
+    "no size": (
+        lambda run: run.meta["obstacles"]["disk"].update(shape="Egg", radius=None),
+        "its obstacle 'disk' has neither a known shape nor a radius",
+    ),
 }  # fmt: skip
 
 
@@ -409,6 +443,30 @@ def test_logs_that_contradict_themselves(
     with pytest.raises(LogError, match=message):
         Rollout.load(path)
     assert main(["plot", str(path)]) == 2
+
+
+def test_logs_that_say_little_are_drawn(run: Rollout, tmp_path: Path) -> None:
+    """Nothing of tasks, field, gain, metric; an obstacle of a shape of its own."""
+    path = run.save(tmp_path / "log.npz")
+    log = Rollout.load(path)
+    for entry in ("tasks", "field", "null_space_gain", "metric", "versions", "columns"):
+        del log.meta[entry]
+    log.meta["obstacles"]["disk"].update(shape="Egg", parameters={"yolk": 1})
+    log.save(path)
+    assert main(["plot", str(path), "--out", str(tmp_path)]) == 0
+    assert main(["export", str(path), "--html", str(tmp_path / "page.html")]) == 0
+    (axes, *_) = diagnostics_figure(Rollout.load(path)).axes
+    assert [line.get_label() for line in axes.lines] == ["the log has no task"]
+
+
+def test_what_is_lost_of_a_log_that_talks_nonsense(
+    run: Rollout, tmp_path: Path
+) -> None:
+    log = Rollout(run.columns, {**run.meta, "obstacles": []})
+    path = log.save(tmp_path / "log.npz")
+    path.write_bytes(path.read_bytes()[:-3000])
+    with pytest.raises(LogError, match="says nonsense at 'obstacles'"):
+        Rollout.salvage(path)
 
 
 def test_meta_nested_without_end(run: Rollout, tmp_path: Path) -> None:

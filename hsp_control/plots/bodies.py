@@ -83,11 +83,11 @@ def _body(rollout: Rollout, name: str, about: Mapping[str, Any]) -> Body:
     if f"obstacle.{name}.quaternion" in rollout and len(center):
         turned = Rotation.from_quat(rollout[f"obstacle.{name}.quaternion"])
         rotation = turned.as_matrix()
-    form = _FORMS.get(about.get("shape", "Sphere"))
+    form = _FORMS.get(about.get("shape", ""))
     if form is None:
         points, radius = np.zeros((1, 3)), float(about["radius"])
     else:
-        points, radius = form(about.get("parameters", about))
+        points, radius = form(about.get("parameters", {}))
     robot = float(np.ptp(rollout["skeleton"].reshape(-1, 3), axis=0).max())
     size = 2.0 * radius + float(np.ptp(points, axis=0).max()) if len(points) else np.inf
     vast = size > 1.2 * robot

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hsp_control import palette
-from hsp_control.plots.legends import legend_below, plain
+from hsp_control.plots.legends import legend_below, note, plain
 from hsp_control.plots.lines import log_scale, mark_damped, single, time_axis
 from hsp_control.readings import task_errors
 from hsp_control.simulation import Rollout
@@ -16,6 +16,8 @@ _DASHES = {"rad": "--", "–": ":"}
 def draw_task_errors(axes: Axes, rollout: Rollout) -> None:
     """Draw the norm of every task's error, metres and radians apart, on a log scale."""
     t, parts = rollout.t, task_errors(rollout)
+    if not parts:
+        note(axes, "the log has no task")
     for part in parts:
         axes.plot(
             t,
@@ -26,7 +28,8 @@ def draw_task_errors(axes: Axes, rollout: Rollout) -> None:
             label=plain(f"{part.label} [{part.unit}]"),
         )
     mark_damped(axes, rollout)
-    log_scale(axes, np.concatenate([part.norm for part in parts]), top=1e-6)
+    norms = [np.zeros(0), *(part.norm for part in parts)]
+    log_scale(axes, np.concatenate(norms), top=1e-6)
     units = ", ".join(dict.fromkeys(part.unit for part in parts))
     axes.set_ylabel(rf"task error $\Vert e \Vert$ [{units}]")
     time_axis(axes, t)

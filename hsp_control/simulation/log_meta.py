@@ -1,7 +1,7 @@
 """What a log says of itself: checked against its columns before anybody believes it.
 
-Only what readers rely on is checked, and only where it is there: a log may say less,
-and a user's own data may say more.
+Only what readers rely on is checked. How the run ended and what the robot is must be
+there; of the rest a log may say less, and a user's own data may say more.
 """
 
 import math
@@ -12,6 +12,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hsp_control.arrays import Array
+from hsp_control.exceptions import SceneError
+from hsp_control.shapes import described_shape
 
 _MOTION = ("t", "q", "v", "tau")
 _PLACED = {*_MOTION, "joint_positions", "skeleton"}
@@ -36,12 +38,12 @@ class _Column(_Model):
 
 
 class _Robot(_Model):
-    name: str = ""
+    name: str
     nq: Count | None = None
     nv: Count | None = None
-    freedoms: list[str] | None = None
-    units: list[str] | None = None
-    skeleton_parents: list[Annotated[int, Field(ge=-1)]] | None = None
+    freedoms: list[str]
+    units: list[str]
+    skeleton_parents: Annotated[list[Annotated[int, Field(ge=-1)]], Field(min_length=1)]
     joint_coordinates: str | None = None
 
 
@@ -61,12 +63,12 @@ class _Obstacle(_Model):
 
 class _Meta(_Model):
     format: str
-    status: Literal["completed", "interrupted", "stopped", "diverged"] | None = None
+    status: Literal["completed", "interrupted", "stopped", "diverged"]
     message: str = ""
     name: str = ""
     title: str = ""
     columns: dict[str, _Column] = {}
-    robot: _Robot = _Robot()
+    robot: _Robot
     tasks: dict[str, _Task] = {}
     field: str = ""
     controls_null_space: bool = True
@@ -85,6 +87,8 @@ def complaint(meta: dict[str, Any], columns: dict[str, Array]) -> str:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(str(part) for part in first["loc"])
+        if first["type"] == "missing":
+            return f"its entry 'meta' does not say {place!r}"
         return f"its entry 'meta' says nonsense at {place!r}: {first['msg']}"
     except RecursionError:
         return "its entry 'meta' is nested too deeply"
@@ -99,6 +103,8 @@ def _wrong_columns(columns: dict[str, Array]) -> str:
     for name, column in columns.items():
         if column.dtype.kind not in "fiub":
             return f"its column {name!r} holds no numbers"
+        if 0 in column.shape[1:]:
+            return f"its column {name!r} has no number in a row"
         placed = (
             name in _PLACED
             or name.startswith("obstacle.")
@@ -120,7 +126,7 @@ def _wrong_columns(columns: dict[str, Array]) -> str:
 
 def _wrong_shapes(told: _Meta, columns: dict[str, Array]) -> str:
     nq, nv = columns["q"].shape[1], columns["v"].shape[1]
-    points = len(told.robot.skeleton_parents or ()) or None
+    points = len(told.robot.skeleton_parents) or None
     wanted: dict[str, tuple[int | None, ...]] = {
         "q": (told.robot.nq or nq,),
         "v": (told.robot.nv or nv,),
@@ -161,10 +167,9 @@ def _wrong_robot(told: _Meta, columns: dict[str, Array]) -> str:
     robot, nv = told.robot, columns["v"].shape[1]
     for name in ("freedoms", "units"):
         given = getattr(robot, name)
-        if given is not None and len(given) != nv:
+        if len(given) != nv:
             return f"its robot has {len(given)} {name}, its motion {nv}"
-    parents = robot.skeleton_parents or []
-    if any(parent >= k for k, parent in enumerate(parents)):
+    if any(parent >= k for k, parent in enumerate(robot.skeleton_parents)):
         return "a point of its skeleton comes before its parent"
     for name in ("null_space_gain", "metric_matrix"):
         matrix = getattr(told, name)
@@ -177,12 +182,27 @@ def _wrong_robot(told: _Meta, columns: dict[str, Array]) -> str:
         if not (np.abs(np.linalg.norm(part, axis=1) - 1.0) < _NORM).all():
             return f"its column {name!r} holds what is no orientation"
     for name, obstacle in told.obstacles.items():
-        if obstacle.radius is not None and not 0.0 <= obstacle.radius < math.inf:
-            return f"its obstacle {name!r} has the radius {obstacle.radius}"
-        if not _drawable(obstacle.parameters):
-            return f"its obstacle {name!r} has parameters that no obstacle has"
+        if reason := _wrong_obstacle(obstacle):
+            return f"its obstacle {name!r} {reason}"
         if f"obstacle.{name}" not in columns:
             return f"the log lacks the column 'obstacle.{name}'"
+    for name, task in told.tasks.items():
+        if task.type == "FramePosition" and task.axes is None:
+            return f"its entry 'meta' does not say 'tasks.{name}.axes'"
+    return ""
+
+
+def _wrong_obstacle(about: _Obstacle) -> str:
+    if about.radius is not None and not 0.0 <= about.radius < math.inf:
+        return f"has the radius {about.radius}"
+    if not _drawable(about.parameters):
+        return "has parameters that no obstacle has"
+    try:
+        shape = described_shape(about.shape, about.parameters)
+    except SceneError as error:
+        return f"is no shape: {error}"
+    if shape is None and about.radius is None:
+        return "has neither a known shape nor a radius"
     return ""
 
 

@@ -278,12 +278,10 @@ def _checked(
         )
     if lost:
         kept = {n: d for n, d in meta["columns"].items() if n not in lost}
-        seen = {
-            name: about
-            for name, about in meta.get("obstacles", {}).items()
-            if f"obstacle.{name}" not in lost
-        }
-        meta = {**meta, "columns": kept, "obstacles": seen, "lost": list(lost)}
+        meta = {**meta, "columns": kept, "lost": list(lost)}
+        if isinstance(obstacles := meta.get("obstacles"), dict):
+            seen = {k: v for k, v in obstacles.items() if f"obstacle.{k}" not in lost}
+            meta["obstacles"] = seen
     described = meta.get("columns")
     wanted = [*_REQUIRED, *(described if isinstance(described, dict) else ())]
     missing = [name for name in wanted if name not in columns]

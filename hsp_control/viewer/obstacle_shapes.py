@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import coal
@@ -11,7 +10,7 @@ import numpy as np
 from hsp_control import shapes
 from hsp_control.arrays import Array, Indices
 from hsp_control.exceptions import SceneError
-from hsp_control.shapes import Shape
+from hsp_control.shapes import Shape, described_shape
 from hsp_control.viewer import threejs
 from hsp_control.viewer.appearance import OBSTACLE, OBSTACLE_OPACITY
 from hsp_control.viewer.commands import Json
@@ -34,16 +33,12 @@ def logged_shape(about: Mapping[str, Any]) -> Shape | None:
         about: The obstacle's entry in the log: its ``shape``, ``parameters`` and the
             ``radius`` of a ball that holds it, None if there is none.
     """
-    kind = getattr(shapes, str(about.get("shape")), None)
-    parameters = dict(about.get("parameters", {}))
-    if "file" in parameters:
-        parameters["file"] = Path(parameters["file"])
     try:
-        if isinstance(kind, type) and issubclass(kind, Shape):
-            shape: Shape = kind(**parameters)
+        shape = described_shape(str(about.get("shape")), about.get("parameters", {}))
+        if shape is not None:
             shape.geometry()  # a mesh's file may be gone
             return shape
-    except (SceneError, TypeError):
+    except SceneError:
         pass
     radius = about.get("radius")
     return None if radius is None else shapes.Sphere(float(radius))

@@ -96,7 +96,8 @@ def _panels(rollout: Rollout) -> Iterator[Panel]:
         for part in readings.task_errors(rollout)
     ]
     units = ", ".join(dict.fromkeys(p.unit for p in readings.task_errors(rollout)))
-    yield Panel("Task error ‖e‖", units, errors, logarithmic=True)
+    if errors:
+        yield Panel("Task error ‖e‖", units, errors, logarithmic=True)
     yield Panel(
         "Null-space error ‖e_N‖",
         readings.column_unit(rollout, "null_space_norm"),
