@@ -112,7 +112,7 @@ ROWS = [
 Remedies = dict[str, Any]
 COLUMNS: dict[str, Callable[[Row], Remedies | None]] = {
     "law alone": lambda row: {},
-    "integral": lambda row: {"integral_action": {"rate": 10.0}},
+    "integral": lambda row: {"integral_action": {"rate": 5.0}},
     "observer": lambda row: {"momentum_observer": {"bandwidth": 50.0}},
     "feed-forward": lambda row: _if(row.friction, "friction_feed_forward"),
     "feed-forward + observer": lambda row: _if(

@@ -36,6 +36,7 @@ from hsp_control.cli.main import main
 from hsp_control.exceptions import HspControlError, SimulationError, UnstableRateError
 from hsp_control.fields import TargetPosture
 from hsp_control.plants.drives import EffortDelay
+from hsp_control.plants.model_changes import ScaledInertias, changed
 from hsp_control.plants.sensors import SensorDelay
 from hsp_control.remedies.linear_loop import LinearLoop
 from hsp_control.remedies.rate_check import null_space_rates, rate_findings
@@ -94,6 +95,7 @@ CARRIAGE = """<robot name="carriage"><link name="rail"/><link name="carriage">
 <limit lower="-10" upper="10" effort="1000" velocity="100"/></joint></robot>"""
 
 
+@pytest.mark.parametrize("heavy", [1.0, 3.0])
 @pytest.mark.parametrize(
     ("delays", "remedies"),
     [
@@ -118,9 +120,9 @@ CARRIAGE = """<robot name="carriage"><link name="rail"/><link name="carriage">
     ],
 )
 def test_the_linear_loop_is_the_chain_link_by_link(
-    delays: tuple[int, int], remedies: dict[str, Any], tmp_path: Path
+    delays: tuple[int, int], remedies: dict[str, Any], heavy: float, tmp_path: Path
 ) -> None:
-    """A carriage on a rail *is* the linear mode.
+    """A carriage on a rail *is* the linear mode, also one heavier than its model.
 
     By Cayley and Hamilton its positions obey the recurrence of the transition's
     characteristic polynomial, once what was there before the run has passed.
@@ -132,7 +134,9 @@ def test_the_linear_loop_is_the_chain_link_by_link(
     task = JointPosture(robot, np.zeros(1), Gains.from_frequency(frequency))
     made, parts = Controller(robot, [task]), Remedies(**remedies)
     plant = ImperfectPlant(
-        IntegratedPlant(RigidBodyPlant(robot), Rk4(h)),
+        IntegratedPlant(
+            RigidBodyPlant(changed(robot, [ScaledInertias(heavy)])), Rk4(h)
+        ),
         [SensorDelay(delays[1])],
         [EffortDelay(delays[0])],
     )
@@ -142,16 +146,51 @@ def test_the_linear_loop_is_the_chain_link_by_link(
     ).q[:, 0]  # fmt: skip
     action = parts.integral_action
     Ki = ZERO if action is None else action.gains([task])["posture"]
-    loop = LinearLoop(task.Kp, task.Kv, Ki, h, *delays, parts)
+    loop = LinearLoop(task.Kp, task.Kv, Ki, h, *delays, parts, 1.0 / heavy)
     coefficients = np.poly(loop.transition())
     n, begun = len(coefficients), 8
     residuals = [coefficients[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
     # Rounding of coefficients of up to 10, on positions of 1 m.
     assert np.abs(residuals).max() < 1e-12
-    other = LinearLoop(1.1 * task.Kp, task.Kv, Ki, h, *delays, parts)
+    other = LinearLoop(1.1 * task.Kp, task.Kv, Ki, h, *delays, parts, 1.0 / heavy)
     wrong = np.poly(other.transition())
     missed = [wrong[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
     assert np.abs(missed).max() > 1e3 * np.abs(residuals).max()
+
+
+def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
+    """The weightless arm agrees: 10 % beside what is told its motion dies or grows."""
+    robot = Robot.load("panda", gravity=[0.0, 0.0, 0.0])
+    task = JointPosture(robot, Q0, Gains.from_frequency(20.0))
+    made = Controller(robot, [task])
+    for observer in (None, MomentumObserver(20.0)):
+        strong = Remedies(
+            integral_action=IntegralAction(12.0), momentum_observer=observer
+        )
+        (found,) = check_rate(made, Q0, 1e-3, strong)
+        assert found.path == ("remedies", "integral_action")
+        assert not found.unstable
+        told = re.fullmatch(
+            r"where the robot is (.*) times as heavy at task 'posture' as its model, .*"
+            r"design for 5: Ki of at most (.*) times this, or a (faster )?momentum .*",
+            found.message,
+        )
+        assert told is not None
+        assert (told[3] is None) is (observer is None)
+        times, scale = float(told[1]), float(told[2])
+        if observer is None:
+            assert times == pytest.approx(40.0 / 12.0, rel=0.02)  # Kv Kp/Ki
+        for factor, grows in ((0.9 * times, False), (1.1 * times, True)):
+            log = simulate(
+                made, Q0 + 1e-4, duration=3.0, control_period=1e-3, log_period=0.01,
+                integrator=Rk4(1e-3), remedies=strong,
+                plant=RigidBodyPlant(changed(robot, [ScaledInertias(factor)])),
+            )  # fmt: skip
+            error = np.abs(log["task.posture.error"]).max(axis=1)
+            assert bool(error[200:].max() > error[100:200].max()) is grows
+        weaker = IntegralAction(12.0 * scale)
+        mild = Remedies(integral_action=weaker, momentum_observer=observer)
+        assert check_rate(made, Q0, 1e-3, mild) == []
 
 
 # ------------------------------------------------------------------------- the robot

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from hsp_control import (
@@ -49,12 +50,14 @@ from hsp_control.actuation.status import EXACT, LIMITED
 from hsp_control.exceptions import GainError, RemedyError, SimulationError
 from hsp_control.fields import TargetPosture
 from hsp_control.plants.drives import EffortDelay
-from hsp_control.plants.model_changes import ScaledInertias, changed
+from hsp_control.plants.model_changes import Payload, ScaledInertias, changed
 from hsp_control.plants.sensors import SensorDelay, VelocityNoise
 
+Array = NDArray[np.float64]
 H = 1e-3
 PANDA = Robot.load("panda")
 Q0 = PANDA.home()
+EYE = np.eye(7)
 
 
 def circle(
@@ -377,6 +380,68 @@ def test_a_lasting_error_dies_and_the_null_space_keeps_its_own() -> None:
     assert last[1] < 0.05 * last[0]  # the arm still moves, and its weight with it
     norms = [log["null_space_norm"][-1] for log in (alone, mended)]
     assert norms[1] > 0.5 * norms[0] > 0.0
+
+
+@pytest.mark.parametrize(("mass", "tolerance"), [(0.5, 0.01), (2.0, 0.07)])
+@pytest.mark.parametrize("rate", [2.0, 5.0])
+def test_a_payload_s_error_dies_as_the_linear_equation_says(
+    mass: float, tolerance: float, rate: float
+) -> None:
+    """e'' + B (Kv e' + Kp e + Ki ∫e) + D e = d, with B = M̃⁻¹M, M̃ the loaded arm's.
+
+    d is what the payload's weight accelerates, D e what that changes with the posture.
+    All joints are led, so that no self-motion is left; the rest is of second order.
+    """
+    loaded = changed(PANDA, [Payload("panda_tcp", mass)])
+    task = JointPosture(PANDA, Q0, Gains.from_frequency(20.0), name="hand")
+
+    def dynamics(robot: Robot, q: Array) -> tuple[Array, Array]:
+        state = robot.state(0.0, q, np.zeros(7))
+        upper = np.triu(state.mass_matrix)
+        return upper + np.triu(upper, 1).T, state.nonlinear_effects.copy()
+
+    def weight(q: Array) -> Array:
+        M, N = dynamics(loaded, q)
+        return np.linalg.solve(M, N - dynamics(PANDA, q)[1])
+
+    B = np.linalg.solve(dynamics(loaded, Q0)[0], dynamics(PANDA, Q0)[0])
+    D = np.transpose([(weight(Q0 + s) - weight(Q0 - s)) / 2e-5 for s in 1e-5 * EYE])
+    A = np.zeros((22, 22))
+    A[:7, 7:14] = A[14:21, :7] = EYE
+    A[7:14] = np.hstack(
+        [-400.0 * B - D, -40.0 * B, -400.0 * rate * B, weight(Q0)[:, None]]
+    )
+    log = run(
+        Controller(PANDA, [task]), Remedies(integral_action=IntegralAction(rate)),
+        plant=RigidBodyPlant(loaded), duration=2.0, log_period=0.02,
+    )  # fmt: skip
+    expected = np.array([expm(A * t)[:7, 21] for t in log.t])
+    error, size = log["task.hand.error"], np.abs(expected).max()
+    assert size > 0.01 * mass  # [rad]
+    np.testing.assert_allclose(error, expected, rtol=0, atol=tolerance * size)
+    assert np.abs(error[-1]).max() < (0.05 if rate == 2.0 else 1e-3) * size
+
+
+def test_too_much_integral_action_is_lost_with_a_payload() -> None:
+    """2 kg at the hand leave 0.3 of the feedback: as little as Ki/(Kv Kp) = 12/40."""
+    loaded = RigidBodyPlant(changed(PANDA, [Payload("panda_tcp", 2.0)]))
+    point = circle(away=0.0).trajectory.sample(0.0).position
+    hold = FramePosition(
+        PANDA, "panda_tcp", Hold(point), Gains.from_frequency(20.0), name="hand"
+    )
+    made = Controller(PANDA, [hold], 2.0 * TargetPosture(PANDA, Q0))
+    largest = {}
+    for rate in (5.0, 12.0):
+        remedies = Remedies(integral_action=IntegralAction(rate))
+        log = run(made, remedies, plant=loaded, duration=4.0, log_period=0.01)
+        error = np.linalg.norm(log["task.hand.error"], axis=1)
+        largest[rate] = [error[:100].max(), error[100:200].max(), error[-100:].max()]
+    first, second, last = largest[5.0]
+    assert first > 10e-3
+    assert second < 0.1 * first
+    assert last < 0.01 * first
+    first, second, last = largest[12.0]
+    assert last > 2.0 * second
 
 
 @pytest.mark.parametrize("rate", [40.0, 41.0, 400.0])

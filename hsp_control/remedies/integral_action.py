@@ -19,6 +19,10 @@ class IntegralAction:
     While the law is not delivered as it is (a limit binds, a singularity bounds it, the
     effort's rate is cut, the start-up ramp runs), the integral only unwinds.
 
+    A robot that is heavier than its model does but a part β of what the law asks for:
+    e'' + β (Kv e' + Kp e + Ki ∫e) = d, whose error grows where β < Ki/(Kv Kp) (Routh).
+    `check_rate` says so beforehand.
+
     Attributes:
         rate: Ki = rate · Kp, the rate at which a lasting error dies [1/s], for tasks
             that ``ki`` does not name; None: only those.

@@ -13,7 +13,8 @@ class LinearLoop:
     """x'' = u held over a period h, u = -Kp x - Kv x' - Ki ∫x, and all that is between.
 
     That is a task's error, and the null space with Kp = K_N A, Kv = K_N + A for a field
-    g of slope -A: `Command` is followed link by link, on a model that is exact.
+    g of slope -A: `Command` is followed link by link, on a model that is exact, or of
+    whose accelerations the robot does a part.
 
     Attributes:
         kp: Kp, shape (m, m) [1/s²].
@@ -24,6 +25,8 @@ class LinearLoop:
         sensor_delay: Periods that a measurement is old.
         remedies: What of them acts on a linear mode: the velocity filter, the predictor
             and the momentum observer.
+        share: The part of u that the robot does: below 1 where it is heavier than its
+            model.
     """
 
     kp: Array
@@ -33,6 +36,7 @@ class LinearLoop:
     effort_delay: int = 0
     sensor_delay: int = 0
     remedies: Remedies = field(default_factory=Remedies)
+    share: float = 1.0
 
     def transition(self) -> Array:
         """Return the matrix of one period, on everything that is remembered."""
@@ -81,7 +85,7 @@ class LinearLoop:
         u = -self.kp @ x_seen - self.kv @ v_seen - self.ki @ z - r
         z = z + h * x_seen if self.ki.any() else 0.0 * z
         drives = [*drives, u]
-        x, v = _moved(x, v, drives[0], h)
+        x, v = _moved(x, v, self.share * drives[0], h)
         rest = [*past, *sent[1:], u, *drives[1:], *sensors]
         return [each[None] for each in (x, v, z, r, momentum, *rest)]
 

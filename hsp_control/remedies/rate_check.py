@@ -27,6 +27,9 @@ RULE = 0.2
 """Greatest K_N h, and ω0 h without a delay, of a loop that is to be like the law."""
 RULE_DELAYED = 0.1
 """Greatest ω0 h with a delay that nothing predicts."""
+RULE_HEAVY = 5.0
+"""How many times as heavy at its task as its model a robot may be before integral
+action makes the error grow; without other remedies that is a rate of Kv/5."""
 _ROUNDING = 1e-7
 """Of the eigenvalues: self-motion without a field keeps its place, which is a 1."""
 _STEP = 1e-5
@@ -139,7 +142,32 @@ def _task_findings(
         delayed = delays[0] + delays[1] > 0 and delays[2].predictor is None
         rule = RULE_DELAYED if delayed else RULE
         found.append(_finding(path, loop, words, rule, ""))
+        if task.name in integral:
+            found.append(_integral_finding(task.name, loop))
     return found
+
+
+def _integral_finding(name: str, loop: LinearLoop) -> RateFinding | None:
+    """Return what is to be said of integral action on a robot unlike its model."""
+    heavy = replace(loop, share=1.0 / RULE_HEAVY)
+    if heavy.radius() <= 1.0 + _ROUNDING:
+        return None
+    times = _largest(
+        lambda s: replace(loop, share=1.0 / (s * RULE_HEAVY)), 1.0 / RULE_HEAVY
+    )
+    if times is None:  # with its model, too: that has been said
+        return None
+    scale = _largest(lambda s: replace(heavy, ki=s * heavy.ki))
+    less = "" if scale is None else f" Ki of at most {_rounded(scale)} times this, or"
+    faster = "" if loop.remedies.momentum_observer is None else " faster"
+    return RateFinding(
+        ("remedies", "integral_action"),
+        f"where the robot is {times * RULE_HEAVY:.3g} times as heavy at task {name!r} "
+        f"as its model, as with a payload, the error grows; design for {RULE_HEAVY:g}:"
+        f"{less} a{faster} momentum observer",
+        loop.radius(),
+        False,
+    )
 
 
 def _null_space_findings(
