@@ -168,7 +168,7 @@ def _whole(total: float, part: float, total_name: str, part_name: str) -> int:
         if not 0.0 < value < np.inf:
             raise SimulationError(f"{name} is {value} s; must be positive")
     ratio = total / part
-    if ratio > MAX_STEPS:
+    if not ratio < 2**53:  # beyond it every number is whole
         raise SimulationError(
             f"{total_name} = {total:g} s is {ratio:.3g} times "
             f"{part_name} = {part:g} s; at most {MAX_STEPS:.0e} times"
