@@ -330,6 +330,28 @@ def ball(radius: float = 0.1) -> Robot:
     return Robot(model, find_robot("planar3r"))
 
 
+@pytest.mark.parametrize("corners", [3, 4])
+def test_a_flat_mesh_is_a_contact(corners: int, tmp_path: Path) -> None:
+    """A plate's box has some height; three corners upright have no hull."""
+    places = np.array([[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0], [0, 0.1, 0]])[:corners]
+    if corners == 3:
+        places = places[:, [0, 2, 1]]  # no sole: its capsule
+    lines = [f"v {x} {y} {z}" for x, y, z in places]
+    lines += [f"f 1 {k} {k + 1}" for k in range(2, corners)]
+    (tmp_path / "plate.obj").write_text("\n".join(lines) + "\n")
+    (tmp_path / "plate.urdf").write_text(
+        '<robot name="plate"><link name="base"/><link name="plate"><inertial>'
+        '<mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        '</inertial><collision><geometry><mesh filename="plate.obj"/></geometry>'
+        '</collision></link><joint name="lift" type="prismatic"><parent link="base"/>'
+        '<child link="plate"/><axis xyz="0 0 1"/>'
+        '<limit lower="-9" upper="9" effort="100" velocity="9"/></joint></robot>'
+    )
+    robot = Robot.load(tmp_path / "plate.urdf")
+    plant = MujocoPlant(robot, contacts=[ContactShape("plate")])
+    assert -0.1 < plant.clearance(robot.neutral()) <= 0.0
+
+
 def test_a_contact_force_is_the_grounds_on_the_robot_about_the_frame() -> None:
     """A block at rest under a frame beside it: f = m g, moment = r × f."""
     robot = ball()

@@ -116,7 +116,7 @@ def _box_of_sole(points: Array, frame: pin.SE3) -> Geom | None:
     They do if the lowest tenth is at least half as long and as wide as all.
     """
     low, high = points.min(axis=0), points.max(axis=0)
-    sole = points[points[:, 2] < low[2] + 0.1 * (high[2] - low[2])]
+    sole = points[points[:, 2] <= low[2] + 0.1 * (high[2] - low[2])]
     if (np.ptp(sole[:, :2], axis=0) < 0.5 * (high - low)[:2]).any():
         return None
     middle = pin.SE3(np.eye(3), 0.5 * (low + high))
