@@ -335,7 +335,8 @@ ABOUT = {
     "joints": "A position task (3 rows) at the tip of a chain, posture beside it",
     "tasks": "Positions of a chain of 40 joints, 3 rows each, posture beside them",
     "fields": "A Panda's pose; centering, limit barrier, posture, manipulability, "
-    "inverse condition and transmission, in this order",
+    "inverse condition and transmission, in this order; the last three differentiate "
+    "Jacobians, and the exponent says no more than that",
     "levels": "Positions of a chain of 40 joints, one a level; in conflict: with a "
     "rival of the first one at the lowest level",
     "obstacles": "A Panda's pose, posture, and moving balls against its 12 capsules",

@@ -157,7 +157,7 @@ def parts_table(case: Standing, states: list[State]) -> str:
     controller, state = case.controller(), hsp.RobotState(case.robot)
     controller.compute(state.update(*states[0]))
     mode, actuation = controller.mode, controller._actuation
-    problem, support = mode.resolution.problem, mode.support
+    support = mode.support
     taken: dict[str, list[str]] = {}
 
     def timed(name: str, function: Callable[[], Any]) -> Any:
@@ -166,20 +166,12 @@ def parts_table(case: Standing, states: list[State]) -> str:
         taken.setdefault(name, []).append(perf_counter_ns() - started)
         return result
 
-    def rows() -> None:
-        for part, sample in mode._parts:
-            part.evaluate(state, sample)
-
-    def law() -> Any:
-        controller.metric.evaluate(state, problem.metric)
-        form = controller.metric.form
-        controller.field.evaluate(state, problem.metric, form, problem.field)
-        return mode._law()  # bound to its arrays, as in a step
+    def law() -> float:
+        return mode.resolve(state, controller.metric, controller.field)
 
     for t, q, v in states:
         timed("kinematics, one pass of Pinocchio", lambda: state.update(t, q, v))  # noqa: B023
-        timed("rows of contacts and tasks", rows)
-        timed("field, metric and law", law)
+        timed("contacts, tasks, field, metric and law", law)
         a = mode.resolution.acceleration
         wanted = timed("inverse dynamics", lambda: state.inverse_dynamics(a).copy())  # noqa: B023
         timed("map of the corner forces", lambda: support.update(state))
