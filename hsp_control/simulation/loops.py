@@ -8,6 +8,7 @@ import numpy as np
 from hsp_control.arrays import Array
 from hsp_control.controller import Controller, ControlOutput
 from hsp_control.exceptions import SimulationError
+from hsp_control.kernels import kernel
 from hsp_control.plants import ContinuousPlant, Integrator, Reading, SampledPlant
 from hsp_control.remedies import Command
 from hsp_control.robot import RobotState
@@ -84,11 +85,7 @@ def sampled_loop(
             tau = command.effort(t, *plant.measure(t, q, v), period).copy()
             if k == 0:
                 output, state = command.output, command.state
-                if not (
-                    t == state.t
-                    and np.array_equal(state.q, q)
-                    and np.array_equal(state.v, v)
-                ):
+                if not (t == state.t and _equal(state.q, q) and _equal(state.v, v)):
                     output = command.at(t, q, v)
                 yield Instant(state, output, tau, command.readings())
             if end == start:  # the last row: nobody waits for what comes next
@@ -99,10 +96,28 @@ def sampled_loop(
 
 
 def _stop_runaway(t: float, q: Array, v: Array) -> None:
-    speed = float(np.abs(v).max())
-    if not (np.isfinite(q).all() and speed < RUNAWAY_SPEED):
+    if not (_within(q, np.inf) and _within(v, RUNAWAY_SPEED)):
+        speed = float(np.abs(v).max())
         raise SimulationError(
             f"the motion diverged before t = {t:.6g} s: a joint moves at {speed:.3g} "
             "rad/s (or m/s). A singularity, gains too high for the control period, or "
             "a field without a minimum do that"
         )
+
+
+@kernel
+def _within(x: Array, bound: float) -> bool:
+    """Return whether every component is a number smaller than a bound."""
+    inside = True
+    for i in range(x.shape[0]):
+        inside = inside and bool(-bound < x[i] < bound)
+    return inside
+
+
+@kernel
+def _equal(x: Array, y: Array) -> bool:
+    """Return whether two vectors are the same."""
+    same = bool(x.shape[0] == y.shape[0])
+    for i in range(x.shape[0]):
+        same = same and bool(x[i] == y[i])
+    return same

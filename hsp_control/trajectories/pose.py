@@ -27,7 +27,9 @@ class PoseSample(NamedTuple):
     @classmethod
     def allocate(cls) -> "PoseSample":
         """Return a sample at the identity, to be written into."""
-        return cls.over(np.vstack([np.zeros((3, 3)), np.eye(3), np.zeros((2, 3))]))
+        memory = np.zeros((8, 3))
+        memory[3, 0] = memory[4, 1] = memory[5, 2] = 1.0
+        return cls.over(memory)
 
     @classmethod
     def over(cls, memory: Array) -> "PoseSample":
