@@ -252,27 +252,27 @@ class Actuation:
         H = np.zeros((n + p, n + p))
         H[:n, :n] = order.metric
         # Beside directions that cost nothing else, a force costs next to nothing.
-        H[n:, n:] = np.diag(_FORCE_COST / np.maximum(support.ease, 1e-6))
+        cost = _FORCE_COST / np.maximum(support.ease, 1e-6)
+        H[range(n, n + p), range(n, n + p)] = cost
         f = np.zeros(n + p)
-        f[n:] = -H[n:, n:] @ (forces / scale)
+        f[n:] = -cost * (forces / scale)
 
-        base = self.base
-        hard = [
-            self._base_rows(np.hstack([-M[base], F[base]]), wanted[base]),
-            self._effort_rows(np.hstack([M, -F]), wanted),
-            *(_padded(rows, n, 0) for rows in self._force_rows(support)),
-        ]
-        contacts = self._contact_rows(resolution, support, n + p)
+        base, pushes = self.base, np.hstack([M, -F])
+        hard, soft = [self._effort_rows(pushes, wanted)], {}
+        if base.size:
+            hard.append(self._base_rows(-pushes[base], wanted[base]))
+        if p:
+            hard += [_padded(rows, n, 0) for rows in self._force_rows(support)]
+            soft["contacts"] = self._contact_rows(resolution, support, n + p)
         bounded = np.flatnonzero(np.isfinite(self._least) | np.isfinite(self._greatest))
-        motion = Rows(
-            np.eye(n + p)[bounded],
-            (self._least - a)[bounded],
-            (self._greatest - a)[bounded],
+        unit = np.zeros((len(bounded), n + p))
+        unit[np.arange(len(bounded)), bounded] = 1.0
+        soft["motion"] = Rows(
+            unit, (self._least - a)[bounded], (self._greatest - a)[bounded]
         )
-        soft = {"contacts": contacts, "motion": motion}
         for kind, rows in barriers.items():
-            A = np.pad(rows.A, ((0, 0), (0, p)))
-            soft[kind] = Rows(A, rows.lower - rows.A @ a, rows.upper)
+            wide = _padded(rows, 0, p)
+            soft[kind] = wide._replace(lower=rows.lower - rows.A @ a)
         kept = stacked(*hard, *soft.values())
         bound = None
         if limits is not None and limits.null_space_speed is not None:
@@ -352,7 +352,10 @@ class Actuation:
 
 def _padded(rows: Rows, before: int, after: int) -> Rows:
     """Return rows with columns of zeros on either side."""
-    return rows._replace(A=np.pad(rows.A, ((0, 0), (before, after))))
+    width = rows.A.shape[1]
+    A = np.zeros((len(rows.A), before + width + after))
+    A[:, before : before + width] = rows.A
+    return rows._replace(A=A)
 
 
 def _nearest(H: Array, f: Array, kept: Rows, bound: Rows | None) -> Array | None:

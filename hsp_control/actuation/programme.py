@@ -48,8 +48,5 @@ def solve(H: Array, f: Array, rows: Rows) -> Array | None:
 
 def stacked(*rows: Rows) -> Rows:
     """Return rows below each other."""
-    return Rows(
-        np.vstack([each.A for each in rows]),
-        np.concatenate([each.lower for each in rows]),
-        np.concatenate([each.upper for each in rows]),
-    )
+    some = [each for each in rows if len(each.lower)] or rows[:1]
+    return Rows(*(np.concatenate(parts) for parts in zip(*some, strict=True)))

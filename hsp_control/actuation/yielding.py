@@ -5,9 +5,17 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.actuation.programme import Rows
-from hsp_control.arrays import Array
-from hsp_control.linalg import solve_rows, solve_rows_transposed
+from hsp_control.arrays import Array, Indices
+from hsp_control.kernels import kernel
+from hsp_control.linalg import (
+    orthogonalise_rows,
+    orthonormalise_rows,
+    solve_rows,
+    solve_rows_transposed,
+)
+from hsp_control.metrics.metric import IDENTITY
 from hsp_control.resolution import Resolution
+from hsp_control.resolution.pseudo_inverse import whiten
 
 _SINGLE, _SEVERAL = 1e-6, 1e-8
 """Cost of null-space motion beside the first level's. The smaller, the nearer to strict
@@ -38,29 +46,90 @@ def yielding(
         weight: Cost of null-space motion beside the first level's; None: the least.
     """
     J = resolution.problem.task.jacobian
-    L = resolution.problem.metric.L
-    n = J.shape[1]
-    whitened = J.copy()
-    solve_rows(L, whitened)
+    L, form = resolution.problem.metric.L, resolution.form
+    m, n = J.shape
+    N, of_level = np.empty((n, n)), np.empty(n, dtype=np.int64)
+    count = _directions(
+        *(J, L, form, resolution.ends, resolution.threshold),
+        *(np.empty((2, m, n)), np.empty((m, m)), N, of_level),
+    )
+    N, of_level = N[:count], of_level[:count]
     levels = len(resolution.ends) - supported
     whole = weight or (_SINGLE if levels <= 1 else _SEVERAL)
     ratio = whole ** (1.0 / max(levels, 1))
-    H = np.eye(n) * whole
-    taken = np.zeros((n, 0))
-    start = 0
-    for level, end in enumerate(resolution.ends):
-        block = whitened[start:end].T
-        block = block - taken @ (taken.T @ block)
-        U, s, _ = np.linalg.svd(block, full_matrices=False)
-        N = U[:, s > resolution.threshold]
-        cost = ratio ** max(level - supported, 0)
-        H += (cost - whole) * (N @ N.T)
-        taken = np.hstack([taken, N])
-        start = end
-    raised = taken.T.copy()
+    costs = ratio ** np.maximum(of_level - supported, 0)
+    one = np.eye(n)
+    H = whole * one + (N.T * (costs - whole)) @ N
+    if form == IDENTITY:
+        return Yielding(H, one - N.T @ N)
+    raised = N.copy()
     solve_rows_transposed(L, raised)
-    P = np.eye(n) - raised.T @ (taken.T @ L.T)
-    return Yielding(np.asarray(L @ H @ L.T), P)
+    return Yielding(np.asarray(L @ H @ L.T), one - raised.T @ (N @ L.T))
+
+
+@kernel
+def _directions(
+    J: Array,
+    L: Array,
+    form: int,
+    ends: Indices,
+    threshold: float,
+    wide: Array,
+    X: Array,
+    N: Array,
+    of_level: Indices,
+) -> int:
+    """Write the directions of all levels, orthonormal rows in whitened coordinates.
+
+    Args:
+        J: Jacobian of all tasks, level after level, shape (m, nv).
+        L: Cholesky factor of the metric, shape (nv, nv).
+        form: The metric's form.
+        ends: Where each level's rows end in the stack.
+        threshold: Singular value below which a direction is nobody's.
+        wide: Scratch, shape (2, m, nv).
+        X: Scratch, shape (m, m).
+        N: The directions, shape (nv, nv).
+        of_level: Whose each is, shape (nv,).
+
+    Returns:
+        How many there are.
+    """
+    n = J.shape[1]
+    count = start = 0
+    whiten(J, L, form, wide[0])
+    for level in range(ends.shape[0]):
+        end = ends[level]
+        B, Q, U = (
+            wide[0, start:end],
+            wide[1, start:end],
+            X[: end - start, : end - start],
+        )
+        taken = count
+        for k in range(end - start):
+            for d in range(taken):
+                share = 0.0
+                for i in range(n):
+                    share += N[d, i] * B[k, i]
+                for i in range(n):
+                    B[k, i] -= share * N[d, i]
+        # Where no singular value is small any orthonormal rows do, and cost a tenth.
+        regular = orthonormalise_rows(B, Q, U) >= threshold
+        if not regular:
+            orthogonalise_rows(B, U[:, :0])
+        for k in range(end - start):
+            square = 0.0
+            for i in range(n):
+                square += B[k, i] * B[k, i]
+            size = np.sqrt(square)
+            if count == n or not (regular or size > threshold):
+                continue
+            for i in range(n):
+                N[count, i] = Q[k, i] if regular else B[k, i] / size
+            of_level[count] = level
+            count += 1
+        start = end
+    return count
 
 
 def null_space_rows(

@@ -44,6 +44,7 @@ class Resolution:
     Attributes:
         problem: What is to be resolved, to be filled in before `resolve`.
         ends: Where each level's rows end in the stack.
+        form: The metric's form.
         threshold: Singular value below which the inverse is bounded.
         acceleration: a of the last `resolve`, shape (nv,).
         null_space_error: e_N of the last `resolve`, shape (nv,).
@@ -64,7 +65,7 @@ class Resolution:
         m = sum(levels)
         self.problem = Problem(m, nv, gain)
         self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
-        self._form = form
+        self.form = form
         self.threshold = threshold
         self._scratch = (
             np.zeros((2, m, nv)),
@@ -99,7 +100,7 @@ class Resolution:
             *self.problem.arrays,
             v,
             self.ends,
-            self._form,
+            self.form,
             self.threshold,
             controls,
             *self._scratch,
@@ -118,7 +119,7 @@ class Resolution:
             J, L = self.problem.task.jacobian[first:], self.problem.metric.L
             out = np.zeros(min(J.shape))
             wide, small, _ = self._scratch
-            call = bind(_singular_values, J, L, self._form, wide, small, out)
+            call = bind(_singular_values, J, L, self.form, wide, small, out)
             self._spectra[first] = values = call, out
         manipulability = values[0]()
         return values[1].copy(), manipulability
