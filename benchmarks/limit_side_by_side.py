@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from marked import DOCS, replace_part
 from matplotlib.figure import Figure
+from timing import ratios, spread, step_times
 
 import hsp_control as hsp
+from hsp_control.actuation import EXACT
 from hsp_control.arrays import Array
 from hsp_control.config import Experiment
 from hsp_control.palette import INK, SERIES
@@ -225,6 +227,33 @@ HEADER = (
 )
 
 
+def cost(name: str, run: Run, limits: hsp.Limits) -> str:
+    """Return lines of what a step costs beside TSID's, limits binding or not."""
+    experiment = hsp.load_experiment(f"limits/{name}")
+    controller, state = experiment.controller, hsp.RobotState(experiment.robot)
+
+    def law(t: float, q: Array, v: Array) -> Array:
+        return controller.compute(state.update(t, q, v)).tau
+
+    steps = list(zip(run.t, run.q, run.v, strict=True))
+    bound = [controller.compute(state.update(*step)).status != EXACT for step in steps]
+    peer = tsid_of(hsp.load_experiment(f"limits/{name}", "limits=null"), limits, 1e-3)
+    lines = ""
+    for label, wanted in (("none", False), ("some", True)):
+        chosen = [step for step, b in zip(steps, bound, strict=True) if b == wanted]
+        times = step_times({"law": law, "TSID": peer}, chosen, rounds=25, block=40)
+        ratio = spread(ratios(times, "law", "TSID"))
+        taken = 1e6 * np.median(times["law"])
+        lines += f"| `{name}` | {label} | {len(chosen)} | {ratio} | {taken:.0f} |\n"
+    return lines
+
+
+COST = (
+    "\n| configuration | limits that bind | steps | this law / TSID | µs |\n"
+    "|---|---|--:|--:|--:|\n"
+)
+
+
 def figure(found: dict[str, tuple[dict[str, Run], hsp.Limits]]) -> Figure:
     """Return limits, what meets them, and what gives way."""
     drawn = new_figure(10.0, 7.2)
@@ -268,6 +297,11 @@ def main() -> None:
         for name, (runs, limits) in found.items()
         for label, run in runs.items()
     )
+    if any(label.startswith("TSID") for label in found[NAMES[0]][0]):
+        table += COST + "".join(
+            cost(name, runs["this law, limits"], limits)
+            for name, (runs, limits) in found.items()
+        )
     print(table)
     replace_part(DOCS / "limits.md", "limit_side_by_side", "\n" + table + "\n")
     with styled():
