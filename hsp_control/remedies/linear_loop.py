@@ -53,7 +53,7 @@ class LinearLoop:
 
     def radius(self) -> float:
         """Return the spectral radius: below 1 all dies, above it something grows."""
-        return float(np.abs(np.linalg.eigvals(self.transition())).max())
+        return float(np.abs(np.linalg.eigvals(_coupled(self.transition()))).max())
 
     def _step(
         self,
@@ -92,3 +92,14 @@ class LinearLoop:
 
 def _moved(x: Array, v: Array, u: Array, h: float) -> tuple[Array, Array]:
     return x + h * v + 0.5 * h * h * u, v + h * u
+
+
+def _coupled(A: Array) -> Array:
+    """Return a matrix without what is never written or never read.
+
+    Its eigenvalues are 0, and those of the rest are the others: a loop without remedies
+    and delays uses a sixth of what it could remember.
+    """
+    while not (used := A.any(axis=0) & A.any(axis=1)).all():
+        A = A[np.ix_(used, used)]
+    return A

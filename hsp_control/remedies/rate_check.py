@@ -350,7 +350,7 @@ def _largest(
         return None
     first = max(k for k, fine in enumerate(good) if not fine) + 1
     low, high = float(tried[first]), float(tried[first - 1])
-    for _ in range(30):
+    for _ in range(14):  # to 1e-5 of it
         middle = np.sqrt(low * high)
         low, high = (middle, high) if stable(middle) else (low, middle)
     return low
