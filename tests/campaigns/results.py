@@ -12,7 +12,7 @@ FOLDER = Path("out/fuzz")
 def keep(name: str, counts: dict[str, Any]) -> None:
     """Write the counts of one campaign, whole or so far."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    text = json.dumps({**counts, "python": platform.python_version()}, indent=1)
+    text = json.dumps({**counts, "interpreter": platform.python_version()}, indent=1)
     part = FOLDER / f".{name}.part"
     part.write_text(text, encoding="utf-8")
     part.replace(FOLDER / f"{name}.json")
