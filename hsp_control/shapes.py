@@ -314,8 +314,9 @@ def described_shape(kind: str, parameters: Mapping[str, Any]) -> Shape | None:
     Raises:
         SceneError: If a shape of this kind has other parameters.
     """
-    form = globals().get(kind)
-    if not (isinstance(form, type) and issubclass(form, Shape) and form is not Shape):
+    forms = {form.__name__: form for form in Shape.__subclasses__()}
+    form = forms.get(kind)
+    if form is None:
         return None
     try:
         known = {k: Path(v) if k == "file" else v for k, v in parameters.items()}

@@ -38,7 +38,7 @@ from hsp_control.fields import TargetPosture
 from hsp_control.plants.drives import EffortDelay
 from hsp_control.plants.model_changes import ScaledInertias, changed
 from hsp_control.plants.sensors import SensorDelay
-from hsp_control.remedies.linear_loop import LinearLoop
+from hsp_control.remedies.linear_loop import LinearLoop, _coupled
 from hsp_control.remedies.rate_check import null_space_rates, rate_findings
 
 H = 1e-3
@@ -80,6 +80,23 @@ def test_the_limits_of_theory(make: Any, limit: float) -> None:
     """theory.md §8, in units of 1/h, to five digits."""
     assert make(limit * (1.0 - 1e-5) / H).radius() <= 1.0 + 1e-9
     assert make(limit * (1.0 + 1e-5) / H).radius() > 1.0 + 1e-7
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        pd(300.0),
+        pd(300.0, ki=500.0),
+        pd(300.0, effort_delay=1, sensor_delay=1),
+        pd(300.0, effort_delay=2, remedies=Remedies(predictor=Predictor(2))),
+    ],
+)
+def test_memory_that_is_not_used_does_not_decide(loop: LinearLoop) -> None:
+    """The radius is taken without zeros of the whole matrix, and only without those."""
+    whole = loop.transition()
+    assert len(_coupled(whole)) < len(whole)
+    expected = np.abs(np.linalg.eigvals(whole)).max()
+    assert loop.radius() == pytest.approx(expected, rel=1e-6)  # a double eigenvalue
 
 
 def test_an_integral_is_stable_up_to_routh_where_the_rate_is_high() -> None:

@@ -147,14 +147,13 @@ class Actuation:
         """
         wanted = state.inverse_dynamics(a)  # M a + N
         broken = self._broken(state, a)
+        moves, affords = broken in (0, EFFORT), broken in (0, MOTION)
         if offset is not None:
             wanted = wanted + offset
-            broken = (broken == MOTION or broken == MOTION + EFFORT) * MOTION
-            broken += (not within(wanted, self._low, self._high)) * EFFORT
+            affords = within(wanted, self._low, self._high)
         forces, tau = self._no_forces, wanted
-        if self._only_boxes and not broken:
+        if self._only_boxes and moves and affords:
             return wanted, a, forces, EXACT, 0.0
-        moves = broken in (0, EFFORT)
         if support.size:
             support.update(state)
             forces, tau = support.least_forces(self.base, wanted)
