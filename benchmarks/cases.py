@@ -12,11 +12,11 @@ import numpy as np
 import pinocchio as pin
 
 import hsp_control as hsp
-from hsp_control.arrays import Array
-from hsp_control.fields import FieldSample, ObstacleClearance
-from hsp_control.metrics import MetricSample
-from hsp_control.metrics.metric import IDENTITY
-from hsp_control.shapes import Sphere
+from hsp_control.common.arrays import Array
+from hsp_control.geometry.shapes import Sphere
+from hsp_control.null_space.fields import FieldSample, ObstacleClearance
+from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.metrics.metric import IDENTITY
 from hsp_control.trajectories import Blend, ComposedPose, HoldOrientation, PoseSample
 
 FRAME = "panda_tcp"

@@ -18,8 +18,8 @@ from marked import DOCS, replace_part
 from rich.progress import track
 
 import hsp_control as hsp
-from hsp_control.actuation import LIMITED, RELAXED
-from hsp_control.arrays import Array, Indices
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.control.actuation import LIMITED, RELAXED
 
 T = TypeVar("T")
 PERIOD = 1e-3  # [s]

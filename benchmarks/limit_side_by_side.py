@@ -15,11 +15,11 @@ from matplotlib.figure import Figure
 from timing import ratios, spread, step_times
 
 import hsp_control as hsp
-from hsp_control.actuation import EXACT
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 from hsp_control.config import Experiment
-from hsp_control.palette import INK, SERIES
-from hsp_control.plots import new_figure, styled
+from hsp_control.control.actuation import EXACT
+from hsp_control.visualization.palette import INK, SERIES
+from hsp_control.visualization.plots import new_figure, styled
 
 PERIOD = 1e-3  # [s]
 NAMES = ("panda_half_strength", "panda_towards_limit")

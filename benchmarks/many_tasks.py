@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 import hsp_control as hsp
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 from hsp_control.trajectories import ComposedPose, HoldOrientation, PoseSample
 
 FREQUENCY, NULL_SPACE_GAIN, POSTURE_RATE = 10.0, 10.0, 1.0

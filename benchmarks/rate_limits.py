@@ -15,7 +15,7 @@ from marked import DOCS, replace_part
 from rich.progress import track
 
 from hsp_control import Rollout, load_experiment
-from hsp_control.exceptions import SimulationError, UnstableRateError
+from hsp_control.common.exceptions import SimulationError, UnstableRateError
 
 BESIDE = 0.03
 PERIODS = 600
@@ -103,25 +103,27 @@ CASES = [
     Case("task, two periods late", "iiwa14", 500,
          also(frequency, plant__drives__delay=2), omega, 2.0),
     Case("task, one period late, predicted", "panda", 1000,
-         also(frequency, **LATE, remedies__predictor={"effort_delay": 1}), omega, 2.0),
+         also(frequency, **LATE, compensation__predictor={"effort_delay": 1}),
+         omega, 2.0),
     Case("task, one each, predicted", "panda", 500,
          also(frequency, **LATE, plant__sensors__delay=1,
-              remedies__predictor={"effort_delay": 1, "sensor_delay": 1}), omega, 2.0),
+              compensation__predictor={"effort_delay": 1, "sensor_delay": 1}),
+         omega, 2.0),
     Case("task, velocity at 50 Hz", "panda", 1000,
-         also(frequency, remedies__velocity_filter={"cutoff": 50.0}), omega, 2.0),
+         also(frequency, compensation__velocity_filter={"cutoff": 50.0}), omega, 2.0),
     Case("task, velocity at 50 Hz, second order", "panda", 1000,
-         also(frequency, remedies__velocity_filter={"cutoff": 50.0, "order": 2}),
+         also(frequency, compensation__velocity_filter={"cutoff": 50.0, "order": 2}),
          omega, 2.0),
     Case("task, observer of 50 1/s, one period late", "panda", 1000,
-         also(frequency, **LATE, remedies__momentum_observer={"bandwidth": 50.0}),
+         also(frequency, **LATE, compensation__momentum_observer={"bandwidth": 50.0}),
          omega, 2.0),
     Case("observer of x, ω0 h = 0.1, one period late", "panda", 1000,
-         lambda x, h: {"remedies.momentum_observer": {"bandwidth": x},
+         lambda x, h: {"compensation.momentum_observer": {"bandwidth": x},
                        "tasks.hand.gains.natural_frequency": 0.1 / h,
                        "plant.drives.delay": 1},
          lambda x, h: ("K_O h", x * h), 4.0),
     Case("integral action, ω0 h = 0.05", "panda", 1000,
-         lambda x, h: {"remedies.integral_action": {"rate": x},
+         lambda x, h: {"compensation.integral_action": {"rate": x},
                        "tasks.hand.gains.natural_frequency": 0.05 / h},
          lambda x, h: ("Ki / (Kv Kp)", x / (0.1 / h)), 0.099),
 ]  # fmt: skip
@@ -152,7 +154,7 @@ def configuration(case: Case, x: float, *, check: bool) -> dict[str, Any]:
             "fields": [{"type": "target_posture", "target": target, "weight": 1.0}],
         },
         "plant": {"type": "rigid_body", "drives": {}, "sensors": {}},
-        "remedies": {},
+        "compensation": {},
         "simulation": {
             "duration": PERIODS * h,
             "control_period": h,

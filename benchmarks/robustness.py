@@ -1,4 +1,4 @@
-"""What each remedy is worth on each imperfect plant: two arms, two engines.
+"""What each compensator is worth on each imperfect plant: two arms, two engines.
 
     .venv/bin/python benchmarks/robustness.py [--fresh] [--tables]
 
@@ -24,7 +24,7 @@ from marked import DOCS, replace_part
 from rich.progress import track
 
 from hsp_control import ContinuousPlant, IntegratedPlant, SampledPlant, load_experiment
-from hsp_control.remedies import Command
+from hsp_control.control.compensation import Command
 from hsp_control.robot import RobotState
 
 PROCESSES = 3
@@ -109,8 +109,8 @@ ROWS = [
     Row("exact, friction imagined", imagined=True),
 ]  # fmt: skip
 
-Remedies = dict[str, Any]
-COLUMNS: dict[str, Callable[[Row], Remedies | None]] = {
+Compensation = dict[str, Any]
+COLUMNS: dict[str, Callable[[Row], Compensation | None]] = {
     "law alone": lambda row: {},
     "integral": lambda row: {"integral_action": {"rate": 5.0}},
     "observer": lambda row: {"momentum_observer": {"bandwidth": 50.0}},
@@ -139,10 +139,10 @@ COLUMNS: dict[str, Callable[[Row], Remedies | None]] = {
         **(_if({"effort_delay": row.delay} if row.delay else None, "predictor") or {}),
     },
 }
-"""What is on in each column; None where the remedy has nothing to do."""
+"""What is on in each column; None where the compensator has nothing to do."""
 
 
-def _if(settings: Any, name: str, **beside: Any) -> Remedies | None:
+def _if(settings: Any, name: str, **beside: Any) -> Compensation | None:
     return None if settings is None else {name: settings, **beside}
 
 
@@ -165,15 +165,15 @@ def jobs(robots: list[str], engines: list[str]) -> list[Job]:
         for k, row in enumerate(ROWS)
         if row.robot in (None, robot)
         for engine in engines
-        for column, remedies in COLUMNS.items()
-        if remedies(row) is not None
+        for column, compensation in COLUMNS.items()
+        if compensation(row) is not None
         for seed in row.seeds
     ]
 
 
 def experiment(job: Job, folder: Path) -> dict[str, Any]:
     """Return the configuration of a cell."""
-    row, remedies = ROWS[job.row], COLUMNS[job.column](ROWS[job.row])
+    row, compensation = ROWS[job.row], COLUMNS[job.column](ROWS[job.row])
     plant = {"type": job.engine, "seed": job.seed, **row.plant}
     if row.robot == "iiwa14":
         folder.mkdir(exist_ok=True)
@@ -181,7 +181,7 @@ def experiment(job: Job, folder: Path) -> dict[str, Any]:
     config = configuration(job.robot, HANDS[job.robot], plant)
     config["simulation"]["control_period"] = 1.0 / row.frequency
     config["simulation"]["log_period"] = 1.0 / row.frequency
-    config["remedies"] = remedies
+    config["compensation"] = compensation
     return config
 
 
@@ -198,7 +198,7 @@ def measured(config: dict[str, Any]) -> tuple[float, float, float]:
     if isinstance(plant, ContinuousPlant):
         plant = IntegratedPlant(plant, made.integrator)
     assert isinstance(plant, SampledPlant)
-    command, state = Command(made.controller, made.remedies), RobotState(made.robot)
+    command, state = Command(made.controller, made.compensation), RobotState(made.robot)
     q, v, last = made.q0, made.v0, np.zeros(made.robot.nv)
     plant.reset(0.0, q, v)
     sums, efforts, rows = np.zeros(2), 0.0, 0
@@ -234,7 +234,7 @@ def run_all() -> None:
     todo = [job for job in jobs([*HANDS], [*ENGINES]) if _place(job) not in done]
     todo.sort(key=_lateness)
     if not CSV.is_file():
-        names = ["robot", "engine", "plant", "remedies", "seed", *MEASURES]
+        names = ["robot", "engine", "plant", "compensation", "seed", *MEASURES]
         CSV.write_text(",".join(names) + "\n", encoding="utf-8")
     with ProcessPoolExecutor(PROCESSES) as pool:
         results = pool.map(run, todo)
@@ -260,8 +260,8 @@ def _lateness(job: Job) -> tuple[int, int]:
 
 
 def read() -> dict[tuple[str, ...], dict[str, float]]:
-    """Return what was measured, by robot, engine, plant, remedies and seed."""
-    names = ("robot", "engine", "plant", "remedies", "seed")
+    """Return what was measured, by robot, engine, plant, compensation and seed."""
+    names = ("robot", "engine", "plant", "compensation", "seed")
     with CSV.open(encoding="utf-8") as file:
         return {
             tuple(row[name] for name in names): {
@@ -272,7 +272,7 @@ def read() -> dict[tuple[str, ...], dict[str, float]]:
 
 
 def means() -> dict[tuple[str, ...], dict[str, float]]:
-    """Return root mean squares over the seeds, by robot, engine, plant, remedies.
+    """Return root mean squares over the seeds, by robot, engine, plant, compensation.
 
     Of the seeds that all cells of an arm's row have: else columns would not compare.
     """
@@ -308,8 +308,8 @@ def tables() -> str:
                 if (robot, "Pinocchio", row.name, "law alone") not in cells:
                     continue
                 shown = []
-                for column, remedies in COLUMNS.items():
-                    if remedies(row) is None:
+                for column, compensation in COLUMNS.items():
+                    if compensation(row) is None:
                         shown.append("·")
                         continue
                     pair = [

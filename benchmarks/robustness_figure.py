@@ -1,4 +1,4 @@
-"""The picture of docs/robustness.md: every plant beside every remedy, both measures.
+"""The picture of docs/robustness.md: every plant beside every compensator.
 
 .venv/bin/python benchmarks/robustness_figure.py
 """
@@ -10,7 +10,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.image import AxesImage
 from robustness import COLUMNS, ROWS, means
 
-from hsp_control.plots import new_figure, styled
+from hsp_control.visualization.plots import new_figure, styled
 
 FILE = DOCS / "figures" / "robustness.png"
 SHOWN = {"error": "task error [mm]", "e_N": "‖e_N‖ [rad/s]"}

@@ -15,7 +15,7 @@ from time import process_time
 from typing import Any
 
 from hsp_control import Rollout, load_experiment
-from hsp_control.resources import bundled_configs
+from hsp_control.common.resources import bundled_configs
 
 PANDA: dict[str, Any] = {
     "robot": {"name": "panda"},

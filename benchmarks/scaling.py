@@ -19,8 +19,9 @@ from scipy.optimize import curve_fit
 from timing import Compute, State, step_times
 
 import hsp_control as hsp
-from hsp_control.arrays import Array
-from hsp_control.fields import (
+from hsp_control.common.arrays import Array
+from hsp_control.geometry.shapes import Sphere
+from hsp_control.null_space.fields import (
     InverseCondition,
     JointCentering,
     LimitBarrier,
@@ -30,9 +31,8 @@ from hsp_control.fields import (
     TargetPosture,
     Transmission,
 )
-from hsp_control.plots import new_figure, styled
-from hsp_control.shapes import Sphere
 from hsp_control.trajectories import TrajectorySample
+from hsp_control.visualization.plots import new_figure, styled
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENT, FIGURE = ROOT / "docs" / "speed.md", ROOT / "docs" / "figures" / "scaling.png"

@@ -29,8 +29,8 @@ from many_tasks import humanoid, two_arms
 from timing import Compute, State, ratios, spread, step_times
 
 import hsp_control as hsp
-from hsp_control.arrays import Array
-from hsp_control.fields import Manipulability
+from hsp_control.common.arrays import Array
+from hsp_control.null_space.fields import Manipulability
 
 Make = Callable[[Case], Compute]
 

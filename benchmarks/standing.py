@@ -12,10 +12,10 @@ import numpy as np
 from scipy.optimize import nnls
 
 import hsp_control as hsp
-from hsp_control.arrays import Array
-from hsp_control.plants import ContactPlant, RigidContact
-from hsp_control.plants.mujoco import ContactShape, Ground, MujocoPlant
-from hsp_control.shapes import Box
+from hsp_control.common.arrays import Array
+from hsp_control.geometry.shapes import Box
+from hsp_control.simulation.plants import ContactPlant, RigidContact
+from hsp_control.simulation.plants.mujoco import ContactShape, Ground, MujocoPlant
 from hsp_control.trajectories import Blend
 
 COM, HAND, TRUNK = "center_of_mass", "hand", "trunk"
@@ -243,7 +243,7 @@ class Engine:
 
     def wrenches(self, t: float, q: Array, v: Array, tau: Array) -> list[Array]:
         """Return what it does to each sole, about its frame's origin."""
-        read = self.plant.readings(t, q, v, tau)
+        read = self.plant.log_channels(t, q, v, tau)
         forces = [name for name in read if name.endswith(".force")]
         return [
             np.concatenate(

@@ -15,10 +15,10 @@ from marked import DOCS, replace_part
 from matplotlib.figure import Figure
 
 import hsp_control as hsp
-from hsp_control.actuation import LIMITED, RELAXED
-from hsp_control.arrays import Array
-from hsp_control.palette import INK, SERIES
-from hsp_control.plots import new_figure, styled
+from hsp_control.common.arrays import Array
+from hsp_control.control.actuation import LIMITED, RELAXED
+from hsp_control.visualization.palette import INK, SERIES
+from hsp_control.visualization.plots import new_figure, styled
 
 NAME = "whole_body/talos_weak_arm"
 IDEAL = (
@@ -67,7 +67,7 @@ def run(*overrides: str) -> Seen:
     rollout = experiment.run()
     limits = experiment.controller.limits
     assert limits is not None
-    names = experiment.robot.freedom_names
+    names = experiment.robot.dof_names
     arm = [i for i, name in enumerate(names) if name.startswith("arm_right")]
     off = {
         task: 1e3 * np.linalg.norm(rollout[f"task.{task}.error"], axis=1)

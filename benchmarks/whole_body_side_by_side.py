@@ -30,7 +30,7 @@ from standing import COM, G1, HAND, PERIOD, TALOS, TRUNK, Body, Engine, Standing
 from timing import Compute, State, ratios, spread, step_times
 
 import hsp_control as hsp
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 
 ROOT = Path(__file__).resolve().parent.parent
 LAW = "this law"

@@ -9,9 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import hsp_control as hsp
-from hsp_control.palette import DESIRED, INK, SERIES
-from hsp_control.plots import new_figure, paper_figure, styled, sweep_figure
-from hsp_control.readings import chosen_rows
+from hsp_control.simulation.log_series import chosen_rows
+from hsp_control.visualization.palette import DESIRED, INK, SERIES
+from hsp_control.visualization.plots import (
+    new_figure,
+    paper_figure,
+    styled,
+    sweep_figure,
+)
 
 FOLDER = Path(__file__).parent / "figures"
 GAIN, FREQUENCY = 4.0, 6.0

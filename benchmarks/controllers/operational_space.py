@@ -15,7 +15,7 @@ import pinocchio as pin
 if TYPE_CHECKING:  # it also runs where this package does not: see placo_side.py
     from cases import Case
 
-    from hsp_control.arrays import Array
+    from hsp_control.common.arrays import Array
 
 
 def make(case: "Case") -> "Callable[[float, Array, Array], Array]":

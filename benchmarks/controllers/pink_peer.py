@@ -14,7 +14,7 @@ import pinocchio as pin
 from cases import FRAME, Case
 from pink.tasks import FrameTask, PostureTask
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 
 
 def make(

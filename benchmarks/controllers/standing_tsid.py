@@ -10,7 +10,7 @@ import numpy as np
 import tsid
 from standing import CONTACT_DAMPING, FREQUENCY, FRICTION, GAIN, POSTURE_RATE, Standing
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 
 FORCE_WEIGHT = 1e-5  # of the forces' regularisation, as in TSID's exercises
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from cases import FRAME, Case
 
 import hsp_control as hsp
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 
 
 def make(

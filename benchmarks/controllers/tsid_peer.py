@@ -11,7 +11,7 @@ import numpy as np
 import tsid
 from cases import FRAME, Case
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 
 
 def make(

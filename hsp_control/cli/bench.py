@@ -8,11 +8,11 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from hsp_control.arrays import Array
 from hsp_control.cli.consoles import errors, out
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import SimulationError
 from hsp_control.config import load_experiment
-from hsp_control.exceptions import SimulationError
-from hsp_control.latency import (
+from hsp_control.live.latency import (
     ControlLoop,
     Latency,
     Quantiles,
@@ -97,7 +97,7 @@ def _table(found: Latency) -> Table:
 
 
 def _draw(found: Latency, file: Path, title: str) -> None:
-    from hsp_control.plots import latency_figure, save_figure
+    from hsp_control.visualization.plots import latency_figure, save_figure
 
     save_figure(latency_figure(found, title), file, file.suffix.lstrip(".") or "png")
     out.print(f"Figure: {file}")

@@ -20,12 +20,12 @@ from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.consoles import told
 from hsp_control.cli.interrupts import FirstInterruptWaits
 from hsp_control.cli.stopwatch import Stopwatch
+from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema, load_experiment
-from hsp_control.exceptions import LogError, SimulationError
 from hsp_control.robot import Robot
+from hsp_control.robot.description.sources import example_robots
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import Recorder
-from hsp_control.sources import example_robots
 
 if TYPE_CHECKING:
     from hsp_control.cli.screen import Screen
@@ -123,7 +123,7 @@ def salvage(options: argparse.Namespace) -> int:
 def view(options: argparse.Namespace) -> int:
     """Play logs in the browser."""
     from hsp_control.cli.screen import attend
-    from hsp_control.viewer import view_logs
+    from hsp_control.visualization.viewer import view_logs
 
     with view_logs(
         options.logs,
@@ -160,7 +160,7 @@ def check(options: argparse.Namespace) -> int:
         )
     table.add_row("null space", f"{robot.nv - rows} freedoms, {controller.field.name}")
     table.add_row("plant", experiment.plant.describe()["type"])
-    table.add_row("remedies", ", ".join(experiment.remedies.names) or "none")
+    table.add_row("compensation", ", ".join(experiment.compensation.names) or "none")
     values = ", ".join(f"{value:.3g}" for value in diagnostics.singular_values)
     table.add_row("singular values", f"{values} at the start")
     table.add_row("largest effort", f"{np.abs(output.tau).max():.3g} at the start")
@@ -186,7 +186,7 @@ def plot(options: argparse.Namespace) -> int:
         from hsp_control.cli import sweep as sweeps
 
         return sweeps.plot(options)
-    from hsp_control.plots import save_figures
+    from hsp_control.visualization.plots import save_figures
 
     rollout = Rollout.load(options.log)
     folder = options.out or options.log.parent
@@ -323,7 +323,7 @@ def _describe(robot: Robot) -> None:
     table.add_column("freedom")
     for heading in ("lower", "upper", "speed limit", "effort limit"):
         table.add_column(heading, justify="right")
-    for i, name in enumerate(robot.freedom_names):
+    for i, name in enumerate(robot.dof_names):
         numbers = (lower[i], upper[i], speed[i], effort[i])
         table.add_row(name, *(f"{number:.4g}" for number in numbers))
     _out.print(table)

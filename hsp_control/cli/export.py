@@ -10,14 +10,18 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hsp_control.cli.consoles import errors, out
-from hsp_control.exceptions import ExportError
+from hsp_control.common.exceptions import ExportError
 from hsp_control.simulation import Rollout
 
 
 def export(options: argparse.Namespace) -> int:
     """Write every file that is asked for; one that fails does not stop the others."""
-    from hsp_control.viewer.export import FilmStyle, export_film, export_html
-    from hsp_control.viewer.replay import access_for, act_of
+    from hsp_control.visualization.viewer.export import (
+        FilmStyle,
+        export_film,
+        export_html,
+    )
+    from hsp_control.visualization.viewer.replay import access_for, act_of
 
     films = [path for path in (options.mp4, options.gif, options.webp) if path]
     if not options.html and not films:

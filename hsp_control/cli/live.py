@@ -13,25 +13,25 @@ from typing import Any
 from rich.table import Table
 
 from hsp_control.cli.consoles import out
+from hsp_control.cli.robot_process import RobotProcess
+from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment, load_experiment
-from hsp_control.exceptions import LiveError, LogError
-from hsp_control.latency import Quantiles
-from hsp_control.live import (
-    Faults,
-    InProcessRobot,
-    LoopReport,
-    Operator,
-    RobotProcess,
-    run_loop,
-)
-from hsp_control.live.from_config import (
-    check_fixed,
+from hsp_control.config.build_live import (
     interface_of,
     stop_of,
     tolerance_of,
     watched_robot,
 )
-from hsp_control.remedies import Command
+from hsp_control.control.compensation import Command
+from hsp_control.live import (
+    Faults,
+    InProcessRobot,
+    LoopReport,
+    Operator,
+    run_loop,
+)
+from hsp_control.live.latency import Quantiles
+from hsp_control.live.settings import check_fixed
 from hsp_control.simulation import Rollout
 
 _REHEARSED = 0.5
@@ -58,7 +58,7 @@ def live(options: argparse.Namespace) -> int:
         "scene": experiment.scene,
         "log_period": simulation.log_period,
     }
-    command = Command(experiment.controller, experiment.remedies)
+    command = Command(experiment.controller, experiment.compensation)
     with _signals(operator):
         rehearsal = InProcessRobot(watched_robot(experiment))
         run_loop(

@@ -7,9 +7,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from hsp_control.exceptions import HspControlError
-from hsp_control.startup import end_quietly
-from hsp_control.version import __version__
+from hsp_control.cli.startup import end_quietly
+from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.version import __version__
 
 _OWN_INTERRUPTS = {"bench", "export", "sweep", "view"}
 """Commands that have processes, pages or rows to look after when Ctrl-C comes."""

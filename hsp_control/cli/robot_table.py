@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.exceptions import ModelError
-from hsp_control.resources import bundled_robots
+from hsp_control.common.exceptions import ModelError
+from hsp_control.common.resources import bundled_robots
+from hsp_control.common.suggestions import listing
 from hsp_control.robot import Robot
-from hsp_control.sources import (
+from hsp_control.robot.description.sources import (
     RobotSource,
     example_robots,
     examples_without_urdf,
     find_robot,
 )
-from hsp_control.suggest import listing
 
 _BRAVO = {"bravo_finger1_joint": 0.0, "bravo_finger2_joint": 0.0}
 _ROMEO = {
@@ -26,7 +26,7 @@ _ROMEO = {
         *("Finger31", "Finger32", "Finger33", "Thumb1", "Thumb2", "Thumb3"),
     )
 }
-REMEDIES: dict[str, dict[str, Any]] = {
+COMPENSATION: dict[str, dict[str, Any]] = {
     "alex_psyonic_hands": {"mimic": False},
     "bluevolta_bravo7_gripper": {"locked": _BRAVO},
     "bravo7_gripper": {"locked": _BRAVO},
@@ -57,8 +57,8 @@ The end effector is the frame that the robot's source names, or else the likelie
 its tree of joints (`Robot.end_effector`). *Position* and *pose* give the rank of these
 tasks there, and how many of the joints that move the end effector remain for
 self-motion: 3 + 4 for an arm of seven. Every robot with a number there is driven in
-`tests/test_every_robot.py`. Those with a floating base, which needs contacts, are
-driven there with `root: fixed`.
+`tests/integration/test_every_robot.py`. Those with a floating base, which needs
+contacts, are driven there with `root: fixed`.
 """
 
 
@@ -154,11 +154,11 @@ def _row(name: str, source: RobotSource) -> Row:
         reason = str(error).removeprefix(f"{source.urdf}: ")
         reason = reason.removeprefix("not a robot that can be built: ")
         notes.append(reason.split("; ")[0].split(", so that")[0])
-        if name not in REMEDIES:
+        if name not in COMPENSATION:
             return Row(name, source.origin, source.root, note="; ".join(notes))
-    if name in REMEDIES:
+    if name in COMPENSATION:
         notes.append(f"load it with {_options(name)}")
-        robot = Robot.load(name, **REMEDIES[name])
+        robot = Robot.load(name, **COMPENSATION[name])
     found: dict[str, Any] = {"end_effector": robot.end_effector}
     if source.root != "free_flyer":
         found |= abilities(robot)
@@ -171,9 +171,9 @@ def _row(name: str, source: RobotSource) -> Row:
 
 
 def _options(name: str) -> str:
-    """Return the remedy as a configuration has it."""
+    """Return the compensator as a configuration has it."""
     options = []
-    for key, value in REMEDIES[name].items():
+    for key, value in COMPENSATION[name].items():
         if key == "locked":
             locks = [f"{joint}: {position:g}" for joint, position in value.items()]
             options.append(f"`locked: {{{listing(locks, limit=3)}}}`")

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from typing import Self
 
+from hsp_control.common.exceptions import ViewerError
 from hsp_control.config import Experiment
-from hsp_control.exceptions import ViewerError
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import Recorder
-from hsp_control.viewer import LiveView, Viewer
+from hsp_control.visualization.viewer import LiveView, Viewer
 
 PAGE_TIMEOUT = 15.0
 """How long a browser that was started may take to show the page [s]."""

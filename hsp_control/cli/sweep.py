@@ -19,8 +19,8 @@ from rich.progress import (
 from rich.table import Table
 
 from hsp_control.cli.consoles import errors, out
+from hsp_control.common.exceptions import SweepError
 from hsp_control.config import load_experiment
-from hsp_control.exceptions import SweepError
 from hsp_control.sweeps import Sensitivity, Sweep, sensitivity
 from hsp_control.sweeps import sweep as run_sweep
 
@@ -90,7 +90,7 @@ def plot(options: argparse.Namespace) -> int:
 
 
 def _draw(swept: Sweep, folder: Path, stem: str, formats: list[str]) -> None:
-    from hsp_control.plots import save_sweep_figure
+    from hsp_control.visualization.plots import save_sweep_figure
 
     for file in save_sweep_figure(swept, folder, stem, formats):
         out.print(f"Figure: {file}")

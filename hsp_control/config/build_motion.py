@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.config.models import motion as s
-from hsp_control.exceptions import TrajectoryError
 from hsp_control.trajectories import (
     Circle,
     ComposedPose,

@@ -4,13 +4,14 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ConfigError, MetricError, SceneError
 from hsp_control.config.build_robot import end_effector, posture
 from hsp_control.config.document import Document
 from hsp_control.config.models import fields as f
 from hsp_control.config.models import null_space as s
-from hsp_control.exceptions import ConfigError, MetricError, SceneError
-from hsp_control.fields import (
+from hsp_control.geometry.scene import Scene
+from hsp_control.null_space.fields import (
     Clearance,
     EqualJointAngles,
     InverseCondition,
@@ -29,14 +30,13 @@ from hsp_control.fields import (
     Weight,
     WeightedSum,
 )
-from hsp_control.metrics import (
+from hsp_control.null_space.metrics import (
     ConstantMetric,
     IdentityMetric,
     MassMatrixMetric,
     Metric,
 )
 from hsp_control.robot import Robot, RobotState
-from hsp_control.scene import Scene
 
 
 def build_metric(document: Document, model: s.AnyMetric, robot: Robot) -> Metric:

@@ -10,13 +10,14 @@ from hsp_control.config.document import Document
 from hsp_control.config.models import plant as s
 from hsp_control.config.models.robot import LoadModel
 from hsp_control.config.scenario import Scenario
-from hsp_control.plants import (
+from hsp_control.robot import Robot
+from hsp_control.robot.friction import JointFriction
+from hsp_control.robot.integrators import Integrator
+from hsp_control.simulation.plants import (
     ContactPlant,
     ContinuousPlant,
     ImperfectPlant,
     IntegratedPlant,
-    Integrator,
-    JointFriction,
     Plant,
     Push,
     RigidBodyPlant,
@@ -25,7 +26,7 @@ from hsp_control.plants import (
     StickingPlant,
     check_plant,
 )
-from hsp_control.plants.drives import (
+from hsp_control.simulation.plants.drives import (
     Drive,
     DroppedPeriods,
     EffortDelay,
@@ -33,7 +34,7 @@ from hsp_control.plants.drives import (
     Jitter,
     Saturation,
 )
-from hsp_control.plants.model_changes import (
+from hsp_control.simulation.plants.model_changes import (
     ModelChange,
     MotorInertia,
     Payload,
@@ -41,8 +42,8 @@ from hsp_control.plants.model_changes import (
     ScaledInertias,
     changed,
 )
-from hsp_control.plants.mujoco import ContactShape, Ground, MujocoPlant
-from hsp_control.plants.sensors import (
+from hsp_control.simulation.plants.mujoco import ContactShape, Ground, MujocoPlant
+from hsp_control.simulation.plants.sensors import (
     DifferencedVelocity,
     Encoder,
     PositionNoise,
@@ -50,7 +51,6 @@ from hsp_control.plants.sensors import (
     SensorDelay,
     VelocityNoise,
 )
-from hsp_control.robot import Robot
 
 _STEP = 1e-3
 """Largest step of joints that stick, where the integrator says none [s]."""

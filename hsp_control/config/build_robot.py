@@ -5,15 +5,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.combining import placement
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ConfigurationError
 from hsp_control.config.document import Document
 from hsp_control.config.keys import KeyPath
 from hsp_control.config.models import robot as s
 from hsp_control.config.scenario import Scenario
-from hsp_control.exceptions import ConfigurationError
-from hsp_control.loading import ToolFrame
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.description.combining import placement
+from hsp_control.robot.description.loading import ToolFrame
 
 Loaded = TypeVar("Loaded", bound=s.LoadModel)
 

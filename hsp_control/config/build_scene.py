@@ -8,9 +8,8 @@ from hsp_control.config.build_motion import orientation_trajectory, position_tra
 from hsp_control.config.document import Document
 from hsp_control.config.keys import KeyPath
 from hsp_control.config.models import scene as s
-from hsp_control.mesh_files import check_inside
-from hsp_control.scene import Obstacle, Scene
-from hsp_control.shapes import (
+from hsp_control.geometry.scene import Obstacle, Scene
+from hsp_control.geometry.shapes import (
     Box,
     Capsule,
     Cylinder,
@@ -21,6 +20,7 @@ from hsp_control.shapes import (
     Shape,
     Sphere,
 )
+from hsp_control.robot.description.mesh_files import check_inside
 
 
 def located_scene(model: s.SceneModel, folder: Path) -> s.SceneModel:

@@ -4,19 +4,24 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ContactError, LimitError
 from hsp_control.config.document import Document
 from hsp_control.config.models import contacts as c
 from hsp_control.config.models import limits as l
 from hsp_control.config.models.tasks import AnyTask, ScheduleModel
-from hsp_control.contacts import BallContact, Contact, PointContact, SurfaceContact
-from hsp_control.exceptions import ContactError, LimitError
-from hsp_control.fields import Clearance, ObstacleClearance, SelfClearance
-from hsp_control.limits import Limits, MinimumDistance
+from hsp_control.constraints.contacts import (
+    BallContact,
+    Contact,
+    PointContact,
+    SurfaceContact,
+)
+from hsp_control.constraints.limits import Limits, MinimumDistance
+from hsp_control.geometry.scene import Scene
+from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClearance
 from hsp_control.robot import Robot
-from hsp_control.scene import Scene
-from hsp_control.schedules import Schedule
 from hsp_control.tasks import Task
+from hsp_control.trajectories.schedule import Schedule
 
 
 def build_contacts(

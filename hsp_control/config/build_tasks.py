@@ -3,7 +3,8 @@
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import GainError, TaskError
 from hsp_control.config.build_motion import (
     orientation_trajectory,
     pose_trajectory,
@@ -12,7 +13,6 @@ from hsp_control.config.build_motion import (
 from hsp_control.config.build_robot import end_effector, posture
 from hsp_control.config.document import Document
 from hsp_control.config.models import tasks as s
-from hsp_control.exceptions import GainError, TaskError
 from hsp_control.robot import RobotState
 from hsp_control.tasks import (
     AngularMomentum,

@@ -7,15 +7,15 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from hsp_control.access import ANYWHERE
+from hsp_control.common.exceptions import ConfigError, HspControlError
+from hsp_control.common.suggestions import nearest
 from hsp_control.config.keys import KeyPath, split_assignment
 from hsp_control.config.located import locate, located
 from hsp_control.config.overrides import assign
 from hsp_control.config.plain import shortened, shown
-from hsp_control.config.reading import MAX_SIZE, Mark, read_yaml
 from hsp_control.config.syntax import YamlError
-from hsp_control.exceptions import ConfigError, HspControlError
-from hsp_control.suggest import nearest
+from hsp_control.config.yaml_reader import MAX_SIZE, Mark, read_yaml
+from hsp_control.robot.description.access import ANYWHERE
 
 _TOO_LARGE = f"larger than {MAX_SIZE // 1_000_000} MB, too much for a configuration"
 _LONGEST_ORIGIN = 72

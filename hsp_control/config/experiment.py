@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.access import only_within
-from hsp_control.arrays import Array
-from hsp_control.composition import check_support
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ConfigError, SimulationError
+from hsp_control.common.resources import bundled_configs
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.config.build_compensation import build_compensation, check_rates
 from hsp_control.config.build_null_space import build_fields, build_metric
 from hsp_control.config.build_plant import build_plant
-from hsp_control.config.build_remedies import build_remedies, check_rates
 from hsp_control.config.build_robot import build_robot, build_start
 from hsp_control.config.build_scene import build_scene, located_scene
 from hsp_control.config.build_support import (
@@ -29,18 +30,18 @@ from hsp_control.config.models.plant import MujocoPlantModel
 from hsp_control.config.models.simulation import Dop853Model, Rk4Model
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
-from hsp_control.controller import Controller
-from hsp_control.exceptions import ConfigError, SimulationError
-from hsp_control.plants import Dop853, Integrator, Plant, Rk4, SemiImplicitEuler
-from hsp_control.remedies import RateFinding, Remedies
-from hsp_control.resources import bundled_configs
+from hsp_control.control.compensation import Compensation, RateFinding
+from hsp_control.control.composition import check_support
+from hsp_control.control.controller import Controller
+from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot
-from hsp_control.scene import Scene
+from hsp_control.robot.description.access import only_within
+from hsp_control.robot.description.sources import packaged_folders
+from hsp_control.robot.integrators import Dop853, Integrator, Rk4, SemiImplicitEuler
 from hsp_control.simulation import Rollout, simulate
+from hsp_control.simulation.plants import Plant
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.simulate import check_steps, planned
-from hsp_control.sources import packaged_folders
-from hsp_control.suggest import did_you_mean, listing
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Experiment:
         v0: Start velocity, shape (nv,).
         integrator: How the simulation moves on.
         plant: What the controller's efforts move.
-        remedies: What is done about what the plant has beside the model.
+        compensation: What is done about what the plant has beside the model.
         rate_findings: Gains that are high for the control period.
     """
 
@@ -70,7 +71,7 @@ class Experiment:
     v0: Array
     integrator: Integrator
     plant: Plant
-    remedies: Remedies
+    compensation: Compensation
     rate_findings: tuple[RateFinding, ...]
 
     def run(
@@ -89,7 +90,7 @@ class Experiment:
             log_period=settings.log_period,
             integrator=self.integrator,
             plant=self.plant,
-            remedies=self.remedies,
+            compensation=self.compensation,
             scene=self.scene,
             on_progress=on_progress,
             on_row=on_row,
@@ -226,8 +227,8 @@ def build(document: Document) -> Experiment:
             limits.check_start(q0, v0)
     integrator = _integrator(document, scenario)
     plant, scenario = build_plant(document, scenario, folder, robot, integrator)
-    remedies = build_remedies(document, scenario, controller)
-    rates = check_rates(document, scenario, controller, remedies, q0)
+    compensation = build_compensation(document, scenario, controller)
+    rates = check_rates(document, scenario, controller, compensation, q0)
     return Experiment(
         name=Path(document.name).stem,
         scenario=scenario,
@@ -238,7 +239,7 @@ def build(document: Document) -> Experiment:
         v0=v0.copy(),
         integrator=integrator,
         plant=plant,
-        remedies=remedies,
+        compensation=compensation,
         rate_findings=rates,
     )
 

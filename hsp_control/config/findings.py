@@ -12,10 +12,10 @@ from typing import Any, NamedTuple, TypeAlias
 
 from pydantic_core import ErrorDetails
 
+from hsp_control.common.suggestions import nearest
 from hsp_control.config.document import Document
 from hsp_control.config.keys import KeyPath
 from hsp_control.config.schema import Shape, entry, keys, shape, tagged
-from hsp_control.suggest import nearest
 
 Pending: TypeAlias = tuple[KeyPath, ErrorDetails]
 """An error, and the part of its path that is still ahead."""

@@ -1,7 +1,7 @@
 """Errors that say where: ``panda.yaml:9: tasks.hand.gains.kp: what is wrong``."""
 
+from hsp_control.common.exceptions import ConfigError, HspControlError
 from hsp_control.config.keys import KeyPath, written
-from hsp_control.exceptions import ConfigError, HspControlError
 
 
 def located(where: str, message: str, path: KeyPath = ()) -> ConfigError:

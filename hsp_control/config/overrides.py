@@ -5,7 +5,7 @@ from typing import Any
 
 from hsp_control.config.keys import KeyPath, written
 from hsp_control.config.plain import shown
-from hsp_control.config.reading import MAX_DEPTH
+from hsp_control.config.yaml_reader import MAX_DEPTH
 
 
 def assign(data: dict[str, Any], keys: list[str], value: Any) -> KeyPath:

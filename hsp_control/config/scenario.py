@@ -9,12 +9,12 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from hsp_control.config.models.base import Model, Name
+from hsp_control.config.models.compensation import CompensationModel
 from hsp_control.config.models.contacts import AnyContact
 from hsp_control.config.models.limits import LimitsModel
 from hsp_control.config.models.live import LiveModel
 from hsp_control.config.models.null_space import NullSpaceModel
 from hsp_control.config.models.plant import AnyPlant
-from hsp_control.config.models.remedies import RemediesModel
 from hsp_control.config.models.robot import RobotModel, StartModel
 from hsp_control.config.models.scene import SceneModel
 from hsp_control.config.models.simulation import SimulationModel
@@ -49,7 +49,7 @@ class Scenario(Model):
     """Where self-motion goes."""
     plant: AnyPlant = "rigid_body"
     """What its efforts move, and how that differs from the controller's model."""
-    remedies: RemediesModel = RemediesModel()
+    compensation: CompensationModel = CompensationModel()
     """What is done about that difference."""
     simulation: SimulationModel = SimulationModel()
     """How it is simulated."""

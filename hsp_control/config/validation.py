@@ -4,11 +4,11 @@ from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from hsp_control.common.exceptions import ConfigError
 from hsp_control.config.document import Document
 from hsp_control.config.findings import Finding, Pending, findings
 from hsp_control.config.schema import shape
 from hsp_control.config.wording import explained
-from hsp_control.exceptions import ConfigError
 
 Model = TypeVar("Model", bound=BaseModel)
 

@@ -5,10 +5,10 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
+from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.config.findings import Finding
 from hsp_control.config.plain import joined, kind, shown
 from hsp_control.config.schema import Shape, is_model, keys, literals, shape, tagged
-from hsp_control.suggest import did_you_mean, listing
 
 _SIMPLE = {
     float: ("a number", "numbers"),

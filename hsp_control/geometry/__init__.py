@@ -4,4 +4,15 @@ from .links import LinkShape as LinkShape
 from .links import Proxy as Proxy
 from .links import link_shapes as link_shapes
 from .proximity import Proximity as Proximity
+from .scene import Obstacle as Obstacle
+from .scene import Scene as Scene
 from .self_pairs import self_pairs as self_pairs
+from .shapes import Box as Box
+from .shapes import Capsule as Capsule
+from .shapes import Cylinder as Cylinder
+from .shapes import HalfSpace as HalfSpace
+from .shapes import HeightField as HeightField
+from .shapes import Mesh as Mesh
+from .shapes import PointCloud as PointCloud
+from .shapes import Shape as Shape
+from .shapes import Sphere as Sphere

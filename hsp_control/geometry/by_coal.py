@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.arrays import Array, Indices
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.kernels import kernel
 from hsp_control.geometry.links import LinkShape
-from hsp_control.kernels import kernel
-from hsp_control.kinematics import joint_support
+from hsp_control.geometry.scene import Obstacle
 from hsp_control.robot import Robot, RobotState
-from hsp_control.scene import Obstacle
+from hsp_control.robot.kinematics import joint_support
 
 GJK_TOLERANCE = 1e-10
 """Coal's own is 1e-6, too coarse for the rates of gradients."""
@@ -90,12 +90,12 @@ class ByCoal:
         own = slopes[self.places]
         J = state.world.jacobian
         for k in np.flatnonzero(own).tolist():
-            columns, freedoms, columns2, freedoms2 = self._supports[k]
+            columns, dofs, columns2, dofs2 = self._supports[k]
             first, second, normal = self.witness(k)
             force = -own[k] * normal
-            _push(J, columns, freedoms, first, force, gradient)
+            _push(J, columns, dofs, first, force, gradient)
             if len(columns2):
-                _push(J, columns2, freedoms2, second, -force, gradient)
+                _push(J, columns2, dofs2, second, -force, gradient)
 
     def _add(self, name: str, joint: int, placement: pin.SE3, geometry: Any) -> None:
         self._geometry.addGeometryObject(
@@ -107,7 +107,7 @@ class ByCoal:
 def _push(
     J_world: Array,
     columns: Indices,
-    freedoms: Indices,
+    dofs: Indices,
     point: Array,
     force: Array,
     out: Array,
@@ -118,7 +118,7 @@ def _push(
     mz = point[0] * force[1] - point[1] * force[0]
     for k in range(columns.shape[0]):
         c = columns[k]
-        out[freedoms[k]] += (
+        out[dofs[k]] += (
             J_world[0, c] * force[0]
             + J_world[1, c] * force[1]
             + J_world[2, c] * force[2]

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from scipy.optimize import minimize
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 
 
 def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:

@@ -17,9 +17,14 @@ from typing import Any
 import coal
 import numpy as np
 
-from hsp_control.arrays import Array, Indices
-from hsp_control.bound import Bound
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+from hsp_control.common.rotations import cross, rotate, rotate_back
+from hsp_control.common.step_plan import StepPlan
 from hsp_control.geometry.links import LinkShape
+from hsp_control.geometry.scene import Obstacle
+from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
 from hsp_control.geometry.signed_distance import (
     BOX,
     CYLINDER,
@@ -30,13 +35,8 @@ from hsp_control.geometry.signed_distance import (
     nearest_on_segments,
     nearest_rates,
 )
-from hsp_control.kernels import kernel
-from hsp_control.kinematics import joint_support
-from hsp_control.native import bind
 from hsp_control.robot import Robot, RobotState
-from hsp_control.rotations import cross, rotate, rotate_back
-from hsp_control.scene import Obstacle
-from hsp_control.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
+from hsp_control.robot.kinematics import joint_support
 from hsp_control.trajectories.following import stay
 
 MOTION = 18
@@ -96,34 +96,34 @@ class ClosedForm:
         self._sizes = np.array(rows).reshape(-1, 7)
         supports = {i: joint_support(robot.model, i) for i in {x.joint for x in links}}
         self._kinds: Indices = np.zeros((len(rows), 4), dtype=np.int64)
-        columns, freedoms, end = [], [], 0
+        columns, dofs, end = [], [], 0
         for i, link in enumerate(links):
-            own_columns, own_freedoms = supports[link.joint]
+            own_columns, own_dofs = supports[link.joint]
             columns.append(own_columns)
-            freedoms.append(own_freedoms)
+            dofs.append(own_dofs)
             self._kinds[i] = SEGMENT, link.joint, end, end + len(own_columns)
             end += len(own_columns)
         for k, (kind, _) in enumerate(solids):
             self._kinds[len(links) + k] = kind, -1 - k, 0, 0
         self._columns = np.concatenate(columns)
-        self._freedoms = np.concatenate(freedoms)
+        self._dofs = np.concatenate(dofs)
         self._used: Indices = used[self._kinds[used, 0] == SEGMENT]
         self._segments = np.zeros((len(rows), 2, 3))
         self._cores = np.zeros((len(pairs), 3, 3))
         self._scratch = np.zeros((40, 3))
         self.measurements: Indices = np.zeros(1, dtype=np.int64)
-        self._measured: tuple[RobotState, Array, Bound] | None = None
+        self._measured: tuple[RobotState, Array, StepPlan] | None = None
         self._derived: _Derived | None = None
 
     def measure(self, state: RobotState, distances: Array) -> None:
         """Write the distances, each in its place."""
-        bound = self.bind(state, distances)
+        bound = self.compile(state, distances)
         for follow in bound.follow:
             follow(state.t)
         for write in bound.write:
             write()
 
-    def bind(self, state: RobotState, distances: Array) -> Bound:
+    def compile(self, state: RobotState, distances: Array) -> StepPlan:
         """Return what `measure` does with this state and this array."""
         measured = self._measured
         if measured and measured[0] is state and measured[1] is distances:
@@ -143,7 +143,7 @@ class ClosedForm:
             self._scratch,
             distances,
         )
-        bound = Bound(self._moving, (measure,))
+        bound = StepPlan(self._moving, (measure,))
         self._measured = state, distances, bound
         return bound
 
@@ -202,7 +202,7 @@ class ClosedForm:
             self._kinds,
             self._sizes,
             self._columns,
-            self._freedoms,
+            self._dofs,
             self._pairs,
             self._places,
             self._segments,
@@ -330,7 +330,7 @@ def _differentiate(
     kinds: Indices,
     sizes: Array,
     columns: Indices,
-    freedoms: Indices,
+    dofs: Indices,
     pairs: Indices,
     places: Indices,
     segments: Array,
@@ -359,8 +359,8 @@ def _differentiate(
         if slope == 0.0 and bend == 0.0:
             continue
         i, j = pairs[k, 0], pairs[k, 1]
-        _twist(J, v, motion, kinds, i, columns, freedoms, ours)
-        _twist(J, v, motion, kinds, j, columns, freedoms, theirs)
+        _twist(J, v, motion, kinds, i, columns, dofs, ours)
+        _twist(J, v, motion, kinds, j, columns, dofs, theirs)
         if kinds[j, 0] == SEGMENT:
             _between_segments(segments, i, j, ours, theirs, work, core, core_dot)
         else:
@@ -382,7 +382,7 @@ def _differentiate(
             kinds,
             i,
             columns,
-            freedoms,
+            dofs,
             x,
             x_dot,
             n,
@@ -400,7 +400,7 @@ def _differentiate(
                 kinds,
                 j,
                 columns,
-                freedoms,
+                dofs,
                 y,
                 y_dot,
                 n,
@@ -419,7 +419,7 @@ def _twist(
     kinds: Indices,
     i: int,
     columns: Indices,
-    freedoms: Indices,
+    dofs: Indices,
     twist: Array,
 ) -> None:
     """Write the velocity of the point at the world's origin, and the angular one."""
@@ -427,8 +427,8 @@ def _twist(
         twist[0, a] = twist[1, a] = 0.0
     for p in range(kinds[i, 2], kinds[i, 3]):
         for a in range(3):
-            twist[0, a] += J[a, columns[p]] * v[freedoms[p]]
-            twist[1, a] += J[3 + a, columns[p]] * v[freedoms[p]]
+            twist[0, a] += J[a, columns[p]] * v[dofs[p]]
+            twist[1, a] += J[3 + a, columns[p]] * v[dofs[p]]
     if kinds[i, 1] < 0:
         own = motion[-1 - kinds[i, 1]]
         for a in range(3):
@@ -525,7 +525,7 @@ def _push(
     kinds: Indices,
     i: int,
     columns: Indices,
-    freedoms: Indices,
+    dofs: Indices,
     x: Array,
     x_dot: Array,
     force: Array,
@@ -548,5 +548,5 @@ def _push(
             change += J[a, c] * force[a] + J[3 + a, c] * moment[a]
             change_dot += J_dot[a, c] * force[a] + J_dot[3 + a, c] * moment[a]
             change_dot += J[a, c] * force_dot[a] + J[3 + a, c] * moment_dot[a]
-        gradient[freedoms[p]] += change
-        rate[freedoms[p]] += change_dot
+        gradient[dofs[p]] += change
+        rate[dofs[p]] += change_dot

@@ -9,15 +9,15 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from hsp_control import mesh_files
-from hsp_control.arrays import Array
-from hsp_control.combining import Part
-from hsp_control.exceptions import ModelError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ModelError
 from hsp_control.geometry.capsule_fit import enclosing_capsule
-from hsp_control.hulls import convex_hull, hull_corners
+from hsp_control.geometry.hulls import convex_hull, hull_corners
 from hsp_control.robot import Robot
-from hsp_control.sources import RobotSource
-from hsp_control.urdf_checks import read_urdf
+from hsp_control.robot.description import mesh_files
+from hsp_control.robot.description.combining import Part
+from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.urdf_checks import read_urdf
 
 Proxy = Literal["capsules", "spheres", "hulls", "meshes"]
 

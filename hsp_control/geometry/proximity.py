@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import FieldError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import FieldError
 from hsp_control.geometry.by_coal import ByCoal
 from hsp_control.geometry.closed_form import ClosedForm, has_closed_form
 from hsp_control.geometry.links import LinkShape
+from hsp_control.geometry.scene import Obstacle
 from hsp_control.robot import Robot, RobotState
-from hsp_control.scene import Obstacle
 
 
 class Proximity:

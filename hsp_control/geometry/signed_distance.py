@@ -6,8 +6,8 @@ origin (box, cylinder, half-space), with gradient n and Hessian H.
 
 from math import sqrt
 
-from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
 
 SEGMENT, BOX, CYLINDER, HALF_SPACE = 0, 1, 2, 3
 """Kinds of shapes: a ball is a segment without length."""

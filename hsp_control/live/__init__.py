@@ -10,7 +10,6 @@ from .link import Link as Link
 from .loop import run_loop as run_loop
 from .operator import Operator as Operator
 from .report import LoopReport as LoopReport
-from .robot_process import RobotProcess as RobotProcess
 from .safe_stop import Phase as Phase
 from .safe_stop import SafeStop as SafeStop
 from .settings import EffortInterface as EffortInterface

@@ -2,9 +2,9 @@
 
 from typing import Protocol
 
-from hsp_control.arrays import Array
-from hsp_control.controller import Controller, ControlOutput
-from hsp_control.remedies import Command
+from hsp_control.common.arrays import Array
+from hsp_control.control.compensation import Command
+from hsp_control.control.controller import Controller, ControlOutput
 from hsp_control.robot import RobotState
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import HspControlError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HspControlError
 from hsp_control.robot import Robot, RobotState
 
 

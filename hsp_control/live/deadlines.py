@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.latency import Quantiles
+from hsp_control.common.arrays import Array
+from hsp_control.live.latency import Quantiles
 
 KEPT = 600_000
 """Periods whose times are kept, the latest: ten minutes at 1 kHz."""

@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
-from hsp_control.exceptions import LiveError
-from hsp_control.suggest import did_you_mean
+from hsp_control.common.exceptions import LiveError
+from hsp_control.common.suggestions import did_you_mean
 
 
 @dataclass(frozen=True)

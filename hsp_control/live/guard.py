@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.limits import Limits
+from hsp_control.common.arrays import Array
+from hsp_control.constraints.limits import Limits
 from hsp_control.live.hardware import Measurement
 from hsp_control.live.settings import Tolerance
 from hsp_control.robot import Robot
@@ -78,6 +78,6 @@ class Guard:
             return None
         i = int(np.flatnonzero(outside)[0])
         return (
-            f"{self._robot.freedom_names[i]} {verb} {values[i]:.6g}, beyond "
+            f"{self._robot.dof_names[i]} {verb} {values[i]:.6g}, beyond "
             f"{lower[i]:.6g} to {upper[i]:.6g}"
         )

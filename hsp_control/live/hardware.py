@@ -2,7 +2,7 @@
 
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 
 
 class Measurement(NamedTuple):

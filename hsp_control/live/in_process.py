@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 from hsp_control.live.hardware import Measurement
 from hsp_control.live.watched_robot import WatchedRobot
 

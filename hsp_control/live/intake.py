@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import HardwareError
-from hsp_control.limits import Limits
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HardwareError
+from hsp_control.constraints.limits import Limits
 from hsp_control.live.dead_reckoning import DeadReckoning
 from hsp_control.live.deadlines import Deadlines
 from hsp_control.live.guard import Guard

@@ -8,8 +8,8 @@ from time import monotonic, monotonic_ns
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import HardwareError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HardwareError
 from hsp_control.live.faults import FaultInjector, Faults
 from hsp_control.live.packets import Kind, Packet, decode, encode
 

@@ -5,16 +5,16 @@ from math import floor, inf, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from hsp_control.arrays import Array
-from hsp_control.controller import Controller, ControlOutput
+from hsp_control.common.arrays import Array
+from hsp_control.control.controller import Controller, ControlOutput
+from hsp_control.control.log_channel import LogChannel
+from hsp_control.geometry.scene import Scene
 from hsp_control.live.commander import Commander
 from hsp_control.live.effort_port import EffortPort
 from hsp_control.live.intake import Intake
 from hsp_control.live.report import LoopReport
 from hsp_control.live.safe_stop import Phase
-from hsp_control.plants import Reading
 from hsp_control.robot import RobotState
-from hsp_control.scene import Scene
 from hsp_control.simulation.journal import JournalWriter
 from hsp_control.simulation.recorder import Recorder
 
@@ -40,7 +40,7 @@ class Row(NamedTuple):
     state: RobotState
     output: ControlOutput | None
     tau: Array
-    readings: Mapping[str, Reading]
+    log_channels: Mapping[str, LogChannel]
 
 
 class LiveLog:
@@ -173,14 +173,14 @@ class LoopLog:
         self, phase: Phase, intake: Intake, port: EffortPort, response: float
     ) -> Row:
         found, state = intake.found, intake.state
-        readings = live_readings(
+        log_channels = live_channels(
             phase=float(phase),
             sent=port.sent,
             measured=float(found is not None),
             age=nan if found is None else found.age,
             response=response,
         )
-        return Row(state, self._law(phase, state), port.acting, readings)
+        return Row(state, self._law(phase, state), port.acting, log_channels)
 
     def end(self, report: LoopReport) -> None:
         """Close the journal, if there is one that can be written.
@@ -218,8 +218,9 @@ class LoopLog:
             return None
 
 
-def live_readings(**values: Array | float) -> dict[str, Reading]:
+def live_channels(**values: Array | float) -> dict[str, LogChannel]:
     """Return readings by their names in `ABOUT`."""
     return {
-        f"live.{name}": Reading(value, *ABOUT[name]) for name, value in values.items()
+        f"live.{name}": LogChannel(value, *ABOUT[name])
+        for name, value in values.items()
     }

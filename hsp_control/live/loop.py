@@ -8,22 +8,26 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.controller import Controller
-from hsp_control.exceptions import HardwareError, LiveError
-from hsp_control.latency import no_garbage_collection, real_time_priority
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.control.controller import Controller
+from hsp_control.geometry.scene import Scene
 from hsp_control.live.commander import Commander, as_commander
 from hsp_control.live.effort_port import EffortPort
-from hsp_control.live.from_config import check_fixed
 from hsp_control.live.hardware import Hardware
 from hsp_control.live.intake import Intake
+from hsp_control.live.latency import no_garbage_collection, real_time_priority
 from hsp_control.live.live_log import LoopLog
 from hsp_control.live.operator import Operator
 from hsp_control.live.report import Ended, LoopReport
 from hsp_control.live.safe_stop import Phase, SafeStop
-from hsp_control.live.settings import EffortInterface, StopSettings, Tolerance
+from hsp_control.live.settings import (
+    EffortInterface,
+    StopSettings,
+    Tolerance,
+    check_fixed,
+)
 from hsp_control.robot import Robot
-from hsp_control.scene import Scene
 
 _WARM_UP = 20
 """Steps off the clock: all kernels are compiled, all memory is touched."""

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 
 MAGIC, VERSION = b"HSPC", 1
 _HEAD = struct.Struct("<4sBBBxIQQQqd")

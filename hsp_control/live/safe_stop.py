@@ -4,7 +4,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 from hsp_control.live.settings import StopSettings
 from hsp_control.robot import Robot, RobotState
 

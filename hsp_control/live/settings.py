@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import LiveError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import LiveError
 from hsp_control.robot import Robot
 
 
@@ -133,6 +133,19 @@ class StopSettings:
                     f"the safe stop's {name} is {value:g}; at a period of {period:g} s "
                     f"it may be {most / period:g} at most"
                 )
+
+
+def check_fixed(robot: Robot) -> None:
+    """Refuse a floating base.
+
+    Raises:
+        LiveError: If the robot has one.
+    """
+    if robot.unactuated:
+        raise LiveError(
+            f"{robot.name} has a floating base; a live loop is for fixed ones: damping "
+            "and holding its joints does not keep a robot from falling"
+        )
 
 
 def _greatest(robot: Robot, value: Any, what: str) -> Array:

@@ -3,7 +3,7 @@
 import secrets
 from time import monotonic
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 from hsp_control.live.faults import Faults
 from hsp_control.live.hardware import Measurement
 from hsp_control.live.link import LOOPBACK, Address, Ages, Link

@@ -6,8 +6,8 @@ from time import monotonic, sleep
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.latency import no_garbage_collection
+from hsp_control.common.arrays import Array
+from hsp_control.live.latency import no_garbage_collection
 from hsp_control.live.link import Link
 from hsp_control.live.packets import Kind
 from hsp_control.live.safe_stop import Phase

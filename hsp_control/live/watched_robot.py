@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import LiveError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import LiveError
 from hsp_control.live.effort_port import EffortPort
 from hsp_control.live.safe_stop import Phase, SafeStop
 from hsp_control.live.settings import EffortInterface, StopSettings
-from hsp_control.plants import SampledPlant
 from hsp_control.robot import RobotState
+from hsp_control.simulation.plants import SampledPlant
 
 WATCHDOG = 20
 """Periods without a valid effort after which a robot stops itself, as a Panda does."""

@@ -25,8 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import LogError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import LogError
 
 MAGIC = b"hsp_control journal 1\n"
 KILLED = "the journal has no end: its writer was killed"

@@ -14,7 +14,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.lib import format as npy
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 
 MAX_SIZE = 2_000_000_000
 """Bytes of all columns together, in memory: an hour at 1 kHz with 70 numbers a row."""

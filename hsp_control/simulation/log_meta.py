@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import SceneError
-from hsp_control.shapes import described_shape
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import SceneError
+from hsp_control.geometry.shapes import described_shape
 
 _MOTION = ("t", "q", "v", "tau")
 _PLACED = {*_MOTION, "joint_positions", "skeleton"}
@@ -41,7 +41,7 @@ class _Robot(_Model):
     name: str
     nq: Count | None = None
     nv: Count | None = None
-    freedoms: list[str]
+    dofs: list[str]
     units: list[str]
     skeleton_parents: Annotated[list[Annotated[int, Field(ge=-1)]], Field(min_length=1)]
     joint_coordinates: str | None = None

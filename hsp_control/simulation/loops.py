@@ -5,13 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.controller import Controller, ControlOutput
-from hsp_control.exceptions import SimulationError
-from hsp_control.kernels import kernel
-from hsp_control.plants import ContinuousPlant, Integrator, Reading, SampledPlant
-from hsp_control.remedies import Command
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.kernels import kernel
+from hsp_control.control.compensation import Command
+from hsp_control.control.controller import Controller, ControlOutput
+from hsp_control.control.log_channel import LogChannel
 from hsp_control.robot import RobotState
+from hsp_control.robot.integrators import Integrator
+from hsp_control.simulation.plants import ContinuousPlant, SampledPlant
 
 RUNAWAY_SPEED = 1e4
 """Joint speed [rad/s or m/s] beyond which a simulation is said to have diverged."""
@@ -24,13 +26,13 @@ class Instant(NamedTuple):
         state: The true state.
         output: What the controller makes of the true state.
         tau: The effort that it commands, of what it is shown, shape (nv,).
-        readings: What its remedies tell of themselves.
+        readings: What its compensation tell of themselves.
     """
 
     state: RobotState
     output: ControlOutput
     tau: Array
-    readings: Mapping[str, Reading]
+    log_channels: Mapping[str, LogChannel]
 
 
 def continuous_loop(
@@ -87,7 +89,7 @@ def sampled_loop(
                 output, state = command.output, command.state
                 if not (t == state.t and _equal(state.q, q) and _equal(state.v, v)):
                     output = command.at(t, q, v)
-                yield Instant(state, output, tau, command.readings())
+                yield Instant(state, output, tau, command.log_channels())
             if end == start:  # the last row: nobody waits for what comes next
                 return
             stop = start + (k + 1) * (end - start) / periods

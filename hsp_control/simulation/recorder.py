@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.arrays import Array
-from hsp_control.controller import Controller, ControlOutput
-from hsp_control.exceptions import SimulationError
-from hsp_control.fields import FieldSample, NullSpaceField, WeightedSum
-from hsp_control.metrics import ConstantMetric, Metric
-from hsp_control.plants import Reading
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.version import __version__
+from hsp_control.control.controller import Controller, ControlOutput
+from hsp_control.control.log_channel import LogChannel
+from hsp_control.geometry.scene import Obstacle, Scene
+from hsp_control.null_space.fields import FieldSample, NullSpaceField, WeightedSum
+from hsp_control.null_space.metrics import ConstantMetric, Metric
 from hsp_control.robot import Robot, RobotState
-from hsp_control.scene import Obstacle, Scene
 from hsp_control.simulation.log_file import MAX_SIZE
 from hsp_control.simulation.rollout import FORMAT, Rollout, settle
-from hsp_control.version import __version__
 
 _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
@@ -120,7 +120,7 @@ class Recorder:
         state: RobotState,
         output: ControlOutput | None,
         tau: Array,
-        readings: Mapping[str, Reading],
+        log_channels: Mapping[str, LogChannel],
     ) -> None:
         """Append a row.
 
@@ -129,7 +129,7 @@ class Recorder:
             output: What the controller makes of that state; None: nothing, and what
                 only the law tells is not a number in this row.
             tau: The effort that it commands, of what it is shown, shape (nv,).
-            readings: What the plant tells of itself.
+            log_channels: What the plant tells of itself.
         """
         i, columns = self._rows, self._columns
         robot = self._controller.robot
@@ -156,7 +156,7 @@ class Recorder:
             columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
         if output is not None:
             self._record_law(state, output)
-        for name, reading in readings.items():
+        for name, reading in log_channels.items():
             self._open(name, np.shape(reading.value), reading.unit, reading.meaning)
             columns[name][i] = reading.value
         self._rows += 1
@@ -224,7 +224,7 @@ class Recorder:
     def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
         """Return the rows recorded so far as a rollout."""
         columns = {name: array[: self._rows] for name, array in self._columns.items()}
-        settle(columns, continuous_freedoms(self._controller.robot))
+        settle(columns, continuous_dofs(self._controller.robot))
         return Rollout(columns, self.meta(status, message, **meta))
 
     def meta(self, status: str, message: str, **meta: Any) -> dict[str, Any]:
@@ -239,9 +239,9 @@ class Recorder:
                 "name": robot.name,
                 "nq": robot.nq,
                 "nv": robot.nv,
-                "freedoms": list(robot.freedom_names),
+                "freedoms": list(robot.dof_names),
                 "units": list(robot.units),
-                "continuous": continuous_freedoms(robot),
+                "continuous": continuous_dofs(robot),
                 "skeleton_parents": self._edges,
                 "joint_coordinates": robot.source.joint_coordinates,
             },
@@ -266,7 +266,7 @@ class Recorder:
         }
 
 
-def continuous_freedoms(robot: Robot) -> list[int]:
+def continuous_dofs(robot: Robot) -> list[int]:
     """Return the freedoms of joints that turn without end, as (cos, sin)."""
     joints = robot.single_joints
     return [int(i) for i in joints[joints[:, 2] == 2, 0]]

@@ -10,8 +10,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import LogError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import LogError
+from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.journal import is_journal, read_journal
 from hsp_control.simulation.log_file import (
@@ -22,7 +23,6 @@ from hsp_control.simulation.log_file import (
 )
 from hsp_control.simulation.log_meta import complaint
 from hsp_control.simulation.salvage import read_whole_entries
-from hsp_control.suggest import did_you_mean, listing
 
 FORMAT = "hsp_control rollout 1"
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

@@ -12,7 +12,7 @@ import zlib
 from pathlib import Path
 from typing import IO, NamedTuple
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 from hsp_control.simulation.log_file import MAX_COLUMNS, MAX_SIZE, read_array
 
 _HEADER = struct.Struct("<4s5H3I2H")

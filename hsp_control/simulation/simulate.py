@@ -5,22 +5,21 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.controller import Controller
-from hsp_control.exceptions import HspControlError, SimulationError
-from hsp_control.plants import (
+from hsp_control.common.exceptions import HspControlError, SimulationError
+from hsp_control.control.compensation import Command, Compensation
+from hsp_control.control.controller import Controller
+from hsp_control.geometry.scene import Scene
+from hsp_control.robot.integrators import Dop853, Integrator
+from hsp_control.simulation.loops import continuous_loop, sampled_loop
+from hsp_control.simulation.plants import (
     ContinuousPlant,
-    Dop853,
     IntegratedPlant,
-    Integrator,
     Plant,
     RigidBodyPlant,
     SampledPlant,
     check_plant,
     differing_bodies,
 )
-from hsp_control.remedies import Command, Remedies
-from hsp_control.scene import Scene
-from hsp_control.simulation.loops import continuous_loop, sampled_loop
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.rollout import Rollout
 
@@ -40,7 +39,7 @@ def simulate(
     log_period: float = 0.01,
     integrator: Integrator | None = None,
     plant: Plant | None = None,
-    remedies: Remedies | None = None,
+    compensation: Compensation | None = None,
     scene: Scene | None = None,
     start_time: float = 0.0,
     on_progress: Callable[[float], None] | None = None,
@@ -60,8 +59,8 @@ def simulate(
         integrator: How a continuous plant moves on; None: `Dop853`.
         plant: What the effort moves; None: the controller's own model. One that is
             sampled has an integrator of its own, and needs a control period.
-        remedies: What is done about what the plant has beside the model; they need a
-            control period.
+        compensation: What is done about what the plant has beside the model; it needs
+            a control period.
         scene: Obstacles to log.
         start_time: Time of the first row [s].
         on_progress: Called with the fraction done at every row.
@@ -87,15 +86,15 @@ def simulate(
     times = [start_time + row * log_period for row in range(rows)]
     if isinstance(plant, ContinuousPlant) and periods:
         plant = IntegratedPlant(plant, integrator)
-    if remedies is not None and remedies.names and not periods:
+    if compensation is not None and compensation.names and not periods:
         raise SimulationError(
-            f"remedies ({', '.join(remedies.names)}) are computed once a period: they "
-            "need a control_period [s], for example 0.001"
+            f"compensation ({', '.join(compensation.names)}) is computed once a "
+            "period: it needs a control_period [s], for example 0.001"
         )
     if isinstance(plant, ContinuousPlant):
         loop = continuous_loop(controller, plant, integrator, times, q, v)
     elif isinstance(plant, SampledPlant) and periods:
-        command = Command(controller, remedies)
+        command = Command(controller, compensation)
         loop = sampled_loop(command, plant, periods, times, q, v)
     else:
         raise SimulationError(
@@ -109,8 +108,8 @@ def simulate(
     status, message = "completed", ""
     try:
         for row, (state, output, tau, remembered) in enumerate(loop):
-            readings = plant.readings(state.t, state.q, state.v, tau)
-            recorder.record(state, output, tau, {**remembered, **readings})
+            log_channels = plant.log_channels(state.t, state.q, state.v, tau)
+            recorder.record(state, output, tau, {**remembered, **log_channels})
             if on_progress is not None:
                 on_progress(row / (rows - 1) if rows > 1 else 1.0)
             if on_row is not None:

@@ -10,7 +10,7 @@ from importlib import import_module
 from itertools import islice
 from typing import Any, Self
 
-from hsp_control.exceptions import SweepError
+from hsp_control.common.exceptions import SweepError
 from hsp_control.sweeps.running import crashed, run_task
 
 PATIENCE = 10.0

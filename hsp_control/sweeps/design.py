@@ -7,8 +7,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from hsp_control.exceptions import SweepError
-from hsp_control.suggest import did_you_mean, listing
+from hsp_control.common.exceptions import SweepError
+from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.sweeps.factor import Factor
 
 Design = Literal["grid", "random", "latin_hypercube", "sobol"]

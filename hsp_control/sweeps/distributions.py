@@ -11,7 +11,7 @@ from typing import Any
 
 from scipy.special import ndtr, ndtri
 
-from hsp_control.exceptions import SweepError
+from hsp_control.common.exceptions import SweepError
 
 _LEAST, _MOST = 2.0**-53, 1.0 - 2.0**-53  # the normal's quantile is finite between
 

@@ -12,7 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TextIO
 
-from hsp_control.exceptions import SweepError
+from hsp_control.common.exceptions import SweepError
 from hsp_control.sweeps.metrics import Measure
 from hsp_control.sweeps.row import Row
 

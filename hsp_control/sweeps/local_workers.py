@@ -16,8 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Self, TypeAlias
 
-import hsp_control
-from hsp_control.exceptions import SweepError
+from hsp_control.common.exceptions import SweepError
 from hsp_control.sweeps.running import crashed
 from hsp_control.sweeps.worker import READY, main
 
@@ -117,7 +116,7 @@ class LocalWorkers:
             done.put(None)
 
     def _start(self) -> subprocess.Popen[str]:
-        root = str(Path(hsp_control.__file__).resolve().parents[1])
+        root = str(Path(__file__).resolve().parents[2])
         inherited = os.environ.get("PYTHONPATH")
         path = os.pathsep.join([root, inherited] if inherited else [root])
         with self._lock:

@@ -4,9 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.readings import column_unit, distances, effort_unit, task_errors
+from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_series import (
+    column_unit,
+    distances,
+    effort_unit,
+    task_errors,
+)
 
 
 class Measure(NamedTuple):

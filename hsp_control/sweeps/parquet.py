@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsp_control.exceptions import SweepError
-from hsp_control.suggest import did_you_mean
+from hsp_control.common.exceptions import SweepError
+from hsp_control.common.suggestions import did_you_mean
 from hsp_control.sweeps.journal import journal_of
 
 _KEY = b"hsp_control"

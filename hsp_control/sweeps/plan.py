@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
-from hsp_control.exceptions import HspControlError
 from hsp_control.simulation.recorder import versions
 from hsp_control.sweeps.factor import Factor
 

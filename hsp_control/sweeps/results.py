@@ -8,8 +8,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from hsp_control.exceptions import SweepError
-from hsp_control.suggest import did_you_mean, listing
+from hsp_control.common.exceptions import SweepError
+from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.sweeps.metrics import Measure
 from hsp_control.sweeps.parquet import read_parquet, write_parquet
 from hsp_control.sweeps.plan import Plan, document

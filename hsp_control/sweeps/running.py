@@ -4,8 +4,8 @@ import json
 from functools import cache
 from time import perf_counter
 
+from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.config.experiment import build
-from hsp_control.exceptions import HspControlError, SimulationError
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import versions
 from hsp_control.sweeps.metrics import Measure, measures

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import fdtrc
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import SweepError
-from hsp_control.suggest import did_you_mean, listing
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import SweepError
+from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.sweeps.results import Column, Sweep
 
 LEAST_RUNS = 8
@@ -139,12 +139,12 @@ def _explained(classes: Column, rank: Array) -> float:
     count = np.bincount(classes)
     means = np.bincount(classes, rank) / np.maximum(count, 1)
     groups = int((count > 0).sum())
-    freedoms = len(rank) - groups
-    if freedoms < 1 or groups < 2:
+    dofs = len(rank) - groups
+    if dofs < 1 or groups < 2:
         return np.nan
-    within = float(((rank - means[classes]) ** 2).sum()) / freedoms
+    within = float(((rank - means[classes]) ** 2).sum()) / dofs
     between = float((count * (means - rank.mean()) ** 2).sum()) / (groups - 1)
-    if within > 0.0 and fdtrc(groups - 1, freedoms, between / within) > CHANCE:
+    if within > 0.0 and fdtrc(groups - 1, dofs, between / within) > CHANCE:
         return 0.0
     return max(0.0, 1.0 - within / float(np.var(rank, ddof=1)))
 

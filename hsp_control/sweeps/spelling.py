@@ -4,10 +4,10 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from hsp_control.config.reading import read_yaml
+from hsp_control.common.exceptions import SweepError
+from hsp_control.common.suggestions import did_you_mean
 from hsp_control.config.syntax import YamlError
-from hsp_control.exceptions import SweepError
-from hsp_control.suggest import did_you_mean
+from hsp_control.config.yaml_reader import read_yaml
 from hsp_control.sweeps.distributions import (
     Choices,
     Distribution,

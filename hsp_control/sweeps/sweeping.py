@@ -7,8 +7,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from hsp_control.common.exceptions import HspControlError, SweepError
 from hsp_control.config.experiment import build, read_document
-from hsp_control.exceptions import HspControlError, SweepError
 from hsp_control.simulation.recorder import versions
 from hsp_control.sweeps.dask_workers import DaskWorkers
 from hsp_control.sweeps.design import chosen_design, points

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hsp_control.arrays import Array, Indices
-from hsp_control.exceptions import TaskError
-from hsp_control.kernels import kernel
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import TaskError
+from hsp_control.common.kernels import kernel
 from hsp_control.tasks.task import track
 
 

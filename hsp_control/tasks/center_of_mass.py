@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from functools import partial
 
-from hsp_control.arrays import Array
-from hsp_control.bound import Bound
-from hsp_control.exceptions import TaskError
-from hsp_control.native import bind
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TaskError
+from hsp_control.common.native import bind
+from hsp_control.common.step_plan import StepPlan
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.gains import Gains
@@ -54,7 +54,7 @@ class CenterOfMass(CompiledTask):
             )
         self.trajectory = trajectory
 
-    def _calls(self, state: RobotState, out: TaskSample) -> Bound:
+    def _calls(self, state: RobotState, out: TaskSample) -> StepPlan:
         mass, desired = state.centroidal, TrajectorySample.allocate(self.rows)
         write = bind(
             track_axes,
@@ -70,7 +70,7 @@ class CenterOfMass(CompiledTask):
             *out,
         )
         centroidal = partial(getattr, state, "centroidal")
-        return Bound((self.trajectory.follow(desired),), (centroidal, write))
+        return StepPlan((self.trajectory.follow(desired),), (centroidal, write))
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return c_d' [m/s]."""

@@ -5,13 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
-from hsp_control.kinematics import FrameKinematics
-from hsp_control.linalg import multiply
-from hsp_control.native import bind
-from hsp_control.robot import Robot, RobotState
-from hsp_control.rotations import (
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import multiply
+from hsp_control.common.native import bind
+from hsp_control.common.rotations import (
     compose_back,
     cross,
     jexp3,
@@ -22,6 +20,8 @@ from hsp_control.rotations import (
     rotate,
     rotate_back,
 )
+from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import TaskSample, copy_rows, named_after, track
@@ -70,7 +70,7 @@ class FrameOrientation(FrameTask):
         super().__init__(robot, frame, 3, gains, name)
         self.trajectory = trajectory
 
-    def _bind(
+    def _compile(
         self, frame: FrameKinematics, out: TaskSample
     ) -> tuple[Follower, Callable[[], Any]]:
         desired = OrientationSample.allocate()

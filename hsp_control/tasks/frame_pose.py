@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
-from hsp_control.kinematics import FrameKinematics
-from hsp_control.native import bind
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+from hsp_control.common.rotations import quaternion_from_rotation
 from hsp_control.robot import Robot, RobotState
-from hsp_control.rotations import quaternion_from_rotation
+from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.frame_orientation import (
     ORIENTATION_SCRATCH,
     orientation_acceleration,
@@ -60,7 +60,7 @@ class FramePose(FrameTask):
         super().__init__(robot, frame, 6, gains, name or named_after(frame))
         self.trajectory = trajectory
 
-    def _bind(
+    def _compile(
         self, frame: FrameKinematics, out: TaskSample
     ) -> tuple[Follower, Callable[[], Any]]:
         desired = np.zeros((8, 3))

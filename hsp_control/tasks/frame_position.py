@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import TaskError
-from hsp_control.kinematics import FrameKinematics
-from hsp_control.native import bind
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TaskError
+from hsp_control.common.native import bind
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
@@ -61,7 +61,7 @@ class FramePosition(FrameTask):
         self.trajectory = trajectory
         self._axes = indices
 
-    def _bind(
+    def _compile(
         self, frame: FrameKinematics, out: TaskSample
     ) -> tuple[Follower, Callable[[], Any]]:
         desired = TrajectorySample.allocate(self.rows)

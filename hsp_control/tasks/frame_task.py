@@ -4,16 +4,16 @@ from abc import abstractmethod
 from collections.abc import Callable
 from typing import Any
 
-from hsp_control.bound import Bound
-from hsp_control.kinematics import FrameKinematics
+from hsp_control.common.step_plan import StepPlan
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import CompiledTask, TaskSample
 from hsp_control.trajectories.following import Follower
 
 
 class FrameTask(CompiledTask):
-    """A task of one frame: write `_bind`.
+    """A task of one frame: write `_compile`.
 
     Attributes:
         frame: The frame's name.
@@ -34,7 +34,7 @@ class FrameTask(CompiledTask):
         self.frame = frame
 
     @abstractmethod
-    def _bind(
+    def _compile(
         self, frame: FrameKinematics, out: TaskSample
     ) -> tuple[Follower, Callable[[], Any]]:
         """Return what brings the reference up to a time, and what then writes ``out``.
@@ -42,7 +42,7 @@ class FrameTask(CompiledTask):
         Called whenever another state's frame, or another sample, is to be used.
         """
 
-    def _calls(self, state: RobotState, out: TaskSample) -> Bound:
+    def _calls(self, state: RobotState, out: TaskSample) -> StepPlan:
         frame = state.frame(self.frame)
-        follow, write = self._bind(frame, out)
-        return Bound((follow,), (frame.compute, write))
+        follow, write = self._compile(frame, out)
+        return StepPlan((follow,), (frame.compute, write))

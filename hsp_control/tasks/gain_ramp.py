@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from hsp_control.schedules import Schedule
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import Task
+from hsp_control.trajectories.schedule import Schedule
 
 
 class GainRamp:

@@ -4,8 +4,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import GainError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import GainError
 
 
 class Gains:

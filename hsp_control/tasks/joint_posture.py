@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array, Indices
-from hsp_control.bound import Bound
-from hsp_control.configuration_space import joint_displacements
-from hsp_control.exceptions import TaskError
-from hsp_control.kernels import kernel
-from hsp_control.native import bind
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import TaskError
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+from hsp_control.common.step_plan import StepPlan
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.configuration_space import joint_displacements
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import CompiledTask, TaskSample, track
 from hsp_control.trajectories import Trajectory, TrajectorySample
@@ -85,7 +85,7 @@ class JointPosture(CompiledTask):
         place = {int(row[0]): row for row in robot.single_joints}
         self._rows: Indices = np.array([place[i] for i in indices], dtype=np.int64)
 
-    def _calls(self, state: RobotState, out: TaskSample) -> Bound:
+    def _calls(self, state: RobotState, out: TaskSample) -> StepPlan:
         sample, displacement = TrajectorySample.allocate(self.rows), self.displacement
         write = bind(
             _joint_posture,
@@ -101,7 +101,7 @@ class JointPosture(CompiledTask):
             *out,
         )
         follow = stay if displacement is None else displacement.follow(sample)
-        return Bound((follow,), (write,))
+        return StepPlan((follow,), (write,))
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return the joints' desired rates [rad/s or m/s]."""

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import TaskError
-from hsp_control.kernels import kernel
-from hsp_control.kinematics import FrameKinematics
-from hsp_control.native import bind
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TaskError
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+from hsp_control.common.rotations import cross, rotate, rotate_back
 from hsp_control.robot import Robot, RobotState
-from hsp_control.rotations import cross, rotate, rotate_back
+from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import TaskSample, named_after, track
@@ -74,7 +74,7 @@ class Pointing(FrameTask):
         across[1] *= np.sign(np.linalg.det(np.vstack([across, self.axis])))
         self._across = across.copy()
 
-    def _bind(
+    def _compile(
         self, frame: FrameKinematics, out: TaskSample
     ) -> tuple[Follower, Callable[[], Any]]:
         desired = OrientationSample.allocate()

@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.bound import Bound
-from hsp_control.exceptions import TaskError
-from hsp_control.kernels import kernel
-from hsp_control.kinematics import FrameKinematics
-from hsp_control.native import bind
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TaskError
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+from hsp_control.common.rotations import quaternion_from_rotation
+from hsp_control.common.step_plan import StepPlan
 from hsp_control.robot import Robot, RobotState
-from hsp_control.rotations import quaternion_from_rotation
+from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.frame_orientation import ORIENTATION_SCRATCH
 from hsp_control.tasks.frame_pose import pose_error_equation
 from hsp_control.tasks.gains import Gains
@@ -89,7 +89,7 @@ class RelativePose(CompiledTask):
         self.reference = reference
         self.trajectory = trajectory
 
-    def _calls(self, state: RobotState, out: TaskSample) -> Bound:
+    def _calls(self, state: RobotState, out: TaskSample) -> StepPlan:
         frame, reference = state.frame(self.frame), state.frame(self.reference)
         desired, relative = np.zeros((8, 3)), Relative.allocate(self.robot.nv)
         relate = bind(
@@ -106,7 +106,7 @@ class RelativePose(CompiledTask):
             *out,
         )
         follow = self.trajectory.follow(PoseSample.over(desired))
-        return Bound((follow,), (frame.compute, reference.compute, relate, write))
+        return StepPlan((follow,), (frame.compute, reference.compute, relate, write))
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' and w_d in the reference's axes [m/s, rad/s]."""

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.bound import Bound
-from hsp_control.exceptions import TaskError
-from hsp_control.kernels import kernel
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TaskError
+from hsp_control.common.kernels import kernel
+from hsp_control.common.step_plan import StepPlan
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
 
@@ -92,12 +92,12 @@ class Task(ABC):
     def __init_subclass__(cls, **arguments: Any) -> None:
         """Let an `evaluate` that is overridden count, also of a ready task."""
         super().__init_subclass__(**arguments)
-        if "evaluate" in vars(cls) and "bind" not in vars(cls):
-            cls.bind = Task.bind  # type: ignore[method-assign]
+        if "evaluate" in vars(cls) and "compile" not in vars(cls):
+            cls.compile = Task.compile  # type: ignore[method-assign]
 
-    def bind(self, state: RobotState, out: TaskSample) -> Bound:
+    def compile(self, state: RobotState, out: TaskSample) -> StepPlan:
         """Return what `evaluate` does with this state and this sample."""
-        return Bound(write=(partial(self.evaluate, state, out),))
+        return StepPlan(write=(partial(self.evaluate, state, out),))
 
     @abstractmethod
     def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
@@ -126,13 +126,13 @@ class CompiledTask(Task):
     def __init__(self, robot: Robot, rows: int, gains: Gains, name: str) -> None:
         """Set the task; see `Task`."""
         super().__init__(robot, rows, gains, name)
-        self._bound: tuple[RobotState, TaskSample, Bound] | None = None
+        self._bound: tuple[RobotState, TaskSample, StepPlan] | None = None
 
     @abstractmethod
-    def _calls(self, state: RobotState, out: TaskSample) -> Bound:
+    def _calls(self, state: RobotState, out: TaskSample) -> StepPlan:
         """Return what writes a sample at whatever a state then is."""
 
-    def bind(self, state: RobotState, out: TaskSample) -> Bound:
+    def compile(self, state: RobotState, out: TaskSample) -> StepPlan:
         """Return what `evaluate` does; see `Task.bind`."""
         return self._calls(state, out)
 

@@ -28,6 +28,7 @@ from hsp_control.trajectories.piecewise_polynomial import (
 from hsp_control.trajectories.pose import ComposedPose as ComposedPose
 from hsp_control.trajectories.pose import PoseSample as PoseSample
 from hsp_control.trajectories.pose import PoseTrajectory as PoseTrajectory
+from hsp_control.trajectories.schedule import Schedule as Schedule
 from hsp_control.trajectories.screw_interpolation import (
     ScrewInterpolation as ScrewInterpolation,
 )

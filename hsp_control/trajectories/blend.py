@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
-from hsp_control.native import bind
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Follower, follow_blended
 from hsp_control.trajectories.timing import smooth_step

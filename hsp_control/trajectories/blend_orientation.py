@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
-from hsp_control.native import bind
-from hsp_control.rotations import (
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+from hsp_control.common.rotations import (
     compose_back,
     cross,
     jexp3,

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control.arrays import Array
-from hsp_control.rotations import compose_back, log3
+from hsp_control.common.arrays import Array
+from hsp_control.common.rotations import compose_back, log3
 from hsp_control.trajectories import checks, time_derivatives
 from hsp_control.trajectories.orientation import (
     OrientationSample,

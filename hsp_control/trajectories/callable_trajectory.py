@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from numpy.typing import ArrayLike
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import TrajectoryError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.trajectories import checks, time_derivatives
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import TrajectoryError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TrajectoryError
 
 _ORTHONORMAL = 1e-8  # largest entry of A Aᵀ - I that is put down to rounding
 

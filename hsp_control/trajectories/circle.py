@@ -5,9 +5,9 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import TrajectoryError
-from hsp_control.kernels import kernel
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.kernels import kernel
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.trajectory import Trajectory

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.bound import During, InTurn
-from hsp_control.kernels import kernel
-from hsp_control.native import bind
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+from hsp_control.common.step_plan import CallSequence, TimeWindow
 
 Follower = Callable[[float], object]
 """A function of time [s] that brings a sample, its own, up to that time."""
@@ -27,7 +27,7 @@ def follow_all(*followers: Follower) -> Follower:
     moving = [follower for follower in followers if follower is not stay]
     if len(moving) < 2:
         return moving[0] if moving else stay
-    return InTurn(*moving)
+    return CallSequence(*moving)
 
 
 def follow_by(sampler: Callable[[float, Any], Any], out: Any) -> Follower:
@@ -57,8 +57,10 @@ def follow_blended(
     lead_to: Follower = trajectory.follow(out)
     if lead_to is stay:  # but the blend does not leave it alone
         parts = (bind(_put, part.copy(), part, timed=True) for part in out)
-        lead_to = InTurn(*parts)
-    return InTurn(During(lead_to, start, np.inf), During(blend, -np.inf, end))
+        lead_to = CallSequence(*parts)
+    return CallSequence(
+        TimeWindow(lead_to, start, np.inf), TimeWindow(blend, -np.inf, end)
+    )
 
 
 @kernel

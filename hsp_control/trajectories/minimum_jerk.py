@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.piecewise_polynomial import PiecewisePolynomial
 from hsp_control.trajectories.polynomial import QUINTIC

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 from hsp_control.trajectories.following import Follower, follow_by
 from hsp_control.trajectories.immutable import Immutable
 

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
-from hsp_control.rotations import compose_back, log3, rotate, turn
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.rotations import compose_back, log3, rotate, turn
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.orientation import OrientationTrajectory

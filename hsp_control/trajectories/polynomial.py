@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
 
 # Row k gives the coefficient of u^k from (x, x', x'') at u = 0 and then at u = 1.
 QUINTIC: Array = np.array(

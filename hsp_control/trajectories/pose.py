@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.arrays import Array
-from hsp_control.exceptions import TrajectoryError
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.trajectories.following import Follower, follow_all, follow_by
 from hsp_control.trajectories.immutable import Immutable
 from hsp_control.trajectories.orientation import (

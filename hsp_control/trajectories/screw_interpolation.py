@@ -3,9 +3,9 @@
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
-from hsp_control.rotations import compose_back, jlog3, log3, stumpff, turn
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.rotations import compose_back, jlog3, log3, stumpff, turn
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
 from hsp_control.trajectories.timing import smooth_step

@@ -2,9 +2,9 @@
 
 from numpy.typing import ArrayLike
 
-from hsp_control.arrays import Array
-from hsp_control.kernels import kernel
-from hsp_control.rotations import turn
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.rotations import turn
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.orientation import OrientationTrajectory

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control.exceptions import TrajectoryError
+from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.piecewise_polynomial import PiecewisePolynomial
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 
 STEP = 5e-3  # [s]
 _OFFSETS = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0)

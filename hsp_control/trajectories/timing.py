@@ -1,6 +1,6 @@
 """How far along, and how fast: the smooth step from rest to rest."""
 
-from hsp_control.kernels import kernel
+from hsp_control.common.kernels import kernel
 
 
 @kernel

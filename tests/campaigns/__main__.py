@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from campaigns import document, faults, random_states, soak
 from campaigns.cases import KINDS, Count, count_cases, warm_up
 from campaigns.results import keep, kept
-from hsp_control.resources import bundled_robots
+from hsp_control.common.resources import bundled_robots
 
 STEPS, OTHER_STEPS = 1_000_000, 20_000
 CASES = {"yaml": 10_000, "urdf": 1_000, "logs": 1_000}

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from campaigns.asking import ask
 from campaigns.worker import Worker
-from hsp_control.resources import bundled_configs
+from hsp_control.common.resources import bundled_configs
 
 KINDS = {
     "yaml": "campaigns.yaml_case:case",

@@ -9,10 +9,10 @@ from typing import Any
 from campaigns.asking import ask
 from campaigns.mutate_log import mutated
 from hsp_control import HspControlError, load_experiment
-from hsp_control.exceptions import LogError
+from hsp_control.common.exceptions import LogError
 from hsp_control.simulation import Rollout
-from hsp_control.viewer.recorder import Recorder
-from hsp_control.viewer.replay import view_logs
+from hsp_control.visualization.viewer.recorder import Recorder
+from hsp_control.visualization.viewer.replay import view_logs
 
 CONFIGS = ("paper/4_moving_obstacle", "panda_obstacle", "limits/panda_half_strength")
 RUN = ("simulation.duration=0.06", "simulation.log_period=0.01")

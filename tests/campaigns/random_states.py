@@ -17,7 +17,7 @@ from time import monotonic
 import numpy as np
 
 import hsp_control as hsp
-from hsp_control.arrays import Array
+from hsp_control.common.arrays import Array
 from hsp_control.robot import RobotState
 
 BATCH = 1000

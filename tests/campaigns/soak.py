@@ -14,8 +14,9 @@ from rich.progress import Progress
 
 import hsp_control as hsp
 from campaigns.results import keep
-from hsp_control.plants import IntegratedPlant, Rk4
 from hsp_control.robot import RobotState
+from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation.plants import IntegratedPlant
 
 CONFIG = "panda_obstacle"
 PERIOD = 1e-3
@@ -55,7 +56,7 @@ class Soak:
         return python < PYTHON_GROWTH and process < PROCESS_GROWTH
 
 
-def soak(seconds: float, readings: int, show: object = None) -> Soak:
+def soak(seconds: float, log_channels: int, show: object = None) -> Soak:
     """Run the loop for a simulated time [s], read memory so many times."""
     experiment = hsp.load_experiment(CONFIG)
     controller, robot = experiment.controller, experiment.robot
@@ -65,7 +66,7 @@ def soak(seconds: float, readings: int, show: object = None) -> Soak:
     q, v = experiment.q0.copy(), experiment.v0.copy()
     controller.restart()
     result, steps = Soak(), round(seconds / PERIOD)
-    every, warm_up = max(1, steps // readings), min(2000, steps // 4)
+    every, warm_up = max(1, steps // log_channels), min(2000, steps // 4)
     process = psutil.Process()
     tracemalloc.start()
     try:

@@ -9,7 +9,7 @@ from random import Random
 from campaigns.asking import ask
 from campaigns.mutate_urdf import ARM, EXTERNAL, LAUGHS, mutated
 from campaigns.texts import TRICKS
-from hsp_control.resources import bundled_robots
+from hsp_control.common.resources import bundled_robots
 
 STL = (
     b"\0" * 80

@@ -6,7 +6,7 @@ from random import Random
 
 from campaigns.asking import ask
 from campaigns.mutate_yaml import mutated, override
-from hsp_control.resources import bundled_configs
+from hsp_control.common.resources import bundled_configs
 
 STOP = 0.3
 """When Ctrl-C ends a run that is let begin [s]."""

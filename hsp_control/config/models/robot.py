@@ -3,7 +3,7 @@
 from typing import Literal
 
 from hsp_control.config.models.base import Model, Name, Number, Vector, Vector3
-from hsp_control.sources import Root
+from hsp_control.robot.description.sources import Root
 
 
 class ToolFrameModel(Model):

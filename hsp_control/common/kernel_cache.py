@@ -1,0 +1,175 @@
+"""Where the machine code of kernels is kept on disk, and when it is stale.
+
+Numba takes kept code for fresh while the text of the function's own file is the same.
+That is too strict, since a comment recompiles, and too lax, since the code of kernels
+in other files is compiled into it. Here kept code is fresh while the *bytecode* of the
+function and the value of everything that it reads, kernels included, are the same.
+"""
+
+import hashlib
+import os
+import warnings
+from collections.abc import Callable, Iterator
+from functools import cache, cached_property
+from pathlib import Path
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+from numba.core import types
+from numba.core.caching import (
+    Cache,
+    CompileResultCacheImpl,
+    InTreeCacheLocator,
+    NullCache,
+    UserProvidedCacheLocator,
+    UserWideCacheLocator,
+)
+
+_COMPILERS = ("llvmlite", "math", "numba", "numpy")
+"""Packages whose modules stand for themselves: Numba checks its own version."""
+
+_HOW = Path(__file__).with_name("kernels.py").read_bytes()
+"""The file that says with which options kernels are compiled."""
+
+
+def kept(function: Callable[..., Any]) -> Any:
+    """Return where the machine code of a function is kept.
+
+    Beside the package's files, or where these are read-only in the user's cache
+    folder; the environment variable ``NUMBA_CACHE_DIR`` names another. Where nothing
+    can be written, nothing is kept, and a warning says so.
+    """
+    try:
+        return _KernelCache(function)  # type: ignore[no-untyped-call]
+    except RuntimeError as error:  # Numba found no folder to keep the code in
+        if "cannot cache" not in str(error):
+            raise
+        _warn_of_no_cache()
+        return NullCache()
+
+
+class Stamp:
+    """What the machine code of a function depends on.
+
+    It is computed at its first comparison, not before: a kernel may call one that is
+    defined further down in its file.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        """Keep the function."""
+        self._function = function
+
+    @cached_property
+    def digest(self) -> str:
+        """The dependencies' digest."""
+        state = hashlib.sha256(_HOW)
+        for part in _function(self._function, set()):
+            state.update(part)
+            state.update(b"\0")
+        return state.hexdigest()
+
+    def __eq__(self, other: object) -> bool:
+        return self.digest == (other.digest if isinstance(other, Stamp) else other)
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __reduce__(self) -> tuple[Any, ...]:  # what Numba writes beside the code
+        return str, (self.digest,)
+
+
+def _function(function: Any, seen: set[int]) -> Iterator[bytes]:
+    """Yield what a function does, and the values that it reads."""
+    if id(function) in seen:
+        return
+    seen.add(id(function))
+    names: set[str] = set()
+    yield from _code(function.__code__, function.__doc__, names)
+    for name in sorted(names & function.__globals__.keys()):
+        yield name.encode()
+        yield from _value(function.__globals__[name], seen)
+    for cell in (*(function.__closure__ or ()), function.__defaults__):
+        yield from _value(getattr(cell, "cell_contents", cell), seen)
+
+
+def _code(code: CodeType, docstring: str | None, names: set[str]) -> Iterator[bytes]:
+    """Yield what code does; collect the names of what it reads."""
+    names.update(code.co_names)
+    yield code.co_code
+    yield repr((code.co_names, code.co_varnames, code.co_argcount)).encode()
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _code(constant, None, names)
+        elif docstring is None or constant != docstring:
+            yield repr(constant).encode()
+
+
+def _value(value: Any, seen: set[int]) -> Iterator[bytes]:
+    """Yield what compiled code takes a value for; never twice the same if unknown."""
+    function = getattr(value, "py_func", getattr(value, "_defn", value))
+    if isinstance(function, FunctionType):
+        yield from _function(function, seen)
+    elif isinstance(value, ModuleType):
+        ours = value.__name__.split(".")[0] not in _COMPILERS
+        file = getattr(value, "__file__", None) if ours else None
+        yield value.__name__.encode()
+        yield Path(file).read_bytes() if file else b""
+    elif isinstance(value, np.ndarray):
+        yield f"{value.dtype} {value.shape}".encode()
+        yield value.tobytes()
+    elif isinstance(value, tuple):
+        for each in value:
+            yield from _value(each, seen)
+    elif isinstance(value, type | BuiltinFunctionType | np.ufunc):
+        yield f"{value.__module__}.{value.__name__}".encode()
+    elif value is None or isinstance(
+        value, bool | int | float | complex | str | np.generic | types.Type
+    ):
+        yield repr(value).encode()
+    else:
+        yield os.urandom(16)
+
+
+class _ByContent:
+    """A locator of Numba's, with a stamp that tells more and less than a file's text.
+
+    Nor does the name of the file on disk hold the line at which the function stands.
+    """
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        super().__init__(function, file)  # type: ignore[call-arg]
+        self._function = function
+
+    def get_source_stamp(self) -> Stamp:
+        return Stamp(self._function)
+
+    def get_disambiguator(self) -> str:
+        return "kernel"
+
+
+def _by_content(locator: Any) -> Any:
+    return type(locator.__name__, (_ByContent, locator), {})
+
+
+class _KernelCacheImpl(CompileResultCacheImpl):
+    _locator_classes = [  # noqa: RUF012 (as Numba has it)
+        _by_content(UserProvidedCacheLocator),
+        _by_content(InTreeCacheLocator),
+        _by_content(UserWideCacheLocator),
+    ]
+
+
+class _KernelCache(Cache):
+    _impl_class: Any = _KernelCacheImpl
+
+
+@cache
+def _warn_of_no_cache() -> None:
+    warnings.warn(
+        "compiled code cannot be kept: neither the package's folder nor the user's "
+        "cache can be written. Every start will take some ten seconds longer; set "
+        "NUMBA_CACHE_DIR to a folder that can be written",
+        RuntimeWarning,
+        stacklevel=2,
+    )

@@ -1,0 +1,251 @@
+"""Small dense linear algebra as kernels: no allocation, no LAPACK call."""
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+
+
+@kernel
+def multiply(A: Array, x: Array, out: Array) -> None:
+    """Write A x."""
+    for i in range(A.shape[0]):
+        total = 0.0
+        for j in range(A.shape[1]):
+            total += A[i, j] * x[j]
+        out[i] = total
+
+
+@kernel
+def multiply_transposed(A: Array, x: Array, out: Array) -> None:
+    """Write Aᵀ x."""
+    for j in range(A.shape[1]):
+        out[j] = 0.0
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            out[j] += A[i, j] * x[i]
+
+
+@kernel
+def norm(W: Array, x: Array) -> float:
+    """Return ‖x‖_W = √(xᵀ W x)."""
+    square = 0.0
+    for i in range(x.shape[0]):
+        for j in range(x.shape[0]):
+            square += x[i] * W[i, j] * x[j]
+    return float(np.sqrt(square))
+
+
+@kernel
+def cholesky(A: Array, L: Array) -> bool:
+    """Write the lower triangle L of A = L Lᵀ; return whether A is positive definite."""
+    n = A.shape[0]
+    for j in range(n):
+        pivot = A[j, j]
+        for k in range(j):
+            pivot -= L[j, k] * L[j, k]
+        if not pivot > 0.0:
+            return False
+        L[j, j] = np.sqrt(pivot)
+        for i in range(j + 1, n):
+            total = A[i, j]
+            for k in range(j):
+                total -= L[i, k] * L[j, k]
+            L[i, j] = total / L[j, j]
+            L[j, i] = 0.0
+    return True
+
+
+@kernel
+def solve_lower(L: Array, x: Array) -> None:
+    """Overwrite x by L⁻¹ x."""
+    for i in range(L.shape[0]):
+        total = x[i]
+        for k in range(i):
+            total -= L[i, k] * x[k]
+        x[i] = total / L[i, i]
+
+
+@kernel
+def solve_lower_transposed(L: Array, x: Array) -> None:
+    """Overwrite x by L⁻ᵀ x."""
+    n = L.shape[0]
+    for j in range(n):
+        i = n - 1 - j
+        total = x[i]
+        for k in range(i + 1, n):
+            total -= L[k, i] * x[k]
+        x[i] = total / L[i, i]
+
+
+@kernel
+def solve_rows(L: Array, X: Array) -> None:
+    """Overwrite each row x of X by L⁻¹ x: X by X L⁻ᵀ."""
+    for i in range(X.shape[0]):
+        solve_lower(L, X[i])
+
+
+@kernel
+def solve_rows_transposed(L: Array, X: Array) -> None:
+    """Overwrite each row x of X by L⁻ᵀ x: X by X L⁻¹."""
+    for i in range(X.shape[0]):
+        solve_lower_transposed(L, X[i])
+
+
+@kernel
+def solve_columns(L: Array, X: Array) -> None:
+    """Overwrite X by (L Lᵀ)⁻¹ X, row by row, in the order that they lie in memory."""
+    m, n = X.shape
+    for i in range(m):
+        for k in range(i):
+            for j in range(n):
+                X[i, j] -= L[i, k] * X[k, j]
+        for j in range(n):
+            X[i, j] /= L[i, i]
+    for r in range(m):
+        i = m - 1 - r
+        for k in range(i + 1, m):
+            for j in range(n):
+                X[i, j] -= L[k, i] * X[k, j]
+        for j in range(n):
+            X[i, j] /= L[i, i]
+
+
+@kernel
+def gram(A: Array, B: Array, symmetric: bool, out: Array) -> None:
+    """Write A Bᵀ, or A Bᵀ + B Aᵀ."""
+    m, n = A.shape
+    for i in range(m):
+        for k in range(m):
+            total = 0.0
+            for j in range(n):
+                total += A[i, j] * B[k, j]
+            out[i, k] = total
+    if symmetric:
+        for i in range(m):
+            out[i, i] *= 2.0
+            for k in range(i):
+                out[i, k] += out[k, i]
+                out[k, i] = out[i, k]
+
+
+@kernel
+def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
+    """Write a lower triangular X and Q = X J with orthonormal rows, for m ≤ n.
+
+    Gram-Schmidt, each row handing on what it shares with those after it; X goes through
+    the same steps. Where they cancel nine tenths of a row or more, all rows are cleaned
+    once more ("twice is enough", Giraud et al. 2005), so that Q is orthonormal to
+    rounding. A row that vanishes leaves zeros in Q and X.
+
+    Returns:
+        A lower bound of J's least singular value, within √m of it: 1/‖X‖_F, or 0 where
+        a row vanished.
+    """
+    m, n = J.shape
+    for j in range(m):
+        for i in range(n):
+            Q[j, i] = J[j, i]
+        for i in range(m):
+            X[j, i] = 1.0 if i == j else 0.0
+    cancelled = False
+    for j in range(m):
+        cancelled = _share_row(Q, X, j) < 0.01 * _square(J[j]) or cancelled
+    if cancelled:
+        for j in range(m):
+            _share_row(Q, X, j)
+    total = 0.0
+    for j in range(m):
+        if X[j, j] == 0.0:
+            return 0.0
+        total += _square(X[j, : j + 1])
+    return float(1.0 / np.sqrt(total))
+
+
+@kernel
+def _share_row(Q: Array, X: Array, j: int) -> float:
+    """Scale row j to length one, take it out of those after it; return its square."""
+    m, n = Q.shape
+    square = _square(Q[j])
+    scale = 1.0 / np.sqrt(square) if square > 0.0 else 0.0
+    for i in range(n):
+        Q[j, i] *= scale
+    for i in range(j + 1):
+        X[j, i] *= scale
+    for k in range(j + 1, m):
+        share = 0.0
+        for i in range(n):
+            share += Q[j, i] * Q[k, i]
+        for i in range(n):
+            Q[k, i] -= share * Q[j, i]
+        for i in range(j + 1):
+            X[k, i] -= share * X[j, i]
+    return square
+
+
+@kernel
+def _square(x: Array) -> float:
+    """Return x·x."""
+    total = 0.0
+    for i in range(x.shape[0]):
+        total += x[i] * x[i]
+    return total
+
+
+@kernel
+def least_singular_value_bound(X: Array) -> float:
+    """Return 1/√‖X Xᵀ‖_F for the X of `orthonormalise_rows`: a tighter bound.
+
+    It is within the fourth root of m of the least singular value.
+    """
+    m = X.shape[0]
+    square = 0.0
+    for i in range(m):
+        for j in range(i + 1):
+            dot = 0.0
+            for k in range(j + 1):
+                dot += X[i, k] * X[j, k]
+            square += dot * dot if i == j else 2.0 * dot * dot
+    return float(1.0 / np.sqrt(np.sqrt(square)))
+
+
+@kernel
+def orthogonalise_rows(Y: Array, U: Array) -> None:
+    """Overwrite Y by U Y with orthogonal rows, U orthogonal (one-sided Jacobi).
+
+    Only as many columns of U are written as it has: none, for singular values alone.
+
+    The rows' norms are then Y's singular values, small ones to high relative accuracy
+    (Demmel and Veselić 1992). Rank loss is welcome.
+    """
+    m, n = Y.shape
+    for i in range(m):
+        for j in range(U.shape[1]):
+            U[i, j] = 1.0 if i == j else 0.0
+    for _ in range(30):  # sweeps; about six are needed
+        rotated = False
+        for p in range(m - 1):
+            for q in range(p + 1, m):
+                alpha = beta = gamma = 0.0
+                for i in range(n):
+                    alpha += Y[p, i] * Y[p, i]
+                    beta += Y[q, i] * Y[q, i]
+                    gamma += Y[p, i] * Y[q, i]
+                if abs(gamma) <= 1e-15 * np.sqrt(alpha * beta) or gamma == 0.0:
+                    continue
+                rotated = True
+                zeta = (beta - alpha) / (2.0 * gamma)
+                sign = 1.0 if zeta >= 0.0 else -1.0
+                t = sign / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
+                c = 1.0 / np.sqrt(1.0 + t * t)
+                s = c * t
+                for i in range(n):
+                    y = Y[p, i]
+                    Y[p, i] = c * y - s * Y[q, i]
+                    Y[q, i] = s * y + c * Y[q, i]
+                for i in range(U.shape[1]):
+                    y = U[p, i]
+                    U[p, i] = c * y - s * U[q, i]
+                    U[q, i] = s * y + c * U[q, i]
+        if not rotated:
+            return

@@ -1,0 +1,205 @@
+"""Kernels with their arguments, called one after the other without Python in between.
+
+To take an array apart for compiled code costs 6 ns, to enter it 50, to be a step of a
+loop in Python 60: for kernels of 0.1 µs with ten arrays that is more than what they do.
+`bind` takes the arguments apart once, into words of memory, and compiles a function
+that puts them together again: it has the same signature whatever the kernel's, so that
+`run` can call it by its address.
+"""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from types import FunctionType
+from typing import Any, NamedTuple, Self, cast
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.kernels import callback, is_compiled, kernel
+
+FOREVER = -np.inf, np.inf
+"""From when until when a call is made [s], unless something else is said."""
+
+
+class NativeCall(partial[float]):
+    """A kernel with its arguments: a call of no argument, or of the time.
+
+    It is a `partial` because nothing is called faster from Python.
+
+    Attributes:
+        row: The code's address and that of the words, as `run` takes them.
+        words: The arguments, as the code takes them.
+        recipe: What makes it, and of what: copies are made anew, of the copied arrays.
+            It also keeps the arrays alive.
+    """
+
+    row: tuple[int, int]
+    words: Array
+    recipe: tuple[Callable[..., Any], tuple[Any, ...]]
+
+    @classmethod
+    def of(
+        cls, kernel: Callable[..., Any], arguments: tuple[Any, ...], timed: bool
+    ) -> Self:
+        """Pack the arguments and find the code."""
+        kinds, words = zip(*map(_packed, arguments), strict=True)
+        table = np.concatenate(words)
+        address = _adapter(kernel, kinds, timed)
+        row = address, table.ctypes.data
+        free = () if timed else (0.0,)
+        call = cls(_entry(), np.array([row]), np.array([FOREVER]), *free)
+        call.row, call.words = row, table
+        call.recipe = cls.of, (kernel, arguments, timed)
+        return call
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self.recipe
+
+
+class Timed(NamedTuple):
+    """A native call within a sequence.
+
+    Attributes:
+        call: The call.
+        start: From when it is made [s].
+        end: Until when [s].
+    """
+
+    call: NativeCall
+    start: float
+    end: float
+
+
+def bind(
+    function: Callable[..., Any], *arguments: Any, timed: bool = False
+) -> Callable[..., Any]:
+    """Return a call of a kernel with these very arguments, decided once.
+
+    Args:
+        function: The kernel; it returns nothing or one number.
+        arguments: Its arguments. Arrays are followed, numbers stay as they are.
+        timed: Whether the last argument, the time, is left to the call.
+    """
+    if not is_compiled(function):
+        return partial(function, *arguments)
+    return NativeCall.of(function, arguments, timed)
+
+
+def sequence(calls: Sequence[Timed]) -> Callable[[float], float]:
+    """Return one call, of the time, of several; it returns what the last returned."""
+    when = np.array([[each.start, each.end] for each in calls])
+    call = NativeCall(_entry(), np.array([each.call.row for each in calls]), when)
+    call.recipe = sequence, (calls,)
+    return call
+
+
+def _packed(argument: Any) -> tuple[types.Type, Array]:
+    """Return an argument's type, and what stands for it in memory."""
+    if isinstance(argument, np.ndarray):
+        kind = cast("Callable[[Any], types.Type]", numba.typeof)(argument)
+        size, item, at = argument.size, argument.itemsize, argument.ctypes.data
+        shape = *argument.shape, *argument.strides
+        # Two owners come first in Numba's arrays, of which kernels know nothing.
+        return kind, np.array([0, 0, size, item, at, *shape], dtype=np.int64)
+    if isinstance(argument, bool | int | np.integer | np.bool_):
+        return types.int64, np.array([argument], dtype=np.int64)
+    return types.float64, np.array([argument], dtype=float).view(np.int64)
+
+
+@cache
+def _adapter(
+    kernel: Callable[..., Any], kinds: tuple[types.Type, ...], timed: bool
+) -> int:
+    """Return the address of what calls a kernel: f(where its arguments are, time)."""
+    template = _call_at_a_time if timed else _call
+    place = {
+        "__name__": __name__,
+        "kernel": kernel,
+        "arguments": cast("Any", types).Tuple(kinds),
+        "_unpacked": _unpacked,
+        "_number": _number,
+    }
+    function = FunctionType(cast("FunctionType", template).__code__, place)
+    digest = hashlib.sha256(f"{kinds} {timed}".encode()).hexdigest()[:12]
+    name = f"{kernel.__module__}_{kernel.__name__}_{digest}".replace(".", "_")
+    function.__qualname__ = name
+    signature = types.float64(types.int64, types.float64)
+    code = callback(signature, function)
+    _codes.append(code)
+    return int(code.address)
+
+
+_codes: list[Any] = []
+"""What has been compiled: its addresses are used for as long as the process lives."""
+
+
+def _call(words: int, t: float) -> float:
+    return _number(kernel(*_unpacked(words, arguments)))  # type: ignore # noqa
+
+
+def _call_at_a_time(words: int, t: float) -> float:
+    return _number(kernel(*_unpacked(words, arguments), t))  # type: ignore # noqa
+
+
+@intrinsic
+def _number(typing: Any, value: Any) -> Any:
+    """Return what a kernel returned as a number, 0 for nothing."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        if isinstance(value, types.NoneType):
+            return context.get_constant(types.float64, 0.0)
+        return context.cast(builder, arguments[0], value, types.float64)
+
+    return types.float64(value), code
+
+
+@intrinsic
+def _unpacked(typing: Any, words: Any, kind: Any) -> Any:
+    """Return the values of the types of a tuple that lie at an address."""
+    values = kind.instance_type
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        pointer = context.get_value_type(values).as_pointer()
+        return builder.load(builder.inttoptr(arguments[0], pointer))
+
+    return values(types.int64, kind), code
+
+
+@intrinsic
+def _invoke(typing: Any, address: Any, words: Any, t: Any) -> Any:
+    """Call what `_adapter` made."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = ir.FunctionType(ir.DoubleType(), [ir.IntType(64), ir.DoubleType()])
+        function = builder.inttoptr(arguments[0], kind.as_pointer())
+        return builder.call(function, arguments[1:])
+
+    return types.float64(types.int64, types.int64, types.float64), code
+
+
+@kernel
+def run(calls: Indices, when: Array, t: float) -> float:
+    """Make calls, each a row (code, arguments), those at whose time it is.
+
+    Returns:
+        What the last one returned.
+    """
+    value = 0.0
+    for k in range(calls.shape[0]):
+        if when[k, 0] <= t < when[k, 1]:
+            value = _invoke(calls[k, 0], calls[k, 1], t)  # type: ignore[call-arg]
+    return value
+
+
+@cache
+def _entry() -> Callable[..., float]:
+    """Return `run` as Python calls it without asking for types."""
+    kinds = types.int64[:, ::1], types.float64[:, ::1], types.float64
+    compiled_run = cast("Any", run)
+    compiled_run.compile(kinds)
+    return cast("Callable[..., float]", compiled_run.overloads[kinds].entry_point)

@@ -1,0 +1,1 @@
+"""What must hold: contacts with the world, and limits of motors, joints and space."""

@@ -1,0 +1,132 @@
+"""What is on at one time: the contacts that bear and the tasks that count, stacked."""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.step_plan import StepPlan, steps
+from hsp_control.constraints.contacts import Contact
+from hsp_control.constraints.contacts.unactuated import UnactuatedRows, unactuated_count
+from hsp_control.control.actuation.support import Support
+from hsp_control.law import Resolution
+from hsp_control.null_space.fields import NullSpaceField
+from hsp_control.null_space.metrics import Metric
+from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks import Task, TaskSample
+
+
+class ActiveStack:
+    """The law for one set of contacts and tasks: rows in order of priority.
+
+    The first level, where there is a floating base, holds the contacts still and asks
+    for no effort where nothing can give one; those of the tasks follow, and the field.
+
+    Attributes:
+        contacts: The contacts that bear.
+        levels: The tasks of each level.
+        support: What the contacts can push.
+        resolution: The law.
+        task_rows: Where each task's rows stand in the stack, by name.
+        contact_rows: Where each contact's rows stand, by name.
+        first_task_row: Where the rows of contacts end and those of tasks begin.
+        stack: All rows: J, J', e, e', a_x.
+    """
+
+    def __init__(
+        self,
+        state: RobotState,
+        contacts: Sequence[Contact],
+        levels: Sequence[Sequence[Task]],
+        base: Indices,
+        support: Support,
+        metric: Metric,
+        gain: Array,
+        threshold: float,
+    ) -> None:
+        """Stack the rows; the state tells which base motions the contacts permit."""
+        robot: Robot = state.robot
+        self.contacts = tuple(contacts)
+        self.levels = tuple(tuple(level) for level in levels if level)
+        self.support = support
+        held = sum(contact.rows for contact in contacts)
+        free = unactuated_count(_jacobian(contacts, state), base) if base.size else 0
+        first = [held + free] if held + free else []
+        sizes = [sum(task.rows for task in level) for level in self.levels]
+        self.resolution = Resolution(
+            first + sizes, robot.nv, metric.form, gain, threshold
+        )
+        problem = self.resolution.problem
+        self.stack = problem.task
+        self._held, self._rest = self.stack.rows(0, held), None
+        if free:
+            self._rest = UnactuatedRows(robot, base, free)
+            self._free = self.stack.rows(held, held + free)
+        self._bound: tuple[RobotState, Metric, NullSpaceField] | None = None
+        self.contact_rows = _places(self.contacts, 0)
+        tasks = [task for level in self.levels for task in level]
+        self.first_task_row = held + free
+        self.task_rows = _places(tasks, self.first_task_row)
+        parts: list[Task | Contact] = [*self.contacts, *tasks]
+        places = [*self.contact_rows.values(), *self.task_rows.values()]
+        self._parts = tuple(
+            (part, self.stack.rows(where.start, where.stop))
+            for part, where in zip(parts, places, strict=True)
+        )
+
+    def resolve(
+        self, state: RobotState, metric: Metric, field: NullSpaceField
+    ) -> float:
+        """Resolve contacts, tasks and field: see `resolution` for what comes out.
+
+        Returns:
+            `EXACT`, `DAMPED` or `NOT_FINITE`.
+        """
+        bound = self._bound
+        if bound is None or bound[0] is not state or bound[2] is not field:
+            self._compile(state, metric, field)
+        t, outcome = state.t, 0.0
+        for step in self._steps:
+            outcome = step(t)
+        return outcome
+
+    def _compile(
+        self, state: RobotState, metric: Metric, field: NullSpaceField
+    ) -> None:
+        """Collect what a step calls."""
+        problem = self.resolution.problem
+        bounds = [part.compile(state, sample) for part, sample in self._parts]
+        if self._rest is not None:
+            rest = partial(self._rest.evaluate, state, self._held, self._free)
+            bounds.append(StepPlan(write=(rest,)))
+        bounds.append(metric.compile(state, problem.metric))
+        bounds.append(field.compile(state, problem.metric, metric.form, problem.field))
+        law = self.resolution.compile(state.v, controls=field.controls)
+        self._steps = steps(bounds, law)
+        self._bound = state, metric, field
+
+    def culprit(self) -> str | None:
+        """Return which task's or contact's numbers are not finite, if any are."""
+        for part, sample in self._parts:
+            if not all(np.isfinite(array).all() for array in sample):
+                kind = "task" if isinstance(part, Task) else "contact"
+                return f"{kind} {part.name!r}"
+        return None
+
+
+def _places(parts: Sequence[Task] | Sequence[Contact], start: int) -> dict[str, slice]:
+    places = {}
+    for part in parts:
+        places[part.name] = slice(start, start + part.rows)
+        start += part.rows
+    return places
+
+
+def _jacobian(contacts: Sequence[Contact], state: RobotState) -> Array:
+    nv = state.robot.nv
+    rows = [
+        contact.evaluate(state, TaskSample.allocate(contact.rows, nv)).jacobian
+        for contact in contacts
+    ]
+    return np.vstack([np.zeros((0, nv)), *rows])

@@ -1,0 +1,14 @@
+"""Compensation: what is done about a world that is not as the model has it."""
+
+from .command import Command as Command
+from .compensation import Compensation as Compensation
+from .effort_rate import EffortRateClip as EffortRateClip
+from .friction_feed_forward import FrictionFeedForward as FrictionFeedForward
+from .integral_action import IntegralAction as IntegralAction
+from .momentum_observer import MomentumObserver as MomentumObserver
+from .predictor import Predictor as Predictor
+from .rate_check import RateFinding as RateFinding
+from .rate_check import check_rate as check_rate
+from .rate_check import rate_findings as rate_findings
+from .start_up_ramp import StartUpRamp as StartUpRamp
+from .velocity_filter import VelocityFilter as VelocityFilter

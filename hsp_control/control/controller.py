@@ -1,0 +1,504 @@
+"""The controller: tasks, a null-space field and a metric make one effort."""
+
+from collections.abc import Callable, Mapping, Sequence, Set
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ControllerError, NonFiniteError
+from hsp_control.constraints.contacts import Contact
+from hsp_control.constraints.limits import Limits
+from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.actuation import Actuation
+from hsp_control.control.composition import (
+    Base,
+    check_parts,
+    check_schedules,
+    check_support,
+    checked_gain,
+    levels_of,
+)
+from hsp_control.law import DAMPED, NOT_FINITE, Resolution
+from hsp_control.null_space.fields import FieldSample, NullSpaceField, Rest
+from hsp_control.null_space.fields.crossfade import crossfade
+from hsp_control.null_space.metrics import IdentityMetric, Metric
+from hsp_control.null_space.metrics.metric import CONSTANT
+from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks import Gains, Task, TaskSample
+from hsp_control.tasks.gain_ramp import GainRamp
+from hsp_control.trajectories.schedule import Schedule
+
+
+class ControlOutput(NamedTuple):
+    """The effort at one state, and everything that explains it.
+
+    The arrays are the controller's own and are overwritten by its next `compute`: copy
+    what must outlive it.
+
+    Attributes:
+        tau: Effort M a + N, less what contacts bear, shape (nv,) [N·m or N].
+        acceleration: a, shape (nv,).
+        task: All tasks stacked: J, J', e, e', a_x.
+        field: g and g', shape (nv,) each.
+        null_space_error: e_N = (I - J#J)(g - v), shape (nv,).
+        damped: Whether a task is so near a singularity that the law was bounded
+            rather than exact.
+        forces: At the points of the contacts that bear, in the axes of each (two
+            tangents, normal), shape (3 points,) [N]; see `Mode.support`.
+        status: What of the law could be delivered: `actuation.status`.
+        relaxation: By how much the worst limit is missed, where limits contradict each
+            other [rad/s² or m/s²].
+    """
+
+    tau: Array
+    acceleration: Array
+    task: TaskSample
+    field: FieldSample
+    null_space_error: Array
+    damped: bool
+    forces: Array
+    status: int
+    relaxation: float
+
+
+_output = tuple.__new__
+"""Makes a `ControlOutput` in half the time that calling it takes."""
+
+
+class Diagnostics(NamedTuple):
+    """What one would plot beside the effort.
+
+    Attributes:
+        field_value: The field's cost f, or its norm.
+        null_space_norm: ‖e_N‖_W, which decays like exp(-K_N t) for a scalar gain.
+        singular_values: Of the tasks' stacked Jacobian in the metric, J L⁻ᵀ, largest
+            first.
+        manipulability: det(J W⁻¹ Jᵀ), the product of their squares.
+    """
+
+    field_value: float
+    null_space_norm: float
+    singular_values: Array
+    manipulability: float
+
+
+AccelerationModifier = Callable[
+    [RobotState, ActiveStack, Array], tuple[Array, Array | None]
+]
+"""(state, active stack, a) ↦ the acceleration to deliver, shape (nv,), and the effort
+that this takes besides M a + N, shape (nv,) or None: how compensators act between the
+law and the limits."""
+
+
+class Controller:
+    """Computes tau = M a + N with the law of Hsu, Hauser and Sastry over a metric.
+
+    Wherever the stacked Jacobian keeps its rank and no limit binds: every task's error
+    obeys e'' + Kv e' + Kp e = 0, and V = ½ e_NᵀW e_N obeys V' = -e_NᵀW K_N e_N. It has
+    no memory, but for the last effort where its rate is limited (see `applied`): the
+    same state gives the same effort.
+
+    Attributes:
+        robot: The robot.
+        levels: The tasks of each level, the highest priority first.
+        tasks: All of them, in the same order.
+        field: The null-space field.
+        metric: The joint-space metric.
+        null_space_gain: K_N, shape (nv, nv) [1/s].
+        contacts: Where a floating base may rest.
+        limits: What the efforts and the motion are kept within, if anything.
+        schedules: When each task counts, by name; those not named always do.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        tasks: Sequence[Task | Sequence[Task]],
+        field: NullSpaceField | None = None,
+        *,
+        null_space_gain: Any = 10.0,
+        metric: Metric | None = None,
+        singularity_threshold: float = 0.03,
+        limits: Limits | None = None,
+        contacts: Sequence[Contact] = (),
+        base: Base | None = None,
+        schedules: Mapping[str, Schedule] | None = None,
+    ) -> None:
+        """Compose a controller.
+
+        Args:
+            robot: The robot.
+            tasks: One task or more, with distinct names, stacked at one level; or a
+                list of such lists, the highest priority first.
+            field: Where self-motion shall go; None: to rest.
+            null_space_gain: K_N > 0 [1/s]: scalar, shape (nv,) or (nv, nv).
+            metric: Joint-space metric; None: identity.
+            singularity_threshold: Singular value of the stacked Jacobian (in the
+                metric) below which its inverse is bounded instead of exact. For
+                positions about 3 % of the arm's reach [m]; efforts on the way into a
+                singularity grow with its inverse cube.
+            limits: What efforts and motion are kept within; None: no limits.
+            contacts: Where a robot with a free-flyer root may rest.
+            base: What else moves such a root: ``flying``, nothing when no contact
+                bears; ``driven``, something that delivers the root's effort, as a wind
+                tunnel or a simulator may.
+            schedules: When tasks count, by name; all others always do.
+
+        Raises:
+            ControllerError: If tasks, field and robot do not belong together, or the
+                tasks of one level have more rows than the robot has freedoms.
+            ContactError: If a floating base has neither contact nor word of what else
+                moves it, or a fixed one has.
+            GainError: If K_N does not make the null-space error decay.
+            MetricError: If the metric does not fit the robot.
+        """
+        field = Rest(robot) if field is None else field
+        metric = IdentityMetric() if metric is None else metric
+        levels = levels_of(tasks)
+        check_parts(robot, levels, field)
+        check_support(robot, contacts, base)
+        metric.check(robot.nv)
+        if not 0.0 < singularity_threshold < np.inf:
+            raise ControllerError(
+                f"singularity_threshold is {singularity_threshold}; must be positive"
+            )
+        if limits is not None and limits.robot is not robot:
+            raise ControllerError("the limits were built for another robot object")
+        self.robot = robot
+        self.levels = levels
+        self.tasks = tuple(task for level in levels for task in level)
+        self.field = field
+        self.metric = metric
+        self.null_space_gain = checked_gain(null_space_gain, robot, metric)
+        self.contacts = tuple(contacts)
+        self.limits = limits
+        self.schedules = dict(schedules or {})
+        check_schedules(self.schedules, [task.name for task in self.tasks])
+        self._threshold = singularity_threshold
+        self._actuation = Actuation(
+            robot, limits, () if base == "driven" else robot.unactuated
+        )
+        self._modes: dict[tuple[Any, ...], ActiveStack] = {}
+        self._mode: ActiveStack | None = None
+        self._mixed, self._modified = np.zeros(robot.nv), np.zeros(robot.nv)
+        self._ramps: list[GainRamp] = []
+        self._next_field: tuple[float, NullSpaceField] | None = None
+        self._timeless = not self.schedules and all(
+            contact.schedule.constant for contact in self.contacts
+        )
+
+    # -- the step ---------------------------------------------------------------------
+
+    def compute(
+        self, state: RobotState, modifier: AccelerationModifier | None = None
+    ) -> ControlOutput:
+        """Return the effort at a state.
+
+        Args:
+            state: The robot's state.
+            modifier: What is done about the law's acceleration before it is delivered
+                within the limits; None: nothing.
+
+        Raises:
+            NonFiniteError: If a task or the field gave something that is not finite;
+                an effort that is not finite is never returned.
+            ControllerError: If the state is another robot's.
+        """
+        if state.robot is not self.robot:
+            raise ControllerError(
+                f"the state is of another robot object ({state.robot.name}); "
+                f"this controller is for {self.robot.name}"
+            )
+        if self._ramps:
+            self._ramps = [ramp for ramp in self._ramps if not ramp.apply(state.t)]
+        if self._next_field is not None and state.t >= self._next_field[0]:
+            self.field, self._next_field = self._next_field[1], None
+        mode = self._mode
+        if mode is None or not self._timeless:
+            a, how = self._scheduled(state)
+            mode = self.mode
+        else:
+            how = mode.resolve(state, self.metric, self.field)
+            a = mode.resolution.acceleration
+        if how == NOT_FINITE:
+            self._explain_non_finite(state)
+        offset = None
+        if modifier is not None:
+            self._modified[:], offset = modifier(state, mode, a)
+            a = self._modified
+        resolution = mode.resolution
+        tau, a, forces, status, relaxation = self._actuation.deliver(
+            state, a, resolution, mode.support, offset
+        )
+        problem, e_N = resolution.problem, resolution.null_space_error
+        return _output(
+            ControlOutput,
+            (
+                tau,
+                a,
+                mode.stack,
+                problem.field,
+                e_N,
+                how == DAMPED,
+                forces,
+                status,
+                relaxation,
+            ),
+        )
+
+    def applied(self, tau: Array, period: float) -> None:
+        """Take note of an effort that goes out, and of when the next one will.
+
+        Only where the rate of efforts is limited does it matter.
+
+        Args:
+            tau: Effort, shape (nv,).
+            period: Time until the next effort [s].
+        """
+        self._actuation.applied(tau, period)
+
+    def restart(self) -> None:
+        """Forget the last effort and all offsets: what follows is another run."""
+        self._actuation.forget()
+        for task in self.tasks:
+            task.offset[:] = 0.0
+
+    def _scheduled(self, state: RobotState) -> tuple[Array, float]:
+        """Return the law's acceleration with what the schedules have on.
+
+        And what became of the law, see `Mode.resolve`.
+
+        A task that comes or goes has a weight between 0 and 1. With w1 ≥ w2 ≥ ... the
+        weights of such tasks, the acceleration is
+
+            (1 - w1) a{} + (w1 - w2) a{1} + (w2 - w3) a{1, 2} + ...
+
+        with a{...} the law for the tasks that always count and those in the braces. It
+        is continuous in the weights, and since the tasks in all sets are linear in a,
+        those keep their exact error equation throughout.
+        """
+        t = state.t
+        weights = {
+            name: schedule.weight(t) for name, schedule in self.schedules.items()
+        }
+        coming = sorted(
+            (name for name, w in weights.items() if 0.0 < w < 1.0),
+            key=lambda name: -weights[name],
+        )
+        off = {name for name, w in weights.items() if w < 1.0}
+        shares = [1.0, *(weights[name] for name in coming), 0.0]
+        mixed = self._mixed
+        mixed[:] = 0.0
+        how = 0.0
+        for k, (share, following) in enumerate(pairwise(shares)):
+            self._mode = self._mode_without(state, off - set(coming[:k]))
+            how = max(how, self._mode.resolve(state, self.metric, self.field))
+            a = self._mode.resolution.acceleration
+            if not coming:
+                break
+            mixed += (share - following) * a
+            a = mixed
+        return a, how
+
+    def _mode_without(self, state: RobotState, off: Set[str]) -> ActiveStack:
+        """Return the mode of the contacts that bear now, without some tasks."""
+        bearing = tuple(c for c in self.contacts if c.schedule.active(state.t))
+        key = (tuple(c.name for c in bearing), frozenset(off))
+        if key not in self._modes:
+            levels = [[t for t in level if t.name not in off] for level in self.levels]
+            self._modes[key] = ActiveStack(
+                state,
+                bearing,
+                levels,
+                self._actuation.base,
+                self._actuation.support(bearing),
+                self.metric,
+                self.null_space_gain,
+                self._threshold,
+            )
+        return self._modes[key]
+
+    # -- what explains it -------------------------------------------------------------
+
+    @property
+    def mode(self) -> ActiveStack:
+        """What was on at the last `compute`.
+
+        Raises:
+            ControllerError: If there was none yet.
+        """
+        if self._mode is None:
+            raise ControllerError("nothing has been computed yet")
+        return self._mode
+
+    def stack(self, state: RobotState) -> TaskSample:
+        """Return the rows of all contacts and tasks that count at a state."""
+        self._scheduled(state)
+        return self.mode.stack
+
+    def level_of(self, task: str) -> int:
+        """Return the level that a task is at, 0 the highest.
+
+        Raises:
+            ControllerError: If there is no such task.
+        """
+        check_schedules({task: None}, [each.name for each in self.tasks])
+        return next(
+            k
+            for k, level in enumerate(self.levels)
+            if any(each.name == task for each in level)
+        )
+
+    @property
+    def task_rows(self) -> dict[str, slice]:
+        """Where each task's rows stand in the last output's stack, by name."""
+        return self.mode.task_rows
+
+    @property
+    def field_sample(self) -> FieldSample:
+        """The field, g and g', at the last `compute`."""
+        return self.mode.resolution.problem.field
+
+    def diagnose(self, state: RobotState) -> Diagnostics:
+        """Return what one would plot, after `compute` at the same state."""
+        resolution = self.mode.resolution
+        singular_values, manipulability = resolution.spectrum(self.mode.first_task_row)
+        return Diagnostics(
+            self.field.value(state),
+            resolution.null_space_norm(),
+            singular_values,
+            manipulability,
+        )
+
+    def flow(self, t: float, q: Array) -> Array:
+        """Return v = J# x_d' + P g, shape (nv,): the robot once both errors have died.
+
+        The law makes the robot this first-order flow (law.md §2, Liégeois 1977), so it
+        previews a field, and a start with this velocity has no transient.
+        """
+        state = self.robot.state(t, q, np.zeros(self.robot.nv))
+        self.compute(state)
+        mode, problem = self.mode, self.mode.resolution.problem
+        # At rest, without drift and with unit gain the law's acceleration is the flow.
+        flow = Resolution(
+            np.diff(mode.resolution.ends, prepend=0).tolist(),
+            self.robot.nv,
+            min(self.metric.form, CONSTANT),
+            np.eye(self.robot.nv),
+            self._threshold,
+        )
+        flow.problem.task.jacobian[:] = mode.stack.jacobian
+        for level in mode.levels:
+            for task in level:
+                rate = task.reference_rate(state)
+                flow.problem.task.acceleration[mode.task_rows[task.name]] = rate
+        flow.problem.field.g[:] = problem.field.g
+        flow.problem.metric.W[:], flow.problem.metric.L[:] = problem.metric[:2]
+        return flow.resolve(state.v).acceleration
+
+    # -- changes while it runs --------------------------------------------------------
+
+    def add_task(
+        self, task: Task, *, start: float, ramp: float, level: int | None = None
+    ) -> None:
+        """Let a task come, without a jump in effort.
+
+        Args:
+            task: The task, with a name of its own.
+            start: When it begins to count [s].
+            ramp: How long it takes to count in full [s].
+            level: Its level, 0 the highest; None: the lowest there is.
+
+        Raises:
+            ControllerError: If it does not belong here, or there is no such level.
+        """
+        levels = [list(each) for each in self.levels]
+        if level is not None and not 0 <= level <= len(levels):
+            raise ControllerError(
+                f"there is no level {level}; levels are 0 to {len(levels) - 1}, and "
+                f"{len(levels)} opens a new one"
+            )
+        if level == len(levels):
+            levels.append([])
+        levels[-1 if level is None else level].append(task)
+        check_parts(self.robot, levels, self.field)
+        self.levels = tuple(tuple(each) for each in levels)
+        self.tasks = tuple(each for row in self.levels for each in row)
+        self.schedules[task.name] = Schedule([(start, np.inf)], ramp=ramp)
+        self._modes.clear()
+        self._timeless = False
+
+    def remove_task(self, name: str, *, start: float, ramp: float) -> None:
+        """Let a task go, without a jump in effort.
+
+        Args:
+            name: The task.
+            start: When it begins to fade [s].
+            ramp: How long it takes to fade [s].
+
+        Raises:
+            ControllerError: If there is no such task.
+        """
+        check_schedules({name: None}, [task.name for task in self.tasks])
+        self.schedules[name] = Schedule([(-np.inf, start + ramp)], ramp=ramp)
+        self._timeless = False
+
+    def change_gains(
+        self, name: str, gains: Gains, *, start: float, ramp: float
+    ) -> None:
+        """Let a task's gains change smoothly; its error equation holds throughout.
+
+        Args:
+            name: The task.
+            gains: The gains it shall have.
+            start: When they begin to change [s].
+            ramp: How long they take [s].
+
+        Raises:
+            ControllerError: If there is no such task.
+            GainError: If the gains do not fit it.
+        """
+        check_schedules({name: None}, [task.name for task in self.tasks])
+        task = next(task for task in self.tasks if task.name == name)
+        self._ramps.append(GainRamp(task, gains, start, ramp))
+
+    def change_field(self, field: NullSpaceField, *, start: float, ramp: float) -> None:
+        """Let another field take over smoothly; Proposition 2 holds throughout.
+
+        On the way the field is a `crossfade`, whose exact rate the law is told, so that
+        the null-space error goes on decaying as if nothing happened. A change that
+        comes before the last one has ended begins at whatever the field then is.
+
+        Args:
+            field: The field that it shall be.
+            start: When it begins to take over, now or later [s].
+            ramp: How long it takes [s].
+
+        Raises:
+            ControllerError: If the field is another robot's.
+            FieldError: If the ramp takes no time, or one of the two fields leaves the
+                null space uncontrolled: there is no way between g and no g.
+        """
+        check_parts(self.robot, self.levels, field)
+        self.field = crossfade(self.field, field, start=start, duration=ramp)
+        self._next_field = start + ramp, field
+
+    def _explain_non_finite(self, state: RobotState) -> None:
+        culprit = self.mode.culprit()
+        if culprit is not None:
+            raise NonFiniteError(
+                f"{culprit} is not finite at t = {state.t:.6g} s; "
+                "does its trajectory return NaN or infinity there?"
+            )
+        if not all(np.isfinite(array).all() for array in self.field_sample):
+            raise NonFiniteError(
+                f"field {self.field.name!r} is not finite at t = {state.t:.6g} s"
+            )
+        problem = self.mode.resolution.problem
+        self.metric.evaluate(state, problem.metric)  # may say what is wrong with it
+        raise NonFiniteError(
+            f"the effort is not finite at t = {state.t:.6g} s, "
+            f"q = {state.q.tolist()}, v = {state.v.tolist()}"
+        )

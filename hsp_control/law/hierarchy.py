@@ -1,0 +1,212 @@
+"""Strict priorities: the law for levels of tasks that may be in conflict.
+
+    Q_0 = W⁻¹,   G_k = J_k Q_{k-1} J_kᵀ
+    a ← a + Q_{k-1} J_kᵀ q(G_k) (a_k - J_k'v - J_k a)
+    Q_k = Q_{k-1} - Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1}
+
+Each level moves in the null space of those above, which stay exact whatever it asks
+for, and the field is the last level: with P = Q_K W, J_a the stack of all levels and w
+any solution of J_aᵀ w = W(I - P)x, which going back through the levels finds,
+
+    φ_N = Q_K [ W(g' + K_N e_N) - J_a'ᵀ w + W'(x - e_N/2) ],   e_N = P x,  x = g - v
+
+so that V' = -e_NᵀW K_N e_N as long as the stack keeps its rank, conflicts included.
+Where the stack has full rank this *is* the law of `law.py`, to rounding, which then
+serves: it costs a tenth. (Its least singular value bounds those of all levels from
+below, by the interlacing of Schur complements, so that the two meet where they change
+over.) ``law.md`` §4.
+"""
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import (
+    multiply,
+    multiply_transposed,
+    orthogonalise_rows,
+    solve_lower,
+    solve_lower_transposed,
+)
+from hsp_control.null_space.metrics.metric import VARYING
+
+
+@kernel
+def resolve_levels(
+    J: Array,
+    J_dot: Array,
+    a_x: Array,
+    v: Array,
+    g: Array,
+    g_dot: Array,
+    K_N: Array,
+    W: Array,
+    L: Array,
+    W_dot: Array,
+    form: int,
+    threshold: float,
+    controls: bool,
+    ends: Indices,
+    Q: Array,
+    QJ: Array,
+    G_inverse: Array,
+    square: Array,
+    scratch: Array,
+    e_N: Array,
+    a: Array,
+) -> bool:
+    """Write e_N and a; return whether a singular value was damped.
+
+    Args:
+        J: Jacobian of all tasks, level after level, shape (m, nv).
+        J_dot: Its time derivative, shape (m, nv).
+        a_x: Task accelerations, shape (m,).
+        v: Velocity, shape (nv,).
+        g: Field, shape (nv,).
+        g_dot: Its total time derivative, shape (nv,).
+        K_N: Null-space gain [1/s], shape (nv, nv).
+        W: Metric, shape (nv, nv).
+        L: Its Cholesky factor, shape (nv, nv).
+        W_dot: Its time derivative, shape (nv, nv).
+        form: The metric's form.
+        threshold: Singular value of a level's whitened Jacobian, in the null space of
+            those above, below which it is damped.
+        controls: False for φ_N = 0.
+        ends: Where each level's rows end in the stack.
+        Q: Scratch, shape (nv, nv); the last null space's Q_K = P W⁻¹ afterwards.
+        QJ: Scratch, shape (nv, m).
+        G_inverse: Scratch, shape (m, m).
+        square: Scratch, shape (2, m, m).
+        scratch: Scratch, shape (6, max(nv, m)).
+        e_N: Null-space error, shape (nv,).
+        a: Acceleration, shape (nv,).
+    """
+    n = v.shape[0]
+    damped = False
+    _invert(L, Q)
+    for i in range(n):
+        a[i] = 0.0
+    start = 0
+    for level in range(ends.shape[0]):
+        end = ends[level]
+        block = slice(start, end)
+        G_inv, rest = G_inverse[block, block], scratch[0, start:end]
+        if _open_level(J[block], Q, QJ[:, block], G_inv, square, threshold):
+            damped = True
+        for k in range(start, end):
+            total = a_x[k]
+            for i in range(n):
+                total -= J_dot[k, i] * v[i] + J[k, i] * a[i]
+            scratch[0, k] = total
+        pushed = scratch[1, : end - start]
+        multiply(G_inv, rest, pushed)
+        for i in range(n):
+            for k in range(end - start):
+                a[i] += QJ[i, start + k] * pushed[k]
+        _close_level(Q, QJ[:, block], G_inv, scratch[1])
+        start = end
+
+    x, Wx, Y, bent = scratch[0, :n], scratch[1, :n], scratch[2, :n], scratch[3, :n]
+    for i in range(n):
+        x[i] = g[i] - v[i]
+        Y[i] = bent[i] = 0.0
+    multiply(W, x, Wx)
+    for reverse in range(ends.shape[0]):
+        level = ends.shape[0] - 1 - reverse
+        end = ends[level]
+        start = ends[level - 1] if level > 0 else 0
+        row, w = square[0, 0, : end - start], square[0, 1, : end - start]
+        for k in range(end - start):
+            row[k] = 0.0
+            for i in range(n):
+                row[k] += QJ[i, start + k] * (Wx[i] - Y[i])
+        multiply(G_inverse[start:end, start:end], row, w)
+        for k in range(end - start):
+            for i in range(n):
+                Y[i] += J[start + k, i] * w[k]
+                bent[i] += J_dot[start + k, i] * w[k]
+
+    multiply(Q, Wx, e_N)
+    if not controls:
+        return damped
+    wanted = scratch[4, :n]
+    multiply(K_N, e_N, wanted)
+    for i in range(n):
+        wanted[i] += g_dot[i]
+    multiply(W, wanted, Y)
+    for i in range(n):
+        Y[i] -= bent[i]
+    if form == VARYING:
+        for i in range(n):
+            for j in range(n):
+                Y[i] += W_dot[i, j] * (x[j] - 0.5 * e_N[j])
+    multiply(Q, Y, wanted)
+    for i in range(n):
+        a[i] += wanted[i]
+    return damped
+
+
+@kernel
+def _invert(L: Array, out: Array) -> None:
+    """Write W⁻¹ = (L Lᵀ)⁻¹."""
+    n = L.shape[0]
+    for j in range(n):
+        for i in range(n):
+            out[j, i] = 1.0 if i == j else 0.0
+        solve_lower(L, out[j])
+        solve_lower_transposed(L, out[j])
+
+
+@kernel
+def _open_level(
+    J: Array,
+    Q: Array,
+    QJ: Array,
+    G_inverse: Array,
+    square: Array,
+    threshold: float,
+) -> bool:
+    """Write Q Jᵀ and q(J Q Jᵀ), with q as in `pseudo_inverse.py`; any damped?"""
+    m, n = J.shape
+    for k in range(m):
+        multiply(Q, J[k], QJ[:, k])
+    G, V = square[0, :m, :m], square[1, :m, :m]
+    for p in range(m):
+        for k in range(p + 1):
+            total = 0.0
+            for i in range(n):
+                total += J[p, i] * QJ[i, k]
+            G[p, k] = G[k, p] = total
+    # G is symmetric and not negative: its rows' lengths become its eigenvalues.
+    orthogonalise_rows(G, V)
+    floor = threshold * threshold
+    damped = False
+    for k in range(m):
+        x = 0.0
+        for p in range(m):
+            x += G[k, p] * G[k, p]
+        x = np.sqrt(x)
+        damped = damped or x < floor
+        G[k, 0] = 1.0 / x if x >= floor else (2.0 - x / floor) / floor
+    for p in range(m):
+        for k in range(m):
+            total = 0.0
+            for r in range(m):
+                total += V[r, p] * G[r, 0] * V[r, k]
+            G_inverse[p, k] = total
+    return damped
+
+
+@kernel
+def _close_level(Q: Array, QJ: Array, G_inverse: Array, row: Array) -> None:
+    """Overwrite Q by Q - QJᵀ q(G) JQ, which stays symmetric."""
+    n, m = QJ.shape
+    for i in range(n):
+        multiply_transposed(G_inverse, QJ[i], row[:m])
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(m):
+                total += row[k] * QJ[j, k]
+            Q[i, j] -= total
+            if j < i:
+                Q[j, i] = Q[i, j]

@@ -1,0 +1,109 @@
+"""The weighted pseudo-inverse, exact away from singularities and bounded through them.
+
+Written for the whitened Jacobian B = J L⁻ᵀ with W = L Lᵀ, in which every metric is the
+Euclidean one. It is kept as two factors, which the law multiplies by one after the
+other: J# = L⁻ᵀ Qᵀ X. Away from singularities Q = X B has orthonormal rows, X lower
+triangular; near them Q = U B has orthogonal rows, and X = q(s²) U inverts the spectrum.
+"""
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import (
+    least_singular_value_bound,
+    multiply,
+    multiply_transposed,
+    orthogonalise_rows,
+    orthonormalise_rows,
+    solve_lower,
+    solve_lower_transposed,
+)
+from hsp_control.null_space.metrics.metric import IDENTITY
+
+
+@kernel
+def weighted_pseudo_inverse(
+    J: Array,
+    L: Array,
+    form: int,
+    threshold: float,
+    B: Array,
+    Q: Array,
+    X: Array,
+) -> bool:
+    """Write the factors of J# = W⁻¹Jᵀ q(JW⁻¹Jᵀ); return whether it was damped.
+
+    q(x) = 1/x for x ≥ threshold² and (2 - x/threshold²)/threshold² below it (law.md
+    §4): continuously differentiable, exactly the inverse while every singular value of
+    J L⁻ᵀ is above the threshold, and bounded: ‖J# in whitened coordinates‖ ≤
+    1.09/threshold. Rank loss is a special case.
+
+    Args:
+        J: Task Jacobian, shape (m, nv), m ≤ nv.
+        L: Cholesky factor of the metric, shape (nv, nv).
+        form: The metric's form.
+        threshold: Singular value below which damping starts.
+        B: Scratch, shape (m, nv); holds the whitened Jacobian afterwards.
+        Q: Rows that span those of B, shape (m, nv).
+        X: Shape (m, m).
+    """
+    whiten(J, L, form, B)
+    # The spectrum is asked for only where cheaper bounds leave open whether it is met.
+    bound = orthonormalise_rows(B, Q, X)
+    if 0.0 < bound < threshold:
+        bound = least_singular_value_bound(X)
+    if bound < threshold:
+        return _bounded_factors(B, threshold, Q, X)
+    return False
+
+
+@kernel
+def whiten(J: Array, L: Array, form: int, B: Array) -> None:
+    """Write B = J L⁻ᵀ."""
+    for k in range(J.shape[0]):
+        for i in range(J.shape[1]):
+            B[k, i] = J[k, i]
+        if form != IDENTITY:
+            solve_lower(L, B[k])
+
+
+@kernel
+def _bounded_factors(B: Array, threshold: float, Q: Array, X: Array) -> bool:
+    """Write Q = U B, with rows of norms s, and X = q(s²) U; any s damped?"""
+    m, n = B.shape
+    for k in range(m):
+        for i in range(n):
+            Q[k, i] = B[k, i]
+    orthogonalise_rows(Q, X)
+    floor = threshold * threshold
+    damped = False
+    for k in range(m):
+        x = 0.0
+        for i in range(n):
+            x += Q[k, i] * Q[k, i]
+        inverse = 1.0 / x if x >= floor else (2.0 - x / floor) / floor
+        damped = damped or x < floor
+        for i in range(m):
+            X[k, i] *= inverse
+    return damped
+
+
+@kernel
+def apply_pseudo_inverse(
+    Q: Array, X: Array, L: Array, form: int, x: Array, part: Array, out: Array
+) -> None:
+    """Write J# x = L⁻ᵀ Qᵀ X x, the least motion that x asks for; part is scratch."""
+    multiply(X, x, part)
+    multiply_transposed(Q, part, out)
+    if form != IDENTITY:
+        solve_lower_transposed(L, out)
+
+
+@kernel
+def apply_pseudo_inverse_transpose(
+    Q: Array, X: Array, L: Array, form: int, y: Array, part: Array, out: Array
+) -> None:
+    """Write J#ᵀ y = Xᵀ Q L⁻¹ y, and overwrite y by L⁻¹ y; part is scratch."""
+    if form != IDENTITY:
+        solve_lower(L, y)
+    multiply(Q, y, part)
+    multiply_transposed(X, part, out)

@@ -1,0 +1,246 @@
+"""From tasks and a field to one acceleration: the law with its memory."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import (
+    gram,
+    norm,
+    orthogonalise_rows,
+    orthonormalise_rows,
+)
+from hsp_control.common.native import bind
+from hsp_control.law.hierarchy import resolve_levels
+from hsp_control.law.law import acceleration, null_space_command
+from hsp_control.law.problem import Problem
+from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse, whiten
+
+EXACT, DAMPED, NOT_FINITE = 0, 1, 2
+"""What became of the law: it is exact; a singular value was below the threshold, so
+that it was bounded instead; a is not made of numbers."""
+
+
+class Resolved(NamedTuple):
+    """What the law decided at one state.
+
+    Attributes:
+        acceleration: a, shape (nv,).
+        null_space_error: e_N = P(g - v), shape (nv,).
+        damped: Whether a singular value was below the threshold, so that the law was
+            bounded rather than exact.
+        finite: Whether a is made of numbers.
+    """
+
+    acceleration: Array
+    null_space_error: Array
+    damped: bool
+    finite: bool
+
+
+class Resolution:
+    """The law for levels of tasks: the kernels with their buffers.
+
+    It has scratch but nothing that it remembers: the same input gives the same output.
+
+    Attributes:
+        problem: What is to be resolved, to be filled in before `resolve`.
+        ends: Where each level's rows end in the stack.
+        form: The metric's form.
+        threshold: Singular value below which the inverse is bounded.
+        acceleration: a of the last `resolve`, shape (nv,).
+        null_space_error: e_N of the last `resolve`, shape (nv,).
+    """
+
+    def __init__(
+        self, levels: Sequence[int], nv: int, form: int, gain: Array, threshold: float
+    ) -> None:
+        """Allocate.
+
+        Args:
+            levels: Rows of each level, the highest priority first.
+            nv: Freedoms.
+            form: The metric's form.
+            gain: Null-space gain K_N, shape (nv, nv) [1/s].
+            threshold: Singular value of the whitened Jacobian below which it is damped.
+        """
+        m = sum(levels)
+        self.problem = Problem(m, nv, gain)
+        self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
+        self.form = form
+        self.threshold = threshold
+        self._scratch = (
+            np.zeros((2, m, nv)),
+            np.zeros((3, m, m)),
+            np.zeros((7, max(m, nv))),
+        )
+        # What only conflicting levels need.
+        self._levels_scratch = np.zeros((nv, m)), np.zeros((nv, nv))
+        self.acceleration, self.null_space_error = np.zeros(nv), np.zeros(nv)
+        self._norm = bind(norm, self.problem.metric.W, self.null_space_error)
+        self._spectra: dict[int, tuple[Callable[[], float], Array]] = {}
+
+    def resolve(self, v: Array, *, controls_null_space: bool = True) -> Resolved:
+        """Return the acceleration that tracks the tasks and the field.
+
+        Args:
+            v: Velocity, shape (nv,).
+            controls_null_space: False for φ_N = 0, the paper's first simulation.
+        """
+        how = self.compile(v, controls=controls_null_space)()
+        return Resolved(
+            self.acceleration, self.null_space_error, how == DAMPED, how != NOT_FINITE
+        )
+
+    def compile(self, v: Array, *, controls: bool) -> Callable[[], float]:
+        """Return what `resolve` calls for a velocity, an array that is followed.
+
+        It returns `EXACT`, `DAMPED` or `NOT_FINITE`.
+        """
+        return bind(
+            _resolve,
+            *self.problem.arrays,
+            v,
+            self.ends,
+            self.form,
+            self.threshold,
+            controls,
+            *self._scratch,
+            *self._levels_scratch,
+            self.null_space_error,
+            self.acceleration,
+        )
+
+    def spectrum(self, first: int = 0) -> tuple[Array, float]:
+        """Return the singular values of J L⁻ᵀ from a row on, largest first.
+
+        And their product squared: det(J W⁻¹ Jᵀ), the manipulability of the paper.
+        """
+        values = self._spectra.get(first)
+        if values is None:
+            J, L = self.problem.task.jacobian[first:], self.problem.metric.L
+            out = np.zeros(min(J.shape))
+            wide, small, _ = self._scratch
+            call = bind(_singular_values, J, L, self.form, wide, small, out)
+            self._spectra[first] = values = call, out
+        manipulability = values[0]()
+        return values[1].copy(), manipulability
+
+    def null_space_norm(self) -> float:
+        """Return ‖e_N‖_W, the square root of 2 V, at the last `resolve`."""
+        return float(self._norm())
+
+
+@kernel
+def _resolve(
+    jacobians: Array,
+    tasks: Array,
+    field: Array,
+    squares: Array,
+    v: Array,
+    ends: Indices,
+    form: int,
+    threshold: float,
+    controls: bool,
+    wide: Array,
+    small: Array,
+    scratch: Array,
+    tall: Array,
+    inner: Array,
+    e_N: Array,
+    a: Array,
+) -> int:
+    """Write e_N and a; return `EXACT`, `DAMPED` or `NOT_FINITE`.
+
+    The first four arrays are those of a `Problem`, the next but the last two scratch.
+    """
+    J, J_dot, a_x, g, g_dot = jacobians[0], jacobians[1], tasks[2], field[0], field[1]
+    W, L, W_dot, K_N = squares[0], squares[1], squares[2], squares[3]
+    m, n = J.shape
+    Q, X, u = wide[1], small[1], scratch[6, :n]
+
+    conflicting = m > n
+    damped = False
+    if not conflicting:
+        damped = weighted_pseudo_inverse(J, L, form, threshold, wide[0], Q, X)
+        conflicting = damped and ends.shape[0] > 1
+    if conflicting:
+        damped = resolve_levels(
+            J,
+            J_dot,
+            a_x,
+            v,
+            g,
+            g_dot,
+            K_N,
+            W,
+            L,
+            W_dot,
+            form,
+            threshold,
+            controls,
+            ends,
+            inner,
+            tall,
+            small[2],
+            small,
+            scratch,
+            e_N,
+            a,
+        )
+    else:
+        null_space_command(
+            J, J_dot, Q, X, v, g, g_dot, K_N, W, L, W_dot, form, scratch, e_N, u
+        )
+        if not controls:
+            for i in range(n):
+                u[i] = 0.0
+        acceleration(J, J_dot, Q, X, L, form, v, a_x, u, scratch, a)
+    total = 0.0
+    for i in range(n):
+        total += a[i]
+    if not np.isfinite(total):
+        return NOT_FINITE
+    return DAMPED if damped else EXACT
+
+
+@kernel
+def _singular_values(
+    J: Array, L: Array, form: int, wide: Array, small: Array, values: Array
+) -> float:
+    """Write the singular values of J L⁻ᵀ, largest first; J of any shape.
+
+    Returns:
+        Their product squared.
+    """
+    m, n = J.shape
+    width = min(m, n)
+    B, T, U = wide[0, :m], small[0, :m, :m], small[1, :m, :m]
+    whiten(J, L, form, B)
+    if m <= n:
+        # The columns of the triangular factor are nearer to orthogonal than the rows.
+        Q = wide[1, :m]
+        orthonormalise_rows(B, Q, U)
+        gram(Q, B, False, T)
+        for i in range(m):
+            for k in range(m):
+                B[i, k] = T[i, k]
+    orthogonalise_rows(B[:, :width], U[:, :0])
+    squares = small[2, 0, :m]
+    for k in range(m):
+        squares[k] = 0.0
+        for i in range(width):
+            squares[k] += B[k, i] * B[k, i]
+    product = 1.0
+    for rank in range(values.shape[0]):
+        best = rank
+        for k in range(rank + 1, m):
+            if squares[k] > squares[best]:
+                best = k
+        squares[rank], squares[best] = squares[best], squares[rank]
+        values[rank] = np.sqrt(squares[rank])
+        product *= squares[rank]
+    return product

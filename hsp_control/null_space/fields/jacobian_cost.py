@@ -1,0 +1,300 @@
+"""Costs of a frame's Jacobian: exact gradients and rates from running sums.
+
+For joints i and j on the way to a frame, with world columns J_j = (l_j, w_j) at the
+frame's origin, moving joint i changes J_j by
+
+    w_i × (l_j, w_j)   if i carries j, or is of the same joint,
+    (w_j × l_i, 0)     if j carries i,
+
+for revolute and prismatic joints and floating roots alike. A function φ(J) with
+∂φ/∂J = B, columns (b_j, c_j), therefore has the gradient
+
+    w_i · Σ_{j from i on} (l_j × b_j + w_j × c_j) + l_i · Σ_{j before i} (b_j × w_j)
+
+in O(n), without the kinematic Hessian; and since J' is known exactly, so is the rate.
+"""
+
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import FieldError
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+from hsp_control.common.step_plan import CallSequence
+from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
+from hsp_control.robot import Robot, RobotState
+
+Rows = Literal["position", "orientation", "pose"]
+_ROWS = {"position": "xyz", "orientation": "rpq", "pose": "xyzrpq"}
+
+
+class JacobianTerms(NamedTuple):
+    """φ and its derivatives at one state, for the selected and scaled rows.
+
+    Attributes:
+        value: φ(J).
+        slope: B = ∂φ/∂J, shape (k, nv).
+        slope_rate: B', shape (k, nv).
+    """
+
+    value: float
+    slope: Array
+    slope_rate: Array
+
+
+class JacobianCost(CompiledCost):
+    """f = φ(J) for rows of one frame's Jacobian; write `terms`.
+
+    Attributes:
+        frame: The frame's name.
+        rows: Which rows, ``position``, ``orientation`` or ``pose``.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        frame: str,
+        *,
+        rows: Rows = "position",
+        axes: str = "xyz",
+        length: float = 1.0,
+        name: str,
+    ) -> None:
+        """Select rows.
+
+        Args:
+            robot: The robot.
+            frame: Name of the frame.
+            rows: ``position``, ``orientation`` or ``pose``.
+            axes: World axes of the position rows: ``"xy"`` for a planar arm.
+            length: What one radian is worth [m], where rows mix metres and radians.
+            name: What the log calls it.
+
+        Raises:
+            FrameNotFoundError: If the robot has no such frame.
+            FieldError: If rows or axes are unknown, or too many for the frame's joints.
+        """
+        super().__init__(robot, name)
+        robot.frame_id(frame)
+        if rows not in _ROWS:
+            raise FieldError(
+                f"field {name!r}: rows {rows!r}; choose among {list(_ROWS)}"
+            )
+        if not axes or set(axes) - set("xyz") or len(set(axes)) < len(axes):
+            raise FieldError(f"field {name!r}: axes {axes!r}; name axes among x, y, z")
+        if not 0.0 < length < np.inf:
+            raise FieldError(f"field {name!r}: length {length} must be positive")
+        kept = [i for i, axis in enumerate("xyz") if axis in axes]
+        if rows != "position":
+            kept = (kept if rows == "pose" else []) + [3, 4, 5]
+        self.frame = frame
+        self.rows = rows
+        self._selected: Indices = np.array(kept, dtype=np.int64)
+        self._scale = np.where(self._selected < 3, 1.0, length if rows == "pose" else 1)
+        self._dofs, self._first = _chain(robot, frame)
+        if len(kept) > len(self._dofs):
+            raise FieldError(
+                f"field {name!r}: {len(kept)} rows of frame {frame!r}, which only "
+                f"{len(self._dofs)} freedoms move; they are singular everywhere"
+            )
+
+    @abstractmethod
+    def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
+        """Return φ, ∂φ/∂J and its rate for the selected rows, shape (k, nv)."""
+
+    def _compile_terms(
+        self, J: Array, J_dot: Array, slope: Array, slope_rate: Array
+    ) -> Derivatives:
+        """Return what writes ∂φ/∂J and its rate and returns φ."""
+
+        def write() -> float:
+            value, slope[:], slope_rate[:] = self.terms(J, J_dot)
+            return value
+
+        return write
+
+    def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        frame, nv = state.frame(self.frame), self.robot.nv
+        J, J_dot, slope, slope_rate = np.zeros((4, len(self._selected), nv))
+        rows = self._selected, self._scale
+        select = bind(_select, frame.jacobian, frame.jacobian_dot, *rows, J, J_dot)
+        terms = self._compile_terms(J, J_dot, slope, slope_rate)
+        raise_slope = bind(
+            _raise_slope,
+            frame.jacobian,
+            frame.jacobian_dot,
+            slope,
+            slope_rate,
+            *rows,
+            np.zeros((2, 6, nv)),
+            self._dofs,
+            self._first,
+            np.zeros((4, len(self._dofs) + 1, 3)),
+            gradient,
+            rate,
+        )
+        return CallSequence(frame.compute, select, terms, raise_slope, result=2)
+
+
+class CompiledJacobianCost(JacobianCost):
+    """A Jacobian's cost whose terms come from one kernel: write `_kernel`."""
+
+    @abstractmethod
+    def _kernel(self) -> tuple[Callable[..., float], tuple[Any, ...]]:
+        """Return the kernel and its first arguments.
+
+        The others are J, J', ∂φ/∂J and its rate, all of the shape (k, nv), and scratch
+        of the shape (8, k, nv).
+        """
+
+    def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
+        """Return f, its slope and rate."""
+        slope, slope_rate = np.zeros_like(J), np.zeros_like(J)
+        value = self._compile_terms(J, J_dot, slope, slope_rate)()
+        return JacobianTerms(value, slope, slope_rate)
+
+    def _compile_terms(
+        self, J: Array, J_dot: Array, slope: Array, slope_rate: Array
+    ) -> Derivatives:
+        function, parameters = self._kernel()
+        scratch = np.zeros((8, *J.shape))
+        return bind(function, *parameters, J, J_dot, slope, slope_rate, scratch)
+
+
+@kernel
+def _select(
+    J_frame: Array,
+    J_frame_dot: Array,
+    selected: Indices,
+    scale: Array,
+    J: Array,
+    J_dot: Array,
+) -> None:
+    """Write the selected rows, scaled."""
+    for k in range(J.shape[0]):
+        for j in range(J.shape[1]):
+            J[k, j] = scale[k] * J_frame[selected[k], j]
+            J_dot[k, j] = scale[k] * J_frame_dot[selected[k], j]
+
+
+@kernel
+def _raise_slope(
+    J: Array,
+    J_dot: Array,
+    slope: Array,
+    slope_rate: Array,
+    selected: Indices,
+    scale: Array,
+    B: Array,
+    dofs: Indices,
+    first: Indices,
+    sums: Array,
+    gradient: Array,
+    rate: Array,
+) -> None:
+    """Write the gradient and its rate from the slope of the selected, scaled rows."""
+    for k in range(slope.shape[0]):
+        for j in range(slope.shape[1]):
+            B[0, selected[k], j] = scale[k] * slope[k, j]
+            B[1, selected[k], j] = scale[k] * slope_rate[k, j]
+    for i in range(gradient.shape[0]):
+        gradient[i] = rate[i] = 0.0
+    chain_gradient(J, J_dot, B[0], B[1], dofs, first, sums, gradient, rate)
+
+
+@kernel
+def chain_gradient(
+    J: Array,
+    J_dot: Array,
+    B: Array,
+    B_dot: Array,
+    dofs: Indices,
+    first: Indices,
+    sums: Array,
+    gradient: Array,
+    rate: Array,
+) -> None:
+    """Write the gradient of φ(J) and its rate from B = ∂φ/∂J; see the module.
+
+    Args:
+        J: World-aligned Jacobian of the frame, shape (6, nv).
+        J_dot: Its rate, shape (6, nv).
+        B: ∂φ/∂J, shape (6, nv).
+        B_dot: Its rate, shape (6, nv).
+        dofs: The k degrees of freedom that move the frame, from the root on.
+        first: For each of them, where its joint begins in that list.
+        sums: Scratch, shape (4, k + 1, 3).
+        gradient: ∂φ/∂q, shape (nv,); entries of other dofs are left alone.
+        rate: Its time derivative, shape (nv,).
+    """
+    k = dofs.shape[0]
+    carried, carried_dot, before, before_dot = sums[0], sums[1], sums[2], sums[3]
+    for a in range(3):
+        carried[k, a] = carried_dot[k, a] = 0.0
+        before[0, a] = before_dot[0, a] = 0.0
+    for p in range(k):
+        j = dofs[p]
+        for a in range(3):
+            y, z = (a + 1) % 3, (a + 2) % 3
+            before[p + 1, a] = (
+                before[p, a] + B[y, j] * J[3 + z, j] - B[z, j] * J[3 + y, j]
+            )
+            before_dot[p + 1, a] = (
+                before_dot[p, a]
+                + B_dot[y, j] * J[3 + z, j]
+                - B_dot[z, j] * J[3 + y, j]
+                + B[y, j] * J_dot[3 + z, j]
+                - B[z, j] * J_dot[3 + y, j]
+            )
+    for r in range(k):
+        p = k - 1 - r
+        j = dofs[p]
+        for a in range(3):
+            y, z = (a + 1) % 3, (a + 2) % 3
+            total = total_dot = 0.0
+            for block in (0, 3):  # l × b, then w × c
+                total += J[block + y, j] * B[block + z, j]
+                total -= J[block + z, j] * B[block + y, j]
+                total_dot += J_dot[block + y, j] * B[block + z, j]
+                total_dot -= J_dot[block + z, j] * B[block + y, j]
+                total_dot += J[block + y, j] * B_dot[block + z, j]
+                total_dot -= J[block + z, j] * B_dot[block + y, j]
+            carried[p, a] = carried[p + 1, a] + total
+            carried_dot[p, a] = carried_dot[p + 1, a] + total_dot
+    for p in range(k):
+        i, f = dofs[p], first[p]
+        gradient[i] = rate[i] = 0.0
+        for a in range(3):
+            gradient[i] += J[3 + a, i] * carried[f, a] + J[a, i] * before[f, a]
+            rate[i] += J_dot[3 + a, i] * carried[f, a] + J[3 + a, i] * carried_dot[f, a]
+            rate[i] += J_dot[a, i] * before[f, a] + J[a, i] * before_dot[f, a]
+
+
+def _chain(robot: Robot, frame: str) -> tuple[Indices, Indices]:
+    """Return the freedoms that move a frame, and where each one's joint begins.
+
+    Raises:
+        FieldError: If a joint on the way mimics another: its freedom stands twice on
+            the chain, which the running sums do not know.
+    """
+    model = robot.model
+    dofs: list[int] = []
+    first: list[int] = []
+    for joint_id in list(
+        model.supports[model.frames[robot.frame_id(frame)].parentJoint]
+    ):
+        joint = model.joints[joint_id]
+        if joint_id == 0:
+            continue
+        if joint.nvExtended != joint.nv:
+            raise FieldError(
+                f"frame {frame!r} is moved by {model.names[joint_id]!r}, which mimics "
+                "another joint; choose a frame before it, or load with mimic: false"
+            )
+        first.extend([len(dofs)] * joint.nv)
+        dofs.extend(range(joint.idx_v, joint.idx_v + joint.nv))
+    return np.array(dofs, dtype=np.int64), np.array(first, dtype=np.int64)

@@ -1,0 +1,9 @@
+"""Where the robot is: its model, its state, and every term computed there."""
+
+from .friction import JointFriction as JointFriction
+from .integrators import Dop853 as Dop853
+from .integrators import Integrator as Integrator
+from .integrators import Rk4 as Rk4
+from .integrators import SemiImplicitEuler as SemiImplicitEuler
+from .robot import Robot as Robot
+from .robot import RobotState as RobotState

@@ -1,0 +1,89 @@
+"""The centre of mass and the angular momentum about it, with their exact Jacobians."""
+
+from functools import partial
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+from hsp_control.robot.matrix_view import matrix_view
+
+
+class CentroidalMotion:
+    """Where a robot's mass is and how it moves, in world axes.
+
+    Attributes:
+        mass: Total mass [kg].
+        position: The centre of mass c [m], shape (3,).
+        velocity: c' = J v [m/s], shape (3,).
+        jacobian: J, shape (3, nv).
+        jacobian_dot: J' along v, exact, shape (3, nv).
+        momentum_matrix: A, with A v the angular momentum about c [kg·m²/s], (3, nv).
+        momentum_matrix_dot: A' along v, exact, shape (3, nv).
+    """
+
+    def __init__(self, model: pin.Model, data: pin.Data, q: Array, v: Array) -> None:
+        """Allocate; `RobotState.centroidal` updates it, at whatever q and v hold."""
+        # Pinocchio makes its vectors when they are first asked for: views on them then.
+        pin.computeCentroidalMapTimeVariation(model, data, q, v)
+        self.mass: float = pin.computeTotalMass(model)
+        self.position: Array = data.com[0]
+        self.velocity: Array = np.zeros(3)
+        self.jacobian: Array = np.zeros((3, model.nv))
+        self.jacobian_dot: Array = np.zeros((3, model.nv))
+        self.momentum_matrix: Array = np.zeros((3, model.nv))
+        self.momentum_matrix_dot: Array = np.zeros((3, model.nv))
+        self._move = partial(pin.computeCentroidalMapTimeVariation, model, data, q, v)
+        self._divide = bind(
+            _divide,
+            matrix_view(data.Ag),
+            matrix_view(data.dAg),
+            self.mass,
+            v,
+            self.velocity,
+            self.jacobian,
+            self.jacobian_dot,
+            self.momentum_matrix,
+            self.momentum_matrix_dot,
+        )
+
+    def update(self) -> None:
+        """Compute everything at the configuration and the velocity."""
+        self._move()
+        self._divide()
+
+
+@kernel
+def _divide(
+    A: Array,
+    A_dot: Array,
+    mass: float,
+    v: Array,
+    velocity: Array,
+    J: Array,
+    J_dot: Array,
+    angular: Array,
+    angular_dot: Array,
+) -> None:
+    """Write the linear rows, per mass, and the angular ones with their true rate.
+
+    Pinocchio's A' differentiates about a point at rest, though the centre of mass
+    moves: the derivative of the angular rows is A' - m c' × J (against differences; A'v
+    alone is right as it is, since c' × c' = 0).
+    """
+    for i in range(3):
+        velocity[i] = 0.0
+    for j in range(v.shape[0]):
+        for i in range(3):
+            J[i, j] = A[i, j] / mass
+            J_dot[i, j] = A_dot[i, j] / mass
+            angular[i, j] = A[3 + i, j]
+            velocity[i] += J[i, j] * v[j]
+    x, y, z = velocity[0], velocity[1], velocity[2]
+    for j in range(v.shape[0]):
+        px, py, pz = A[0, j], A[1, j], A[2, j]
+        angular_dot[0, j] = A_dot[3, j] - (y * pz - z * py)
+        angular_dot[1, j] = A_dot[4, j] - (z * px - x * pz)
+        angular_dot[2, j] = A_dot[5, j] - (x * py - y * px)

@@ -1,0 +1,268 @@
+"""The space that configurations live in: a manifold, with tangent vectors (nv,)."""
+
+from collections.abc import Mapping, Sequence
+from math import atan2
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import ConfigurationError, NonFiniteError, ShapeError
+from hsp_control.common.kernels import kernel
+from hsp_control.robot.description.loading import moving_joints
+
+
+class ConfigurationSpace:
+    """Configurations q, shape (nq,), and what may be done with them.
+
+    Attributes:
+        name: What messages call the robot.
+        model: The Pinocchio model.
+        nq: Numbers in a configuration.
+        nv: Freedoms.
+        joints: The joints that have freedoms, by name, in the order of velocities.
+        joint_names: Their names.
+        dof_names: A name for each freedom, ``root_joint.x`` where a joint has many.
+        units: The unit of each freedom, ``rad`` or ``m``.
+        single_joints: Of each joint with one freedom the place of that freedom, and
+            where it begins in q and how many numbers it has there, shape (k, 3).
+        unit_blocks: (start, size) of every quaternion and (cos, sin) pair in q.
+        flat: Whether every joint has one freedom, so that δ' = v holds globally.
+        mimics: Whether some joints follow others.
+        unactuated: The freedoms that no motor moves, those of a free-flyer root.
+        freedom_indices: Where each freedom's own coordinate stands in q; -1 where it
+            has none (roots, continuous joints).
+    """
+
+    def __init__(
+        self, model: pin.Model, name: str, home: Sequence[float] | None = None
+    ) -> None:
+        """Describe a model's configurations; ``home`` has shape (nv,)."""
+        self.model = model
+        self.name = name
+        self.nq: int = model.nq
+        self.nv: int = model.nv
+        self.joints = moving_joints(model)
+        self.joint_names: tuple[str, ...] = tuple(self.joints)
+        self.dof_names: tuple[str, ...] = _dof_names(self.joints)
+        self.units: tuple[str, ...] = _units(self.joints)
+        self.single_joints: Indices = np.array(
+            [(j.idx_v, j.idx_q, j.nq) for j in self.joints.values() if j.nv == 1],
+            dtype=np.int64,
+        ).reshape(-1, 3)
+        self.unit_blocks: tuple[tuple[int, int], ...] = _unit_blocks(self.joints)
+        self.flat: bool = all(joint.nv == 1 for joint in self.joints.values())
+        self.mimics: bool = model.nvExtended != model.nv
+        self.unactuated: tuple[int, ...] = tuple(
+            joint.idx_v + k
+            for joint in self.joints.values()
+            if joint.shortname() == "JointModelFreeFlyer"
+            for k in range(6)
+        )
+        own = np.full(self.nv, -1, dtype=np.int64)
+        for joint in self.joints.values():
+            if joint.nq == joint.nv == 1:
+                own[joint.idx_v] = joint.idx_q
+        self.dof_indices: Indices = own
+        fits = home is not None and len(home) == self.nv
+        self._home = np.array(home) if fits else None
+        if self._home is not None:  # some SRDFs have a joint stand beyond its limit
+            self._home = np.clip(self._home, *self.position_limits())
+
+    def neutral(self) -> Array:
+        """Return the configuration with every joint at zero, shape (nq,)."""
+        return np.asarray(pin.neutral(self.model))
+
+    def home(self) -> Array:
+        """Return the posture that the robot's source recommends, or the neutral one.
+
+        Where neutral lies outside the limits, the joint is put in their middle.
+        """
+        if self._home is not None:
+            return self.integrate(self.neutral(), self._home)
+        lower, upper = self.position_limits()
+        bounded = np.isfinite(lower) & np.isfinite(upper)
+        middle = np.zeros(self.nv)
+        middle[bounded] = 0.5 * (lower[bounded] + upper[bounded])
+        inside = (lower < 0.0) & (upper > 0.0)
+        middle[inside] = 0.0
+        return self.integrate(self.neutral(), middle)
+
+    def random_configuration(self, rng: np.random.Generator) -> Array:
+        """Draw a configuration: uniform within limits, any angle where there are none.
+
+        A floating root is drawn within a unit box, with a uniform orientation.
+        """
+        lower, upper = self.position_limits()
+        bounded = np.isfinite(lower) & np.isfinite(upper)
+        low = np.where(bounded, lower, -np.pi)
+        high = np.where(bounded, upper, np.pi)
+        q = self.integrate(self.neutral(), rng.uniform(low, high))
+        for joint in self.joints.values():
+            if joint.shortname() == "JointModelFreeFlyer":
+                quaternion = rng.standard_normal(4)
+                q[joint.idx_q : joint.idx_q + 3] = rng.uniform(-1.0, 1.0, 3)
+                q[joint.idx_q + 3 : joint.idx_q + 7] = quaternion / np.linalg.norm(
+                    quaternion
+                )
+        return q
+
+    def integrate(self, q: Any, displacement: Any) -> Array:
+        """Return q ⊕ displacement, shape (nq,).
+
+        Raises:
+            ShapeError: If they are not nq and nv numbers.
+        """
+        try:
+            return np.asarray(pin.integrate(self.model, q, displacement))
+        except (TypeError, ValueError):  # lists, or what does not fit: look closer
+            q = self.check_configuration(q)
+            displacement = self.check_tangent(displacement, "displacement")
+            return np.asarray(pin.integrate(self.model, q, displacement))
+
+    def difference(self, start: Any, end: Any) -> Array:
+        """Return end ⊖ start: the displacement that leads from start to end, (nv,).
+
+        Raises:
+            ShapeError: If they are not nq numbers each.
+        """
+        try:
+            return np.asarray(pin.difference(self.model, start, end))
+        except (TypeError, ValueError):
+            start, end = self.check_configuration(start), self.check_configuration(end)
+            return np.asarray(pin.difference(self.model, start, end))
+
+    def joint_positions(self, q: Array) -> Array:
+        """Return every joint's position [rad or m], shape (nv,): the log from neutral.
+
+        Continuous joints come as angles in (-pi, pi].
+        """
+        return self.difference(self.neutral(), q)
+
+    def position_limits(self) -> tuple[Array, Array]:
+        """Return lower and upper joint positions, shape (nv,); ±inf where unlimited.
+
+        Continuous joints and the root have no limits, whatever the model's numbers,
+        and neither has a joint whose two limits are equal: its URDF leaves them out.
+        """
+        lower = np.full(self.nv, -np.inf)
+        upper = np.full(self.nv, np.inf)
+        for joint in self.joints.values():
+            if joint.nq == 1 and joint.nv == 1:
+                low = self.model.lowerPositionLimit[joint.idx_q]
+                high = self.model.upperPositionLimit[joint.idx_q]
+                if low < high:
+                    lower[joint.idx_v], upper[joint.idx_v] = low, high
+        largest = np.finfo(float).max  # Pinocchio's word for unlimited
+        lower[lower <= -largest] = -np.inf
+        upper[upper >= largest] = np.inf
+        return lower, upper
+
+    def check_configuration(self, q: Any) -> Array:
+        """Return q as a float array of shape (nq,) that is a configuration.
+
+        Raises:
+            ShapeError: If its shape is not (nq,).
+            NonFiniteError: If it holds a NaN or an infinity.
+            ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
+        """
+        configuration = _check_vector(q, self.nq, "configuration q", self)
+        for start, size in self.unit_blocks:
+            block = configuration[start : start + size]
+            norm = float(np.linalg.norm(block))
+            if abs(norm - 1.0) > 1e-6:
+                kind = "(cos, sin) pair" if size == 2 else "quaternion"
+                raise ConfigurationError(
+                    f"q[{start}:{start + size}] = {block.tolist()} is a {kind} "
+                    f"of norm {norm:.6g}; needs norm 1"
+                )
+        return configuration
+
+    def check_tangent(self, vector: Any, what: str) -> Array:
+        """Return a velocity, acceleration or effort as a float array of shape (nv,).
+
+        Raises:
+            ShapeError: If its shape is not (nv,).
+            NonFiniteError: If it holds a NaN or an infinity.
+        """
+        return _check_vector(vector, self.nv, what, self)
+
+
+def _units(joints: Mapping[str, Any]) -> tuple[str, ...]:
+    roots = {3: ("m", "m", "rad"), 6: ("m", "m", "m", "rad", "rad", "rad")}
+    units: list[str] = []
+    for joint in joints.values():
+        prismatic = joint.shortname().startswith(
+            ("JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismatic")
+        )
+        single = ("m",) if prismatic else ("rad",)
+        units.extend(roots.get(joint.nv, single * joint.nv))
+    return tuple(units)
+
+
+def _unit_blocks(joints: Mapping[str, Any]) -> tuple[tuple[int, int], ...]:
+    blocks = []
+    for joint in joints.values():
+        if joint.nq == joint.nv + 1:
+            size = 2 if joint.nv in {1, 3} else 4
+            if joint.shortname() == "JointModelSpherical":
+                size = 4
+            blocks.append((joint.idx_q + joint.nq - size, size))
+    return tuple(blocks)
+
+
+def _dof_names(joints: Mapping[str, Any]) -> tuple[str, ...]:
+    suffixes = {
+        3: ("x", "y", "yaw"),
+        6: ("x", "y", "z", "roll", "pitch", "yaw"),
+    }
+    names: list[str] = []
+    for name, joint in joints.items():
+        if joint.nv == 1:
+            names.append(name)
+        else:
+            labels = suffixes.get(joint.nv, tuple(str(k) for k in range(joint.nv)))
+            names.extend(f"{name}.{label}" for label in labels)
+    return tuple(names)
+
+
+def _check_vector(
+    vector: Any, size: int, what: str, space: ConfigurationSpace
+) -> Array:
+    try:
+        array = np.asarray(vector, dtype=float)
+    except (TypeError, ValueError):
+        raise ShapeError(f"{what} is not an array of {size} numbers") from None
+    if array.shape != (size,):
+        raise ShapeError(
+            f"{what} has shape {array.shape}; {space.name} needs ({size},)"
+            + (f" (nq = {space.nq}, nv = {space.nv})" if space.nq != space.nv else "")
+        )
+    bad = np.flatnonzero(~np.isfinite(array))
+    if bad.size:
+        raise NonFiniteError(
+            f"{what}[{bad[0]}] is {array[bad[0]]}; needs finite numbers"
+        )
+    return array
+
+
+@kernel
+def joint_displacements(
+    q: Array, reference: Array, single_joints: Indices, out: Array
+) -> None:
+    """Write q ⊖ reference for joints of one freedom, within ±π for continuous ones.
+
+    Args:
+        q: Configuration, shape (nq,).
+        reference: The other configuration, shape (nq,).
+        single_joints: See `ConfigurationSpace`, shape (k, 3).
+        out: Displacements, shape (nv,); entries of other joints are left alone.
+    """
+    for k in range(single_joints.shape[0]):
+        i, at, size = single_joints[k, 0], single_joints[k, 1], single_joints[k, 2]
+        if size == 1:
+            out[i] = q[at] - reference[at]
+        else:  # (cos, sin)
+            c, s, c_ref, s_ref = q[at], q[at + 1], reference[at], reference[at + 1]
+            out[i] = atan2(s * c_ref - c * s_ref, c * c_ref + s * s_ref)

@@ -1,0 +1,1 @@
+"""From a name or a URDF to a model: found, read with care, checked."""

@@ -1,0 +1,207 @@
+"""Find a robot by bundled name, name of example-robot-data, or path to a URDF."""
+
+import importlib.util
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+
+from hsp_control.common.exceptions import RobotNotFoundError
+from hsp_control.common.resources import bundled_robots
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.robot.description.access import ANYWHERE, Access
+
+Root = Literal["fixed", "planar", "free_flyer"]
+
+# What example-robot-data does not say, and the tree alone does not show: a lone jaw
+# looks like one more joint of the arm, a sensor like a tool.
+_END_EFFECTORS = {
+    "b1_z1": "gripperStator",
+    "baxter": "right_gripper",
+    "talos": "gripper_right_base_link",
+    "talos_arm": "gripper_left_base_link",
+    "talos_box": "gripper_right_base_link",
+    "talos_legs": "gripper_right_base_link",
+    "z1": "gripperStator",
+}
+
+
+@dataclass(frozen=True)
+class RobotSource:
+    """Where a robot comes from, and what its folder says of it.
+
+    Attributes:
+        name: The name that it was asked for by, or the URDF file's stem.
+        urdf: The URDF file.
+        srdf: The SRDF file (reference postures, disabled collision pairs), if any.
+        root: How the robot stands in the world unless told otherwise.
+        package_dirs: Folders that ``package://`` is looked up in.
+        origin: ``bundled``, ``example-robot-data`` or ``file``.
+        locked: Joints locked unless told otherwise, name to value [rad or m].
+        end_effector: The frame that tasks use by default, if known.
+        home: Joint values of a good start posture, shape (nv,), if known.
+        posture: The SRDF's name of a posture to stand in, if known.
+        joint_coordinates: The matrix A of coordinates theta = A q that the literature
+            uses for this robot (``absolute`` for the planar arm), if any.
+        access: Which files its URDF may name.
+    """
+
+    name: str
+    urdf: Path
+    srdf: Path | None = None
+    root: Root = "fixed"
+    package_dirs: tuple[Path, ...] = ()
+    origin: str = "file"
+    locked: Mapping[str, float] = field(default_factory=dict)
+    end_effector: str | None = None
+    home: tuple[float, ...] | None = None
+    posture: str | None = None
+    joint_coordinates: str | None = None
+    access: Access = ANYWHERE
+
+
+def find_robot(name: str | Path, access: Access = ANYWHERE) -> RobotSource:
+    """Find a robot by bundled name, name of example-robot-data, or path to a URDF.
+
+    Args:
+        name: For example ``"panda"``, ``"talos_arm"`` or ``"my_arm/arm.urdf"``.
+        access: Where a URDF that is named by path, and its meshes, may lie.
+
+    Raises:
+        RobotNotFoundError: If there is no such robot; the message names the nearest.
+        AccessError: If the path is not allowed.
+    """
+    text = os.fspath(name)
+    if text.endswith((".urdf", ".xml")) or os.sep in text:
+        return _from_path(Path(text), access)
+    bundled = bundled_robots()
+    if text in bundled:
+        return _from_bundle(text, bundled[text])
+    others = example_robots()
+    if text in others:
+        return others[text]
+    if text in examples_without_urdf():
+        raise RobotNotFoundError(
+            f"robot {text!r} of example-robot-data has no URDF; nothing else is read"
+        )
+    known = sorted({*bundled, *others})
+    hint = "" if others else "; more with: pip install example-robot-data-loaders"
+    raise RobotNotFoundError(
+        f"no robot {text!r}{did_you_mean(text, known)} "
+        f"(a path to a .urdf file, or one of: {listing(known)}){hint}"
+    )
+
+
+def example_robots() -> dict[str, RobotSource]:
+    """Return the robots of example-robot-data by name; empty if it is not installed."""
+    loaders = _example_loaders()
+    if not loaders:
+        return {}
+    root = _example_robot_data_folder()
+    sources = {}
+    for name, loader in loaders.items():
+        folder = root / "robots" / loader.path
+        urdf = folder / loader.urdf_subpath / getattr(loader, "urdf_filename", "")
+        srdf = folder / loader.srdf_subpath / getattr(loader, "srdf_filename", "")
+        if urdf.is_file():
+            sources[name] = RobotSource(
+                name=name,
+                urdf=urdf,
+                srdf=srdf if srdf.is_file() else None,
+                root="free_flyer" if loader.free_flyer else "fixed",
+                package_dirs=(root.parent, root / "robots"),
+                origin="example-robot-data",
+                posture=loader.ref_posture if loader.free_flyer else None,
+                end_effector=_END_EFFECTORS.get(name),
+            )
+    return sources
+
+
+def examples_without_urdf() -> tuple[str, ...]:
+    """Return the names of example-robot-data that stand for no URDF."""
+    found = example_robots()
+    return tuple(name for name in _example_loaders() if name not in found)
+
+
+def packaged_folders() -> list[Path]:
+    """Return the folders of the robots that can be loaded by name."""
+    if importlib.util.find_spec("example_robot_data") is None:
+        return []
+    with suppress(RobotNotFoundError):  # installed without its data
+        return [_example_robot_data_folder()]
+    return []
+
+
+def _from_path(path: Path, access: Access) -> RobotSource:
+    if "\0" in str(path):
+        raise RobotNotFoundError(f"{str(path)!r}: no path has a null character")
+    with suppress(RuntimeError):  # a user that nobody knows: then it is no such file
+        path = path.expanduser()
+    access.check(path, "robot")
+    if path.is_dir():
+        raise RobotNotFoundError(f"{path}: is a folder; name the .urdf file in it")
+    if not path.is_file():
+        near = sorted(file.name for file in path.parent.glob("*.urdf"))
+        raise RobotNotFoundError(f"{path}: no such file{did_you_mean(path.name, near)}")
+    # `package://<folder>/...` names a folder somewhere above the URDF.
+    above = tuple(path.resolve().parents)[:5]
+    ros = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
+    packages = (*above, *(Path(folder) for folder in ros if folder))
+    return RobotSource(
+        name=path.stem,
+        urdf=path,
+        package_dirs=tuple(folder for folder in packages if access.allows(folder)),
+        access=access,
+    )
+
+
+def _from_bundle(name: str, folder: Path) -> RobotSource:
+    settings: dict[str, Any] = {}
+    file = folder / "robot.yaml"
+    if file.is_file():
+        settings = yaml.safe_load(file.read_text(encoding="utf-8")) or {}
+    packages: tuple[Path, ...] = (folder.parent,)
+    if importlib.util.find_spec("example_robot_data") is not None:
+        packages = (*packages, _example_robot_data_folder().parent)
+    home = settings.get("home")
+    return RobotSource(
+        name=name,
+        urdf=folder / f"{name}.urdf",
+        srdf=srdf if (srdf := folder / f"{name}.srdf").is_file() else None,
+        package_dirs=packages,
+        origin="bundled",
+        locked=dict(settings.get("locked") or {}),
+        end_effector=settings.get("end_effector"),
+        home=tuple(float(x) for x in home) if home is not None else None,
+        joint_coordinates=settings.get("joint_coordinates"),
+    )
+
+
+def _example_loaders() -> dict[str, Any]:
+    if importlib.util.find_spec("example_robot_data") is None:
+        return {}
+    from example_robot_data.robots_loader import ROBOTS
+
+    return dict(ROBOTS)
+
+
+def _example_robot_data_folder() -> Path:
+    """Return ``<prefix>/share/example-robot-data`` of the installed package.
+
+    The package's own constant names the folder that it was built in; its ``share``
+    stands beside the ``lib`` that its Python modules are in.
+    """
+    spec = importlib.util.find_spec("example_robot_data")
+    origin = spec.origin if spec is not None else None
+    for parent in Path(origin or "").parents:
+        folder = parent / "share" / "example-robot-data"
+        if folder.is_dir():
+            return folder
+    raise RobotNotFoundError(
+        "example-robot-data is installed without its data; "
+        "reinstall it with: pip install --force-reinstall example-robot-data"
+    )

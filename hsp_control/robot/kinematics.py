@@ -1,0 +1,203 @@
+"""Where joints and frames are and how they move: Jacobians, exact rates and drift."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import ModelError
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+from hsp_control.robot.matrix_view import matrix_view
+
+
+class FrameKinematics:
+    """Where a frame is and how it moves, in world axes, linear before angular.
+
+    Attributes:
+        compute: Brings everything below up to the state, if it is not.
+        rotation: World ← frame, shape (3, 3).
+        position: Its origin in the world [m], shape (3,).
+        jacobian: J with (velocity of the origin, angular velocity) = J v, (6, nv).
+        jacobian_dot: J' = dJ/dt along v, exact, shape (6, nv).
+        velocity: J v, shape (6,) [m/s, rad/s].
+        drift: J' v, shape (6,): the classical acceleration when v' = 0.
+    """
+
+    __slots__ = (
+        "compute",
+        "drift",
+        "jacobian",
+        "jacobian_dot",
+        "position",
+        "rotation",
+        "velocity",
+    )
+
+    def __init__(
+        self, model: pin.Model, data: pin.Data, v: Array, instant: Indices, index: int
+    ) -> None:
+        """Allocate; `compute` fills it.
+
+        Args:
+            model: The model.
+            data: Its data, where joints and their Jacobians are found.
+            v: The velocity, shape (nv,).
+            instant: A number that changes whenever they do, shape (1,).
+            index: The frame's place in the model.
+        """
+        nv, frame = model.nv, model.frames[index]
+        joint = data.oMi[frame.parentJoint]  # its parts are views: they follow the data
+        self.rotation: Array = np.zeros((3, 3))
+        self.position: Array = np.zeros(3)
+        self.jacobian: Array = np.zeros((6, nv))
+        self.jacobian_dot: Array = np.zeros((6, nv))
+        self.velocity: Array = np.zeros(6)
+        self.drift: Array = np.zeros(6)
+        self.compute: Callable[[], object] = bind(
+            frame_kinematics,
+            instant,
+            np.array([-1]),
+            matrix_view(data.J),
+            matrix_view(data.dJ),
+            joint.rotation,
+            joint.translation,
+            np.ascontiguousarray(frame.placement.rotation),
+            frame.placement.translation.copy(),
+            v,
+            *joint_support(model, frame.parentJoint),
+            self.rotation,
+            self.position,
+            self.jacobian,
+            self.jacobian_dot,
+            self.velocity,
+            self.drift,
+        )
+
+
+@kernel
+def frame_kinematics(
+    instant: Indices,
+    computed: Indices,
+    J_world: Array,
+    J_world_dot: Array,
+    R_joint: Array,
+    p_joint: Array,
+    R_local: Array,
+    p_local: Array,
+    v: Array,
+    columns: Indices,
+    dofs: Indices,
+    R: Array,
+    p: Array,
+    J: Array,
+    J_dot: Array,
+    velocity: Array,
+    drift: Array,
+) -> None:
+    """Write where a frame of a joint is, and how its origin moves.
+
+    The joints' Jacobian and its rate are moved from the world's origin to the frame's.
+    A column (l, w) at the origin reads (l + w × p, w) at the point p, and its rate
+    (l' + w' × p + w × p', w'). Only joints that carry the frame have columns; those of
+    joints that mimic add to their leader's. What has been computed at this instant is
+    left as it is.
+    """
+    if computed[0] == instant[0]:
+        return
+    computed[0] = instant[0]
+    for i in range(3):
+        p[i] = p_joint[i]
+        for j in range(3):
+            p[i] += R_joint[i, j] * p_local[j]
+            R[i, j] = 0.0
+            for k in range(3):
+                R[i, j] += R_joint[i, k] * R_local[k, j]
+    for k in range(columns.shape[0]):
+        j = dofs[k]
+        for i in range(6):
+            J[i, j] = 0.0
+            J_dot[i, j] = 0.0
+    for i in range(6):
+        velocity[i] = 0.0
+        drift[i] = 0.0
+    for k in range(columns.shape[0]):
+        c, j = columns[k], dofs[k]
+        wx, wy, wz = J_world[3, c], J_world[4, c], J_world[5, c]
+        J[0, j] += J_world[0, c] + wy * p[2] - wz * p[1]
+        J[1, j] += J_world[1, c] + wz * p[0] - wx * p[2]
+        J[2, j] += J_world[2, c] + wx * p[1] - wy * p[0]
+        J[3, j] += wx
+        J[4, j] += wy
+        J[5, j] += wz
+    for j in range(v.shape[0]):
+        for i in range(6):
+            velocity[i] += J[i, j] * v[j]
+    ux, uy, uz = velocity[0], velocity[1], velocity[2]
+    for k in range(columns.shape[0]):
+        c, j = columns[k], dofs[k]
+        wx, wy, wz = J_world[3, c], J_world[4, c], J_world[5, c]
+        ax, ay, az = J_world_dot[3, c], J_world_dot[4, c], J_world_dot[5, c]
+        J_dot[0, j] += J_world_dot[0, c] + ay * p[2] - az * p[1] + wy * uz - wz * uy
+        J_dot[1, j] += J_world_dot[1, c] + az * p[0] - ax * p[2] + wz * ux - wx * uz
+        J_dot[2, j] += J_world_dot[2, c] + ax * p[1] - ay * p[0] + wx * uy - wy * ux
+        J_dot[3, j] += ax
+        J_dot[4, j] += ay
+        J_dot[5, j] += az
+    for j in range(v.shape[0]):
+        for i in range(6):
+            drift[i] += J_dot[i, j] * v[j]
+
+
+def mass_matrix_difference(model: pin.Model, q: Array, v: Array) -> Array:
+    """Return M' by fourth-order differences along v, good to 1e-11 of M.
+
+    For robots with mimic joints, which Pinocchio's Coriolis matrix does not know.
+    """
+    data, h = model.createData(), 1e-3 / max(1.0, float(np.abs(v).max()))
+
+    def M(s: float) -> Array:
+        return np.array(pin.crba(model, data, pin.integrate(model, q, s * v)))
+
+    return (8.0 * (M(h) - M(-h)) - (M(2.0 * h) - M(-2.0 * h))) / (12.0 * h)
+
+
+def joint_support(model: pin.Model, joint: int) -> tuple[Indices, Indices]:
+    """Return the columns of Pinocchio's J that move a joint, and their freedoms.
+
+    The two differ where joints mimic others: such a joint has a column of its own,
+    already scaled, and its leader's freedom.
+    """
+    columns: list[int] = []
+    dofs: list[int] = []
+    for index in list(model.supports[joint])[1:]:  # not the universe
+        part = model.joints[index]
+        width = part.nvExtended
+        columns.extend(range(part.idx_vExtended, part.idx_vExtended + width))
+        dofs.extend(range(part.idx_v, part.idx_v + width))
+    return np.array(columns, dtype=np.int64), np.array(dofs, dtype=np.int64)
+
+
+def joint_placements(data: pin.Data) -> Array:
+    """Return where all joints are, a view that follows the data, shape (njoints, 12).
+
+    A row is R, column by column, and then the origin: Pinocchio's own placements, which
+    lie one after the other in memory.
+
+    Raises:
+        ModelError: If they do not, in a Pinocchio that is not known yet.
+    """
+    first, address = data.oMi[0].rotation, "__array_interface__"
+    turns = [getattr(M.rotation, address)["data"][0] for M in data.oMi]
+    origins = [getattr(M.translation, address)["data"][0] for M in data.oMi]
+    strides = set(np.diff(turns))
+    offsets = {b - a for a, b in zip(turns, origins, strict=True)}
+    if len(strides) > 1 or offsets != {9 * 8} or first.strides != (8, 24):
+        raise ModelError(
+            f"Pinocchio {pin.__version__} lays placements out in an unknown way; "
+            "use 4.1, or ask for support of this one"
+        )
+    return np.lib.stride_tricks.as_strided(
+        first.T.reshape(9), (len(turns), 12), (strides.pop() if strides else 96, 8)
+    )

@@ -1,0 +1,63 @@
+"""What the law promises of self-motion: how its error decays, read from a log."""
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+
+from hsp_control.common.arrays import Array
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_series import constant_metric
+
+ROUNDING = 1e-12
+"""‖e_N(0)‖ over the speeds that it is made of, below which it is rounding."""
+
+
+class Decay(NamedTuple):
+    """What the law promises of ‖e_N‖_W, or why it promises nothing.
+
+    Attributes:
+        slow: Upper bound, shape (N,); None without a promise.
+        fast: Lower bound, shape (N,); the same array for a scalar gain.
+        gains: The rates of both bounds [1/s].
+        why_not: Why there is no prediction.
+    """
+
+    slow: Array | None
+    fast: Array | None
+    gains: tuple[float, float]
+    why_not: str
+
+
+def predicted_decay(rollout: Rollout) -> Decay:
+    """Return ‖e_N(0)‖_W exp(-K_N t), law.md §2, or bounds for a matrix K_N.
+
+    V' = -e_NᵀW K_N e_N lies between -2V times the greatest and the least eigenvalue of
+    the symmetric part of W K_N relative to W.
+    """
+    if not rollout.meta.get("controls_null_space", True):
+        why = "no prediction: self-motion is not controlled"
+        return Decay(None, None, (0.0, 0.0), why)
+    gain = rollout.meta.get("null_space_gain")
+    if gain is None:
+        why = "no prediction: $K_N$ not in the log"
+        return Decay(None, None, (0.0, 0.0), why)
+    K_N = np.asarray(gain, dtype=float)
+    multiple = K_N[0, 0] * np.eye(len(K_N))
+    scalar = np.array_equal(K_N, multiple)
+    W = np.eye(len(K_N)) if scalar else constant_metric(rollout)
+    if W is None:
+        why = "no prediction: $K_N$ is a matrix, $W$ not in the log"
+        return Decay(None, None, (0.0, 0.0), why)
+    power = 0.5 * (W @ K_N + (W @ K_N).T)
+    rates = scipy.linalg.eigh(power, W, eigvals_only=True)
+    slowest, fastest = float(rates[0]), float(rates[-1])
+    norm, elapsed = rollout["null_space_norm"], rollout.t - rollout.t[0]
+    speeds = np.linalg.norm(rollout["field.g"], axis=1)
+    speeds = speeds + np.linalg.norm(rollout.v, axis=1)
+    if not norm[0] > ROUNDING * float(speeds.max()):
+        why = "no prediction: starts with $e_N$ = 0"
+        return Decay(None, None, (slowest, fastest), why)
+    slow = norm[0] * np.exp(-slowest * elapsed)
+    fast = slow if scalar else norm[0] * np.exp(-fastest * elapsed)
+    return Decay(slow, fast, (slowest, fastest), "")

@@ -1,0 +1,145 @@
+"""What a log says, in the form in which a person would plot it."""
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.simulation import Rollout
+
+
+class ErrorPart(NamedTuple):
+    """Components of a task's error that have one unit.
+
+    Attributes:
+        label: The task's name, and what of it, if it has several parts.
+        unit: The components' unit.
+        task: The task's place among the tasks.
+        norm: Their Euclidean norm at every row, shape (N,).
+    """
+
+    label: str
+    unit: str
+    task: int
+    norm: Array
+
+
+_PARTS = {
+    "FramePosition": (("", "m", slice(None)),),
+    "FrameOrientation": (("", "rad", slice(None)),),
+    "FramePose": (("position", "m", slice(3)), ("orientation", "rad", slice(3, 6))),
+    "Pointing": (("tan of half the angle", "–", slice(None)),),
+    "JointPosture": (("", None, slice(None)),),
+}
+"""The error's parts by type of task: what, unit (None: the joints'), components."""
+
+
+def task_names(rollout: Rollout) -> list[str]:
+    """Return the tasks' names in the controller's order."""
+    return list(rollout.meta.get("tasks", {}))
+
+
+def task_type(rollout: Rollout, name: str) -> str:
+    """Return the name of a task's class, or nothing if the log does not tell."""
+    return str(rollout.meta.get("tasks", {}).get(name, {}).get("type", ""))
+
+
+def task_errors(rollout: Rollout) -> list[ErrorPart]:
+    """Return the norms of all tasks' errors, metres and radians apart."""
+    parts = []
+    for place, name in enumerate(task_names(rollout)):
+        error = rollout[f"task.{name}.error"]
+        unit_in_log = column_unit(rollout, f"task.{name}.error")
+        whole = (("", unit_in_log, slice(None)),)
+        for what, unit, rows in _PARTS.get(task_type(rollout, name), whole):
+            norm = np.linalg.norm(error[:, rows], axis=1)
+            label = f"{name} {what}".strip()
+            parts.append(ErrorPart(label, unit or position_unit(rollout), place, norm))
+    return parts
+
+
+def joint_names(rollout: Rollout) -> list[str]:
+    """Return the freedoms' names, without what all of them begin with.
+
+    ``panda_joint1, panda_joint2`` become ``joint1, joint2``.
+    """
+    names = [str(name) for name in rollout.meta["robot"]["freedoms"]]
+    first, last = min(names), max(names)
+    same = 0
+    while same < min(len(first), len(last)) and first[same] == last[same]:
+        same += 1
+    cut = first[:same].rfind("_") + 1
+    short = [name[cut:] for name in names]
+    return short if all(name[:1].isalpha() for name in short) else names
+
+
+def joint_positions(rollout: Rollout, *, absolute: bool = True) -> tuple[Array, str]:
+    """Return the joints' unwound positions, shape (N, nv), and what they are.
+
+    Args:
+        rollout: The log.
+        absolute: For a robot that the literature describes by absolute angles, return
+            those: theta = A q, A lower-triangular ones, theta_i = q_1 + ... + q_i.
+    """
+    positions = rollout["joint_positions"]
+    if absolute and rollout.meta["robot"].get("joint_coordinates") == "absolute":
+        return np.cumsum(positions, axis=1), "absolute joint angle"
+    return positions, "joint position"
+
+
+def position_unit(rollout: Rollout) -> str:
+    """Return the unit of the joints' positions: ``rad``, ``m`` or ``rad or m``."""
+    return " or ".join(dict.fromkeys(map(str, rollout.meta["robot"]["units"])))
+
+
+def effort_unit(rollout: Rollout) -> str:
+    """Return the unit of the efforts that goes with the joints' positions."""
+    efforts = {"rad": "N·m", "m": "N"}
+    return efforts.get(position_unit(rollout), column_unit(rollout, "tau"))
+
+
+def constant_metric(rollout: Rollout) -> Array | None:
+    """Return the metric W, shape (nv, nv), if it is constant."""
+    if rollout.meta.get("metric") == "IdentityMetric":
+        return np.eye(int(rollout.meta["robot"]["nv"]))
+    matrix = rollout.meta.get("metric_matrix")
+    return None if matrix is None else np.array(matrix)
+
+
+def field_terms(rollout: Rollout) -> list[str]:
+    """Return the names of a sum's terms whose share of g the log has."""
+    inside = re.compile(r"field\.(.+)\.g")
+    found = (inside.fullmatch(name) for name in rollout.columns)
+    return [match[1] for match in found if match]
+
+
+def distances(rollout: Rollout) -> list[str]:
+    """Return the names of the fields that watch a distance."""
+    names = (name for name in rollout.columns if name.startswith("distance."))
+    return [name.removeprefix("distance.") for name in names]
+
+
+def column_unit(rollout: Rollout, name: str) -> str:
+    """Return the unit of a column as the log has it; a dash for a mere number."""
+    unit = str(rollout.meta.get("columns", {}).get(name, {}).get("unit", "-"))
+    return "–" if unit == "-" else unit
+
+
+def chosen_rows(
+    rollout: Rollout, count: int = 8, times: Sequence[float] | None = None
+) -> list[int]:
+    """Return the rows of movie frames, in order and each once.
+
+    Args:
+        rollout: The log.
+        count: How many, evenly from the first row to the last.
+        times: When [s], instead; the nearest rows are taken.
+    """
+    t = rollout.t
+    if times is None:
+        rows = np.linspace(0, len(t) - 1, min(count, len(t))).round().astype(int)
+    else:
+        rows = np.array([np.argmin(np.abs(t - time)) for time in times], dtype=int)
+    return [int(row) for row in np.unique(rows)]

@@ -1,0 +1,168 @@
+"""Writes a Pinocchio model down as MJCF, number by number.
+
+It starts from the model and not from the URDF: what was locked, added, appended or
+changed in the model is so here too, and nothing else is.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.robot import Robot
+from hsp_control.robot.friction import JointFriction
+from hsp_control.simulation.plants.mujoco.contact_shapes import Geom
+from hsp_control.simulation.plants.mujoco.conventions import (
+    CONTINUOUS,
+    FREE,
+    HINGE,
+    PLANAR,
+    SLIDE,
+    SPHERICAL,
+    Joint,
+)
+
+LEAST_INERTIA = 1e-12
+"""What a body is given instead of no mass or inertia [kg, kg·m²]: MuJoCo wants some."""
+
+_FEET, _GROUND = 1, 2  # kinds of geoms: feet touch the ground, and nothing else
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A horizontal floor.
+
+    Attributes:
+        height: Where it is [m].
+        friction: Coulomb's coefficient between it and whatever touches it.
+    """
+
+    height: float = 0.0
+    friction: float = 0.8
+
+
+def write_mjcf(
+    robot: Robot,
+    joints: Sequence[Joint],
+    *,
+    integrator: str,
+    joint_limits: bool,
+    friction: JointFriction | None,
+    geoms: Mapping[int, Sequence[tuple[str, Geom]]],
+    ground: Ground,
+) -> str:
+    """Return the MJCF text.
+
+    Args:
+        robot: The robot.
+        joints: Its joints.
+        integrator: MuJoCo's name of it.
+        joint_limits: Whether MuJoCo keeps joints within the model's position limits.
+        friction: Of the joints.
+        geoms: Named geoms to fix to the joints, by index.
+        ground: The floor, there if there are geoms.
+    """
+    root = Element("mujoco", model=robot.name)
+    SubElement(root, "compiler", angle="radian", autolimits="false")
+    options = {
+        "gravity": _numbers(robot.model.gravity.linear),
+        "integrator": integrator,
+        "cone": "elliptic",
+        "impratio": "10",  # friction as stiff as the normal force: feet do not creep
+    }
+    flags = SubElement(SubElement(root, "option", options), "flag")
+    flags.set("autoreset", "disable")  # a run that diverges is an error, not a restart
+    world = SubElement(root, "worldbody")
+    if geoms:
+        place = pin.SE3(np.eye(3), np.array([0.0, 0.0, ground.height]))
+        plane = Geom("plane", (0.0, 0.0, 1.0), place)
+        _add_geom(world, "ground", plane, ground.friction, _GROUND)
+    lower, upper = robot.position_limits()
+    bodies = {0: world}
+    for joint in joints:
+        body = _add_body(bodies[robot.model.parents[joint.index]], robot, joint)
+        bodies[joint.index] = body
+        moving = [SubElement(body, *form) for form in _joint_forms(joint)]
+        if joint.leader is None and joint.kind != FREE:
+            for k, element in enumerate(moving):
+                _set_resistance(element, robot, friction, joint.v + k)
+        if joint_limits and joint.kind in (HINGE, SLIDE) and joint.leader is None:
+            span = [lower[joint.v], upper[joint.v]]
+            if np.isfinite(span).all():
+                moving[0].set("limited", "true")
+                moving[0].set("range", _numbers(span))
+        for name, geom in geoms.get(joint.index, ()):
+            _add_geom(body, name, geom, ground.friction, _FEET)
+    ties = SubElement(root, "equality")
+    for joint in joints:
+        if joint.leader is not None:
+            tie = SubElement(ties, "joint", joint1=joint.name, joint2=joint.leader.name)
+            tie.set("polycoef", _numbers([joint.offset, joint.scaling, 0.0, 0.0, 0.0]))
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _add_body(parent: Element, robot: Robot, joint: Joint) -> Element:
+    body = SubElement(parent, "body", name=joint.name)
+    _place(body, robot.model.jointPlacements[joint.index])
+    inertia = robot.model.inertias[joint.index]
+    principal, axes = np.linalg.eigh(inertia.inertia)
+    axes[:, 2] *= np.linalg.det(axes)  # a rotation
+    inertial = SubElement(
+        body, "inertial", mass=_numbers([max(inertia.mass, LEAST_INERTIA)])
+    )
+    _place(inertial, pin.SE3(axes, inertia.lever))
+    inertial.set("diaginertia", _numbers(np.maximum(principal, LEAST_INERTIA)))
+    return body
+
+
+def _joint_forms(joint: Joint) -> list[tuple[str, dict[str, str]]]:
+    """Return element and attributes of each MuJoCo joint that stands for a joint."""
+    if joint.kind == FREE:
+        return [("freejoint", {"name": joint.name})]
+    if joint.kind == SPHERICAL:
+        return [("joint", {"name": joint.name, "type": "ball"})]
+    if joint.kind == PLANAR:
+        motions = [("slide", "1 0 0"), ("slide", "0 1 0"), ("hinge", "0 0 1")]
+        return [
+            ("joint", {"name": name, "type": kind, "axis": axis})
+            for name, (kind, axis) in zip(joint.mujoco_names, motions, strict=True)
+        ]
+    kind = "hinge" if joint.kind in (HINGE, CONTINUOUS) else "slide"
+    axis = _numbers(joint.axis)
+    return [("joint", {"name": joint.name, "type": kind, "axis": axis})]
+
+
+def _set_resistance(
+    element: Element, robot: Robot, friction: JointFriction | None, freedom: int
+) -> None:
+    element.set("armature", _numbers([robot.model.armature[freedom]]))
+    if friction is not None:
+        element.set("damping", _numbers([friction.viscous[freedom]]))
+        element.set("frictionloss", _numbers([friction.coulomb[freedom]]))
+        element.set("solreffriction", "0.002 1")
+        element.set("solimpfriction", "0.999 0.999 0.001 0.5 2")
+
+
+def _add_geom(body: Element, name: str, geom: Geom, mu: float, kind: int) -> None:
+    element = SubElement(body, "geom", name=name, type=geom.type)
+    element.set("size", _numbers(geom.size))
+    _place(element, geom.placement)
+    element.set("friction", _numbers([mu, 0.0, 0.0]))
+    element.set("contype", str(kind))
+    element.set("conaffinity", str(_FEET + _GROUND - kind))
+    element.set("mass", "0")
+
+
+def _place(element: Element, placement: pin.SE3) -> None:
+    x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
+    element.set("pos", _numbers(placement.translation))
+    element.set("quat", _numbers([w, x, y, z]))
+
+
+def _numbers(values: Array | Sequence[float]) -> str:
+    return " ".join(repr(float(value)) for value in values)

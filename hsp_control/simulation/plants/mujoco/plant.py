@@ -1,0 +1,247 @@
+"""MuJoCo as a plant: another engine, with its own contacts, friction and integrator."""
+
+import importlib
+import logging
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, get_args
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.control.log_channel import LogChannel
+from hsp_control.robot import Robot
+from hsp_control.robot.friction import JointFriction
+from hsp_control.robot.integrators import number_of_steps
+from hsp_control.simulation.plants.contact_channels import contact_channels
+from hsp_control.simulation.plants.describing import described
+from hsp_control.simulation.plants.floating import FloatingRoots
+from hsp_control.simulation.plants.mujoco.contact_shapes import ContactShape, geoms_of
+from hsp_control.simulation.plants.mujoco.conventions import Conventions, joints_of
+from hsp_control.simulation.plants.mujoco.mjcf import Ground, write_mjcf
+from hsp_control.simulation.plants.plant import SampledPlant
+from hsp_control.simulation.plants.push import Push, Pushes
+
+MujocoIntegrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
+
+_log = logging.getLogger(__name__)
+
+
+class MujocoPlant(SampledPlant):
+    """A robot in MuJoCo, made of the Pinocchio model.
+
+    Whatever is declared a contact touches a flat ground, and nothing else.
+
+    Attributes:
+        mjcf: The model's text, to be opened in any of MuJoCo's tools.
+        model: MuJoCo's model.
+        data: MuJoCo's data.
+        conventions: What carries states between Pinocchio's coordinates and MuJoCo's.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        timestep: float = 1e-3,
+        integrator: MujocoIntegrator = "implicitfast",
+        contacts: Sequence[ContactShape] = (),
+        ground: Ground | None = None,
+        joint_limits: bool = True,
+        friction: JointFriction | None = None,
+        pushes: Sequence[Push] = (),
+    ) -> None:
+        """Build the MuJoCo model.
+
+        Args:
+            robot: The robot that moves.
+            timestep: The largest step [s]; each interval is cut into equal ones.
+            integrator: MuJoCo's integrator.
+            contacts: What may touch the ground.
+            ground: The ground; None: at height 0, with a friction of 0.8.
+            joint_limits: Whether MuJoCo keeps joints within the robot's position
+                limits, by its own soft constraints.
+            friction: In the joints, by MuJoCo's own constraints.
+            pushes: Wrenches from outside.
+
+        Raises:
+            SimulationError: If MuJoCo is not installed or refuses the model.
+            ModelError: If a joint has no counterpart in MuJoCo.
+            FrameNotFoundError: If a contact's frame does not exist.
+        """
+        super().__init__(robot)
+        mujoco = _import_mujoco()
+        if not 0.0 < timestep < np.inf:
+            raise SimulationError(f"mujoco: timestep is {timestep}; must be positive")
+        if integrator not in get_args(MujocoIntegrator):
+            raise SimulationError(
+                f"mujoco: integrator {integrator!r}: choose among "
+                f"{', '.join(get_args(MujocoIntegrator))}"
+            )
+        self.timestep, self.integrator = timestep, integrator
+        self.contacts = tuple(contacts)
+        self.ground = Ground() if ground is None else ground
+        self.joint_limits, self.friction = joint_limits, friction
+        self.pushes = Pushes(robot, pushes)
+        joints = joints_of(robot)
+        geoms: dict[int, list[Any]] = {}
+        touching: dict[str, str] = {}
+        for contact in self.contacts:
+            joint = robot.model.frames[robot.frame_id(contact.frame)].parentJoint
+            for geom in geoms_of(robot, contact):
+                name = f"{contact.frame}/{len(touching)}"
+                geoms.setdefault(joint, []).append((name, geom))
+                touching[name] = contact.frame
+        self.mjcf = write_mjcf(
+            robot,
+            joints,
+            integrator=integrator,
+            joint_limits=joint_limits,
+            friction=friction,
+            geoms=geoms,
+            ground=self.ground,
+        )
+        try:
+            self.model: Any = mujoco.MjModel.from_xml_string(self.mjcf)
+        except ValueError as error:
+            reason = str(error).strip().splitlines()[0]
+            raise SimulationError(f"MuJoCo refuses {robot.name}: {reason}") from error
+        self.data: Any = mujoco.MjData(self.model)
+        names = [name for joint in joints for name in joint.mujoco_names]
+        at = [self.model.joint(name) for name in names]
+        self.conventions = Conventions(
+            robot,
+            joints,
+            {name: int(j.qposadr[0]) for name, j in zip(names, at, strict=True)},
+            {name: int(j.dofadr[0]) for name, j in zip(names, at, strict=True)},
+        )
+        self._roots = FloatingRoots(robot)
+        self._geoms = {
+            self.model.geom(name).id: contact for name, contact in touching.items()
+        }
+        self._data = robot.model.createData()
+        self._origins = {c.frame: robot.frame_id(c.frame) for c in self.contacts}
+
+    def reset(self, t: float, q: Array, v: Array) -> None:
+        """Set the state; see `SampledPlant.reset`."""
+        self._mujoco.mj_resetData(self.model, self.data)
+        self.data.time = t
+        self.conventions.to_mujoco(q, v, self.data.qpos, self.data.qvel)
+
+    def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
+        """Let MuJoCo step; see `SampledPlant.advance`.
+
+        Raises:
+            SimulationError: If the effort pushes a root without a motor, or the motion
+                diverges.
+        """
+        data = self.data
+        motors = self._roots.without(t, tau)
+        steps = number_of_steps(end - t, self.timestep)
+        h = self.model.opt.timestep = (end - t) / steps
+        q, v = self.conventions.from_mujoco(data.qpos, data.qvel)
+        steady = self.conventions.steady and not self.pushes.act(t, end)
+        at_once = steps if steady else 1
+        for k in range(0, steps, at_once):
+            effort = motors + self.pushes.effort(t + (k + 0.5) * h, q)
+            self.conventions.effort_to_mujoco(q, effort, data.qfrc_applied)
+            self._mujoco.mj_step(self.model, data, at_once)
+            self._stop_warned(end)
+            q, v = self.conventions.from_mujoco(data.qpos, data.qvel)
+        return q, v
+
+    def log_channels(
+        self, t: float, q: Array, v: Array, tau: Array
+    ) -> Mapping[str, LogChannel]:
+        """Return each contact's force and moment at a true state under an effort."""
+        if not self.contacts:
+            return {}
+        effort = self._roots.without(t, tau) + self.pushes.effort(t, q)
+        self.conventions.effort_to_mujoco(q, effort, self.data.qfrc_applied)
+        self._mujoco.mj_forward(self.model, self.data)
+        return contact_channels(self._wrenches(q))
+
+    def clearance(self, q: Array) -> float:
+        """Return how far the nearest contact is above the ground [m], negative below.
+
+        A robot that shall start on its feet is lowered by that much.
+
+        Raises:
+            SimulationError: If there are no contacts.
+        """
+        if not self.contacts:
+            raise SimulationError(f"{self.robot.name} has no contacts with the ground")
+        probe = self._mujoco.MjData(self.model)
+        rest = np.zeros(self.robot.nv)
+        self.conventions.to_mujoco(q, rest, probe.qpos, probe.qvel)
+        self._mujoco.mj_kinematics(self.model, probe)
+        ground = self.model.geom("ground").id
+        distance = self._mujoco.mj_geomDistance
+        return min(
+            float(distance(self.model, probe, ground, geom, 1e6, None))
+            for geom in self._geoms
+        )
+
+    def describe(self) -> dict[str, Any]:
+        """Return its settings."""
+        return {
+            "type": "MujocoPlant",
+            "mujoco": self._mujoco.__version__,
+            "timestep": self.timestep,
+            "integrator": self.integrator,
+            "joint_limits": self.joint_limits,
+            "contacts": described(self.contacts),
+            "ground": described(self.ground),
+            "friction": described(self.friction),
+            "pushes": described(self.pushes.pushes),
+        }
+
+    @property
+    def _mujoco(self) -> Any:
+        """The module; a plant that kept it could not be pickled."""
+        return importlib.import_module("mujoco")
+
+    def _wrenches(self, q: Array) -> dict[str, Array]:
+        """Return each contact's wrench about its frame's origin, in world axes."""
+        model, data = self.model, self.data
+        pin.framesForwardKinematics(self.robot.model, self._data, q)
+        wrenches = {contact.frame: np.zeros(6) for contact in self.contacts}
+        own = np.zeros(6)
+        for k, contact in enumerate(data.contact[: data.ncon]):
+            self._mujoco.mj_contactForce(model, data, k, own)
+            # Of the first geom on the second, along the rows of its frame.
+            side = 1.0 if contact.geom2 in self._geoms else -1.0
+            name = self._geoms[contact.geom2 if side > 0.0 else contact.geom1]
+            rows = contact.frame.reshape(3, 3)
+            force, moment = side * rows.T @ own[:3], side * rows.T @ own[3:]
+            origin = self._data.oMf[self._origins[name]].translation
+            wrenches[name][:3] += force
+            wrenches[name][3:] += moment + np.cross(contact.pos - origin, force)
+        return wrenches
+
+    def _stop_warned(self, end: float) -> None:
+        warnings = self._mujoco.mjtWarning
+        for kind in (
+            warnings.mjWARN_BADQPOS,
+            warnings.mjWARN_BADQVEL,
+            warnings.mjWARN_BADQACC,
+        ):
+            if self.data.warning[kind].number:
+                raise SimulationError(
+                    f"the motion diverged before t = {end:.6g} s: MuJoCo's state or "
+                    "acceleration is not finite, or beyond 1e10"
+                )
+
+
+def _import_mujoco() -> Any:
+    try:
+        mujoco = importlib.import_module("mujoco")
+    except ImportError as error:
+        raise SimulationError(
+            "the plant mujoco needs MuJoCo, which is not installed; install it with: "
+            "pip install 'hsp_control[mujoco]'"
+        ) from error
+    if mujoco.get_mju_user_warning() is None:  # or it leaves a file where it was run
+        mujoco.set_mju_user_warning(_log.info)
+    return mujoco

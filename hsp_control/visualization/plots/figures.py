@@ -1,0 +1,159 @@
+"""Whole figures: the paper's five panels, and what explains a run."""
+
+import textwrap
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hsp_control.common.exceptions import PlotError
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_series import chosen_rows, distances, field_terms
+from hsp_control.visualization import palette
+from hsp_control.visualization.plots.conditioning import (
+    draw_manipulability,
+    draw_singular_values,
+)
+from hsp_control.visualization.plots.frames import (
+    columns_for,
+    draw_frames,
+    draw_superimposed,
+)
+from hsp_control.visualization.plots.joints import draw_efforts, draw_joint_positions
+from hsp_control.visualization.plots.legends import plain
+from hsp_control.visualization.plots.lines import mark_frames
+from hsp_control.visualization.plots.null_space import (
+    draw_distances,
+    draw_field_terms,
+    draw_field_value,
+    draw_null_space_error,
+)
+from hsp_control.visualization.plots.paths import draw_end_effector
+from hsp_control.visualization.plots.style import new_figure, styled
+from hsp_control.visualization.plots.task_errors import draw_task_errors
+
+_HEADING = {"x": 0.01, "ha": "left", "fontsize": 10.0, "fontweight": "bold"}
+
+
+def paper_figure(
+    rollout: Rollout,
+    *,
+    absolute: bool = True,
+    frames: int = 8,
+    times: Sequence[float] | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Return the paper's five panels of one run.
+
+    (a) the end effector's path, (b) the joints, (c) manipulability, (d) selected frames
+    and (e) the frames together. The frames are numbered, and their numbers stand above
+    (b) and (c) at their times.
+
+    Args:
+        rollout: The log.
+        absolute: Draw absolute angles where the literature on the robot does.
+        frames: How many frames, evenly over the run.
+        times: When to take frames [s], instead.
+        title: What to write above; None: the run's own title.
+
+    Raises:
+        PlotError: If the log has no row, or no frame is asked for.
+    """
+    _check(rollout)
+    rows = chosen_rows(rollout, frames, times)
+    if not rows:
+        raise PlotError("no frames are asked for; needs at least 1")
+    with styled():
+        figure = new_figure(11.0, 7.6)
+        _entitle(figure, rollout, title)
+        halves = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.05))
+        upper, lower = halves.ravel()
+        grid = upper.add_gridspec(1, 3, width_ratios=(0.85, 1.0, 1.0))
+        a, b, c = (upper.add_subplot(grid[k]) for k in range(3))
+        draw_end_effector(a, rollout)
+        a.set_anchor("NW")
+        draw_joint_positions(b, rollout, absolute=absolute)
+        draw_manipulability(c, rollout)
+        strip, together = lower.subfigures(1, 2, width_ratios=(1.9, 1.0))
+        columns = columns_for(rollout, len(rows), 6.8, 2.7)
+        cells = strip.subplots(-(-len(rows) // columns), columns, squeeze=False)
+        draw_frames(cells.ravel().tolist(), rollout, rows)
+        for cell in cells.ravel():
+            cell.label_outer()
+        strip.suptitle("(d)  Selected frames", **_HEADING)
+        e = together.add_subplot()
+        draw_superimposed(e, rollout, rows)
+        e.set_anchor("N")
+        together.suptitle("(e)  Frames together", **_HEADING)
+        titles = ["End effector", "Joints", "Manipulability"]
+        _letter([a, b, c], titles, pad=18.0)  # room for the frames' numbers
+        for over_time in (b, c):
+            mark_frames(over_time, rollout.t[rows])
+    return figure
+
+
+def diagnostics_figure(rollout: Rollout) -> Figure:
+    """Return panels that tell whether a run did what the law promises.
+
+    Task errors, null-space error, field, efforts, singular values, manipulability; and
+    where the log has them, distances to obstacles and the shares of the field's terms.
+
+    Raises:
+        PlotError: If the log has no row.
+    """
+    _check(rollout)
+    with styled():
+        panels = [
+            (draw_task_errors, "Task error"),
+            (draw_null_space_error, "Null-space error"),
+            (draw_field_value, "Null-space field"),
+            (draw_efforts, "Efforts"),
+            (draw_singular_values, "Singular values"),
+            (draw_manipulability, "Manipulability"),
+        ]
+        if distances(rollout):
+            panels.append((draw_distances, "Distances"))
+        if len(field_terms(rollout)) > 1:
+            panels.append((draw_field_terms, "The field's terms"))
+        columns = -(-len(panels) // 2)
+        figure = new_figure(3.6 * columns, 6.8)
+        _entitle(figure, rollout)
+        axes = figure.subplots(2, columns).ravel().tolist()
+        for one, (draw, _) in zip(axes, panels, strict=False):
+            draw(one, rollout)
+        for left_over in axes[len(panels) :]:
+            left_over.set_axis_off()
+        _letter(axes, [title for _, title in panels])
+    return figure
+
+
+def _letter(axes: list[Axes], titles: list[str], pad: float | None = None) -> None:
+    y = None if pad is None else 1.0  # else titles give way to ticks, each by itself
+    for letter, one, title in zip("abcdefgh", axes, titles, strict=False):
+        one.set_title(f"({letter})  {title}", y=y, pad=pad)
+
+
+def _entitle(figure: Figure, rollout: Rollout, title: str | None = None) -> None:
+    """Write the title, and what the run was, at the foot."""
+    meta, config = rollout.meta, rollout.config or {}
+    robot, field = meta["robot"]["name"], meta.get("field", "")
+    named = (title, config.get("title"), meta.get("title"), meta.get("name"))
+    shown = next(filter(None, named), f"{robot}, field: {field}")
+    figure.suptitle(plain(textwrap.fill(str(shown), 100)))
+    version = meta.get("versions", {}).get("hsp_control", "")
+    parts = [f"robot {robot}", f"field {field}", f"metric {meta.get('metric', '')}"]
+    parts += [f"hsp_control {version}"] if version else []
+    if rollout.status != "completed":
+        parts.insert(0, f"{rollout.status}: {meta.get('message', '')}")
+    figure.supxlabel(
+        plain(textwrap.fill("  ·  ".join(parts), 180)),
+        fontsize=7.5,
+        color=palette.MUTED if rollout.status == "completed" else palette.WARNING,
+        x=0.01,
+        ha="left",
+    )
+
+
+def _check(rollout: Rollout) -> None:
+    if len(rollout) == 0:
+        raise PlotError(f"the log has no rows to draw ({rollout.status})")

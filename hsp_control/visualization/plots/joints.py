@@ -1,0 +1,39 @@
+"""Joints over time: their positions and their efforts."""
+
+from matplotlib.axes import Axes
+
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_series import (
+    effort_unit,
+    joint_names,
+    joint_positions,
+    position_unit,
+)
+from hsp_control.visualization.plots.legends import legend_below
+from hsp_control.visualization.plots.lines import draw_lines, time_axis
+
+
+def draw_joint_positions(
+    axes: Axes, rollout: Rollout, *, absolute: bool = True
+) -> None:
+    """Draw the joints' positions, unwound: a joint that runs away is seen to.
+
+    Args:
+        axes: The axes.
+        rollout: The log.
+        absolute: Draw absolute angles theta = A q where the literature on the robot
+            does; False: always the joints' own.
+    """
+    positions, what = joint_positions(rollout, absolute=absolute)
+    draw_lines(axes, rollout.t, positions, joint_names(rollout))
+    axes.set_ylabel(f"{what} [{position_unit(rollout)}]")
+    time_axis(axes, rollout.t)
+    legend_below(axes)
+
+
+def draw_efforts(axes: Axes, rollout: Rollout) -> None:
+    """Draw the joints' efforts tau."""
+    draw_lines(axes, rollout.t, rollout.tau, joint_names(rollout))
+    axes.set_ylabel(f"effort τ [{effort_unit(rollout)}]")
+    time_axis(axes, rollout.t)
+    legend_below(axes)

@@ -1,0 +1,112 @@
+"""Self-motion: its error e_N against the decay that the law promises, and the field."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.decay import predicted_decay
+from hsp_control.simulation.log_series import (
+    column_unit,
+    distances,
+    field_terms,
+    position_unit,
+)
+from hsp_control.visualization import palette
+from hsp_control.visualization.plots.legends import legend_below, note, plain
+from hsp_control.visualization.plots.lines import (
+    draw_lines,
+    log_scale,
+    mark_damped,
+    single,
+    time_axis,
+)
+
+
+def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
+    """Draw ‖e_N‖_W and its predicted decay, on a logarithmic scale."""
+    t, norm = rollout.t, rollout["null_space_norm"]
+    decay = predicted_decay(rollout)
+    slowest, fastest = decay.gains
+    if decay.slow is not None and decay.fast is not None:
+        if decay.fast is decay.slow:
+            axes.plot(
+                t,
+                decay.slow,
+                color=palette.INK,
+                linewidth=1.2,
+                linestyle=(0, (4, 3)),
+                zorder=2.5,
+                label=rf"predicted: exp(−$K_N$ t), $K_N$ = {slowest:g} 1/s",
+            )
+        else:
+            axes.fill_between(
+                t,
+                decay.fast,
+                decay.slow,
+                color=palette.MUTED,
+                alpha=0.25,
+                linewidth=0.0,
+                label=f"predicted: between exp(−{slowest:g} t) and exp(−{fastest:g} t)",
+            )
+    axes.plot(
+        t,
+        norm,
+        color=palette.FIELD,
+        marker=single(t),
+        label=r"actual $\Vert e_N \Vert_W$",
+    )
+    if decay.why_not:
+        note(axes, decay.why_not)
+    mark_damped(axes, rollout)
+    log_scale(axes, norm, top=1e-6)
+    axes.set_ylabel(rf"$\Vert e_N \Vert_W$ [{_norm_unit(rollout)}]")
+    time_axis(axes, t)
+    legend_below(axes)
+
+
+def draw_field_value(axes: Axes, rollout: Rollout) -> None:
+    """Draw the cost that the field descends, or the norm of a vector field."""
+    t = rollout.t
+    name = plain(str(rollout.meta.get("field", "field")))
+    values = rollout["field.value"]
+    axes.plot(t, values, color=palette.FIELD, marker=single(t), label=name)
+    if float(np.ptp(values)) == 0.0:
+        axes.set_ylim(float(values[0]) - 0.5, float(values[0]) + 0.5)
+    unit = column_unit(rollout, "field.value")
+    axes.set_ylabel(f"value of the field [{unit}]")
+    time_axis(axes, t)
+    legend_below(axes)
+
+
+def draw_field_terms(axes: Axes, rollout: Rollout) -> None:
+    """Draw the norm of every term's share of g, which shows what rules when."""
+    names = field_terms(rollout)
+    shares = [np.linalg.norm(rollout[f"field.{name}.g"], axis=1) for name in names]
+    draw_lines(axes, rollout.t, np.column_stack(shares), names)
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel(rf"share $\Vert g_k \Vert$ [{_rate_unit(rollout)}]")
+    time_axis(axes, rollout.t)
+    legend_below(axes)
+
+
+def draw_distances(axes: Axes, rollout: Rollout) -> None:
+    """Draw the least distance that each field watches; below zero is contact."""
+    names = distances(rollout)
+    values = np.column_stack([rollout[f"distance.{name}"] for name in names])
+    draw_lines(axes, rollout.t, values, names)
+    axes.axhline(0.0, color=palette.OBSTACLE, linewidth=1.0, zorder=1.0)
+    axes.set_ylabel("least distance [m]")
+    time_axis(axes, rollout.t)
+    legend_below(axes)
+
+
+def _norm_unit(rollout: Rollout) -> str:
+    """Return the norm's unit; in the mass matrix it is the root of twice an energy."""
+    if rollout.meta.get("metric") == "MassMatrixMetric":
+        return "√J"
+    return _rate_unit(rollout)
+
+
+def _rate_unit(rollout: Rollout) -> str:
+    unit = position_unit(rollout)
+    return f"({unit})/s" if " " in unit else f"{unit}/s"

@@ -1,0 +1,135 @@
+"""The path of the end effector in the world, as it was asked for and as it was."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from hsp_control.common.arrays import Array
+from hsp_control.simulation import Rollout
+from hsp_control.visualization import palette
+from hsp_control.visualization.plots.bodies import bodies
+from hsp_control.visualization.plots.box import corners, draw_box
+from hsp_control.visualization.plots.legends import legend_below, note, plain
+from hsp_control.visualization.plots.things import draw_body
+from hsp_control.visualization.plots.views import (
+    View,
+    best_plane,
+    fit,
+    is_flat,
+    plane,
+    slant,
+)
+from hsp_control.visualization.plots.world import (
+    centers,
+    end_points,
+    everything,
+    task_paths,
+)
+
+NEARLY_FLAT = 0.05
+"""Depth over width below which one view of a path is enough."""
+
+
+def path_view(rollout: Rollout) -> View:
+    """Return the view in which the end effector's path reads best.
+
+    The robot's plane if it moves in one; the plane that the tasks track if they track
+    two axes; the plane of paths and obstacles if they are nearly flat; else a slant.
+    """
+    if is_flat(whole := centers(rollout)):
+        return plane(best_plane(whole))
+    tracked = {"".join(sorted(path.axes)) for path in task_paths(rollout)}
+    if len(tracked) == 1 and len(only := tracked.pop()) == 2:
+        return plane(only)
+    middles = [body.center for body in bodies(rollout) if not body.vast]
+    seen = np.concatenate([_led(rollout), *middles])
+    return plane(best_plane(seen)) if is_flat(seen, NEARLY_FLAT) else slant()
+
+
+def draw_end_effector(axes: Axes, rollout: Rollout, *, names: str = "") -> None:
+    """Draw desired and actual path of every point that a task leads, and obstacles.
+
+    Obstacles are drawn where they are at the end, and dashed where they were at the
+    start.
+
+    Args:
+        axes: The axes.
+        rollout: The log.
+        names: Two world axes to draw, such as ``"xz"``; empty: see `path_view`.
+    """
+    view = plane(names) if names else path_view(rollout)
+    paths = task_paths(rollout)
+    for place, path in enumerate(paths):
+        page = view.project(path.desired)
+        still = max(float(np.ptp(coordinate)) for coordinate in page) < 1e-9
+        axes.plot(
+            *page,
+            color=palette.DESIRED,
+            linewidth=3.6,
+            marker="o" if still else "",
+            markersize=9.0,
+            zorder=2.2,
+            label=_desired_label(path.axes, view) if place == 0 else None,
+        )
+    for place, path in enumerate(paths):
+        who = path.name if len(paths) > 1 else ""
+        _draw_track(axes, view, path.actual, place, plain(f"{who} actual".strip()))
+    if not paths:
+        ends = end_points(rollout)
+        for k in range(ends.shape[1]):
+            label = "end of the robot" if k == 0 else None
+            _draw_track(axes, view, ends[:, k], k, label)
+        note(axes, "no task leads a point")
+    _draw_obstacles(axes, view, rollout)
+    least = 0.02 * float(np.ptp(everything(rollout), axis=0).max())
+    around = [body.enclosed() for body in bodies(rollout) if not body.vast]
+    seen = np.concatenate([_led(rollout), *around])
+    if view.names:
+        fit(axes, view, seen, least)
+    else:
+        middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+        half = np.maximum(0.53 * np.ptp(seen, axis=0), 0.5 * least)
+        draw_box(axes, view, middle - half, middle + half)
+        fit(axes, view, corners(middle - half, middle + half), margin=0.01)
+    legend_below(axes)
+
+
+def _draw_track(
+    axes: Axes, view: View, points: Array, place: int, label: str | None
+) -> None:
+    color = palette.task(place)
+    axes.plot(*view.project(points), color=color, zorder=2.4, label=label)
+    for row, face, name in ((0, palette.PAPER, "start"), (-1, color, "end")):
+        axes.plot(
+            *view.project(points[[row]]),
+            linestyle="none",
+            marker="o",
+            markersize=5.0,
+            markerfacecolor=face,
+            markeredgecolor=color,
+            zorder=2.6,
+            label=name if place == 0 else None,
+        )
+
+
+def _draw_obstacles(axes: Axes, view: View, rollout: Rollout) -> None:
+    found = bodies(rollout)
+    label = "obstacle" if len(found) == 1 else "obstacles"
+    for place, body in enumerate(found):
+        draw_body(axes, view, body, -1, label=label if place == 0 else None)
+        if body.moves:
+            draw_body(axes, view, body, 0, filled=False)
+            page = view.project(body.center)
+            axes.plot(*page, color=palette.OBSTACLE, linewidth=1.1, linestyle=":")
+
+
+def _desired_label(axes: str, view: View) -> str:
+    """Return the label; with the tracked axes if some in the view are not tracked."""
+    return f"desired ({axes})" if set(view.names or "xyz") - set(axes) else "desired"
+
+
+def _led(rollout: Rollout) -> Array:
+    """Return the points of all paths, or those of the robot's ends, (K, 3) [m]."""
+    paths = task_paths(rollout)
+    if not paths:
+        return end_points(rollout).reshape(-1, 3)
+    return np.concatenate([points for path in paths for points in path[1:3]])

@@ -1,0 +1,41 @@
+"""The tasks' errors over time."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_series import task_errors
+from hsp_control.visualization import palette
+from hsp_control.visualization.plots.legends import legend_below, note, plain
+from hsp_control.visualization.plots.lines import (
+    log_scale,
+    mark_damped,
+    single,
+    time_axis,
+)
+
+_DASHES = {"rad": "--", "–": ":"}
+"""Errors of different units lie on one axis; the legend names the units."""
+
+
+def draw_task_errors(axes: Axes, rollout: Rollout) -> None:
+    """Draw the norm of every task's error, metres and radians apart, on a log scale."""
+    t, parts = rollout.t, task_errors(rollout)
+    if not parts:
+        note(axes, "the log has no task")
+    for part in parts:
+        axes.plot(
+            t,
+            part.norm,
+            color=palette.task(part.task),
+            linestyle=_DASHES.get(part.unit, "-"),
+            marker=single(t),
+            label=plain(f"{part.label} [{part.unit}]"),
+        )
+    mark_damped(axes, rollout)
+    norms = [np.zeros(0), *(part.norm for part in parts)]
+    log_scale(axes, np.concatenate(norms), top=1e-6)
+    units = ", ".join(dict.fromkeys(part.unit for part in parts))
+    axes.set_ylabel(rf"task error $\Vert e \Vert$ [{units}]")
+    time_axis(axes, t)
+    legend_below(axes)

@@ -1,0 +1,87 @@
+"""The manipulability ellipsoid (Yoshikawa 1985): how fast the hand can go, each way."""
+
+from collections.abc import Iterator
+from itertools import permutations
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.control.controller import Controller
+from hsp_control.robot import Robot
+from hsp_control.visualization.viewer import threejs
+from hsp_control.visualization.viewer.appearance import ELLIPSOID, ELLIPSOID_OPACITY
+from hsp_control.visualization.viewer.clip import Track
+from hsp_control.visualization.viewer.commands import Command, set_object
+from hsp_control.visualization.viewer.element import element
+from hsp_control.visualization.viewer.motion import Motion
+from hsp_control.visualization.viewer.surfaces import material
+
+SECONDS = 0.2
+"""An axis is as long as the hand goes in this time at a joint speed of norm 1 [s]."""
+_THINNEST = 0.02
+"""Of an axis, over the longest: what has no volume is a disk."""
+
+
+class Ellipsoid:
+    """The image {J v : |v| = 1} of the joint speeds, at each task's frame."""
+
+    def __init__(self, robot: Robot, controller: Controller | None, root: str) -> None:
+        """Find the frames: those of the tasks, else the robot's end effector."""
+        self._root = root
+        tasks = controller.tasks if controller else ()
+        named = (getattr(task, "frame", None) for task in tasks)
+        frames = dict.fromkeys(frame for frame in named if frame)
+        self._frames = tuple(frames) or (robot.end_effector,)
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield what puts it into a scene of some size [m]."""
+        for frame in self._frames:
+            surface = material(ELLIPSOID, opacity=ELLIPSOID_OPACITY, glow=0.4)
+            ball = threejs.mesh(threejs.sphere(1.0), surface, shadow=False)
+            yield set_object(self._path(frame), threejs.group([ball]))
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield how it moves along the run."""
+        rows = len(motion.times)
+        for frame in self._frames:
+            places, turns, axes = np.empty((rows, 3)), np.empty((rows, 4)), []
+            last = np.eye(3)
+            for row, state in enumerate(motion.states()):
+                kinematics = state.frame(frame)
+                places[row] = kinematics.position
+                last, lengths = principal_axes(kinematics.jacobian[:3], last)
+                turns[row] = pin.Quaternion(last).coeffs()
+                axes.append(np.maximum(lengths, _THINNEST * lengths.max()))
+            path = self._path(frame)
+            yield Track(path, "position", motion.times, places)
+            yield Track(path, "quaternion", motion.times, turns)
+            yield Track(path, "scale", motion.times, SECONDS * np.array(axes))
+
+    def legend(self) -> list[tuple[str, str]]:
+        """Return names and colours."""
+        return [("manipulability", ELLIPSOID)]
+
+    def _path(self, frame: str) -> str:
+        return f"{self._root}/{element(frame)}"
+
+
+def principal_axes(J: Array, last: Array) -> tuple[Array, Array]:
+    """Return the axes of {J v : |v| = 1} as a rotation, and half their lengths.
+
+    They come in the order and with the signs that turn the last ones the least.
+
+    Args:
+        J: Linear Jacobian, shape (3, nv).
+        last: The rotation before, shape (3, 3).
+    """
+    axes, lengths, _ = np.linalg.svd(J)
+    padded = np.zeros(3)
+    padded[: len(lengths)] = lengths
+    overlap = last.T @ axes
+    orders = [list(order) for order in permutations(range(3))]
+    order = max(orders, key=lambda o: float(np.abs(overlap[range(3), o]).sum()))
+    axes = axes[:, order] * np.where(overlap[range(3), order] < 0.0, -1.0, 1.0)
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 2] *= -1.0
+    return axes, padded[order]

@@ -1,0 +1,115 @@
+"""Where a field begins to push the robot off an obstacle: a shell about it."""
+
+from collections.abc import Iterator
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from hsp_control.common.arrays import Array
+from hsp_control.geometry import shapes
+from hsp_control.geometry.hulls import hull_corners
+from hsp_control.geometry.shapes import Shape
+from hsp_control.null_space.fields import ObstacleClearance
+from hsp_control.visualization.viewer import threejs
+from hsp_control.visualization.viewer.appearance import OBSTACLE, ZONE_OPACITY
+from hsp_control.visualization.viewer.clip import Track
+from hsp_control.visualization.viewer.commands import Command, Json, set_object
+from hsp_control.visualization.viewer.element import element
+from hsp_control.visualization.viewer.explained import terms
+from hsp_control.visualization.viewer.motion import Motion
+from hsp_control.visualization.viewer.obstacle_layer import obstacle_tracks
+from hsp_control.visualization.viewer.obstacle_shapes import facets, triangles_of
+from hsp_control.visualization.viewer.poses import moved_to
+from hsp_control.visualization.viewer.surfaces import material
+
+
+class Influence:
+    """The zone of influence of each obstacle that a clearance field watches."""
+
+    def __init__(self, field: Any, shown: dict[str, Shape], root: str) -> None:
+        """Find the zones.
+
+        Args:
+            field: The controller's field.
+            shown: The obstacles' shapes by name.
+            root: The layer's node.
+        """
+        self._root = root
+        self._zones: dict[str, tuple[Shape, float]] = {}
+        for term in terms(field, ObstacleClearance):
+            for each in term.proximity.obstacles:
+                if each.name in shown:
+                    known = self._zones.get(each.name, (each.shape, 0.0))[1]
+                    self._zones[each.name] = each.shape, max(known, term.influence)
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield what puts it into a scene of some size [m]."""
+        for name, (shape, influence) in self._zones.items():
+            yield set_object(self._path(name), zone(shape, influence, 4.0 * size))
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield how it moves along the run."""
+        for name in self._zones:
+            yield from obstacle_tracks(self._path(name), name, motion)
+
+    def legend(self) -> list[tuple[str, str]]:
+        """Return nothing: it is the obstacle's colour."""
+        return []
+
+    def _path(self, name: str) -> str:
+        return f"{self._root}/{element(name)}"
+
+
+def zone(shape: Shape, influence: float, extent: float) -> Json:
+    """Return the surface at a distance [m] from a shape; of a half-space, a square.
+
+    Shapes with hollows get that of their convex hull.
+    """
+    # Its far half alone: it never veils the robot.
+    surface = material(OBSTACLE, opacity=ZONE_OPACITY, glow=0.6) | {"side": 1}
+    pose = np.eye(4)
+    match shape:
+        case shapes.Sphere():
+            solid = threejs.sphere(shape.radius + influence)
+        case shapes.Capsule():
+            radius = shape.radius + influence
+            solid = threejs.capsule(shape.length, radius, radius)
+            pose = moved_to([0.0, 0.0, -0.5 * shape.length])
+        case shapes.Cylinder():
+            solid = threejs.rounded_cylinder(
+                shape.radius + influence, shape.length + 2.0 * influence, influence
+            )
+        case shapes.HalfSpace():
+            solid = threejs.plane(extent)
+            pose = moved_to([0.0, 0.0, influence])
+            surface |= {"side": 2, "opacity": 0.5 * ZONE_OPACITY}
+        case shapes.Box():
+            corners = np.array(list(product((-0.5, 0.5), repeat=3)))
+            solid = _rounded(corners * np.asarray(shape.size), influence)
+        case shapes.PointCloud():
+            solid = _rounded(np.asarray(shape.points), influence)
+        case _:
+            solid = _rounded(triangles_of(shape.geometry())[0], influence)
+    return threejs.group([threejs.mesh(solid, surface, pose, shadow=False)])
+
+
+def _rounded(points: Array, distance: float) -> Json:
+    """Return the hull of balls of a radius [m] about points."""
+    cloud = (hull_corners(points)[:, None, :] + distance * _ball()).reshape(-1, 3)
+    hull = ConvexHull(cloud)
+    corners = hull.points[hull.simplices]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = (normals * hull.equations[:, :3]).sum(axis=1) < 0.0
+    triangles = hull.simplices.astype(np.int64)
+    triangles[inward] = triangles[inward, ::-1]
+    return facets(hull.points, triangles)
+
+
+def _ball() -> Array:
+    """Return points spread evenly over the unit ball's surface, shape (200, 3)."""
+    k = np.arange(200) + 0.5
+    height, turn = 1.0 - k / 100.0, np.pi * (1.0 + np.sqrt(5.0)) * k
+    ring = np.sqrt(1.0 - height**2)
+    return np.column_stack([ring * np.cos(turn), ring * np.sin(turn), height])

@@ -1,0 +1,133 @@
+"""A run as it is drawn: in rows close enough to look smooth."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.robot import Robot, RobotState
+from hsp_control.simulation import Rollout
+from hsp_control.visualization.viewer.moments import (
+    between,
+    configuration_between,
+    moment,
+    orientation_between,
+)
+
+FINEST = 0.01
+"""Least time between two rows that are drawn [s]."""
+COARSEST = 1 / 30
+"""Largest time between them [s]: the page goes straight from row to row."""
+
+
+class Motion(NamedTuple):
+    """What a robot did.
+
+    Attributes:
+        robot: The robot.
+        rows: The rows to draw.
+    """
+
+    robot: Robot
+    rows: Rollout
+
+    @property
+    def times(self) -> Array:
+        """When [s], shape (N,)."""
+        return self.rows.t
+
+    @property
+    def size(self) -> float:
+        """How far the robot reaches along the run, joint to joint [m]."""
+        if "skeleton" in self.rows:
+            points = self.rows["skeleton"].reshape(-1, 3)
+        else:
+            first = next(self.states())
+            points = np.array([place.translation for place in first.data.oMi])
+        return float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+
+    def states(self) -> Iterator[RobotState]:
+        """Yield the state at each row; the next one overwrites it."""
+        state = RobotState(self.robot)
+        for t, q, v in zip(self.rows.t, self.rows.q, self.rows.v, strict=True):
+            yield state.update(float(t), q, v)
+
+
+def motion_of(
+    robot: Robot,
+    rollout: Rollout,
+    finest: float = FINEST,
+    coarsest: float = COARSEST,
+) -> Motion:
+    """Return a log's rows, thinned or with others in between, as they are drawn.
+
+    Args:
+        robot: The robot.
+        rollout: The log.
+        finest: Least time between two rows [s].
+        coarsest: Largest time between two rows [s].
+    """
+    times = drawn_times(rollout.t, finest, coarsest)
+    if len(times) == len(rollout.t) and np.array_equal(times, rollout.t):
+        return Motion(robot, rollout)
+    kept = np.searchsorted(rollout.t, times)
+    on_rows = kept < len(rollout.t)
+    on_rows[on_rows] = rollout.t[kept[on_rows]] == times[on_rows]
+    if on_rows.all():
+        columns = {name: column[kept] for name, column in rollout.columns.items()}
+        return Motion(robot, Rollout(columns, rollout.meta))
+    moments = [moment(rollout.t, time) for time in times]
+    columns = {}
+    for name, column in rollout.columns.items():
+        if name == "q":
+            rows = [configuration_between(robot, column, now) for now in moments]
+        else:
+            rows = [between(column, now) for now in moments]
+        columns[name] = np.array(rows)
+    for name, where in _orientations(rollout):
+        turns = rollout[name][:, where]
+        columns[name][:, where] = [
+            orientation_between(turns, now).coeffs() for now in moments
+        ]
+    return Motion(robot, Rollout(columns, rollout.meta))
+
+
+def _orientations(rollout: Rollout) -> Iterator[tuple[str, slice]]:
+    """Yield which parts of which columns are quaternions."""
+    for name in rollout.columns:
+        if name.endswith(".quaternion"):
+            yield name, slice(0, 4)
+    for task, about in rollout.meta.get("tasks", {}).items():
+        where = {"FramePose": slice(3, 7), "FrameOrientation": slice(0, 4)}
+        if about.get("type") in where:
+            yield f"task.{task}.reference", where[about["type"]]
+            yield f"task.{task}.actual", where[about["type"]]
+
+
+def drawn_times(times: Array, finest: float, coarsest: float) -> Array:
+    """Return which of the times to draw, first and last among them, and others between.
+
+    Args:
+        times: Ascending [s], shape (N,).
+        finest: Least time between two of them [s].
+        coarsest: Largest time between two of them [s].
+    """
+    kept = [0]
+    for row in range(1, len(times)):
+        if times[row] - times[kept[-1]] >= finest * (1.0 - 1e-6):
+            kept.append(row)
+    last = len(times) - 1
+    if kept[-1] != last:
+        # The end is shown in any case; what is too close before it makes room.
+        kept[-1 if len(kept) > 1 else len(kept) :] = [last]
+    chosen = times[kept]
+    gaps = np.diff(chosen)
+    parts = np.ceil(gaps / coarsest * (1.0 - 1e-6)).astype(int).clip(1)
+    if (parts == 1).all():
+        return np.asarray(chosen)
+    filled = [
+        np.linspace(start, end, count, endpoint=False)
+        for start, end, count in zip(chosen[:-1], chosen[1:], parts, strict=True)
+    ]
+    return np.concatenate([*filled, chosen[-1:]])

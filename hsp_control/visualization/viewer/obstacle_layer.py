@@ -1,0 +1,65 @@
+"""A run's obstacles: each where its trajectory led it."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.visualization.viewer.clip import Track
+from hsp_control.visualization.viewer.commands import Command, set_object
+from hsp_control.visualization.viewer.element import element
+from hsp_control.visualization.viewer.motion import Motion
+from hsp_control.visualization.viewer.obstacle_drawing import enclosing, obstacle_legend
+from hsp_control.visualization.viewer.obstacle_shapes import logged_shape, obstacle
+
+
+class ObstacleLayer:
+    """The obstacles of a log.
+
+    Attributes:
+        shapes: Their shapes by name.
+    """
+
+    def __init__(self, motion: Motion, root: str) -> None:
+        """Read the log's obstacles."""
+        self._root = root
+        self._rows = motion.rows
+        self.shapes = {
+            name: shape
+            for name, about in motion.rows.meta.get("obstacles", {}).items()
+            if (shape := logged_shape(about)) and f"obstacle.{name}" in motion.rows
+        }
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield what puts it into a scene of some size [m]."""
+        for name, shape in self.shapes.items():
+            yield set_object(self._path(name), obstacle(shape, 4.0 * size))
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield how it moves along the run."""
+        for name in self.shapes:
+            yield from obstacle_tracks(self._path(name), name, motion)
+
+    def points(self) -> Array:
+        """Return points that enclose the obstacles in the run [m], shape (K, 3)."""
+        clouds = [
+            corners
+            for name, shape in self.shapes.items()
+            for corners in enclosing(shape, self._rows[f"obstacle.{name}"])
+        ]
+        return np.concatenate([np.zeros((0, 3)), *clouds])
+
+    def legend(self) -> list[tuple[str, str]]:
+        """Return names and colours."""
+        return obstacle_legend(self.shapes)
+
+    def _path(self, name: str) -> str:
+        return f"{self._root}/{element(name)}"
+
+
+def obstacle_tracks(path: str, name: str, motion: Motion) -> Iterator[Track]:
+    """Yield how a node goes with an obstacle."""
+    yield Track(path, "position", motion.times, motion.rows[f"obstacle.{name}"])
+    turns = f"obstacle.{name}.quaternion"
+    if turns in motion.rows:
+        yield Track(path, "quaternion", motion.times, motion.rows[turns])

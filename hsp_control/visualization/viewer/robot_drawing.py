@@ -1,0 +1,163 @@
+"""The robot in the scene: drawn once, then moved joint by joint."""
+
+import logging
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.robot import Robot
+from hsp_control.visualization.viewer import threejs
+from hsp_control.visualization.viewer.clip import Track
+from hsp_control.visualization.viewer.commands import (
+    Command,
+    Json,
+    set_object,
+    set_transform,
+)
+from hsp_control.visualization.viewer.element import element
+from hsp_control.visualization.viewer.mesh_files import collada_object, mesh_geometry
+from hsp_control.visualization.viewer.motion import Motion
+from hsp_control.visualization.viewer.poses import moved_to
+from hsp_control.visualization.viewer.stand_ins import stand_in
+from hsp_control.visualization.viewer.surfaces import material
+from hsp_control.visualization.viewer.visuals import Visual, read_visuals
+
+ROOT = "/robot"
+"""Where a robot stands in the scene tree, unless told."""
+
+_log = logging.getLogger(__name__)
+
+
+class RobotDrawing:
+    """A robot's nodes: one a joint, with the links that it carries below.
+
+    Where a link's mesh is missing, or the robot has nothing to show at all, capsules
+    and drums stand in for it.
+    """
+
+    def __init__(self, robot: Robot, root: str = ROOT) -> None:
+        """Find out what there is to show.
+
+        Args:
+            robot: The robot.
+            root: Its node.
+        """
+        self.robot = robot
+        self._visuals = read_visuals(robot)
+        self._nodes = [f"{root}/{element(name)}" for name in robot.model.names]
+        missing = [v for v in self._visuals if v.kind == "mesh" and v.file is None]
+        self._stand_ins = {visual.joint for visual in missing}
+        if not self._visuals:
+            self._stand_ins = set(range(robot.model.njoints))
+        if missing:
+            _log.warning(
+                "%s: %d of %d meshes are not found (the first belongs to link %r)%s; "
+                "capsules are drawn for them",
+                robot.name,
+                len(missing),
+                sum(visual.kind == "mesh" for visual in self._visuals),
+                missing[0].link,
+                _hint(robot),
+            )
+
+    def draw(self) -> Iterable[Command]:
+        """Yield what puts the robot into the scene."""
+        for joint in sorted(self._stand_ins):
+            body = stand_in(self.robot, joint)
+            if body is not None:
+                yield set_object(f"{self._nodes[joint]}/stand-in", body)
+        links: dict[tuple[int, str], list[Json]] = {}
+        for visual in self._visuals:
+            thing = _thing(visual)
+            if thing is not None:
+                links.setdefault((visual.joint, visual.link), []).append(thing)
+        for (joint, link), things in links.items():
+            path = f"{self._nodes[joint]}/{element(link)}"
+            yield set_object(path, threejs.group(things))
+
+    def move(self, placements: Sequence[pin.SE3]) -> list[Command]:
+        """Return what moves the joints to their placements in the world."""
+        return [
+            set_transform(node, placements[joint].homogeneous)
+            for joint, node in enumerate(self._nodes)
+            if joint > 0
+        ]
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield how the joints move along a run."""
+        joints = range(1, self.robot.model.njoints)
+        poses = np.empty((len(motion.times), len(joints), 7))
+        for row, state in enumerate(motion.states()):
+            placements = state.data.oMi
+            for k, joint in enumerate(joints):
+                poses[row, k] = pin.SE3ToXYZQUAT(placements[joint])
+        for k, joint in enumerate(joints):
+            node = self._nodes[joint]
+            yield Track(node, "position", motion.times, poses[:, k, :3])
+            yield Track(node, "quaternion", motion.times, poses[:, k, 3:])
+
+    def points(self, placements: Sequence[pin.SE3]) -> Array:
+        """Return points of the robot in the world [m]: joints, frames, shape (K, 3)."""
+        frames = [
+            placements[frame.parentJoint].act(frame.placement).translation
+            for frame in self.robot.model.frames
+        ]
+        return np.array(frames)
+
+    def stand(self) -> Array:
+        """Return points of what stands still [m], shape (K, 3)."""
+        points = [np.zeros(3)]
+        for visual in self._visuals:
+            if visual.joint == 0 and visual.kind in {"box", "cylinder", "sphere"}:
+                lowest = visual.pose[2, 3] - _half_height(visual)
+                points.append(np.array([*visual.pose[:2, 3], lowest]))
+        return np.array(points)
+
+
+def _half_height(visual: Visual) -> float:
+    """Return half the height of a shape in the world [m]."""
+    z = np.abs(visual.pose[2, :3])
+    if visual.kind == "sphere":
+        return visual.size[0]
+    if visual.kind == "box":
+        return float(z @ np.array(visual.size)) / 2.0
+    radius, length = visual.size
+    return float(z[2] * length / 2.0 + np.hypot(z[0], z[1]) * radius)
+
+
+def _thing(visual: Visual) -> Json | None:
+    """Return one piece of a link, or None if it cannot be shown."""
+    surface = material(visual.color, opacity=visual.color[3])
+    size, pose = visual.size, visual.pose
+    match visual.kind:
+        case "box":
+            return threejs.mesh(threejs.box(size), surface, pose)
+        case "sphere":
+            return threejs.mesh(threejs.sphere(size[0]), surface, pose)
+        case "cylinder":
+            return threejs.mesh(threejs.cylinder(*size), surface, pose)
+        case "capsule":
+            half = moved_to([0.0, 0.0, -size[1] / 2.0])
+            body = threejs.capsule(size[1], size[0], size[0])
+            return threejs.mesh(body, surface, pose @ half)
+    if visual.file is None:
+        return None
+    pose = pose @ np.diag([*visual.size, 1.0])
+    if visual.file.suffix.lower() != ".dae":
+        return threejs.mesh(mesh_geometry(visual.file), surface, pose)
+    thing = collada_object(visual.file)
+    thing["object"] |= {
+        "matrix": threejs.matrix(pose),
+        "castShadow": True,
+        "receiveShadow": True,
+    }
+    return thing
+
+
+def _hint(robot: Robot) -> str:
+    texts = [part.source.urdf.read_text(errors="replace") for part in robot.parts]
+    if any("package://example-robot-data" in text for text in texts):
+        return "; they come with: pip install example-robot-data-loaders"
+    return ""

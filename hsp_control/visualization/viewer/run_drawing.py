@@ -1,0 +1,156 @@
+"""A run in the scene: its robot's motion, and the layers that explain it."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.control.controller import Controller
+from hsp_control.robot import Robot
+from hsp_control.visualization.viewer.appearance import CHALK, INK
+from hsp_control.visualization.viewer.clip import Clip, Track
+from hsp_control.visualization.viewer.commands import Command, delete, set_property
+from hsp_control.visualization.viewer.contacts import Contacts
+from hsp_control.visualization.viewer.distances import Distances
+from hsp_control.visualization.viewer.ellipsoid import Ellipsoid
+from hsp_control.visualization.viewer.influence import Influence
+from hsp_control.visualization.viewer.layer import Layer
+from hsp_control.visualization.viewer.motion import Motion
+from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
+from hsp_control.visualization.viewer.paths import Paths
+from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
+from hsp_control.visualization.viewer.self_motion import SelfMotion
+from hsp_control.visualization.viewer.target_marks import TargetMarks
+
+LAYERS = (
+    "paths",
+    "targets",
+    "obstacles",
+    "influence",
+    "distances",
+    "ellipsoid",
+    "self_motion",
+    "contacts",
+)
+"""What can be switched, as nodes of the scene tree and in a configuration."""
+
+
+def all_layers(
+    robot: Robot,
+    motion: Motion,
+    controller: Controller | None,
+    *,
+    root: str = "",
+    dark: bool = False,
+) -> dict[str, Layer]:
+    """Return the layers that a log can be drawn in, by name.
+
+    Args:
+        robot: The robot.
+        motion: The run.
+        controller: What controlled the robot; without it, layers that need more than
+            the log's columns are left out.
+        root: The node that holds them.
+        dark: Whether the background is.
+    """
+    ink = CHALK if dark else INK
+    obstacles = ObstacleLayer(motion, f"{root}/obstacles")
+    layers: dict[str, Layer] = {
+        "paths": Paths(motion, f"{root}/paths"),
+        "targets": TargetMarks(motion, f"{root}/targets"),
+        "obstacles": obstacles,
+        "ellipsoid": Ellipsoid(robot, controller, f"{root}/ellipsoid"),
+        "contacts": Contacts(robot, motion, f"{root}/contacts"),
+    }
+    if controller is not None:
+        field = controller.field
+        layers |= {
+            "influence": Influence(field, obstacles.shapes, f"{root}/influence"),
+            "distances": Distances(controller, f"{root}/distances", ink),
+        }
+        if "field.g" in motion.rows:
+            arrows = SelfMotion(controller, motion, f"{root}/self_motion")
+            layers["self_motion"] = arrows
+    return layers
+
+
+def ghost_layers(motion: Motion, color: str, root: str) -> dict[str, Layer]:
+    """Return no more than where the robot went, in a colour."""
+    return {"paths": Paths(motion, f"{root}/paths", color, ghost=True)}
+
+
+class RunDrawing:
+    """What a log tells, in layers.
+
+    Attributes:
+        motion: The rows that are drawn.
+        layers: The layers by name.
+    """
+
+    def __init__(
+        self,
+        drawing: RobotDrawing,
+        motion: Motion,
+        layers: dict[str, Layer],
+        *,
+        root: str = "",
+        shown: Mapping[str, bool] | None = None,
+    ) -> None:
+        """Put a run together.
+
+        Args:
+            drawing: The robot in the scene.
+            motion: The run.
+            layers: What to draw beside the robot.
+            root: The node that holds them.
+            shown: Whether each layer is shown at first; those not named are.
+        """
+        self.motion = motion
+        self.layers = layers
+        self._drawing = drawing
+        self._root = root
+        self._shown = dict.fromkeys(LAYERS, True) | dict(shown or {})
+
+    def draw(self, size: float) -> Iterator[Command]:
+        """Yield what puts the layers into a scene of some size [m]."""
+        for name, layer in self.layers.items():
+            yield from layer.draw(size)
+            if not self._shown[name]:
+                yield set_property(f"{self._root}/{name}", "visible", False)
+
+    def clip(self) -> Clip:
+        """Return how everything moves."""
+        times = self.motion.times
+        return Clip(float(times[0]), float(times[-1]), list(self.tracks(self.motion)))
+
+    def tracks(self, motion: Motion) -> Iterator[Track]:
+        """Yield how everything moves along the run, or along a part of it."""
+        yield from self._drawing.tracks(motion)
+        for layer in self.layers.values():
+            yield from layer.tracks(motion)
+
+    def points(self) -> Array:
+        """Return where robot and targets are in the run [m], shape (K, 3)."""
+        rows = self.motion.rows
+        skeleton = rows["skeleton"] if "skeleton" in rows else np.zeros((0, 3))
+        paths = Paths(self.motion, "").points()
+        return np.concatenate([skeleton.reshape(-1, 3), paths])
+
+    def obstacle_points(self) -> Array:
+        """Return points that enclose the obstacles in the run [m], shape (K, 3)."""
+        return ObstacleLayer(self.motion, "").points()
+
+    def legend(self) -> list[tuple[str, str]]:
+        """Return names and colours of what is shown."""
+        return [
+            entry
+            for name, layer in self.layers.items()
+            if self._shown[name]
+            for entry in layer.legend()
+        ]
+
+
+def clear() -> Iterator[Command]:
+    """Yield what takes all layers away."""
+    for name in LAYERS:
+        yield delete(f"/{name}")

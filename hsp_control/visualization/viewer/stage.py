@@ -1,0 +1,143 @@
+"""What surrounds the robot: background, lights, and a floor with a grid."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.config.models.view import ViewModel
+from hsp_control.visualization import palette
+from hsp_control.visualization.viewer import threejs
+from hsp_control.visualization.viewer.appearance import GRID, HAZE
+from hsp_control.visualization.viewer.commands import (
+    Command,
+    Json,
+    set_object,
+    set_property,
+    set_transform,
+)
+from hsp_control.visualization.viewer.poses import moved_to
+
+_LIGHT_FROM = np.array([0.5, -0.45, 1.6])
+_FINE = 1e-3
+
+
+def draw_stage(points: Array, floor: float, view: ViewModel) -> Iterator[Command]:
+    """Yield the background, the lights and the floor.
+
+    Args:
+        points: What stands on the stage [m], shape (K, 3).
+        floor: The floor's height [m].
+        view: How it is lit and coloured, and whether there is a grid.
+    """
+    sky = view.background
+    horizon = palette.blend(sky, palette.MUTED, HAZE)
+    yield set_property("/Background", "top_color", _channels(sky))
+    yield set_property("/Background", "bottom_color", _channels(horizon))
+    center = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    size = scene_size(points)
+    yield from _lights(center, size, view.light)
+    yield from _floor(center, size, floor)
+    yield set_property("/floor/grid", "visible", view.show.grid)
+
+
+def is_dark(color: str) -> bool:
+    """Return whether white is easier to read on ``#RRGGBB`` than black."""
+    red, green, blue = (channel**2.2 for channel in _channels(color))
+    return bool(0.2126 * red + 0.7152 * green + 0.0722 * blue < 0.18)
+
+
+def in_sight(subject: Array, others: Array) -> Array:
+    """Return the points to be seen: the subject's, and others near it.
+
+    What lies far off, or is much larger, counts only up to the subject's own size from
+    it.
+
+    Args:
+        subject: Points of the robot and its paths [m], shape (K, 3).
+        others: Points of obstacles [m], shape (L, 3).
+    """
+    size = scene_size(subject)
+    low, high = subject.min(axis=0) - size, subject.max(axis=0) + size
+    return np.vstack([subject, np.clip(others, low, high)])
+
+
+def scene_size(points: Array) -> float:
+    """Return the distance of the farthest of the points from their middle [m]."""
+    center = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return max(float(np.linalg.norm(points - center, axis=1).max()), _FINE)
+
+
+def _lights(center: Array, size: float, strength: float) -> Iterator[Command]:
+    sky = threejs.light("HemisphereLight", 0.57 * strength, groundColor=0xD5DCE2)
+    fill = threejs.light("DirectionalLight", 0.14 * strength)
+    back = np.array([-_LIGHT_FROM[0], 1.2 * abs(_LIGHT_FROM[1]), 0.6])
+    yield set_object("/lights/sky", threejs.group([sky]))
+    yield set_object("/lights/fill", threejs.group([fill]))
+    yield set_transform("/lights/fill", moved_to(back * 4.0 * size))
+    # The light looks at the origin; what casts shadows must lie in its view.
+    around = float(np.linalg.norm(center)) + 1.3 * size
+    distance = 4.0 * around
+    key = threejs.light(
+        "DirectionalLight",
+        0.44 * strength,
+        castShadow=True,
+        shadow={
+            "radius": 3.0,
+            "bias": -2e-4,
+            "normalBias": 4e-3 * around,
+            "mapSize": [2048, 2048],
+            "camera": {
+                "uuid": threejs.unique_name(),
+                "type": "OrthographicCamera",
+                "left": -around,
+                "right": around,
+                "top": around,
+                "bottom": -around,
+                "near": distance - 2.0 * around,
+                "far": distance + 2.0 * around,
+            },
+        },
+    )
+    towards = _LIGHT_FROM / np.linalg.norm(_LIGHT_FROM)
+    yield set_object("/lights/key", threejs.group([key]))
+    yield set_transform("/lights/key", moved_to(towards * distance))
+
+
+def _floor(center: Array, size: float, height: float) -> Iterator[Command]:
+    pose = moved_to([center[0], center[1], height])
+    yield set_object("/floor/shadow", threejs.group([_shadow(size)]))
+    yield set_transform("/floor/shadow", pose)
+    step = _round_step(size / 4.0)
+    middle = np.round(center[:2] / step) * step
+    yield set_object("/floor/grid", threejs.group([_grid(size, step)]))
+    yield set_transform("/floor/grid", moved_to([*middle, height]))
+
+
+def _shadow(size: float) -> Json:
+    return threejs.shadow_catcher(12.0 * size, 0.16)
+
+
+def _grid(size: float, step: float) -> Json:
+    """Return lines in x and y that fade with the distance from the middle."""
+    reach = 2.6 * size
+    ticks = np.arange(-np.floor(reach / step), np.floor(reach / step) + 1.0) * step
+    cuts = np.linspace(-reach, reach, 41)
+    along = np.column_stack([cuts[:-1], cuts[1:]]).ravel()
+    lines = np.array([(tick, place, 0.0) for tick in ticks for place in along])
+    points = np.vstack([lines, lines[:, [1, 0, 2]]])
+    colors = np.empty((len(points), 4))
+    colors[:, :3] = _channels(GRID)
+    distance = np.linalg.norm(points, axis=1) / reach
+    colors[:, 3] = 0.55 * np.clip(1.0 - distance, 0.0, 1.0) ** 1.5
+    return threejs.segments(points, colors)
+
+
+def _round_step(length: float) -> float:
+    """Return the largest of 1, 2 or 5 times a power of ten that is not above."""
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(power * max(n for n in (1.0, 2.0, 5.0) if n * power <= length * 1.001))
+
+
+def _channels(color: str) -> list[float]:
+    return [int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)]

@@ -1,0 +1,150 @@
+"""What a URDF says its links look like, read without loading a mesh."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ModelError, RobotNotFoundError
+from hsp_control.robot import Robot
+from hsp_control.robot.description.combining import Part
+from hsp_control.robot.description.mesh_files import complaint
+from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.urdf_checks import read_urdf
+
+_GREY = (0.72, 0.74, 0.76, 1.0)
+_MESHES = {".dae", ".obj", ".stl"}  # what the page can read
+_NO_NUMBERS: tuple[float, ...] = ()
+_SIZES = {
+    "box": ("size",),
+    "cylinder": ("radius", "length"),
+    "capsule": ("radius", "length"),
+    "sphere": ("radius",),
+    "mesh": ("scale",),
+}
+
+
+class Visual(NamedTuple):
+    """One piece of what a link looks like.
+
+    Attributes:
+        joint: The index of the joint that carries it; 0: it stands still.
+        link: Its link's name.
+        pose: Its pose in the joint's frame, shape (4, 4).
+        kind: ``box``, ``cylinder``, ``sphere``, ``capsule`` or ``mesh``.
+        size: Its lengths [m] as the URDF gives them; of a mesh: its scale.
+        color: Red, green, blue and opacity, from 0 to 1.
+        file: Of a mesh: the file, or None if there is none that can be shown.
+    """
+
+    joint: int
+    link: str
+    pose: Array
+    kind: str
+    size: tuple[float, ...]
+    color: tuple[float, ...]
+    file: Path | None
+
+
+def read_visuals(robot: Robot) -> list[Visual]:
+    """Return what the robot's links look like; nothing of a URDF that is gone."""
+    return [visual for part in robot.parts for visual in _of_part(robot, part)]
+
+
+def _of_part(robot: Robot, part: Part) -> Iterator[Visual]:
+    try:
+        tree = read_urdf(part.source.urdf)
+    except (ModelError, RobotNotFoundError):
+        return
+    materials = dict(_materials(tree))
+    for link in tree.iter("link"):
+        name = part.prefix + link.get("name", "")
+        if not robot.model.existBodyName(name):
+            continue
+        frame = robot.model.frames[robot.model.getBodyId(name)]
+        for element in link.iter("visual"):
+            visual = _visual(part.source, frame, element, materials)
+            if visual is not None:
+                yield visual
+
+
+def _visual(
+    source: RobotSource,
+    frame: pin.Frame,
+    element: Element,
+    materials: dict[str, tuple[float, ...]],
+) -> Visual | None:
+    shape = next(iter(element.find("geometry") or ()), None)
+    if shape is None or shape.tag not in _SIZES:
+        return None
+    size = sum((_numbers(shape.get(name)) for name in _SIZES[shape.tag]), _NO_NUMBERS)
+    return Visual(
+        joint=frame.parentJoint,
+        link=frame.name,
+        pose=frame.placement.homogeneous @ _pose(element.find("origin")),
+        kind=shape.tag,
+        size=size or (1.0, 1.0, 1.0),
+        color=_color(element.find("material"), materials) or _GREY,
+        file=_mesh_file(source, shape.get("filename", "")),
+    )
+
+
+def _materials(
+    tree: Element,
+) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """Yield the named colours, wherever in the file they are given."""
+    for material in tree.iter("material"):
+        color = material.find("color")
+        if color is not None and material.get("name"):
+            yield material.get("name", ""), _numbers(color.get("rgba"))
+
+
+def _color(
+    material: Element | None, named: dict[str, tuple[float, ...]]
+) -> tuple[float, ...] | None:
+    if material is None:
+        return None
+    own = material.find("color")
+    if own is not None:
+        return _numbers(own.get("rgba"))
+    return named.get(material.get("name", ""))
+
+
+def _pose(origin: Element | None) -> Array:
+    if origin is None:
+        return np.eye(4)
+    rpy = np.array(_numbers(origin.get("rpy")) or (0.0, 0.0, 0.0))
+    xyz = np.array(_numbers(origin.get("xyz")) or (0.0, 0.0, 0.0))
+    pose: Array = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz).homogeneous
+    return pose
+
+
+def _mesh_file(source: RobotSource, name: str) -> Path | None:
+    """Return the file that a mesh's name stands for, if it exists and can be shown."""
+    scheme, _, rest = name.rpartition("://")
+    if scheme == "package":
+        package, _, inside = rest.partition("/")
+        candidates = [folder / rest for folder in source.package_dirs]
+        candidates += [
+            folder / inside for folder in source.package_dirs if folder.name == package
+        ]
+    else:
+        candidates = [source.urdf.parent / rest]  # an absolute path stays as it is
+    return next(
+        (
+            file
+            for file in candidates
+            if file.suffix.lower() in _MESHES
+            and not complaint(file)
+            and source.access.allows(file)
+        ),
+        None,
+    )
+
+
+def _numbers(text: str | None) -> tuple[float, ...]:
+    return tuple(map(float, (text or "").split()))

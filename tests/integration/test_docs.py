@@ -1,0 +1,242 @@
+"""The documents are executed: what the README shows is what happens."""
+
+import re
+import shlex
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+from live_rigs import law, watched
+from places import ROOT
+
+import hsp_control
+from hsp_control import load_experiment
+from hsp_control.cli.main import _parser
+from hsp_control.config.models.live import LiveModel
+from hsp_control.config.models.view import ShowModel
+from hsp_control.live import EffortInterface, StopSettings, Tolerance, run_loop
+from hsp_control.live.watched_robot import WATCHDOG
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+SMALL = """
+robot: {name: planar3r}
+tasks: {tip: {type: frame_position, axes: xy, trajectory: {type: hold}}}
+simulation: {duration: 0.1}
+"""
+
+
+def blocks(text: str, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def test_the_readme_s_python_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (snippet,) = blocks(README, "python")
+    assert len([line for line in snippet.splitlines() if line.strip()]) <= 16
+    space: dict = {}
+    exec(compile(snippet, "README.md", "exec"), space)
+    rollout = space["rollout"]
+    assert np.isfinite(space["tau"]).all()
+    assert (tmp_path / "out" / "elbow.npz").is_file()
+    assert "completed" in capsys.readouterr().out
+    # It does what the README claims: the law's exponential on the user's own cost.
+    decay = np.exp(-8.0 * rollout.t) * rollout["null_space_norm"][0]
+    np.testing.assert_allclose(rollout["null_space_norm"], decay, rtol=1e-4, atol=1e-8)
+
+
+@pytest.mark.parametrize("page", ["sweeps", "latency", "robustness"])
+def test_the_pages_python_runs_and_their_commands_exist(page: str) -> None:
+    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    (snippet,) = blocks(text, "python")
+    exec(compile(snippet, f"{page}.md", "exec"), {})
+    shell = "".join(blocks(text, "sh")).replace("\\\n", " ")
+    commands = [line.split("#")[0] for line in shell.splitlines()]
+    used = [shlex.split(line)[1:] for line in commands if line.startswith("hsp ")]
+    assert used
+    for command in used:
+        _parser().parse_args(command)
+
+
+def test_the_readme_s_yaml_is_a_configuration() -> None:
+    (text,) = blocks(README, "yaml")
+    experiment = load_experiment(yaml.safe_load(text), "simulation.duration=0.05")
+    assert experiment.run().status == "completed"
+
+
+def test_the_readme_s_commands_exist() -> None:
+    commands = [
+        line.split("#")[0].split(">")[0].split()[1:]
+        for block in blocks(README, "sh")
+        for line in block.splitlines()
+        if line.startswith("hsp ")
+    ]
+    assert {command[0] for command in commands} == {
+        "run", "view", "plot", "export", "check", "robots", "schema", "sweep", "bench",
+        "live",
+    }  # fmt: skip
+    for command in commands:
+        _parser().parse_args(command)
+
+
+def test_the_remedies_of_the_document_are_a_configuration() -> None:
+    text = (ROOT / "docs" / "robustness.md").read_text(encoding="utf-8")
+    (configuration,) = blocks(text, "yaml")
+    experiment = load_experiment(
+        yaml.safe_load(configuration), "simulation.duration=0.02"
+    )
+    told = re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE)
+    assert tuple(told) == experiment.compensation.names
+    assert experiment.run().status == "completed"
+
+
+def test_the_view_s_document_is_true(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (ROOT / "docs" / "view.md").read_text(encoding="utf-8")
+    (commands,) = blocks(text, "sh")
+    for command in commands.splitlines():
+        _parser().parse_args(command.split("#")[0].split()[1:])
+    (view,) = blocks(text, "yaml")
+    configuration = {**yaml.safe_load(view), **yaml.safe_load(SMALL)}
+    assert load_experiment(configuration).scenario.view.show.ellipsoid
+    told = re.findall(r"^\| `(\w+)` \| (on|off) \|", text, re.MULTILINE)
+    defaults = ShowModel().model_dump()
+    assert {name: state == "on" for name, state in told} == defaults
+    (snippet,) = blocks(text, "python")
+    exec(compile(snippet, "view.md", "exec"), {})
+
+
+def test_the_export_s_document_is_true(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+    (commands,) = blocks(text, "sh")
+    for command in commands.splitlines():
+        _parser().parse_args(command.split("#")[0].split()[1:])
+    known = _parser().parse_args(["export", "log.npz"])
+    for option in re.findall(r"`--(?:no-)?(\w+)`", text):
+        assert {"from": "first", "to": "last"}.get(option, option) in vars(known)
+    page, _ = blocks(text, "python")  # the film is taken in test_browser.py
+    exec(compile(page, "export.md", "exec"), {})
+    assert (tmp_path / "out" / "page.html").is_file()
+
+
+def test_the_law_in_the_document_is_the_law_of_the_code() -> None:
+    (snippet,) = blocks(
+        (ROOT / "docs" / "law.md").read_text(encoding="utf-8"), "python"
+    )
+    space: dict = {"np": np}
+    exec(compile(snippet, "law.md", "exec"), space)
+    experiment = load_experiment("paper/4_moving_obstacle")
+    robot, controller = experiment.robot, experiment.controller
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        state = robot.state(
+            rng.uniform(0, 9), robot.random_configuration(rng), rng.standard_normal(3)
+        )
+        output = controller.compute(state)
+        a, e_N = space["law"](
+            output.task.jacobian,
+            output.task.jacobian_dot,
+            output.task.acceleration,
+            state.v,
+            *output.field,
+            controller.null_space_gain,
+            controller.metric.W,
+            np.zeros((3, 3)),
+        )
+        if not output.damped:
+            # Relative to the largest term: near singular random states are large.
+            scale = np.abs(a).max()
+            np.testing.assert_allclose(
+                output.acceleration / scale, a / scale, atol=1e-9
+            )
+            np.testing.assert_allclose(output.null_space_error, e_N, atol=1e-9)
+
+
+def test_every_public_name_is_documented_and_importable() -> None:
+    for name in vars(hsp_control):
+        thing = getattr(hsp_control, name)
+        if isinstance(thing, type):
+            assert thing.__doc__, name
+            assert not name.startswith("_")
+
+
+def test_pictures_that_documents_show_exist() -> None:
+    for document in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
+        text = document.read_text(encoding="utf-8")
+        for target in re.findall(r"\]\(([^)#]+)\)", text):
+            if "://" not in target:
+                assert (document.parent / target).exists(), f"{document.name}: {target}"
+
+
+class _FakeFranka:
+    """pylibfranka as far as the page uses it, around a simulated Panda."""
+
+    def __init__(self, address: str) -> None:
+        self.watched = watched(EffortInterface(True, 1000.0))
+        self.efforts: list[np.ndarray] = []
+        self.stopped = False
+
+    def read_once(self) -> SimpleNamespace:
+        return SimpleNamespace(q=self.watched.q.tolist(), dq=self.watched.v.tolist())
+
+    def start_torque_control(self) -> "_FakeFranka":
+        return self
+
+    def readOnce(self) -> tuple[SimpleNamespace, SimpleNamespace]:
+        self.watched.advance(self.efforts)
+        self.efforts = []
+        return self.read_once(), SimpleNamespace(to_sec=lambda: 0.001)
+
+    def writeOnce(self, torques: list[float]) -> None:
+        self.efforts.append(np.array(torques))
+
+    def stop(self) -> None:
+        self.stopped = True
+
+
+def test_the_live_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
+    (shell,) = blocks(text, "sh")
+    for line in shell.splitlines():
+        _parser().parse_args(shlex.split(line.split("#")[0])[1:])
+    example, panda = blocks(text, "python")
+    space: dict = {}
+    exec(compile(example, "live.md", "exec"), space)
+    assert space["report"].ended == "completed"
+    assert space["controller"].field is space["calm"]
+    assert space["run"].status == "completed"
+
+    module = SimpleNamespace(
+        Robot=_FakeFranka, Torques=list, FrankaException=type("F", (Exception,), {})
+    )
+    monkeypatch.setitem(sys.modules, "pylibfranka", module)
+    exec(compile(panda, "live.md", "exec"), space)
+    robot = space["Panda"]("fake")
+    interface = EffortInterface(True, 1000.0)
+    report = run_loop(law(), robot, duration=0.2, interface=interface)
+    assert report.ended == "completed", report.reason
+    assert robot._robot.stopped
+    assert robot._robot.watched.t > 0.2
+
+
+def test_the_live_page_s_defaults_are_the_code_s() -> None:
+    text = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
+    settings = LiveModel()
+    told = set(re.findall(r"`(\w+)`", text))
+    assert set(settings.model_dump()) | set(settings.stop.model_dump()) <= told
+    tolerance = Tolerance()
+    assert settings.missing == tolerance.missing == settings.watchdog == WATCHDOG == 20
+    assert settings.age == tolerance.age == 0.02
+    assert settings.position_margin == tolerance.position_margin == 0.02
+    assert settings.velocity_margin == tolerance.velocity_margin == 0.1
+    assert settings.stop.model_dump() == asdict(StopSettings())

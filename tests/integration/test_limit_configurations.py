@@ -1,0 +1,94 @@
+"""The configurations of configs/limits: the null space gives way, then the hand."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hsp_control import Limits, Rollout, load_experiment
+from hsp_control.control.actuation import LIMITED
+
+EVERY_STEP = "simulation.log_period=0.001"
+UNLIMITED = "limits=null"
+
+
+@cache
+def run(name: str, *overrides: str) -> tuple[Rollout, Limits | None]:
+    experiment = load_experiment(f"limits/{name}", EVERY_STEP, *overrides)
+    return experiment.run(), experiment.controller.limits
+
+
+def check_limits(rollout: Rollout, limits: Limits | None) -> None:
+    """Nothing is beyond its limit at any step of the log."""
+    assert limits is not None
+    assert rollout.meta["status"] == "completed"
+    q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
+    assert (np.abs(tau) <= limits.effort + 1e-9).all()
+    assert (np.abs(np.diff(tau, axis=0)) <= 1e-3 * limits.effort_rate + 1e-9).all()
+    assert (np.abs(v) <= limits.velocity).all()
+    assert ((limits.lower <= q) & (q <= limits.upper)).all()
+    assert rollout["status"].max() == LIMITED
+
+
+def error(rollout: Rollout) -> np.ndarray:
+    """Return how far the hand is off its path [m]."""
+    return np.linalg.norm(rollout["task.hand.error"], axis=1)
+
+
+def test_half_strength() -> None:
+    """No effort beyond half; the null space pays, and the hand a little."""
+    shorter = "simulation.duration=3.2"
+    ours, limits = run("panda_half_strength", shorter)
+    free, _ = run("panda_half_strength", shorter, UNLIMITED)
+    check_limits(ours, limits)
+    assert limits is not None
+    assert (np.abs(free["tau"]) / limits.effort).max() > 1.05  # it is asked for
+    assert error(ours).max() < 3e-3
+    limited = ours["status"] == LIMITED
+    first = int(np.flatnonzero(limited)[0])
+    soon = slice(first, first + 60)
+    assert np.abs(error(ours)[soon] - error(free)[soon]).max() < 1e-5
+    assert ours["null_space_norm"][soon].max() > 0.3
+    assert free["null_space_norm"][soon].max() < 0.03
+
+
+def test_towards_a_joint_limit() -> None:
+    """At the first stop the null space has given way, at the second the hand too."""
+    ours, limits = run("panda_towards_limit")
+    free, _ = run("panda_towards_limit", UNLIMITED)
+    check_limits(ours, limits)
+    assert limits is not None
+    assert free["q"][:, 3].max() > limits.upper[3] + 0.5
+    assert ours["q"][:, 3].max() > limits.upper[3] - 0.006  # up to the margin
+    first, second, home = (np.searchsorted(ours.t, t) for t in (2.9, 4.9, 7.9))
+    # What a weight of 1e-3 leaves of strict order; below, that it is this weight's.
+    assert error(ours)[first] < 5e-4
+    assert ours["null_space_norm"][first] > 1.0
+    assert 5e-3 < error(ours)[second] < 0.05
+    waiting = (ours.t > 4.6) & (ours.t < 5.0)
+    assert np.abs(ours["v"][waiting]).max() < 0.1  # at rest beyond its reach
+    assert error(ours)[home] < 1e-5  # and on the way back all is as it was
+    assert ours["null_space_norm"][home] < 1e-3
+    assert ours["status"][home] == 0
+
+
+def test_strict_order() -> None:
+    """With the least weight of the null space its giving way costs the hand nothing."""
+    strict, _ = run(
+        "panda_towards_limit",
+        "limits.null_space_weight=null",
+        "simulation.duration=2.9",
+    )
+    assert strict["null_space_norm"][-1] > 1.0
+    assert error(strict)[-1] < 1e-5
+
+
+@pytest.mark.parametrize("name", ["panda_half_strength", "panda_towards_limit"])
+def test_the_law_until_a_limit_is_met(name: str) -> None:
+    """Before the first limited step both runs are one."""
+    shorter = ("simulation.duration=3.2",) if "half" in name else ()
+    ours, _ = run(name, *shorter)
+    free, _ = run(name, *shorter, UNLIMITED)
+    first = int(np.flatnonzero(ours["status"])[0])
+    assert first > 500
+    np.testing.assert_allclose(ours.tau[:first], free.tau[:first], rtol=0, atol=1e-9)

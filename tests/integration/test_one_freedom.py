@@ -1,0 +1,154 @@
+"""A robot of one joint: Pinocchio hands its matrices of one column over as vectors."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hsp_control import (
+    CenterOfMass,
+    Controller,
+    FramePosition,
+    Gains,
+    Hold,
+    IdentityMetric,
+    JointPosture,
+    Limits,
+    MassMatrixMetric,
+    MinimumDistance,
+    Obstacle,
+    ObstacleClearance,
+    Push,
+    RigidBodyPlant,
+    Rk4,
+    Robot,
+    Sphere,
+    TargetPosture,
+    simulate,
+)
+from hsp_control.robot.matrix_view import matrix_view
+
+Array = NDArray[np.float64]
+MASS, LEVER, INERTIA, LENGTH = 2.0, 0.2, 0.1, 0.4
+PENDULUM = f"""<robot name="pendulum">
+  <link name="base"/>
+  <link name="rod">
+    <inertial><origin xyz="0 0 {LEVER}"/><mass value="{MASS}"/>
+      <inertia ixx="0.1" iyy="{INERTIA}" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0 0 {LEVER}"/><geometry><sphere radius="0.05"/></geometry>
+    </collision>
+  </link>
+  <link name="tip"/>
+  <joint name="pivot" type="revolute"><parent link="base"/><child link="rod"/>
+    <axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="90" velocity="9"/></joint>
+  <joint name="end" type="fixed"><parent link="rod"/><child link="tip"/>
+    <origin xyz="0 0 {LENGTH}"/></joint>
+</robot>"""
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Robot:
+    file = tmp_path / "pendulum.urdf"
+    file.write_text(PENDULUM)
+    return Robot.load(file)
+
+
+def turning(length: float, angle: float) -> Array:
+    """Return ∂/∂angle of the place of a point on the rod."""
+    return length * np.array([np.cos(angle), 0.0, -np.sin(angle)])
+
+
+def falling(length: float, angle: float) -> Array:
+    """Return ∂²/∂angle² of the place of a point on the rod."""
+    return length * np.array([-np.sin(angle), 0.0, -np.cos(angle)])
+
+
+def test_terms_are_the_pendulums_at_every_state(robot: Robot) -> None:
+    """The arrays follow the state: they are asked for once, and read after moving."""
+    state = robot.state(0.0, [0.0], [0.0])
+    tip, mass, world = state.frame("tip"), state.centroidal, state.world
+    for angle, rate in ((0.3, 1.5), (-2.0, -0.4)):
+        state.update(0.0, np.array([angle]), np.array([rate]))
+        state.frame("tip").compute()
+        assert state.centroidal is mass  # moved, too
+        for got, wanted in (
+            (tip.jacobian[:3, 0], turning(LENGTH, angle)),
+            (tip.jacobian[3:, 0], [0.0, 1.0, 0.0]),
+            (tip.jacobian_dot[:3, 0], rate * falling(LENGTH, angle)),
+            (tip.drift[:3], rate**2 * falling(LENGTH, angle)),
+            (mass.jacobian[:, 0], turning(LEVER, angle)),
+            (mass.jacobian_dot[:, 0], rate * falling(LEVER, angle)),
+            (mass.momentum_matrix[:, 0], [0.0, INERTIA, 0.0]),
+            (world.jacobian[:, 0], [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
+            (state.mass_matrix, [[INERTIA + MASS * LEVER**2]]),
+            (state.mass_matrix_rate, [[0.0]]),
+        ):
+            np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-12)
+
+
+def test_a_matrix_of_one_column_is_a_view(robot: Robot) -> None:
+    data = robot.model.createData()
+    for name in ("J", "dJ", "Ag", "dAg"):
+        matrix = matrix_view(getattr(data, name))
+        assert matrix.shape == (6, 1)
+        assert np.shares_memory(matrix, getattr(data, name))
+    wide = np.zeros((6, 2))
+    assert matrix_view(wide) is wide
+
+
+def gains() -> Gains:
+    return Gains.from_frequency(10.0)
+
+
+def controlled(robot: Robot, task: str, metric: Any) -> Controller:
+    tasks = {
+        "position": lambda: FramePosition(
+            robot, "tip", Hold([0.1]), gains(), axes="x", name="it"
+        ),
+        "center of mass": lambda: CenterOfMass(
+            robot, Hold([0.05]), gains(), axes="x", name="it"
+        ),
+        "posture": lambda: JointPosture(robot, [0.2], gains(), name="it"),
+    }
+    field = TargetPosture(robot, [0.0])
+    return Controller(robot, [tasks[task]()], field, null_space_gain=5.0, metric=metric)
+
+
+@pytest.mark.parametrize("task", ["position", "center of mass", "posture"])
+@pytest.mark.parametrize("metric", [IdentityMetric, MassMatrixMetric])
+def test_the_error_equation_in_closed_loop(
+    robot: Robot, task: str, metric: Any
+) -> None:
+    """Critically damped: e(t) = e(0) (1 + 10 t) exp(-10 t) from rest."""
+    controller = controlled(robot, task, metric())
+    run = simulate(controller, [0.6], duration=0.5)
+    t = run.t[:, None]
+    expected = run["task.it.error"][0] * (1.0 + 10.0 * t) * np.exp(-10.0 * t)
+    np.testing.assert_allclose(run["task.it.error"], expected, rtol=0, atol=1e-8)
+    assert np.abs(run["null_space_error"]).max() < 1e-9  # nothing is left of it
+
+
+def test_within_limits_beside_a_ball_and_pushed(robot: Robot) -> None:
+    ball = Obstacle("ball", Sphere(0.1), Hold([0.3, 0.0, 0.1]))
+    clearance = ObstacleClearance(robot, [ball])
+    limits = Limits(robot, distances=[MinimumDistance(clearance.proximity, 0.02)])
+    task = FramePosition(robot, "tip", Hold([0.39]), gains(), axes="x", name="it")
+    controller = Controller(
+        robot, [task], clearance, null_space_gain=5.0, limits=limits
+    )
+    push = Push("tip", force=(20.0, 0.0, 0.0), start=0.2, duration=0.05)
+    run = simulate(
+        controller,
+        [0.1],
+        duration=0.6,
+        control_period=1e-3,
+        plant=RigidBodyPlant(robot, [push]),
+        integrator=Rk4(1e-3),
+    )
+    assert run.status == "completed"
+    assert run["distance.obstacle_clearance"].min() > 0.0
+    assert run["task.it.error"][-1, 0] > 0.05  # the ball is in the way
+    free = simulate(controller, [0.1], duration=0.6, control_period=1e-3)
+    assert np.abs(run.v - free.v).max() > 0.1  # it was pushed

@@ -1,0 +1,222 @@
+"""docs/paper.md and its pictures: every number, and every frame, comes from a run."""
+
+import importlib.util
+import json
+import re
+from types import ModuleType
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+from places import ROOT
+
+from hsp_control import Rollout, load_experiment
+from hsp_control.config import Experiment
+from hsp_control.simulation.log_series import joint_positions
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+DOCS = ROOT / "docs"
+FIGURES = (2, 3, 4, 5)
+UNITS = {"": 1.0, "m": 1.0, "s": 1.0, "rad": 1.0, "rad/s": 1.0, "kN·m": 1e3}
+
+
+def load_drawing() -> ModuleType:
+    """Return docs/make_figures.py, which is a script beside the documents."""
+    path = DOCS / "make_figures.py"
+    spec = importlib.util.spec_from_file_location("make_figures", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+drawing = load_drawing()
+PAPER = {one.number: one for one in drawing.PAPER}
+
+
+@pytest.fixture(scope="module")
+def runs() -> dict[int, Rollout]:
+    return {n: load_experiment(PAPER[n].configuration).run() for n in FIGURES}
+
+
+# ------------------------------------------------------------------------ the numbers
+
+
+def angles(rollout: Rollout) -> Array:
+    """Return absolute angles, as the paper's panels (b) show them, shape (N, 3)."""
+    theta, what = joint_positions(rollout)
+    assert what == "absolute joint angle"
+    return theta
+
+
+def drift(rollout: Rollout) -> float:
+    """Return the most that an angle changes in a turn, the first turn left out."""
+    theta = angles(rollout)
+    turns = drawing.TURN * np.arange(1, 5)
+    at = [[np.interp(t, rollout.t, theta[:, k]) for k in range(3)] for t in turns]
+    return float(np.abs(np.diff(at, axis=0)).max())
+
+
+def joint_distance(rollout: Rollout) -> float:
+    """Return how near joints two and three come to the disk's centre [m]."""
+    away = rollout["skeleton"][:, 1:3] - rollout["obstacle.disk"][:, None]
+    return float(np.linalg.norm(away, axis=2).min())
+
+
+def link_distance(rollout: Rollout) -> float:
+    """Return how near the links come to the disk's centre [m]."""
+    points, center = rollout["skeleton"], rollout["obstacle.disk"][:, None]
+    link = np.diff(points, axis=1)
+    from_root = center - points[:, :-1]
+    share = np.clip((from_root * link).sum(axis=2) / (link**2).sum(axis=2), 0.0, 1.0)
+    away = from_root - share[..., None] * link
+    return float(np.linalg.norm(away, axis=2).min())
+
+
+def without_the_disk() -> Experiment:
+    fields = "[{type: equal_joint_angles, joints: [joint2, joint3], weight: 5}]"
+    return load_experiment(PAPER[5].configuration, f"null_space.fields={fields}")
+
+
+def farthest_apart() -> float:
+    """Return how far (1) takes two starts 1e-9 rad apart [rad]."""
+    here = load_experiment(PAPER[2].configuration, "simulation.log_period=0.02")
+    there = load_experiment(PAPER[2].configuration, "simulation.log_period=0.02")
+    there.q0[:] = there.robot.integrate(there.q0, np.array([1e-9, 0.0, 0.0]))
+    return float(np.abs(angles(there.run()) - angles(here.run())).max())
+
+
+def log_channels(number: int, run: Rollout) -> dict[str, float]:
+    """Return what the page may say of a run, in SI units."""
+    det, late = run["manipulability"], run.t >= 5.0
+    found = {
+        "largest tracking error from 5 s on": np.abs(run["task.tip.error"][late]).max(),
+        "largest angle of link 1": np.abs(angles(run)[:, 0]).max(),
+        "largest angle of link 3": np.abs(angles(run)[:, 2]).max(),
+        "largest self-motion from 5 s on": run["null_space_norm"][late].max(),
+        "largest ‖e_N‖": run["null_space_norm"].max(),
+        "‖e_N‖ at the end": run["null_space_norm"][-1],
+        "least det(J Jᵀ)": det.min(),
+        "at": run.t[det.argmin()],
+        "largest effort": np.abs(run.tau).max(),
+        "largest drift of an angle from one turn to the next": drift(run),
+    }
+    if number == 2:
+        found["starts 1e-9 rad apart, farthest apart"] = farthest_apart()
+    if number == 5:
+        found["nearest joint to the disk's centre"] = joint_distance(run)
+        found["nearest link to the disk's centre"] = link_distance(run)
+        bare = joint_distance(without_the_disk().run())
+        found["the same without 1/d₂² + 1/d₃²"] = bare
+    return {name: float(value) for name, value in found.items()}
+
+
+def table(number: int) -> dict[str, str]:
+    """Return the rows of the table under a figure's heading, label to value."""
+    page = (DOCS / "paper.md").read_text(encoding="utf-8")
+    (section,) = re.findall(rf"^## Figure {number}:(.*?)(?=^## |\Z)", page, re.M | re.S)
+    rows = re.findall(r"^\| (.+?) \| (.+?) \|$", section, re.M)
+    return {label: value for label, value in rows if label != "the run"}
+
+
+def agrees(printed: str, measured: float) -> bool:
+    """Say whether a printed bound holds, or a printed number is the measured one."""
+    bound, digits, unit = re.fullmatch(r"([<>]?) ?([\d.e-]+) ?(\S*)", printed).groups()
+    value = float(digits) * UNITS[unit]
+    if bound:
+        return measured < value if bound == "<" else measured > value
+    last_place = 10.0 ** -len(digits.partition(".")[2]) * UNITS[unit]
+    return abs(measured - value) <= 0.5000001 * last_place
+
+
+@pytest.mark.parametrize("number", FIGURES)
+def test_every_number_of_the_page_comes_from_a_run(
+    number: int, runs: dict[int, Rollout]
+) -> None:
+    printed, measured = table(number), log_channels(number, runs[number])
+    assert len(printed) >= 4
+    for label, value in printed.items():
+        assert agrees(value, measured[label]), f"{label}: {value}, {measured[label]:g}"
+
+
+def test_a_wrong_number_would_be_found() -> None:
+    assert agrees("0.416 m", 0.4159)
+    assert not agrees("0.416 m", 0.4171)
+    assert agrees("31 kN·m", 30810.0)
+    assert not agrees("31 kN·m", 31600.0)
+    assert not agrees("< 1e-9 rad/s", 2e-9)
+    assert not agrees("> 8 rad", 7.9)
+
+
+def test_what_the_page_says_of_figure_4_beside_figure_3(
+    runs: dict[int, Rollout],
+) -> None:
+    """A hundred times the determinant, a sixty-fifth of the effort."""
+    det = {n: runs[n]["manipulability"].min() for n in (3, 4)}
+    effort = {n: np.abs(runs[n].tau).max() for n in (3, 4)}
+    assert det[4] / det[3] == pytest.approx(100.0, rel=0.05)
+    assert effort[3] / effort[4] == pytest.approx(65.0, rel=0.05)
+
+
+def test_link_two_lies_over_the_disk_in_frame_5(runs: dict[int, Rollout]) -> None:
+    run, times = runs[5], PAPER[5].times
+    over = []
+    for frame, time in enumerate(times, start=1):
+        row = int(np.abs(run.t - time).argmin())
+        points, center = run["skeleton"][row, :, :2], run["obstacle.disk"][row, :2]
+        share = np.linspace(0.0, 1.0, 201)[:, None]
+        link_two = points[1] + share * (points[2] - points[1])
+        if np.linalg.norm(link_two - center, axis=1).min() < 0.2:
+            over.append(frame)
+    assert over == [5]
+
+
+# ----------------------------------------------------------------------- the pictures
+
+
+@pytest.mark.parametrize("number", FIGURES)
+def test_pictures_show_runs_of_today(number: int, runs: dict[int, Rollout]) -> None:
+    """What a picture says of itself is what a run gives: else `make figures`."""
+    with Image.open(PAPER[number].file) as picture:
+        said = dict(picture.text)
+    run = runs[number]
+    # Through the schema of today, which may have more to say than that of then.
+    then = load_experiment(json.loads(said["configuration"])).scenario
+    assert then.model_dump(mode="json") == run.config
+    drawn = json.loads(said["frames"])
+    today = json.loads(drawing.provenance(run, PAPER[number].times)["frames"])
+    assert drawn["t"] == today["t"]
+    # The first simulation is chaos, tenfold a second: its later frames are of that run.
+    rows = slice(None) if number != 2 else np.array(drawn["t"]) < 5.0
+    for name in ("skeleton", "manipulability"):
+        found, expected = np.array(drawn[name])[rows], np.array(today[name])[rows]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("number", [3, 5])
+def test_panels_are_drawn_from_the_run(number: int, runs: dict[int, Rollout]) -> None:
+    """Curves and stick figures of the very figure that is written are the log's."""
+    run, one = runs[number], PAPER[number]
+    figure = one.figure(run)
+    assert figure.get_suptitle().startswith(f"Figure {number}")
+    joints, conditioning = (
+        next(a for a in figure.axes if a.get_title(loc="left").startswith(panel))
+        for panel in ("(b)", "(c)")
+    )
+    for line, expected in zip(joints.lines, angles(run).T, strict=False):
+        np.testing.assert_array_equal(line.get_ydata(), expected)
+    np.testing.assert_array_equal(
+        conditioning.lines[0].get_ydata(), run["manipulability"]
+    )
+    frames = [a for a in figure.axes if a.get_title(loc="left").startswith("t = ")]
+    assert [a.get_title(loc="right") for a in frames] == [str(k) for k in range(1, 9)]
+    for axes, time in zip(frames, one.times, strict=True):
+        row = int(np.abs(run.t - time).argmin())
+        sticks = np.concatenate([line.get_xydata() for line in axes.lines])
+        for point in run["skeleton"][row, :, :2]:
+            away = np.abs(sticks - point).sum(axis=1)
+            assert np.nanmin(away) < 1e-12

@@ -1,0 +1,762 @@
+"""The paper's three propositions along whole motions, on three robots and metrics.
+
+Errors are taken from the logged configurations by plain Pinocchio, never from the
+columns that the controller wrote about itself.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from hsp_control import (
+    ConstantMetric,
+    Controller,
+    Dop853,
+    EqualJointAngles,
+    FramePose,
+    FramePosition,
+    FunctionField,
+    Gains,
+    Hold,
+    IdentityMetric,
+    JointCentering,
+    MassMatrixMetric,
+    Metric,
+    NullSpaceField,
+    Obstacle,
+    PointDistance,
+    Pointing,
+    Rk4,
+    Robot,
+    RobotState,
+    Rollout,
+    TargetPosture,
+    Task,
+    simulate,
+)
+from hsp_control.geometry.shapes import Sphere
+from hsp_control.trajectories import (
+    Circle,
+    ComposedPose,
+    HoldOrientation,
+    HoldPose,
+    Lissajous,
+    Spin,
+)
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+FRAMES = {"planar3r": "tip", "panda": "panda_tcp", "iiwa14": "iiwa_link_ee"}
+NEAR = {
+    "planar3r": ("link2", "link3"),
+    "panda": ("panda_link4", "panda_hand"),
+    "iiwa14": ("iiwa_link_4", "iiwa_link_6"),
+}
+PRECISE = Dop853(rtol=1e-11, atol=1e-11)
+
+# Differences of eighth order, at -4 h ... 4 h.
+FIRST = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
+SECOND = np.array([-9, 128, -1008, 8064, -14350, 8064, -1008, 128, -9]) / 5040
+
+
+@cache
+def load(name: str) -> Robot:
+    return Robot.load(name)
+
+
+def differences(column: Array, weights: Array, step: float) -> Array:
+    """Return the derivative of a column at its rows 4 to -5."""
+    windows = np.lib.stride_tricks.sliding_window_view(column, len(weights), axis=0)
+    return windows @ weights / step ** (1 if weights is FIRST else 2)
+
+
+class Plain:
+    """Kinematics, dynamics and rows by plain Pinocchio."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.model = robot.model
+        self.data = robot.model.createData()
+
+    def placement(self, q: Array, frame: str) -> pin.SE3:
+        pin.framesForwardKinematics(self.model, self.data, q)
+        return self.data.oMf[self.model.getFrameId(frame)].copy()
+
+    def jacobians(self, q: Array, v: Array, frame: str) -> tuple[Array, Array]:
+        """Return J and J' of a frame, in world axes, linear before angular."""
+        index = self.model.getFrameId(frame)
+        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        pin.computeJointJacobiansTimeVariation(self.model, self.data, q, v)
+        pin.updateFramePlacement(self.model, self.data, index)
+        return (
+            pin.getFrameJacobian(self.model, self.data, index, axes).copy(),
+            pin.getFrameJacobianTimeVariation(
+                self.model, self.data, index, axes
+            ).copy(),
+        )
+
+    def mass_matrix(self, q: Array) -> Array:
+        upper = np.triu(pin.crba(self.model, self.data, q))
+        return upper + np.triu(upper, 1).T
+
+
+@cache
+def plain(name: str) -> Plain:
+    return Plain(load(name))
+
+
+def constant(nv: int) -> Array:
+    """Return a constant metric that couples all joints."""
+    A = np.eye(nv) + 0.25 * np.random.default_rng(nv).normal(size=(nv, nv))
+    return A.T @ A
+
+
+METRICS: dict[str, tuple[Callable[[int], Metric], Callable[[str, Array], Array]]] = {
+    "identity": (lambda nv: IdentityMetric(), lambda n, q: np.eye(load(n).nv)),
+    "constant": (
+        lambda nv: ConstantMetric(constant(nv)),
+        lambda n, q: constant(load(n).nv),
+    ),
+    "mass matrix": (
+        lambda nv: MassMatrixMetric(),
+        lambda n, q: plain(n).mass_matrix(q),
+    ),
+}
+
+
+def home(name: str) -> Array:
+    """Return a start well away from singularities; never one with symmetries."""
+    robot = load(name)
+    if name == "planar3r":
+        return robot.integrate(robot.neutral(), np.array([-0.4, 0.9, 0.8]))
+    q = robot.home()
+    return robot.integrate(q, 0.15 * np.cos(1.0 + np.arange(robot.nv)))
+
+
+# --- the tasks -----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class TaskCase:
+    """Tasks on a robot, started off their reference.
+
+    Attributes:
+        build: The tasks, for the start's placement of the frame.
+        errors: Each task's error at (t, q) by plain Pinocchio, given the same.
+        frequency: Natural frequency of the critically damped gains [rad/s].
+    """
+
+    robot: str
+    build: Callable[[Robot, pin.SE3], list[Task]]
+    errors: Callable[[pin.SE3], dict[str, Callable[[float, pin.SE3], Array]]]
+    frequency: float
+    metric: str = "identity"
+
+
+def circle_about(start: Array, off: Array) -> Lissajous:
+    """Return a motion in space that starts ``off`` the given point, with a speed."""
+    return Lissajous(start + off, [0.05, 0.04, 0.03], [2.0, 3.0, 4.0])
+
+
+def swing(start: Array, off: Array, t: float) -> Array:
+    rates = np.array([2.0, 3.0, 4.0])
+    return start + off + np.array([0.05, 0.04, 0.03]) * np.sin(rates * t)
+
+
+OFF = np.array([0.03, -0.05, 0.04])
+TURNED = np.array([0.9, -1.0, 0.7])  # 1.5 rad off
+SPUN = np.array([0.3, 0.2, -0.4])  # rad/s
+LEANT = pin.exp3(np.array([0.9, 0.4, 0.2]))
+
+
+def turned(start: pin.SE3, t: float) -> Array:
+    return pin.exp3(t * SPUN) @ start.rotation @ pin.exp3(TURNED)
+
+
+def spin(start: pin.SE3) -> Spin:
+    return Spin(turned(start, 0.0), SPUN, float(np.linalg.norm(SPUN)))
+
+
+def log3_error(desired: Array, actual: Array) -> Array:
+    return -pin.log3(desired.T @ actual)
+
+
+def stereographic(desired: Array, direction: Array) -> Array:
+    n = desired.T @ direction
+    return -n[:2] / (1.0 + n[2])
+
+
+TASKS: dict[str, TaskCase] = {
+    "planar position": TaskCase(
+        "planar3r",
+        lambda robot, start: [
+            FramePosition(
+                robot,
+                "tip",
+                Circle([1.0, 1.0], 0.9, 2.0, phase=0.4),
+                Gains.from_frequency(8.0),
+                axes="xy",
+            )
+        ],
+        lambda start: {
+            "tip": lambda t, here: (
+                np.array([1.0, 1.0])
+                + 0.9 * np.array([np.cos(2.0 * t + 0.4), np.sin(2.0 * t + 0.4)])
+                - here.translation[:2]
+            )
+        },
+        8.0,
+        "constant",
+    ),
+    "iiwa14 position": TaskCase(
+        "iiwa14",
+        lambda robot, start: [
+            FramePosition(
+                robot,
+                "iiwa_link_ee",
+                circle_about(start.translation, OFF),
+                Gains.from_frequency(6.0),
+            )
+        ],
+        lambda start: {
+            "iiwa_link_ee": lambda t, here: (
+                swing(start.translation, OFF, t) - here.translation
+            )
+        },
+        6.0,
+        "mass matrix",
+    ),
+    "iiwa14 pose": TaskCase(
+        "iiwa14",
+        lambda robot, start: [
+            FramePose(
+                robot,
+                "iiwa_link_ee",
+                ComposedPose(circle_about(start.translation, OFF), spin(start)),
+                Gains.from_frequency(5.0),
+            )
+        ],
+        lambda start: {
+            "iiwa_link_ee": lambda t, here: np.concatenate(
+                [
+                    swing(start.translation, OFF, t) - here.translation,
+                    log3_error(turned(start, t), here.rotation),
+                ]
+            )
+        },
+        5.0,
+    ),
+    "panda position and pointing": TaskCase(
+        "panda",
+        lambda robot, start: [
+            FramePosition(
+                robot,
+                "panda_tcp",
+                circle_about(start.translation, OFF),
+                Gains.from_frequency(5.0),
+            ),
+            Pointing(
+                robot,
+                "panda_tcp",
+                [0.0, 0.0, 1.0],
+                HoldOrientation(LEANT @ start.rotation),
+                Gains.from_frequency(5.0),
+            ),
+        ],
+        lambda start: {
+            "panda_tcp": lambda t, here: (
+                swing(start.translation, OFF, t) - here.translation
+            ),
+            "panda_tcp_pointing": lambda t, here: stereographic(
+                LEANT @ start.rotation, here.rotation[:, 2]
+            ),
+        },
+        5.0,
+    ),
+}
+every_task = pytest.mark.parametrize("which", TASKS)
+LOG_PERIOD = 0.005  # [s]
+DURATION = 0.5  # of self-motion [s]
+
+
+@cache
+def tracked(which: str) -> tuple[Controller, Rollout]:
+    """Return a motion of 1 s from off the reference, at a velocity of its own."""
+    case = TASKS[which]
+    robot = load(case.robot)
+    q0 = home(case.robot)
+    start = plain(case.robot).placement(q0, FRAMES[case.robot])
+    field = TargetPosture(robot, robot.integrate(q0, np.full(robot.nv, 0.2)))
+    metric = METRICS[case.metric][0](robot.nv)
+    controller = Controller(robot, case.build(robot, start), field, metric=metric)
+    v0 = 0.3 * np.sin(2.0 + np.arange(robot.nv))
+    rollout = simulate(
+        controller, q0, v0, duration=1.0, log_period=LOG_PERIOD, integrator=PRECISE
+    )
+    assert not rollout["damped"].any()
+    return controller, rollout
+
+
+def errors_of(which: str, rollout: Rollout) -> dict[str, Array]:
+    """Return every task's error along a motion, by plain Pinocchio."""
+    case = TASKS[which]
+    kinematics, frame = plain(case.robot), FRAMES[case.robot]
+    functions = case.errors(kinematics.placement(rollout.q[0], frame))
+    placements = [kinematics.placement(q, frame) for q in rollout.q]
+    return {
+        name: np.array([e(t, at) for t, at in zip(rollout.t, placements, strict=True)])
+        for name, e in functions.items()
+    }
+
+
+@every_task
+def test_proposition_1_the_error_is_critically_damped(which: str) -> None:
+    """e(t) = (e0 + (e0' + ω e0) t) exp(-ω t), exactly: to 1e-12 of 1 over 1 s."""
+    controller, rollout = tracked(which)
+    w, t = TASKS[which].frequency, rollout.t[:, None]
+    for name, e in errors_of(which, rollout).items():
+        np.testing.assert_allclose(rollout[f"task.{name}.error"], e, rtol=0, atol=1e-13)
+        e0, e0_dot = e[0], rollout[f"task.{name}.error_rate"][0]
+        assert np.linalg.norm(e0) > 0.05
+        assert np.linalg.norm(e0_dot) > 0.05
+        expected = (e0 + (e0_dot + w * e0) * t) * np.exp(-w * t)
+        np.testing.assert_allclose(e, expected, rtol=0, atol=1e-12)
+        rate = (e0_dot - w * (e0_dot + w * e0) * t) * np.exp(-w * t)
+        np.testing.assert_allclose(
+            rollout[f"task.{name}.error_rate"], rate, rtol=0, atol=1e-11
+        )
+    assert controller.robot.name == TASKS[which].robot
+
+
+@every_task
+def test_proposition_1_residual_of_the_error_equation(which: str) -> None:
+    """e'' + 2 ω e' + ω² e = 0 by differences of e, to rounding, 1e-16/h² = 1e-10."""
+    _, rollout = tracked(which)
+    w = TASKS[which].frequency
+    for e in errors_of(which, rollout).values():
+        e_dot = differences(e, FIRST, LOG_PERIOD)
+        e_ddot = differences(e, SECOND, LOG_PERIOD)
+        residual = e_ddot + 2.0 * w * e_dot + w**2 * e[4:-4]
+        assert np.abs(e_ddot).max() > 0.5
+        np.testing.assert_allclose(residual, 0.0, rtol=0, atol=2e-9)
+
+
+@every_task
+def test_proposition_1_the_logged_acceleration(which: str) -> None:
+    """J a + J'v = a_x, J and J' by plain Pinocchio, at every row; M a + N = tau."""
+    controller, rollout = tracked(which)
+    robot, case = controller.robot, TASKS[which]
+    for i in range(0, len(rollout), 10):
+        t, q, v, a = (
+            rollout.t[i],
+            rollout.q[i],
+            rollout.v[i],
+            rollout["acceleration"][i],
+        )
+        state = robot.state(t, q, v)
+        J, J_dot = plain(case.robot).jacobians(q, v, FRAMES[case.robot])
+        answer = J @ a + J_dot @ v
+        for task in controller.tasks:
+            wanted = task.evaluate(state).acceleration
+            if isinstance(task, Pointing):
+                R = plain(case.robot).placement(q, task.frame).rotation
+                # Rows turn with the frame: (Cᵀ w)' = Cᵀ w' for rows fixed in the body.
+                C = task.evaluate(state).jacobian @ np.linalg.pinv(J[3:])
+                np.testing.assert_allclose(C @ R[:, 2], 0.0, rtol=0, atol=1e-13)
+                found = C @ answer[3:]
+            else:
+                found = answer[: task.rows]
+            np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11)
+        model, data = robot.model, robot.model.createData()
+        answered = pin.aba(model, data, q, v, rollout.tau[i])
+        np.testing.assert_allclose(answered, a, rtol=0, atol=1e-11)
+
+
+# --- the null space ------------------------------------------------------------------
+
+
+def moving(robot: Robot, name: str) -> NullSpaceField:
+    """Return a field that moves in time: an obstacle, and a vector field with ∂g/∂t."""
+    lookout = Lissajous([0.7, 0.9, 1.1], [0.2, 0.3, 0.1], [3.0, 2.0, 4.0])
+    ball = Obstacle("ball", Sphere(0.1), lookout)
+    posture = TargetPosture(robot, home(name), weights=2.0)
+    frame = FRAMES[name]
+
+    def wave(state: RobotState) -> Array:
+        i = np.arange(robot.nv)
+        return 0.5 * np.sin(3.0 * state.t + i) * (1.0 + state.position(frame)[0])
+
+    avoid = PointDistance(robot, NEAR[name], ball, weight=0.05)
+    return posture + avoid + 0.8 * FunctionField(robot, wave)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A motion with a null space, and what is wanted of it."""
+
+    robot: str
+    metric: str
+    gain: str
+
+    def __str__(self) -> str:
+        return f"{self.robot}-{self.metric}-{self.gain}"
+
+    @property
+    def K_N(self) -> Array:
+        """The null-space gain; the matrix is neither diagonal nor symmetric."""
+        nv = load(self.robot).nv
+        if self.gain == "scalar":
+            return 6.0 * np.eye(nv)
+        rng = np.random.default_rng(nv)
+        return np.diag(rng.uniform(5.0, 9.0, nv)) + 0.3 * rng.normal(size=(nv, nv))
+
+
+RUNS = [
+    Run(robot, metric, gain)
+    for robot in FRAMES
+    for metric in METRICS
+    for gain in ("scalar", "matrix")
+]
+every_run = pytest.mark.parametrize("run", RUNS, ids=str)
+
+
+@cache
+def self_motion(run: Run) -> Rollout:
+    """Return half a second of tracking off the path, with a field moving in time."""
+    robot, frame, q0 = load(run.robot), FRAMES[run.robot], home(run.robot)
+    start = plain(run.robot).placement(q0, frame)
+    gains = Gains.from_frequency(7.0)
+    if run.robot == "planar3r":
+        circle = Circle(start.translation[:2] - [0.5, 0.1], 0.5, 2.0)
+        task: Task = FramePosition(robot, frame, circle, gains, axes="xy")
+    elif run.robot == "panda":
+        path = circle_about(start.translation, OFF)
+        task = FramePosition(robot, frame, path, gains)
+    else:
+        pose = ComposedPose(circle_about(start.translation, OFF), spin(start))
+        task = FramePose(robot, frame, pose, gains)
+    controller = Controller(
+        robot,
+        [task],
+        moving(robot, run.robot),
+        null_space_gain=run.K_N,
+        metric=METRICS[run.metric][0](robot.nv),
+    )
+    v0 = 0.5 * np.sin(1.0 + 2.0 * np.arange(robot.nv))
+    rollout = simulate(
+        controller, q0, v0, duration=DURATION, log_period=LOG_PERIOD, integrator=PRECISE
+    )
+    assert not rollout["damped"].any()
+    return rollout
+
+
+def null_space_errors(run: Run, rollout: Rollout) -> tuple[Array, Array]:
+    """Return e_N = (I - J#J)(g - v) and W along a motion, by plain Pinocchio."""
+    kinematics, W_of = plain(run.robot), METRICS[run.metric][1]
+    rows = {"planar3r": 2, "panda": 3, "iiwa14": 6}[run.robot]
+    errors, metrics = [], []
+    for q, v, g in zip(rollout.q, rollout.v, rollout["field.g"], strict=True):
+        W = W_of(run.robot, q)
+        J = kinematics.jacobians(q, v, FRAMES[run.robot])[0][:rows]
+        across = np.linalg.solve(W, J.T)
+        x = g - v
+        errors.append(x - across @ np.linalg.solve(J @ across, J @ x))
+        metrics.append(W)
+    return np.array(errors), np.array(metrics)
+
+
+@every_run
+def test_proposition_2_the_null_space_error_decays_as_it_must(run: Run) -> None:
+    """Scalar K_N: ‖e_N‖_W = ‖e_N(0)‖_W exp(-K_N t) to 1e-9 of itself, all along.
+
+    Any K_N: V' = -e_NᵀW K_N e_N with V = ½ e_NᵀW e_N, by differences of eighth order.
+    They are good to 1e-10 of V(0), to 1e-8 where M couples a matrix gain with the
+    wrists, so that V has fast parts.
+    """
+    rollout = self_motion(run)
+    e_N, W = null_space_errors(run, rollout)
+    np.testing.assert_allclose(rollout["null_space_error"], e_N, rtol=0, atol=2e-11)
+    V = 0.5 * np.einsum("ti,tij,tj->t", e_N, W, e_N)
+    np.testing.assert_allclose(
+        rollout["null_space_norm"], np.sqrt(2.0 * V), rtol=1e-9, atol=1e-12
+    )
+    assert V[0] > 0.005
+    if run.gain == "scalar":
+        expected = np.sqrt(2.0 * V[0]) * np.exp(-6.0 * rollout.t)
+        np.testing.assert_allclose(np.sqrt(2.0 * V), expected, rtol=1e-9, atol=0)
+    power = -np.einsum("ti,tij,tj->t", e_N, W @ run.K_N, e_N)
+    found = differences(V, FIRST, LOG_PERIOD)
+    fast = run.metric == "mass matrix" and run.gain == "matrix"
+    atol = (3e-8 if fast else 1e-9) * V[0]
+    np.testing.assert_allclose(found, power[4:-4], rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("run", [r for r in RUNS if r.gain == "scalar"], ids=str)
+def test_proposition_2_there_was_something_to_prove(run: Run) -> None:
+    """The field and the null space move by far more than what is left of e_N."""
+    rollout = self_motion(run)
+    g = rollout["field.g"]
+    assert np.abs(g - g[0]).max() > 0.1
+    e_N, _ = null_space_errors(run, rollout)
+    moved = e_N[-1] - np.exp(-6.0 * DURATION) * e_N[0]  # a null space that did not turn
+    if run.robot != "planar3r" or run.metric == "mass matrix":
+        assert np.abs(moved).max() > 1e-4 * np.abs(e_N[0]).max()
+
+
+@pytest.mark.parametrize("metric", METRICS)
+def test_the_law_integrates_in_fourth_order(metric: str) -> None:
+    """Rk4's error falls with the fourth power of its step: the law is smooth in t.
+
+    A null-space law that forgets a term in J' or g' would still be smooth; a state
+    left over from another stage would not.
+    """
+    run = Run("panda", metric, "scalar")
+    robot, q0 = load("panda"), home("panda")
+    start = plain("panda").placement(q0, "panda_tcp")
+    task = FramePosition(
+        robot,
+        "panda_tcp",
+        circle_about(start.translation, OFF),
+        Gains.from_frequency(7),
+    )
+    field = moving(robot, "panda")
+    controller = Controller(
+        robot, [task], field, null_space_gain=6.0, metric=METRICS[metric][0](7)
+    )
+    v0 = self_motion(run).v[0]
+    # The mass matrix makes light wrists fast: -M⁻¹∇f has rates of up to 1e3 1/s.
+    longest = 0.001 if metric == "mass matrix" else 0.02
+    steps = longest / np.array([1.0, 2.0, 4.0, 8.0])
+    duration = 5.0 * longest
+
+    def end(integrator: Any) -> Array:
+        out = simulate(
+            controller,
+            q0,
+            v0,
+            duration=duration,
+            log_period=duration,
+            integrator=integrator,
+        )
+        return np.concatenate([out.q[-1], out.v[-1]])
+
+    exact = end(Dop853(rtol=1e-13, atol=1e-13))
+    errors = [np.abs(end(Rk4(step)) - exact).max() for step in steps]
+    order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert order == pytest.approx(4.0, abs=0.2)
+
+
+# --- the minimum ---------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Held:
+    """An end effector at rest, a cost, and the same cost by hand."""
+
+    robot: str
+    task: Callable[[Robot, pin.SE3], Task]
+    field: Callable[[Robot], NullSpaceField]
+    cost: Callable[[Array], float]
+    constraint: Callable[[Array], Array]
+    weight: float
+    duration: float
+
+
+def tip_by_hand(angles: Array) -> Array:
+    absolute = np.cumsum(angles)
+    return np.array([np.cos(absolute).sum(), np.sin(absolute).sum()])
+
+
+def planar_cost(angles: Array) -> float:
+    first = np.array([np.cos(angles[0]), np.sin(angles[0])])
+    absolute = angles[0] + angles[1]
+    second = first + np.array([np.cos(absolute), np.sin(absolute)])
+    ball = np.array([0.3, 1.3])
+    away = 1.0 / ((first - ball) @ (first - ball)) + 1.0 / (
+        (second - ball) @ (second - ball)
+    )
+    return float(5.0 * (angles[2] - angles[1]) ** 2 + 0.5 * away)
+
+
+def posture() -> Array:
+    """Return where the Panda's joints would go if nothing held its hand."""
+    return home("panda") + np.array([0.8, 0.3, -0.9, 0.2, 0.7, -0.1, 0.5])
+
+
+def centering_and_posture(angles: Array) -> float:
+    robot = load("panda")
+    low, high = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    away = angles - posture()
+    return float(
+        2.0 * 0.5 * (((angles - middle) / half) ** 2).sum() + 3.0 * 0.5 * away @ away
+    )
+
+
+HELD: dict[str, Held] = {
+    "planar3r": Held(
+        "planar3r",
+        lambda robot, start: FramePosition(
+            robot,
+            "tip",
+            Hold(start.translation[:2]),
+            Gains.from_frequency(10),
+            axes="xy",
+        ),
+        lambda robot: (
+            EqualJointAngles(robot, ["joint2", "joint3"], weight=5.0)
+            + PointDistance(
+                robot,
+                ["link2", "link3"],
+                Obstacle("ball", Sphere(0.1), Hold([0.3, 1.3, 0.0])),
+                weight=0.5,
+            )
+        ),
+        planar_cost,
+        tip_by_hand,
+        1.0,
+        4.0,
+    ),
+    "panda position": Held(
+        "panda",
+        lambda robot, start: FramePosition(
+            robot, "panda_tcp", Hold(start.translation), Gains.from_frequency(10)
+        ),
+        lambda robot: (
+            2.0 * JointCentering(robot) + 3.0 * TargetPosture(robot, posture())
+        ),
+        centering_and_posture,
+        lambda q: plain("panda").placement(q, "panda_tcp").translation,
+        2.0,
+        4.0,
+    ),
+    "panda pose": Held(
+        "panda",
+        lambda robot, start: FramePose(
+            robot, "panda_tcp", HoldPose(start), Gains.from_frequency(10)
+        ),
+        lambda robot: (
+            2.0 * JointCentering(robot) + 3.0 * TargetPosture(robot, posture())
+        ),
+        centering_and_posture,
+        lambda q: (
+            pin.log6(
+                plain("panda")
+                .placement(home("panda"), "panda_tcp")
+                .actInv(plain("panda").placement(q, "panda_tcp"))
+            ).vector
+        ),
+        2.0,
+        4.0,
+    ),
+}
+HELD_RUNS = [
+    (which, metric) for which in HELD for metric in ("identity", "mass matrix")
+]
+
+
+@cache
+def settled(which: str, metric: str) -> Rollout:
+    """Return the motion to the minimum, from rest, the end effector held."""
+    case = HELD[which]
+    robot, q0 = load(case.robot), home(case.robot)
+    start = plain(case.robot).placement(q0, FRAMES[case.robot])
+    controller = Controller(
+        robot,
+        [case.task(robot, start)],
+        case.weight * case.field(robot),
+        null_space_gain=20.0,
+        metric=METRICS[metric][0](robot.nv),
+    )
+    return simulate(
+        controller,
+        q0,
+        duration=case.duration,
+        log_period=0.01,
+        integrator=Dop853(1e-10, 1e-10),
+    )
+
+
+@cache
+def constrained_minimum(which: str) -> Array:
+    """Return the joint angles of the local minimum near the start, by SciPy."""
+    case = HELD[which]
+    robot = load(case.robot)
+    start = robot.joint_positions(home(case.robot))
+    goal = case.constraint(start)
+    best = minimize(
+        case.cost,
+        start,
+        constraints={"type": "eq", "fun": lambda x: case.constraint(x) - goal},
+        method="SLSQP",
+        options={"ftol": 1e-14, "maxiter": 300},
+        jac="3-point",
+    )
+    assert best.success, best.message
+    return np.asarray(best.x)
+
+
+@pytest.mark.parametrize(("which", "metric"), HELD_RUNS)
+def test_proposition_3_q_converges_to_the_constrained_minimum(
+    which: str, metric: str
+) -> None:
+    """In both metrics the same minimum, that of an optimiser that knows no robot.
+
+    SLSQP with differences is good to 1e-8 here. The velocity that is left is Pg, the
+    projected gradient, which is zero at the minimum alone.
+    """
+    case, rollout = HELD[which], settled(which, metric)
+    minimum = constrained_minimum(which)
+    final = rollout["joint_positions"][-1]
+    assert (
+        np.abs(rollout["joint_positions"][0] - minimum).max() > 0.05
+    )  # it had to move
+    np.testing.assert_allclose(final, minimum, rtol=0, atol=1e-7)
+    assert case.cost(final) <= case.cost(minimum) + 1e-10
+    np.testing.assert_allclose(
+        case.constraint(final),
+        case.constraint(rollout["joint_positions"][0]),
+        atol=1e-9,
+    )
+    # Nothing moves any more.
+    np.testing.assert_allclose(rollout.v[-1], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("which", "metric"), HELD_RUNS)
+def test_proposition_3_the_cost_falls(which: str, metric: str) -> None:
+    """f' = -‖Pg‖²_W + gᵀW e_N while the end effector is held (law.md §2).
+
+    Once e_N has died f falls monotonically, to rounding.
+    """
+    rollout = settled(which, metric)
+    case = HELD[which]
+    W_of, frame = METRICS[metric][1], FRAMES[case.robot]
+    rows = {"planar3r": 2, "panda position": 3, "panda pose": 6}[which]
+    f = case.weight * np.array([case.cost(q) for q in rollout["joint_positions"]])
+    np.testing.assert_allclose(rollout["field.value"], f, rtol=1e-12)
+    predicted = []
+    for q, v, g, e_N in zip(
+        rollout.q,
+        rollout.v,
+        rollout["field.g"],
+        rollout["null_space_error"],
+        strict=True,
+    ):
+        W, J = W_of(case.robot, q), plain(case.robot).jacobians(q, v, frame)[0][:rows]
+        across = np.linalg.solve(W, J.T)
+        Pg = g - across @ np.linalg.solve(J @ across, J @ g)
+        predicted.append(-Pg @ W @ Pg + g @ W @ e_N)
+    found = differences(f, FIRST, 0.01)
+    size = np.abs(predicted).max()
+    late = slice(20, -4)  # the first rows move fast for differences of 10 ms
+    np.testing.assert_allclose(
+        found[late.start - 4 :], predicted[late], rtol=0, atol=1e-7 * size
+    )
+    assert np.diff(f[100:]).max() < 1e-12

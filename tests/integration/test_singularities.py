@@ -1,0 +1,471 @@
+"""Singularities: the law is exact away from them, and bounded and forgiving in them.
+
+A singular value s of J L⁻ᵀ below the threshold ε is inverted by s(2 - s²/ε²)/ε² instead
+of 1/s, so ‖J#‖ ≤ 1.0887/ε. With κ = 1.0887/ε and x = g - v, for the identity metric,
+
+    a = J#(a_x - J'v) + (I - J#J)(g' + K_N e_N - J'ᵀ J#ᵀ x),
+    |a| ≤ κ(|a_x| + ‖J'‖|v|) + |g'| + K_N|x| + κ‖J'‖|x|,   |tau| ≤ ‖M‖|a| + |N|.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Controller,
+    ControlOutput,
+    FramePose,
+    FramePosition,
+    Gains,
+    Hold,
+    Rk4,
+    Robot,
+    RobotState,
+    Rollout,
+    TargetPosture,
+    Task,
+    simulate,
+)
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.trajectories import (
+    CallableOrientation,
+    CallableTrajectory,
+    ComposedPose,
+    HoldPose,
+    MinimumJerk,
+)
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+DEFAULT = 0.03
+FREQUENCY = 10.0  # of the tasks [rad/s], and K_N [1/s]
+LIMIT = np.sqrt(32.0 / 27.0)  # of s q(s²) ε: 1.0887
+TINY = 1e-9  # a threshold that is never met: the plain pseudo-inverse
+
+
+@cache
+def load(name: str) -> Robot:
+    return Robot.load(name)
+
+
+def bound(state: RobotState, output: ControlOutput, threshold: float) -> float:
+    """Return the bound on |a| of this module's first lines, at a state."""
+    kappa = LIMIT / threshold
+    x = float(np.linalg.norm(output.field.g - state.v))
+    turning = float(np.linalg.norm(output.task.jacobian_dot, 2))
+    return (
+        kappa * float(np.linalg.norm(output.task.acceleration))
+        + kappa * turning * (float(np.linalg.norm(state.v)) + x)
+        + float(np.linalg.norm(output.field.g_dot))
+        + FREQUENCY * x
+    )
+
+
+# --- motions through singularities ---------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A motion into a singularity and out of it again.
+
+    Attributes:
+        task: The task, which leads there and back.
+        start: Where it starts, shape (nq,).
+        duration: How long it takes, with time to recover [s].
+        threshold: The singularity threshold.
+        effort: What the largest effort stays below [N·m].
+        step: Of the integrator [s].
+    """
+
+    task: Task
+    start: Array
+    duration: float
+    threshold: float
+    effort: float
+    step: float = 0.0005
+
+    def controller(self, threshold: float) -> Controller:
+        """Return a controller that draws the joints to where they started."""
+        robot = self.task.robot
+        return Controller(
+            robot,
+            [self.task],
+            TargetPosture(robot, self.start),
+            null_space_gain=FREQUENCY,
+            singularity_threshold=threshold,
+        )
+
+    def run(self, threshold: float, control_period: float | None = None) -> Rollout:
+        """Return the motion; it starts with a speed of its own."""
+        v0 = 0.05 * np.sin(1.0 + np.arange(self.task.robot.nv))
+        return simulate(
+            self.controller(threshold),
+            self.start,
+            v0,
+            duration=self.duration,
+            control_period=control_period,
+            log_period=0.01,
+            integrator=Rk4(self.step),
+        )
+
+
+def stretched_planar_arm() -> Passage:
+    """Its tip leaves the disk of 3 m that it can reach by 0.4 m, and returns."""
+    robot = load("planar3r")
+    q0 = robot.integrate(robot.neutral(), np.array([0.6, -0.9, -0.7]))
+    here = robot.state(0.0, q0, np.zeros(3)).position("tip")[:2].copy()
+    away = 3.4 * here / np.linalg.norm(here)
+    path = MinimumJerk([here, away, away, here], [0.0, 1.5, 2.0, 3.5])
+    task = FramePosition(robot, "tip", path, Gains.from_frequency(FREQUENCY), axes="xy")
+    return Passage(task, q0, 5.0, 0.1, effort=1.5e3)
+
+
+def panda_out_of_reach(threshold: float) -> Passage:
+    """Its hand is asked for a point 15 cm out of reach, and back."""
+    robot = load("panda")
+    q0, shoulder = robot.home(), np.array([0.0, 0.0, 0.333])
+    here = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp").copy()
+    ray = (here - shoulder) * [1.0, 1.0, 0.0] + [0.0, 0.0, 0.1]
+    away = shoulder + 1.05 * ray / np.linalg.norm(ray)
+    path = MinimumJerk([here, away, away, here], [0.0, 1.5, 2.0, 3.5])
+    task = FramePosition(robot, "panda_tcp", path, Gains.from_frequency(FREQUENCY))
+    effort = 2e3 if threshold < 0.1 else 2e2
+    return Passage(task, q0, 5.0, threshold, effort)
+
+
+def driven(
+    name: str, frame: str, joints: dict[int, float], swing: list[float]
+) -> Passage:
+    """A pose that follows joints which swing through a singularity and back."""
+    robot = load(name)
+    state, still = RobotState(robot), np.zeros(robot.nv)
+    singular = robot.home()
+    singular[list(joints)] = list(joints.values())
+    span = np.array(swing)
+    there_and_back = 4.0  # [s]
+
+    def hand(t: float) -> Any:
+        u = np.clip(t / there_and_back, 0.0, 1.0)
+        angle = 2.0 * np.pi * u**4 * (35.0 - 84.0 * u + 70.0 * u**2 - 20.0 * u**3)
+        return state.update(0.0, singular + span * np.cos(angle), still).frame(frame)
+
+    path = ComposedPose(
+        CallableTrajectory(lambda t: hand(t).position.copy(), 3),
+        CallableOrientation(lambda t: hand(t).rotation.copy()),
+    )
+    task = FramePose(robot, frame, path, Gains.from_frequency(FREQUENCY))
+    return Passage(task, singular + span, 5.0, DEFAULT, effort=80.0, step=0.0025)
+
+
+PASSAGES: dict[str, Callable[[], Passage]] = {
+    "planar arm stretched": stretched_planar_arm,
+    "panda out of reach": lambda: panda_out_of_reach(DEFAULT),
+    "panda out of reach, more damping": lambda: panda_out_of_reach(0.1),
+    # The wrist's centre is on the line through shoulder and elbow's offset.
+    "panda elbow": lambda: driven(
+        *("panda", "panda_tcp", {3: -0.466}),
+        [0.1, -0.15, 0.1, 0.5, -0.1, 0.2, 0.1],
+    ),
+    # Three axes of the wrist in a plane with the elbow's. Self-motion goes around it.
+    "panda wrist": lambda: driven(
+        *("panda", "panda_tcp", {4: np.pi / 2.0, 5: -0.205}),
+        [0.1, -0.1, 0.1, 0.1, -0.3, 0.5, 0.1],
+    ),
+    "iiwa14 wrist": lambda: driven(
+        *("iiwa14", "iiwa_link_ee", {4: np.pi / 2.0, 5: 0.0}),
+        [0.1, -0.1, 0.1, 0.1, -0.3, 0.6, 0.1],
+    ),
+}
+every_passage = pytest.mark.parametrize("which", PASSAGES)
+
+
+@cache
+def passed(which: str) -> tuple[Passage, Rollout]:
+    passage = PASSAGES[which]()
+    return passage, passage.run(passage.threshold)
+
+
+def damped_part(rollout: Rollout) -> tuple[int, int]:
+    """Return the first row that is damped and the last."""
+    (rows,) = np.nonzero(rollout["damped"])
+    return int(rows[0]), int(rows[-1])
+
+
+def decayed(rollout: Rollout, name: str, rows: slice) -> tuple[Array, Array]:
+    """Return e at some rows, and what the first of them leaves of it by the law."""
+    t = (rollout.t[rows] - rollout.t[rows][0])[:, None]
+    e, e_dot = rollout[f"task.{name}.error"][rows], rollout[f"task.{name}.error_rate"]
+    slope = e_dot[rows][0] + FREQUENCY * e[0]
+    return e, (e[0] + slope * t) * np.exp(-FREQUENCY * t)
+
+
+@every_passage
+def test_the_law_is_exact_until_the_threshold_is_met(which: str) -> None:
+    """Both propositions, to 1e-5 of what there was, until the singularity is there.
+
+    What is missing is the integrator's: the last joint speeds grow within milliseconds.
+    """
+    passage, rollout = passed(which)
+    first, _ = damped_part(rollout)
+    assert first > 40
+    e, expected = decayed(rollout, passage.task.name, slice(0, first))
+    assert np.linalg.norm(e, axis=1).max() > 1e-3  # it had something to get rid of
+    np.testing.assert_allclose(e, expected, rtol=0, atol=1e-5 * np.abs(e).max())
+    norm, t = rollout["null_space_norm"][:first], rollout.t[:first]
+    np.testing.assert_allclose(
+        norm, norm[0] * np.exp(-FREQUENCY * t), rtol=0, atol=1e-5 * norm[0]
+    )
+
+
+@every_passage
+def test_effort_is_bounded_in_the_singularity(which: str) -> None:
+    """By the bound that 1.0887/ε gives at every row, and by a number for the motion."""
+    passage, rollout = passed(which)
+    controller = passage.controller(passage.threshold)
+    robot, state = controller.robot, RobotState(controller.robot)
+    tightest = 0.0
+    for i in range(len(rollout)):
+        output = controller.compute(
+            state.update(rollout.t[i], rollout.q[i], rollout.v[i])
+        )
+        a = float(np.linalg.norm(output.acceleration))
+        limit = bound(state, output, passage.threshold)
+        assert a <= limit
+        M = state.mass_matrix
+        heaviest = float(np.linalg.eigvalsh(np.triu(M) + np.triu(M, 1).T)[-1])
+        gravity = float(np.linalg.norm(state.nonlinear_effects))
+        assert np.linalg.norm(output.tau) <= heaviest * limit + gravity
+        tightest = max(tightest, a / limit)
+        if not output.damped:
+            task = output.task
+            answer = task.jacobian @ output.acceleration + task.jacobian_dot @ state.v
+            scale = 1.0 + limit * passage.threshold
+            np.testing.assert_allclose(answer, task.acceleration, atol=1e-11 * scale)
+    assert tightest > 0.02  # so the bound means something
+    assert np.isfinite(rollout.tau).all()
+    assert np.abs(rollout.tau).max() < passage.effort
+    assert robot is passage.task.robot
+
+
+@every_passage
+def test_the_log_says_where_it_was_singular(which: str) -> None:
+    """Damped where the least singular value is below the threshold, and only there."""
+    passage, rollout = passed(which)
+    values = rollout["singular_values"]
+    assert (np.diff(values, axis=1) <= 0.0).all()  # largest first
+    np.testing.assert_array_equal(
+        rollout["damped"].astype(bool), values[:, -1] < passage.threshold
+    )
+    assert values[:, -1].min() < 0.8 * passage.threshold
+
+
+@every_passage
+def test_exact_tracking_is_recovered(which: str) -> None:
+    """Once out, the error decays by its own equation, to less than 1e-6."""
+    passage, rollout = passed(which)
+    _, last = damped_part(rollout)
+    rows = slice(last + 1, None)
+    e, expected = decayed(rollout, passage.task.name, rows)
+    scale = np.linalg.norm(rollout[f"task.{passage.task.name}.error"], axis=1).max()
+    np.testing.assert_allclose(e, expected, rtol=0, atol=1e-6 * scale)
+    assert np.linalg.norm(e[-1]) < 1e-6
+    assert not rollout["damped"][rows].any()
+    norm, t = rollout["null_space_norm"][rows], rollout.t[rows]
+    np.testing.assert_allclose(
+        norm, norm[0] * np.exp(-FREQUENCY * (t - t[0])), rtol=0, atol=1e-6 * norm[0]
+    )
+
+
+@pytest.mark.parametrize("which", [n for n in PASSAGES if n != "panda wrist"])
+def test_the_plain_pseudo_inverse_fails_or_wants_far_more(which: str) -> None:
+    """The threshold is what makes the difference: the same motions without it."""
+    passage, rollout = passed(which)
+    try:
+        plain = passage.run(TINY)
+    except SimulationError:
+        return  # it diverged, and the simulation said so
+    peaks = [np.abs(run["acceleration"]).max() for run in (plain, rollout)]
+    assert peaks[0] > 10.0 * peaks[1]
+
+
+@pytest.mark.parametrize("which", ["planar arm stretched", "panda out of reach"])
+def test_an_effort_that_is_held_for_a_millisecond_survives(which: str) -> None:
+    """At 1 kHz the threshold must leave time: a smaller one is crossed in one period.
+
+    The boundary is crossed in ε²/(speed · length). Thresholds of 0.02 for the Panda
+    and 0.05 for the planar arm ended these motions.
+    """
+    passage = PASSAGES[which]()
+    rollout = passage.run(passage.threshold, control_period=0.001)
+    assert rollout.status == "completed"
+    assert np.abs(rollout.tau).max() < passage.effort
+    e = rollout[f"task.{passage.task.name}.error"]
+    assert np.linalg.norm(e, axis=1).max() > 0.1
+    assert np.linalg.norm(e[-1]) < 1e-5
+
+
+# --- a target out of reach -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("threshold", [DEFAULT, 0.1])
+def test_a_target_out_of_reach_is_pointed_at(threshold: float) -> None:
+    """A step to 20 cm out of reach, sampled at 1 kHz: the arm stretches and rests.
+
+    The error that is left is along the arm: Jᵀ e = 0 in the directions that move.
+    """
+    robot = load("panda")
+    goal = np.array([1.055, 0.0, 0.5])
+    task = FramePosition(robot, "panda_tcp", Hold(goal), Gains.from_frequency(3.0))
+    controller = Controller(
+        robot,
+        [task],
+        TargetPosture(robot, robot.home()),
+        singularity_threshold=threshold,
+    )
+    rollout = simulate(
+        controller,
+        robot.home(),
+        duration=5.0,
+        control_period=0.001,
+        integrator=Rk4(0.001),
+    )
+    assert rollout["damped"][-1]
+    assert np.abs(rollout.tau).max() < {DEFAULT: 600.0, 0.1: 150.0}[threshold]
+    assert np.abs(rollout.v[-1]).max() < 1e-2
+    e = rollout["task.panda_tcp.error"][-1]
+    assert 0.05 < np.linalg.norm(e) < 0.2
+    J = robot.state(0.0, rollout.q[-1], np.zeros(7)).frame("panda_tcp").jacobian[:3]
+    assert np.linalg.norm(J.T @ e) < 0.1 * np.linalg.norm(J, 2) * np.linalg.norm(e)
+
+
+# --- random starts -------------------------------------------------------------------
+
+STARTS = 1250
+ROBOTS = {
+    "planar3r": "xy",
+    "panda": "pose",
+    "iiwa14": "pose",
+    "ur5": "xyz",
+    "kinova": "xyz",
+    "xarm7": "pose",
+    "talos_arm": "pose",
+    "tiago_no_hand": "pose",
+}
+
+
+def random_start(robot: Robot, rng: np.random.Generator) -> Array:
+    """Return a configuration; every other one on singularities of all kinds.
+
+    Joints at multiples of a right angle align axes, exactly or to 1e-1 ... 1e-12.
+    """
+    q = robot.joint_positions(robot.random_configuration(rng))
+    if rng.random() < 0.5:
+        some = rng.random(robot.nv) < 0.7
+        q[some] = np.pi / 2.0 * rng.integers(-1, 2, size=int(some.sum()))
+        q += rng.choice([0.0, 10.0 ** rng.uniform(-12.0, -1.0)]) * rng.normal(
+            size=robot.nv
+        )
+    return robot.integrate(robot.neutral(), q)
+
+
+class Target:
+    """A task whose target is set anew for every start."""
+
+    def __init__(self, robot: Robot, kind: str) -> None:
+        frame, gains = robot.end_effector, Gains.from_frequency(FREQUENCY)
+        self.robot, self.kind = robot, kind
+        self.task: Task
+        if kind == "pose":
+            self.task = FramePose(robot, frame, HoldPose(pin.SE3.Identity()), gains)
+        else:
+            self.task = FramePosition(
+                robot, frame, Hold(np.zeros(len(kind))), gains, axes=kind
+            )
+
+    def move(self, state: RobotState, away: Array, turn: Array) -> None:
+        """Put the target ``away`` [m] and turned by ``turn`` [rad] from the frame."""
+        here = state.frame(self.task.frame)
+        if self.kind == "pose":
+            goal = pin.SE3(here.rotation @ pin.exp3(turn), here.position + away)
+            self.task.trajectory = HoldPose(goal)
+        else:
+            axes = ["xyz".index(axis) for axis in self.kind]
+            self.task.trajectory = Hold((here.position + away)[axes])
+
+
+def loaded(name: str) -> Robot:
+    if name not in {"planar3r", "panda", "iiwa14"}:
+        pytest.importorskip("example_robot_data")
+    return load(name)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_random_starts(name: str) -> None:
+    """10,000 in all: finite, bounded, exact where nothing is damped, and said so."""
+    robot = loaded(name)
+    rng = np.random.default_rng(sum(map(ord, name)))
+    target = Target(robot, ROBOTS[name])
+    field = TargetPosture(robot, robot.random_configuration(rng))
+    controller = Controller(robot, [target.task], field, null_space_gain=FREQUENCY)
+    state = RobotState(robot)
+    singular = 0
+    for _ in range(STARTS):
+        q, v = random_start(robot, rng), rng.normal(size=robot.nv)
+        state.update(0.0, q, v)
+        target.move(state, rng.normal(size=3), rng.uniform(-1.0, 1.0, 3))
+        output = controller.compute(state)
+        a, task = output.acceleration, output.task
+        limit = bound(state, output, DEFAULT)
+        assert np.isfinite(output.tau).all()
+        assert np.linalg.norm(a) <= limit
+        values = controller.diagnose(state).singular_values
+        assert output.damped == (values[-1] < DEFAULT)
+        singular += output.damped
+        # ‖e_N‖ ≤ ‖g - v‖: a projection where exact, a contraction where damped.
+        x = output.field.g - v
+        assert np.linalg.norm(output.null_space_error) <= np.linalg.norm(x) * (1 + 1e-9)
+        if not output.damped:
+            answer = task.jacobian @ a + task.jacobian_dot @ v
+            np.testing.assert_allclose(
+                answer, task.acceleration, rtol=0, atol=1e-10 * (1.0 + limit * DEFAULT)
+            )
+            left = task.jacobian @ output.null_space_error
+            np.testing.assert_allclose(left, 0.0, rtol=0, atol=1e-10)
+    assert 30 <= singular <= STARTS - 30  # of both kinds
+
+
+@pytest.mark.parametrize("name", ["planar3r", "panda", "iiwa14", "ur5"])
+def test_rollouts_from_singular_starts(name: str) -> None:
+    """A quarter of a second at 1 kHz from twelve of them: none runs away."""
+    robot = loaded(name)
+    rng = np.random.default_rng(5)
+    target = Target(robot, ROBOTS[name])
+    field = TargetPosture(robot, robot.home())
+    controller = Controller(robot, [target.task], field, null_space_gain=FREQUENCY)
+    state, runs = RobotState(robot), 0
+    while runs < 12:
+        q, v = random_start(robot, rng), 0.3 * rng.normal(size=robot.nv)
+        target.move(
+            state.update(0.0, q, v), 0.1 * rng.normal(size=3), rng.uniform(-0.3, 0.3, 3)
+        )
+        if not controller.compute(state).damped:
+            continue
+        runs += 1
+        rollout = simulate(
+            controller,
+            q,
+            v,
+            duration=0.25,
+            control_period=0.001,
+            integrator=Rk4(0.001),
+        )
+        assert rollout.status == "completed"
+        assert np.isfinite(rollout.tau).all()
+        assert np.abs(rollout.v).max() < 60.0

@@ -1,0 +1,480 @@
+"""Files of strangers: nothing runs, nothing outside is read, sizes are bounded."""
+
+import io
+import os
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from campaigns.mutate_log import Touch, packed
+from campaigns.mutate_urdf import ARM, EXTERNAL, LAUGHS
+from campaigns.mutate_yaml import TAGS
+from campaigns.urdf_case import DAE, OBJ, STL
+
+from hsp_control import HspControlError, Mesh, Robot, load_experiment
+from hsp_control.cli import main
+from hsp_control.common.exceptions import (
+    AccessError,
+    ConfigError,
+    LogError,
+    ModelError,
+    SceneError,
+    SimulationError,
+)
+from hsp_control.robot.description.access import ANYWHERE, only_within
+from hsp_control.robot.description.urdf_checks import MAX_DOFS, MAX_LINKS
+from hsp_control.robot.description.xml_files import (
+    MAX_DEPTH,
+    XmlError,
+    parse_xml,
+    refuse_document_type,
+)
+from hsp_control.simulation import Rollout, log_file
+from hsp_control.visualization.plots.figures import diagnostics_figure
+from hsp_control.visualization.viewer.mesh_files import collada_object
+
+CONFIG = """robot: {name: ROBOT}
+tasks:
+  hand: {type: frame_position, trajectory: {type: hold}}
+null_space: {gain: 5, fields: [{type: self_clearance}]}
+simulation: {duration: 0.01, control_period: 0.001,
+  integrator: {type: rk4, step: 0.001}}
+"""
+MESH = """scene:
+  obstacles:
+    thing: {shape: {type: mesh, file: MESH}, center: {type: hold, point: [9, 9, 9]}}
+"""
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    """A stranger's folder with a configuration, a robot and its mesh; one beside it."""
+    folder, outside = tmp_path / "theirs", tmp_path / "mine"
+    for where in (folder, outside):
+        where.mkdir()
+        (where / "good.stl").write_bytes(STL)
+        (where / "arm.urdf").write_text(ARM)
+    (folder / "config.yaml").write_text(CONFIG.replace("ROBOT", "arm.urdf"))
+    return folder
+
+
+def write(home: Path, robot: str = "arm.urdf", more: str = "") -> Path:
+    path = home / "config.yaml"
+    path.write_text(CONFIG.replace("ROBOT", robot) + more)
+    return path
+
+
+# --- code ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tag", TAGS)
+def test_no_code_runs_from_yaml(tag: str, tmp_path: Path) -> None:
+    canary, path = tmp_path / "canary", tmp_path / "config.yaml"
+    path.write_text(f"robot: {tag.format(canary=canary)}\n")
+    with pytest.raises(ConfigError, match=r"config.yaml:1: "):
+        load_experiment(path)
+    with pytest.raises(ConfigError):
+        load_experiment("panda_limits", f"title={tag.format(canary=canary)}")
+    assert not canary.exists()
+
+
+def test_no_pickle_is_opened(tmp_path: Path) -> None:
+    """The canary works: NumPy told to unpickle touches it."""
+    canary, path = tmp_path / "canary", tmp_path / "log.npz"
+    path.write_bytes(packed({"t": np.array([Touch(str(canary))], dtype=object)}))
+    for read in (Rollout.load, Rollout.salvage):
+        with pytest.raises(LogError):
+            read(path)
+    assert not canary.exists()
+    with np.load(path, allow_pickle=True) as archive:
+        archive["t"].item().close()
+    assert canary.exists()
+
+
+# --- paths ---------------------------------------------------------------------------
+
+
+def test_what_lies_beside_or_is_bundled_is_read(home: Path) -> None:
+    for robot in ("arm.urdf", str(home / "arm.urdf"), "panda", "./arm.urdf"):
+        load_experiment(write(home, robot), strict=True)
+    load_experiment("panda_obstacle", strict=True)
+    load_experiment(write(home, more=MESH.replace("MESH", "good.stl")), strict=True)
+
+
+def test_a_robot_elsewhere_is_refused_and_allowed(
+    home: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    outside = home.parent / "mine"
+    for robot in ("../mine/arm.urdf", str(outside / "arm.urdf"), "/etc/hostname.urdf"):
+        config = write(home, robot)
+        message = r"config.yaml:1: robot.name: robot '.*' leads to .*; .*--allow /"
+        with pytest.raises(AccessError, match=message):
+            load_experiment(config, strict=True)
+    config = write(home, str(outside / "arm.urdf"))
+    load_experiment(config)
+    load_experiment(config, strict=True, allow=[outside])
+    assert main(["check", str(config), "--strict"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"hsp: {config}:1: robot.name: robot '{outside}/arm.urdf'")
+    assert told.count("\n") == 1
+    assert main(["check", str(config), "--allow", str(outside)]) == 0
+    assert main(["check", str(config)]) == 0
+
+
+def test_links_are_followed_before_they_are_judged(home: Path) -> None:
+    (home / "link.urdf").symlink_to("../mine/arm.urdf")
+    (home / "folder").symlink_to("../mine")
+    (home / "loop.urdf").symlink_to("loop.urdf")
+    for robot in ("link.urdf", "folder/arm.urdf", "loop.urdf"):
+        with pytest.raises((AccessError, HspControlError)):
+            load_experiment(write(home, robot), strict=True)
+    with pytest.raises(AccessError):
+        load_experiment(write(home, str(home / "link.urdf")), strict=True)
+    (home / "inside.urdf").symlink_to("arm.urdf")
+    load_experiment(write(home, "inside.urdf"), strict=True)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../mine/good.stl",
+        "MINE/good.stl",
+        "file://MINE/good.stl",
+        "package://../mine/good.stl",
+        "package://theirs/../mine/good.stl",
+        "/nowhere/there/is/nothing.stl",
+        "link.stl",
+        "good.ply",
+    ],
+)
+@pytest.mark.parametrize("tag", ["collision", "visual"])
+def test_meshes_elsewhere_are_refused(home: Path, name: str, tag: str) -> None:
+    (home / "link.stl").symlink_to("../mine/good.stl")
+    (home / "good.ply").write_bytes(b"ply")
+    mesh = name.replace("MINE", str(home.parent / "mine"))
+    text = ARM.replace("good.stl", mesh).replace("collision>", f"{tag}>")
+    (home / "arm.urdf").write_text(text)
+    with pytest.raises(AccessError, match=r"arm.urdf: link 'upper': <mesh>"):
+        load_experiment(write(home), strict=True)
+    with pytest.raises(AccessError):
+        Robot.load(home / "arm.urdf", access=only_within([home]))
+    assert Robot.load(home / "arm.urdf").nv == 3  # dynamics need no meshes
+
+
+def test_an_obstacle_s_mesh_elsewhere_is_refused(home: Path) -> None:
+    config = write(home, more=MESH.replace("MESH", "../mine/good.stl"))
+    load_experiment(config)
+    where = (
+        r"config.yaml:\d+: scene.obstacles.thing.shape.file: mesh '.*/good.stl' leads"
+    )
+    with pytest.raises(AccessError, match=where):
+        load_experiment(config, strict=True)
+
+
+@pytest.mark.parametrize(("suffix", "text"), [("obj", OBJ), ("dae", DAE.encode())])
+def test_what_a_mesh_names_is_judged_too(home: Path, suffix: str, text: bytes) -> None:
+    """OBJ names material libraries, Collada pictures."""
+    (home / f"thing.{suffix}").write_bytes(text)
+    (home / "arm.urdf").write_text(ARM.replace("good.stl", f"thing.{suffix}"))
+    with pytest.raises(AccessError, match=r"its reference '.*/etc/passwd'"):
+        Robot.load(home / "arm.urdf", access=only_within([home]))
+
+
+def test_a_log_is_a_stranger_s_file_too(home: Path, tmp_path: Path) -> None:
+    """Its configuration and its obstacles name files; a replay reads them."""
+    outside = str(home.parent / "mine")
+    config = write(home, f"{outside}/arm.urdf", MESH.replace("MESH", "good.stl"))
+    log = load_experiment(config).run().save(home / "run.npz")
+    page = ["--html", str(tmp_path / "page.html")]
+    with pytest.raises(AccessError):
+        load_experiment(log, strict=True)
+    assert main(["run", str(log), "--strict", "--out", str(tmp_path)]) == 2
+    assert main(["export", str(log), *page, "--strict"]) == 2
+    assert main(["view", str(log), "--strict", "--no-browser"]) == 2
+    assert not (tmp_path / "page.html").exists()
+    assert main(["export", str(log), *page, "--allow", outside]) == 0
+
+
+def test_a_page_carries_pictures_and_nothing_else(tmp_path: Path) -> None:
+    """Without strict reading, either: a page is given to others."""
+    secret, mesh = tmp_path / "secret", tmp_path / "thing.dae"
+    for name in ("secret", "picture.png"):
+        (tmp_path / name).write_bytes(b"mine")
+        mesh.write_text(DAE.replace("/etc/passwd", name))
+        carried = collada_object(mesh)["object"]["resources"]
+        assert list(carried) == ([] if name == secret.name else [name])
+
+
+def test_access() -> None:
+    assert ANYWHERE.allows(Path("/etc/passwd"))
+    assert not only_within(["/tmp"]).allows(Path("/tmp/../etc/passwd"))
+    assert not only_within(["/tmp/a"]).allows(Path("/tmp/ab"))
+    assert not only_within(["/tmp"]).allows(Path("/tmp/\0"))
+
+
+# --- XML -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("head", [LAUGHS, EXTERNAL, "<!DOCTYPE robot>"])
+def test_document_types_are_refused(head: str, home: Path) -> None:
+    (home / "arm.urdf").write_text(head + ARM)
+    with pytest.raises(ModelError, match=r"arm.urdf:\d: a document type"):
+        Robot.load(home / "arm.urdf")
+    with pytest.raises(XmlError, match="a document type"):
+        refuse_document_type((head + "<COLLADA/>").encode())
+    (home / "thing.dae").write_text(head + DAE.partition("?>")[2])
+    with pytest.raises(SceneError, match=r"thing.dae: line \d: a document type"):
+        Mesh(home / "thing.dae").geometry()
+    (home / "arm.urdf").write_text(ARM.replace("good.stl", "thing.dae"))
+    with pytest.raises(ModelError, match=r"collision mesh: .*thing.dae: line"):
+        load_experiment(write(home))
+
+
+def test_depth_and_elements_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    deep = "<x>" * (MAX_DEPTH + 1) + "</x>" * (MAX_DEPTH + 1)
+    with pytest.raises(XmlError, match="nested deeper than 100 levels"):
+        parse_xml(deep.encode())
+    monkeypatch.setattr("hsp_control.robot.description.xml_files.MAX_ELEMENTS", 10)
+    with pytest.raises(XmlError, match="more than 10 elements"):
+        parse_xml(b"<x>" + b"<y/>" * 10 + b"</x>")
+
+
+NONSENSE = [
+    ('mass value="2"', 'mass value="nan"', r"<mass>: value=\"nan\" is not finite"),
+    ('mass value="2"', 'mass value="-2"', "a mass is not negative"),
+    ('mass value="2"', 'mass value="1e300"', "beyond 1e.09, no number of a robot"),
+    ('mass value="2"', 'mass value="two"', 'value="two" is not 1 number'),
+    ('ixx="0.1"', 'ixx="-0.1"', r"a principal moment of -0.1 kg·m²"),
+    ('xyz="0 1 0"', 'xyz="0 0 0"', r"joint 'shoulder': <joint>: axis .* no direction"),
+    (
+        'upper="3"',
+        'upper="inf"',
+        r"joint 'shoulder': <limit>: upper=\"inf\" is not fin",
+    ),
+    ('xyz="0 0 0.4"', 'xyz="0 0"', r'xyz="0 0" is not 3 numbers'),
+    ('radius="0.1"', 'radius="-0.1"', "a negative length"),
+    ('filename="good.stl"', 'filename=" "', "names no file"),
+]
+
+
+@pytest.mark.parametrize(("good", "bad", "message"), NONSENSE)
+def test_numbers_that_no_robot_has(
+    good: str, bad: str, message: str, home: Path
+) -> None:
+    assert good in ARM
+    (home / "arm.urdf").write_text(ARM.replace(good, bad, 1))
+    with pytest.raises(ModelError, match=message):
+        Robot.load(home / "arm.urdf")
+
+
+# --- sizes ---------------------------------------------------------------------------
+
+
+def test_links_are_bounded(home: Path) -> None:
+    links = "".join(f'<link name="l{k}"/>' for k in range(MAX_LINKS))
+    (home / "arm.urdf").write_text(ARM.replace("</robot>", links + "</robot>"))
+    with pytest.raises(ModelError, match=r"1004 links; at most 1000"):
+        Robot.load(home / "arm.urdf")
+    joints = "".join(f'<joint name="j{k}" type="floating"/>' for k in range(MAX_DOFS))
+    (home / "arm.urdf").write_text(ARM.replace("</robot>", joints + "</robot>"))
+    with pytest.raises(ModelError, match=r"203 joints that move; at most 200"):
+        Robot.load(home / "arm.urdf")
+
+
+@pytest.mark.parametrize("module", ["xml_files", "mesh_files"])
+def test_files_are_bounded(
+    module: str, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"hsp_control.robot.description.{module}.MAX_SIZE", 200)
+    with pytest.raises(ModelError, match=r"larger than|collision mesh: .*at most"):
+        load_experiment(home / "config.yaml")
+
+
+def test_a_pipe_is_no_mesh(home: Path) -> None:
+    """It would be waited for."""
+    os.mkfifo(home / "pipe.stl")
+    (home / "arm.urdf").write_text(ARM.replace("good.stl", "pipe.stl"))
+    with pytest.raises(ModelError, match="a collision mesh"):
+        load_experiment(home / "config.yaml")
+    with pytest.raises(SceneError, match="no file"):
+        Mesh(home / "pipe.stl").geometry()
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (
+            ["duration=1e9", "log_period=0.01"],
+            r"simulation: .* 1e.11 rows; at most 1e.07",
+        ),
+        (["duration=10", "control_period=1e-9"], r"1e.10 steps; at most 1e.09"),
+        (["integrator.step=1e-12"], r"simulation.integrator.step: .* steps; at most"),
+    ],
+)
+def test_runs_that_would_not_end_are_refused(
+    overrides: list[str], message: str, home: Path
+) -> None:
+    with pytest.raises(SimulationError, match=message):
+        load_experiment(
+            home / "config.yaml", *(f"simulation.{text}" for text in overrides)
+        )
+
+
+def test_a_log_too_large_is_refused_before_it_is_computed(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    experiment = load_experiment(home / "config.yaml")
+    monkeypatch.setattr("hsp_control.simulation.recorder.MAX_SIZE", 100)
+    with pytest.raises(SimulationError, match="a log of 2 rows is larger than"):
+        experiment.run()
+
+
+def archive(**entries: bytes) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as packed_file:
+        for name, content in entries.items():
+            packed_file.writestr(f"{name}.npy", content)
+    return file.getvalue()
+
+
+def header(shape: tuple[int, ...], descr: str = "<f8") -> bytes:
+    file = io.BytesIO()
+    described: dict[str, Any] = {"descr": descr, "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(file, described)
+    return file.getvalue()
+
+
+BOMBS: dict[str, tuple[Callable[[], bytes], str]] = {
+    "a shape without its bytes": (
+        lambda: archive(t=header((10**12,)) + bytes(80)), "another size than its shape"
+    ),
+    "a negative shape": (lambda: archive(t=header((-1, -10))), "another size than its"),
+    "structured": (lambda: archive(t=header((1,), "<M8[s]") + bytes(8)), "neither num"),
+    "too much in all": (lambda: archive(t=bytes(3000)), "it unpacks to .* GB; at most"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("which", BOMBS)
+def test_logs_that_lie_about_their_size(
+    which: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make, message = BOMBS[which]
+    if which == "too much in all":
+        monkeypatch.setattr(log_file, "MAX_SIZE", 2000)
+    path = tmp_path / "log.npz"
+    path.write_bytes(make())
+    with pytest.raises(LogError, match=message):
+        Rollout.load(path)
+
+
+@pytest.fixture(scope="module")
+def run() -> Rollout:
+    return load_experiment("paper/4_moving_obstacle", "simulation.duration=0.05").run()
+
+
+CONTRADICTIONS: dict[str, tuple[Callable[[Rollout], None], str]] = {
+    "nan": (lambda run: run.q.fill(np.nan), "'q' holds a NaN or an infinity"),
+    "backwards": (lambda run: run.t.__imul__(-1.0), "its time runs backwards"),
+    "far": (lambda run: run.q.fill(1e15), "'q' holds 1e.15, no number of a robot"),
+    "width": (
+        lambda run: run.columns.update(tau=run.tau[:, :2]),
+        r"'tau' has rows of shape \(2,\); what it says of itself needs \(3,\)",
+    ),
+    "freedoms": (
+        lambda run: run.meta["robot"].update(dofs=["a"]), "has 1 freedoms, its mot"
+    ),
+    "tree": (
+        lambda run: run.meta["robot"].update(skeleton_parents=[3, 2, 1, 0]),
+        "comes before its parent",
+    ),
+    "type": (lambda run: run.meta.update(tasks=[1]), "says nonsense at 'tasks'"),
+    "no orientation": (
+        lambda run: run["obstacle.disk.quaternion"].fill(0.0), "no orientation"
+    ),
+    "metric": (
+        lambda run: run.meta.update(metric_matrix=np.diag([1.0, -1, 1]).tolist()),
+        "metric_matrix is not symmetric positive definite",
+    ),
+    "no status": (lambda run: run.meta.pop("status"), "does not say 'status'"),
+    "no robot": (lambda run: run.meta.pop("robot"), "does not say 'robot'"),
+    "no name": (lambda run: run.meta["robot"].pop("name"), "not say 'robot.name'"),
+    "no units": (lambda run: run.meta["robot"].pop("units"), "not say 'robot.units'"),
+    "no tree": (
+        lambda run: run.meta["robot"].update(skeleton_parents=None),
+        "says nonsense at 'robot.skeleton_parents'",
+    ),
+    "no skeleton": (
+        lambda run: run.columns.update(skeleton=run["skeleton"][:, :0]),
+        "its column 'skeleton' has no number in a row",
+    ),
+    "no axes": (
+        lambda run: run.meta["tasks"]["tip"].pop("axes"), "not say 'tasks.tip.axes'"
+    ),
+    "shape": (
+        lambda run: run.meta["obstacles"]["disk"].update(parameters={}),
+        r"its obstacle 'disk' is no shape: sphere: needs radius; found {}",
+    ),
+    "size": (
+        lambda run: run.meta["obstacles"]["disk"]["parameters"].update(radius=[1]),
+        r"'disk' is no shape: sphere: needs radius; found {'radius': \[1\]}",
+    ),
+    "file": (
+        lambda run: run.meta["obstacles"]["disk"].update(
+            shape="Mesh", parameters={"file": 3}
+        ),
+        "'disk' is no shape: mesh: needs file, scale, convex; found {'file': 3}",
+    ),
+    "no size": (
+        lambda run: run.meta["obstacles"]["disk"].update(shape="Egg", radius=None),
+        "its obstacle 'disk' has neither a known shape nor a radius",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("which", CONTRADICTIONS)
+def test_logs_that_contradict_themselves(
+    which: str, run: Rollout, tmp_path: Path
+) -> None:
+    change, message = CONTRADICTIONS[which]
+    path = run.save(tmp_path / "log.npz")
+    log = Rollout.load(path)
+    change(log)
+    log.save(path)
+    with pytest.raises(LogError, match=message):
+        Rollout.load(path)
+    assert main(["plot", str(path)]) == 2
+
+
+def test_logs_that_say_little_are_drawn(run: Rollout, tmp_path: Path) -> None:
+    """Nothing of tasks, field, gain, metric; an obstacle of a shape of its own."""
+    path = run.save(tmp_path / "log.npz")
+    log = Rollout.load(path)
+    for entry in ("tasks", "field", "null_space_gain", "metric", "versions", "columns"):
+        del log.meta[entry]
+    log.meta["obstacles"]["disk"].update(shape="Egg", parameters={"yolk": 1})
+    log.save(path)
+    assert main(["plot", str(path), "--out", str(tmp_path)]) == 0
+    assert main(["export", str(path), "--html", str(tmp_path / "page.html")]) == 0
+    (axes, *_) = diagnostics_figure(Rollout.load(path)).axes
+    assert [line.get_label() for line in axes.lines] == ["the log has no task"]
+
+
+def test_what_is_lost_of_a_log_that_talks_nonsense(
+    run: Rollout, tmp_path: Path
+) -> None:
+    log = Rollout(run.columns, {**run.meta, "obstacles": []})
+    path = log.save(tmp_path / "log.npz")
+    path.write_bytes(path.read_bytes()[:-3000])
+    with pytest.raises(LogError, match="says nonsense at 'obstacles'"):
+        Rollout.salvage(path)
+
+
+def test_meta_nested_without_end(run: Rollout, tmp_path: Path) -> None:
+    arrays = {"meta": np.array("[" * 100_000), **run.columns}
+    path = tmp_path / "log.npz"
+    path.write_bytes(packed(arrays))
+    with pytest.raises(LogError, match="its entry 'meta' is not JSON"):
+        Rollout.load(path)

@@ -1,0 +1,56 @@
+"""A clip as a page would play it, read from what a recorder keeps; for tests."""
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.visualization.viewer import Recorder
+from hsp_control.visualization.viewer.commands import CLIP
+
+
+class Clip:
+    """The clip of a recorder: what each node does, at any time."""
+
+    def __init__(self, recorder: Recorder) -> None:
+        begin = recorder.command(CLIP, "begin")
+        assert begin is not None
+        self.start, self.end = begin["start"], begin["end"]
+        self._tracks: dict[tuple[str, str], tuple[np.ndarray, np.ndarray]] = {}
+        for track in begin["tracks"]:
+            times = begin["clocks"][track["clock"]]
+            values = np.reshape(track["values"], (len(times), -1)).astype(float)
+            self._tracks[track["path"], track["property"]] = times, values
+
+    def paths(self, below: str) -> set[str]:
+        """Return the nodes below a path that move."""
+        return {path for path, _ in self._tracks if path.startswith(below)}
+
+    def times(self, path: str, name: str) -> np.ndarray:
+        """Return a track's times."""
+        return self._tracks[path, name][0]
+
+    def values(self, path: str, name: str) -> np.ndarray:
+        """Return a track's rows."""
+        return self._tracks[path, name][1]
+
+    def value(self, path: str, name: str, time: float) -> np.ndarray:
+        """Return what a track says at a time, as the page's player would."""
+        times, values = self._tracks[path, name]
+        row = int(np.clip(np.searchsorted(times, time, "right") - 1, 0, len(times) - 1))
+        after = min(row + 1, len(times) - 1)
+        gap = times[after] - times[row]
+        fraction = float(np.clip((time - times[row]) / gap, 0, 1)) if gap else 0.0
+        here, there = values[row], values[after]
+        if name == "quaternion":
+            start, end = (pin.Quaternion(*x[[3, 0, 1, 2]]) for x in (here, there))
+            return np.array(start.slerp(fraction, end).coeffs())
+        if name == "visible":
+            return there if fraction >= 1.0 else here
+        return np.asarray(here + fraction * (there - here))
+
+    def pose(self, path: str, time: float) -> Any:
+        """Return a node's pose in its parent, shape (4, 4)."""
+        turn = pin.Quaternion(self.value(path, "quaternion", time)).normalized()
+        place = self.value(path, "position", time)
+        return pin.SE3(turn.matrix(), place).homogeneous

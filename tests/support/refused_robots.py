@@ -1,0 +1,14 @@
+"""The robots of example-robot-data that cannot be loaded, and what is said of each."""
+
+NO_MASS = "no mass moves with bravo_finger1_joint, bravo_finger2_joint, so that no acc"
+LATE_LEADER = "mimics '.*', which comes after it in the tree, .*; .*mimic=False"
+NO_LEADER = "'Left_index_q2' mimics 'index_q1', which is no moving joint; .*mimic=False"
+REFUSED = {
+    "bravo7_gripper": NO_MASS,
+    "falcon_bravo7_gripper": NO_MASS,
+    "bluevolta_bravo7_gripper": NO_MASS,
+    "alex_psyonic_hands": NO_LEADER,
+    "romeo": LATE_LEADER,
+    "talos_full": LATE_LEADER,
+    "talos_full_box": LATE_LEADER,
+}

@@ -1,0 +1,421 @@
+"""In a real browser: what the live view and an exported page draw, and how they act.
+
+Chromium without a window. Where there is none these tests are skipped, but not in CI.
+"""
+
+import io
+import itertools
+import os
+import re
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from PIL import Image, ImageSequence
+from places import ROOT
+
+from hsp_control import Robot, Rollout, load_experiment
+from hsp_control.cli import main
+from hsp_control.common.resources import bundled_configs
+from hsp_control.visualization.viewer import Viewer
+from hsp_control.visualization.viewer.export import FilmStyle, export_film, export_html
+from hsp_control.visualization.viewer.export.chromium import (
+    find_browser,
+    headless_browser,
+    open_page,
+)
+from hsp_control.visualization.viewer.export.encoding import find_ffmpeg
+from hsp_control.visualization.viewer.export.tracks import ANGLE_BOUND, POSITION_BOUND
+
+sync_api = pytest.importorskip("playwright.sync_api")
+
+SCREENSHOTS = ROOT / "out" / "screenshots"
+SIZE = (1000, 640)
+# As configured, a run takes minutes without compiled kernels.
+COARSE = (
+    "simulation.control_period=null",
+    "simulation.integrator={type: rk4, step: 0.01}",
+    "simulation.log_period=0.02",
+)
+PLANAR = "paper/4_moving_obstacle"
+HARMLESS = "GPU stall due to ReadPixels"  # a remark of the software renderer
+
+# What a page shows once it has drawn: without the two frames, a picture may be stale.
+SETTLE = """() => { viewer.render(); return new Promise((drawn) =>
+  requestAnimationFrame(() => requestAnimationFrame(drawn))); }"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    if find_browser() is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("CI needs Chromium: apt-get install chromium")
+        pytest.skip("there is no Chromium on the path")
+    with headless_browser() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def planar() -> Rollout:
+    return load_experiment(PLANAR, "simulation.duration=4").run()
+
+
+@pytest.fixture(scope="module")
+def planar_page(planar: Rollout, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return export_html(planar, tmp_path_factory.mktemp("page") / "planar.html")
+
+
+class Watched:
+    """A page, and all that went wrong on it."""
+
+    def __init__(self, browser: Any, address: str, size: tuple[int, int]) -> None:
+        self.page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        self.wrong: list[str] = []
+        self.requests: list[str] = []
+        self.page.on("console", self._on_console)
+        self.page.on("pageerror", lambda error: self.wrong.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(address)
+
+    def _on_console(self, message: Any) -> None:
+        if message.type in {"error", "warning"} and HARMLESS not in message.text:
+            self.wrong.append(message.text)
+
+    def until(self, expression: str, timeout: float = 20.0) -> None:
+        """Wait until an expression is true; playwright's own way needs eval."""
+        deadline = time.monotonic() + timeout
+        while not self.page.evaluate(expression):
+            assert time.monotonic() < deadline, f"never: {expression}"
+            time.sleep(0.02)
+
+    def picture(self, selector: str = "#meshcat-pane") -> np.ndarray:
+        """What is seen of an element now, shape (height, width, 3)."""
+        self.page.evaluate(SETTLE)
+        data = self.page.locator(selector).screenshot()
+        return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
+
+    def matrix(self, path: str) -> np.ndarray:
+        """Where a node of the scene is in Pinocchio's world."""
+        elements = self.page.evaluate(
+            """(path) => {
+              const root = node("").matrixWorld.clone().invert();
+              const here = node(path);
+              here.updateWorldMatrix(true, false);
+              return root.multiply(here.matrixWorld).toArray();
+            }""",
+            path,
+        )
+        return np.reshape(elements, (4, 4)).T
+
+
+@pytest.fixture
+def watch(browser: Any) -> Iterator[Callable[..., Watched]]:
+    opened: list[Watched] = []
+
+    def open_watched(
+        address: str | Path, size: tuple[int, int] = SIZE, at: str = ""
+    ) -> Watched:
+        if isinstance(address, Path):
+            address = address.resolve().as_uri() + at
+        opened.append(Watched(browser, address, size))
+        return opened[-1]
+
+    yield open_watched
+    for watched in opened:
+        watched.page.close()
+    for watched in opened:
+        assert watched.wrong == []
+
+
+def exported(watch: Callable[..., Watched], page: Path, **about: Any) -> Watched:
+    watched = watch(page, **about)
+    watched.page.wait_for_selector("body[data-ready]", state="attached")
+    return watched
+
+
+def seek(watched: Watched, moment: float) -> None:
+    watched.page.evaluate("(t) => { player.pause(); player.seek(t); }", moment)
+
+
+def cursors(watched: Watched) -> list[float]:
+    """Where the cursors stand in the plots, as the times below them."""
+    return watched.page.evaluate(
+        """() => [...document.querySelectorAll("#side svg")].map((picture) => {
+          const cursor = picture.querySelector(".cursor").transform.baseVal;
+          return cursor.consolidate().matrix.e;
+        })"""
+    )
+
+
+# -- an exported page -----------------------------------------------------------------
+
+
+def test_the_arm_is_drawn_and_moves(
+    planar: Rollout, planar_page: Path, watch: Callable[..., Watched]
+) -> None:
+    watched = exported(watch, planar_page, at="#t=0")
+    first = watched.picture()
+    seek(watched, 1.0)
+    second = watched.picture()
+    again = watched.picture()
+    seek(watched, 0.0)
+    back = watched.picture()
+    assert len(np.unique(first.reshape(-1, 3), axis=0)) > 500  # light and shade
+    dark = first.sum(axis=2) < 200  # the arm's joints
+    assert 500 < dark.sum() < 0.1 * dark.size
+    moved = np.abs(second - first).max(axis=2) > 40
+    assert moved.sum() > 3000
+    np.testing.assert_array_equal(second, again)
+    np.testing.assert_array_equal(first, back)
+    assert watched.requests == [planar_page.resolve().as_uri()]
+
+
+def test_every_joint_is_where_pinocchio_has_it(
+    tmp_path: Path, watch: Callable[..., Watched]
+) -> None:
+    rollout = load_experiment("panda_obstacle", *COARSE).run()
+    page = export_html(rollout, tmp_path / "panda.html")
+    assert page.stat().st_size < 2e6
+    watched = exported(watch, page, at="#t=0")
+    robot = Robot.load("panda")
+    data = robot.model.createData()
+    for row in (0, 37, 250, len(rollout) - 1):
+        seek(watched, rollout.t[row])
+        pin.forwardKinematics(robot.model, data, rollout.q[row])
+        for joint, name in enumerate(robot.model.names[1:], start=1):
+            shown = pin.SE3(watched.matrix(f"/robot/{name}"))
+            off = data.oMi[joint].actInv(shown)
+            assert np.linalg.norm(off.translation) <= POSITION_BOUND * 1.01
+            turned = np.linalg.norm(pin.log3(off.rotation))
+            assert turned <= ANGLE_BOUND * 1.01
+    meshes = watched.page.evaluate(
+        """() => {
+          const seen = [];
+          node("/robot").traverse(({geometry}) => {
+            const {position, normal} = geometry?.attributes ?? {};
+            const corners = geometry?.index?.count;
+            if (position) seen.push([position.count, normal.count, corners]);
+          });
+          return seen;
+        }"""
+    )
+    assert len(meshes) > 11
+    assert all(vertices == normals for vertices, normals, _ in meshes)
+    assert sum(corners for *_, corners in meshes) / 3 > 130_000  # all there are
+
+
+def test_timeline_plots_and_robot_move_together(
+    planar: Rollout, planar_page: Path, watch: Callable[..., Watched]
+) -> None:
+    watched = exported(watch, planar_page, at="#t=2")
+    page = watched.page
+    assert page.evaluate("[player.time, player.playing]") == [2.0, False]
+    left, right = 50.0, page.evaluate(
+        "document.querySelector('#side svg').clientWidth - 12"
+    )  # fmt: skip
+
+    def expect(moment: float) -> None:
+        at = left + moment / 4.0 * (right - left)
+        np.testing.assert_allclose(cursors(watched), at, atol=0.02)
+        assert page.locator(".player .clock").inner_text().startswith(f"{moment:.2f} /")
+        assert float(page.locator(".timeline").input_value()) == pytest.approx(moment)
+
+    assert len(cursors(watched)) == 7
+    expect(2.0)
+    seek(watched, 3.25)
+    expect(3.25)
+    shown = page.locator("#side section:nth-of-type(4) output").all_inner_texts()
+    row = int(np.argmin(np.abs(planar.t - 3.25)))
+    angles = np.cumsum(planar["joint_positions"][row])
+    numbers = [float(text.replace("−", "-")) for text in shown]
+    np.testing.assert_allclose(numbers, angles, atol=0.02)
+
+    # To press in a plot goes there, to drag follows.
+    box = page.locator("#side svg").nth(1).bounding_box()
+    page.mouse.move(box["x"] + left + 0.25 * (right - left), box["y"] + 40)
+    page.mouse.down()
+    assert page.evaluate("player.time") == pytest.approx(1.0, abs=0.02)
+    page.mouse.move(box["x"] + left + 0.5 * (right - left), box["y"] + 45)
+    page.mouse.up()
+    released = page.evaluate("player.time")
+    assert released == pytest.approx(2.0, abs=0.02)
+    page.mouse.move(box["x"] + left, box["y"] + 40)
+    assert page.evaluate("player.time") == released
+
+    # Playing moves all of it.
+    page.keyboard.press("Space")
+    watched.until("player.time > 2.2")
+    page.keyboard.press("Space")
+    expect(page.evaluate("player.time"))
+    page.evaluate("location.hash = '#t=0.5'")
+    watched.until("player.time === 0.5")
+    expect(0.5)
+
+
+def test_it_plays_by_itself_and_to_its_end(
+    planar_page: Path, watch: Callable[..., Watched]
+) -> None:
+    watched = exported(watch, planar_page)
+    assert watched.page.evaluate("player.playing")
+    watched.page.evaluate("player.setSpeed(8)")
+    watched.until("!player.playing")
+    assert watched.page.evaluate("player.time === player.end")
+
+
+def test_the_plots_can_be_put_away_and_narrow_screens_stack(
+    planar_page: Path, watch: Callable[..., Watched]
+) -> None:
+    watched = exported(watch, planar_page, at="#t=1")
+    page = watched.page
+    width = page.locator("#meshcat-pane canvas").bounding_box()["width"]
+    page.keyboard.press("p")
+    watched.until(f"document.querySelector('canvas').clientWidth === {SIZE[0]}")
+    assert width < SIZE[0]
+    assert not page.locator("#side").is_visible()
+    page.locator(".player .side").click()
+    watched.until(f"document.querySelector('canvas').clientWidth === {width}")
+
+    page.set_viewport_size({"width": 390, "height": 800})
+    watched.until("document.querySelector('canvas').clientWidth === 390")
+    stage, side = (page.locator(x).bounding_box() for x in ("#stage", "#side"))
+    assert side["y"] == pytest.approx(stage["y"] + stage["height"], abs=1)
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    image = watched.picture()
+    arm = np.argwhere(image.sum(axis=2) < 200)
+    assert arm.size
+    assert (arm.min(axis=0) > 2).all()  # all of it is in sight
+
+
+# -- the live view --------------------------------------------------------------------
+
+
+def test_the_live_view_draws_and_plays(
+    planar: Rollout, watch: Callable[..., Watched]
+) -> None:
+    with Viewer(Robot.load("planar3r")) as viewer:
+        viewer.draw_scene(planar)
+        watched = watch(viewer.url)
+        assert viewer.wait_for_browser(20.0)
+        first = watched.picture()
+        assert (first.sum(axis=2) < 200).sum() > 500
+        viewer.play(planar, speed=2.0)
+        watched.until("player.playing && player.time > 0.5")
+        watched.page.keyboard.press("Space")
+        assert not watched.page.evaluate("player.playing")
+        second = watched.picture()
+        assert (np.abs(second - first).max(axis=2) > 40).sum() > 3000
+        moment = watched.page.evaluate("player.time")
+        assert f"{moment:.2f} / 4.00 s" in watched.page.locator(".clock").inner_text()
+        robot = viewer.robot
+        row = int(np.argmin(np.abs(planar.t - 1.5)))
+        seek(watched, planar.t[row])
+        state = robot.state(0.0, planar.q[row], planar.v[row])
+        for joint, name in enumerate(robot.model.names[1:], start=1):
+            shown = watched.matrix(f"/robot/{name}")
+            expected = state.data.oMi[joint].homogeneous
+            np.testing.assert_allclose(shown, expected, atol=1e-5)
+        assert all(
+            request.startswith(("http://127.0.0.1", "ws://127.0.0.1", "data:"))
+            for request in watched.requests
+        )
+        watched.page.close()
+
+
+# -- films ----------------------------------------------------------------------------
+
+
+def test_a_film_shows_its_moments_and_is_the_same_again(
+    planar: Rollout, browser: Any, tmp_path: Path
+) -> None:
+    del browser  # there is one
+    style = FilmStyle(size=(320, 240), frame_rate=5.0, speed=2.0, plots=False)
+    done: list[float] = []
+    first, again = (
+        export_film(planar, tmp_path / name, style=style, progress=done.append)
+        for name in ("a.gif", "b.gif")
+    )
+    assert first.read_bytes() == again.read_bytes()
+    assert done == [k / 11 for k in range(1, 12)] * 2
+    with Image.open(first) as film:
+        frames = [np.asarray(f.convert("RGB")) for f in ImageSequence.Iterator(film)]
+        assert film.size == (320, 240)
+        assert film.info["duration"] == 200
+        assert film.info["loop"] == 0
+    assert len(frames) == 11
+    for one, two in itertools.pairwise(frames):
+        assert (np.abs(one.astype(int) - two).max(axis=2) > 40).sum() > 200
+    assert {file.name for file in tmp_path.iterdir()} == {"a.gif", "b.gif"}
+
+
+def test_films_from_the_command_line(
+    planar: Rollout, browser: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    del browser
+    log = planar.save(tmp_path / "run.npz")
+    films = [tmp_path / "new" / f"film.{kind}" for kind in ("mp4", "webp")]
+    wanted = [f"--{film.suffix[1:]}={film}" for film in films]
+    style = ["--size=301x200", "--fps=4", "--speed=4"]
+    assert main(["export", str(log), *wanted, *style]) == 0
+    assert [line.partition(": ")[2] for line in capsys.readouterr().out.split("\n")][
+        :-1
+    ] == [str(film) for film in films]
+    told = subprocess.run(
+        [find_ffmpeg(), "-hide_banner", "-i", str(films[0]), "-f", "null", "-"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stderr
+    assert "Video: h264" in told
+    assert "302x200" in told  # H.264 has even sizes only
+    assert "Duration: 00:00:01.25" in told
+    with Image.open(films[1]) as film:
+        assert (film.format, film.size) == ("WEBP", (301, 200))
+        assert film.n_frames == 5
+
+
+def test_the_document_s_film(
+    planar: Rollout, browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    del browser
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+    snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)[1]
+    columns = {name: column[:101] for name, column in planar.columns.items()}
+    exec(snippet, {"rollout": Rollout(columns, planar.meta)})
+    with Image.open(tmp_path / "out" / "film.webp") as film:
+        assert film.n_frames == 6
+
+
+# -- every configuration --------------------------------------------------------------
+
+
+# A robot's motion is run coarsely and not to its end: what it does is tested elsewhere.
+QUICK = (*COARSE, "simulation.duration=4")
+SHOWN = {"paper": (), "whole_body": ("simulation.duration=0.6",)}
+
+
+@pytest.mark.parametrize("name", bundled_configs())
+def test_every_configuration_has_its_picture(
+    name: str, browser: Any, tmp_path: Path
+) -> None:
+    overrides = SHOWN.get(name.partition("/")[0], QUICK)
+    rollout = load_experiment(name, *overrides).run()
+    file = export_html(rollout, tmp_path / "page.html")
+    page = open_page(browser, file, (1280, 800))
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.evaluate("(t) => { player.pause(); player.seek(t); }", 0.6 * rollout.t[-1])
+    page.evaluate(SETTLE)
+    picture = SCREENSHOTS / f"{name.replace('/', '_')}.png"
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=picture)
+    page.close()
+    assert wrong == []
+    with Image.open(picture) as image:
+        pixels = np.asarray(image.convert("RGB"))
+    assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 1000

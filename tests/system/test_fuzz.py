@@ -1,0 +1,152 @@
+"""Small samples of the campaigns; ``make fuzz`` runs them in full (docs/fuzz.md)."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+
+import pytest
+from campaigns import document, faults, random_states
+from campaigns.cases import KINDS, count_cases
+from campaigns.results import keep, kept
+from campaigns.soak import PROCESS_GROWTH, PYTHON_GROWTH, soak
+from campaigns.worker import Worker
+
+from hsp_control.common.exceptions import LogError
+from hsp_control.common.resources import bundled_robots
+from hsp_control.simulation import Rollout
+
+SEED = 2
+"""Not the campaigns' own: these are other cases."""
+
+
+@pytest.mark.parametrize("robot", bundled_robots())
+def test_random_states(robot: str) -> None:
+    for tally in random_states.bundled(robot, SEED, 2000):
+        assert tally.good, tally.examples
+    assert tally.steps == 2000
+    assert tally.limited > 0
+    assert tally.damped > 0
+    assert tally.status[2] > 0  # limits were met
+
+
+@pytest.mark.parametrize(("kind", "cases"), [("yaml", 30), ("urdf", 5), ("logs", 5)])
+def test_mutated_files(kind: str, cases: int) -> None:
+    count = count_cases(KINDS[kind], SEED, cases)
+    assert count.good, "\n".join(count.examples)
+    assert count.kinds["refused"] > 0
+
+
+def test_crashes_and_hangs_are_noticed() -> None:
+    """The harness sees what it looks for, and goes on after it."""
+    with Worker("campaigns.crash_case:case", 1.0) as worker:
+        assert worker.ask(0, 3).kind == "fine"  # the first has a minute more
+        kinds = [worker.ask(0, index).kind for index in (1, 0, 2, 3)]
+    assert kinds == ["hang", "crash", "crash", "fine"]
+
+
+def test_memory_stays_flat() -> None:
+    """Four seconds at 1 kHz, after a warm-up of one."""
+    found = soak(5.0, 4)
+    python, process = found.growth
+    assert found.steps == 5000
+    assert python < PYTHON_GROWTH / 10
+    assert process < PROCESS_GROWTH
+    assert found.worst_error < 1e-2
+
+
+# --- faults --------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def run() -> Rollout:
+    return faults.short_run(0.3)
+
+
+@pytest.fixture(scope="module")
+def log(run: Rollout, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return run.save(tmp_path_factory.mktemp("log") / "whole.npz")
+
+
+def sample(count: int, once: Callable[[Random, Path], faults.Faults]) -> set[str]:
+    """Try faults, and return what came of them, all good."""
+    outcomes: set[str] = set()
+    for k in range(count):
+        with tempfile.TemporaryDirectory() as folder:
+            found = once(Random(k), Path(folder))
+        assert found.good, found.wrong
+        outcomes |= set(found.outcomes)
+    return outcomes
+
+
+def test_a_disk_that_fills(run: Rollout, log: Path) -> None:
+    size = log.stat().st_size
+    outcomes = sample(30, lambda r, f: faults.full_disk(run, size, r, f))
+    assert len(outcomes) == 2
+
+
+def test_a_log_cut_anywhere(run: Rollout, log: Path, tmp_path: Path) -> None:
+    data = log.read_bytes()
+    ends = faults.whole_before(data, tmp_path)
+    outcomes = sample(
+        150, lambda r, f: faults.cut_log(run, data, ends, r.randrange(len(data)), f)
+    )
+    assert len(outcomes) == 2
+
+
+def test_ctrl_c_at_any_moment(log: Path) -> None:
+    sample(3, lambda r, f: faults.interrupted(r, f, log, 6.0))
+
+
+def test_salvage_names_what_is_lost(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from hsp_control.cli import main
+
+    data, cut = log.read_bytes(), tmp_path / "run.cut.npz"
+    cut.write_bytes(data[: 2 * len(data) // 3])
+    with pytest.raises(LogError, match="its motion is whole: hsp salvage"):
+        Rollout.load(cut)
+    assert main(["salvage", str(cut)]) == 0
+    printed = capsys.readouterr().out
+    salvaged = Rollout.load(tmp_path / "run-salvaged.npz")
+    assert salvaged.meta["lost"]
+    assert f"lost: {', '.join(salvaged.meta['lost'])}" in printed
+    assert set(salvaged.columns) | set(salvaged.meta["lost"]) == set(
+        Rollout.load(log).columns
+    )
+    cut.write_bytes(data[:100])
+    assert main(["salvage", str(cut)]) == 2
+    assert "nothing to salvage: it is cut in 'meta'" in capsys.readouterr().err
+
+
+def test_a_run_that_cannot_be_saved_is_saved_elsewhere(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from hsp_control.cli import main
+
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / ".2_rest.npz.part").symlink_to("/dev/full")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    short = ["--set", "simulation.duration=0.02"]
+    command = ["run", "paper/2_rest", "--out", str(tmp_path / "out"), *short]
+    assert main(command) == 2
+    captured = capsys.readouterr()
+    assert "No space left on device; it is in another place" in captured.err
+    (elsewhere,) = tmp_path.glob("hsp-*/2_rest.npz")
+    assert f"Log: {elsewhere}" in captured.out
+    assert len(Rollout.load(elsewhere)) == 3
+
+
+def test_counts_are_kept_as_they_were(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside what is added to them; the document's line on the soak was lost once."""
+    monkeypatch.chdir(tmp_path)
+    read = {"python": [100_000, 120_200], "process": [1_000_000, 1_080_000]}
+    counts = read | {"steps": 600_000, "wanted": 600_000, "worst_error": 1.4e-4}
+    keep("soak", counts)
+    assert counts.items() <= kept()["soak"].items()
+    assert "grew by 20.2 kB, the process by 0.08 MB" in document.counts(kept())

@@ -1,0 +1,269 @@
+"""A loop and a robot in two processes, with a bad line between them, and either killed.
+
+Nothing here asserts on a clock: machines that run tests are late. What must hold is
+that all ends, in the safe stop, with whole logs, and that what was injected was seen.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control import Rollout
+from hsp_control.cli import main
+from hsp_control.cli.robot_process import RobotProcess
+from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.live import Faults, Phase, Tolerance, run_loop
+
+PATIENT = {"missing": 1000, "age": 5.0, "watchdog": 1000}
+"""For a machine on which other tests run: what is shown here is not punctuality."""
+CONFIG: dict[str, Any] = {
+    "robot": {"name": "panda"},
+    "tasks": {
+        "tip": {
+            "type": "frame_position",
+            "trajectory": {
+                "type": "circle",
+                "origin": "start",
+                "center": [0.0, 0.0, 0.1],
+                "radius": 0.1,
+                "angular_rate": 3.0,
+                "normal": [1, 0, 0],
+            },
+            "gains": {"natural_frequency": 10.0},
+            "blend": 0.3,
+        }
+    },
+    "simulation": {
+        "duration": 1.0,
+        "control_period": 0.001,
+        "integrator": {"type": "semi_implicit_euler", "step": 0.001},
+    },
+    "live": PATIENT,
+}
+COUNTED = {"late": "stale", "duplicated": "duplicated", "corrupted": "corrupted"}
+
+
+def tolerance(**changes: Any) -> Tolerance:
+    return Tolerance(**{"missing": 1000, "age": 5.0, "start": 60.0} | changes)
+
+
+def assert_stopped(log: Rollout) -> None:
+    """The robot's own log: true states, to the end of its safe stop."""
+    phases = log["live.phase"]
+    # No damping where the loop had brought it to rest before it let go.
+    assert {Phase.RUNNING, Phase.HOLDING} <= set(phases)
+    assert (np.diff(phases) >= 0).all()
+    assert phases[-1] == Phase.HOLDING
+    assert np.abs(log.v[-1]).max() < 0.01
+    held = log.q[phases == Phase.HOLDING]
+    assert np.abs(held - held[-1]).max() < 0.01
+    assert_whole(log)
+
+
+def assert_whole(log: Rollout) -> None:
+    assert (np.diff(log.t) > 0.0).all()
+    for name in ("q", "v", "tau"):
+        assert np.isfinite(log[name]).all()
+
+
+def gone(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
+def wait_for(what: Any, seconds: float = 60.0) -> bool:
+    end = monotonic() + seconds
+    while not what():
+        if monotonic() > end:
+            return False
+        sleep(0.02)
+    return True
+
+
+def test_a_bad_line_is_seen_counted_and_survived(tmp_path: Path) -> None:
+    experiment = hsp.load_experiment(CONFIG)
+    logs = tmp_path / "loop.journal", tmp_path / "robot.journal"
+    faults = Faults(late=0.03, lost=0.03, duplicated=0.03, corrupted=0.03, seed=1)
+    with RobotProcess(experiment, faults=faults, log=logs[1]) as robot:
+        report = run_loop(
+            experiment.controller,
+            robot.hardware,
+            duration=1.0,
+            tolerance=tolerance(),
+            log=logs[0],
+        )
+        told = robot.wait(60.0)
+        pid = robot.process.pid if robot.process else 0
+    assert gone(pid)
+    assert report.ended == "completed", report.reason
+    assert (report.phase, report.silent) == (Phase.HOLDING, False)
+    assert told is not None
+    assert told["reason"] == "the loop said its end"
+    link = robot.hardware.link
+    ends = (link.counts, link.lost, told["injected"]), (
+        told["link"], told["link"]["lost"], link.injected
+    )  # fmt: skip
+    for counts, lost, injected in ends:
+        assert min(injected.values()) > 0
+        assert lost == injected["lost"]
+        assert counts["foreign"] == 0
+        for fault, seen in COUNTED.items():
+            if fault == "late":  # one that nothing overtook is new
+                assert injected[fault] - 3 <= counts[seen] <= injected[fault]
+            else:
+                assert counts[seen] == injected[fault]
+    # The robot did what it was for, over such a line.
+    log = Rollout.load(logs[0])
+    assert log.status == "completed"
+    assert_whole(log)
+    assert_stopped(Rollout.load(logs[1]))
+    assert np.linalg.norm(log["task.tip.error"][log.t > 0.5], axis=1)[:20].max() < 0.02
+
+
+def test_the_robot_s_process_is_killed(tmp_path: Path) -> None:
+    experiment = hsp.load_experiment(CONFIG)
+    logs = tmp_path / "loop.journal", tmp_path / "robot.journal"
+    with RobotProcess(experiment, log=logs[1]) as robot:
+        killed = []
+
+        def kill(t: float) -> None:
+            if t >= 0.3 and not killed:
+                killed.append(t)
+                robot.kill()
+
+        report = run_loop(
+            experiment.controller,
+            robot.hardware,
+            duration=60.0,
+            tolerance=tolerance(missing=300),
+            log=logs[0],
+            on_period=kill,
+        )
+        assert robot.wait(10.0) is None
+    assert report.ended == "fault"
+    assert report.reason == "no new state for 301 periods"
+    assert report.silent
+    log, truth = (Rollout.load(path) for path in logs)
+    assert log.status == "stopped"
+    assert_whole(log)
+    # In its last rows the model reckons; the robot's own log ends where it was killed.
+    assert set(log["live.measured"]) == {0.0, 1.0}
+    assert truth.status == "interrupted"
+    assert_whole(truth)
+    assert truth.t[-1] >= killed[0] - 0.02
+    assert set(truth["live.phase"]) == {Phase.RUNNING}
+
+
+def hsp_live(tmp_path: Path, *options: str) -> "subprocess.Popen[str]":
+    path = tmp_path / "arm.yaml"
+    path.write_text(json.dumps(CONFIG))
+    command = [sys.executable, "-m", "hsp_control", "live", str(path), *options]
+    return subprocess.Popen(
+        [*command, "--out", str(tmp_path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def rows(path: Path) -> int:
+    try:
+        return len(Rollout.load(path))
+    except hsp.HspControlError:  # not begun yet
+        return 0
+
+
+def test_the_loop_s_process_is_killed(tmp_path: Path) -> None:
+    process = hsp_live(tmp_path, "--duration", "60", "--kill", "controller=0.3")
+    process.communicate(timeout=200)
+    assert process.returncode == -signal.SIGKILL
+    # The robot is alone now: it stops, writes its log, and its process ends.
+    truth_path = tmp_path / "arm-robot.journal"
+
+    def ended() -> bool:
+        return Rollout.load(truth_path).status != "interrupted"
+
+    assert wait_for(ended)
+    truth, log = Rollout.load(truth_path), Rollout.load(tmp_path / "arm-live.journal")
+    assert truth.status == "stopped"
+    assert truth.meta["message"] == "the process that started the robot is gone"
+    assert_stopped(truth)
+    assert Phase.DAMPING in truth["live.phase"]  # nobody else braked it
+    assert log.status == "interrupted"
+    assert_whole(log)
+    assert log.t[-1] == pytest.approx(0.3, abs=0.02)
+    assert set(log["live.phase"]) == {Phase.RUNNING}
+
+
+def _runs_or_ended(process: "subprocess.Popen[str]", journal: Path) -> bool:
+    return rows(journal) > 10 or process.poll() is not None
+
+
+def test_ctrl_c_is_the_operator_s_stop(tmp_path: Path) -> None:
+    for attempt in range(4):  # where the machine stands still, the arm is stopped first
+        tmp_path = tmp_path / str(attempt)
+        tmp_path.mkdir()
+        process = hsp_live(tmp_path, "--duration", "inf")
+        journal = tmp_path / "arm-live.journal"
+        assert wait_for(partial(_runs_or_ended, process, journal), 200.0)
+        process.send_signal(signal.SIGINT)
+        out, error = process.communicate(timeout=60)
+        if process.returncode == 0:
+            break
+    assert process.returncode == 0, error  # what else should end it
+    assert "stopped by the operator (SIGINT)" in out
+    assert "The robot: the loop said its end; holding" in out
+    log = Rollout.load(tmp_path / "arm-live.npz")
+    assert log.status == "interrupted"
+    assert log["live.phase"][-1] == Phase.HOLDING
+    assert log.meta["link"]["accepted"] > 0
+    assert_stopped(Rollout.load(tmp_path / "arm-robot.npz"))
+    assert not list(tmp_path.glob("*.journal"))
+
+
+def test_a_robot_that_cannot_start_says_so(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    experiment = hsp.load_experiment(CONFIG)
+    robot = RobotProcess(experiment, log=tmp_path / "none" / "file")
+    (tmp_path / "none").write_text("")
+    with pytest.raises(HardwareError, match="the simulated robot did not start"):
+        robot.start()
+    assert "hsp: the simulated robot: " in capfd.readouterr().err
+    robot.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--faults", "lots=1"], "no fault 'lots'"),
+        (["--duration", "-1"], "--duration -1; must be positive"),
+        (["--kill", "me=1"], "--kill 'me=1'; needs robot=SECONDS or controller="),
+        (["--set", "live.missing=-1"], "live.missing"),
+    ],
+)
+def test_options_that_are_none(
+    options: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["live", "iiwa_null_space", *options]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_floating_base_is_refused_before_anything_starts() -> None:
+    robot = {"name": "panda", "root": "free_flyer"}
+    experiment = hsp.load_experiment(CONFIG | {"robot": robot, "base": "driven"})
+    with pytest.raises(LiveError, match="floating base"):
+        RobotProcess(experiment)

@@ -1,0 +1,404 @@
+"""The page's player in a real browser: what it shows at a time, and who steers it.
+
+Chromium without a window; where there is none these tests are skipped, but not in CI.
+"""
+
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from hsp_control import Robot
+from hsp_control.visualization.viewer import Viewer, threejs
+from hsp_control.visualization.viewer.clip import (
+    Clip,
+    Track,
+    extend_clip,
+    no_clip,
+    set_clip,
+)
+from hsp_control.visualization.viewer.commands import (
+    extend_trail,
+    set_object,
+    set_property,
+    set_trail,
+)
+from hsp_control.visualization.viewer.mesh_files import collada_object
+
+sync_api = pytest.importorskip("playwright.sync_api")
+
+OPTIONS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+HARMLESS = "GPU stall due to ReadPixels"  # a remark of the software renderer
+JOINT, TRAIL = "/robot/joint1", "/paths/tip/actual"
+TIMES = np.linspace(1.0, 3.0, 21)
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    found = shutil.which("chromium") or shutil.which("google-chrome")
+    if found is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("CI needs Chromium: apt-get install chromium")
+        pytest.skip("there is no Chromium on the path")
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=found, args=OPTIONS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def viewer() -> Iterator[Viewer]:
+    with Viewer(Robot.load("planar3r")) as viewer:
+        yield viewer
+
+
+@pytest.fixture(scope="module")
+def opened(chromium: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
+    page = chromium.new_page(viewport={"width": 900, "height": 600})
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on(
+        "console",
+        lambda said: (
+            wrong.append(said.text)
+            if said.type in {"error", "warning"} and HARMLESS not in said.text
+            else None
+        ),
+    )
+    page.goto(viewer.url)
+    assert viewer.wait_for_browser(60.0)
+    yield page, wrong
+    page.close()
+
+
+@pytest.fixture
+def page(opened: tuple[Any, list[str]], viewer: Viewer) -> Iterator[Any]:
+    page, wrong = opened
+    tell(viewer, [*trail(), *set_clip(clip())])
+    yield page
+    assert wrong == []
+
+
+def turns(times: np.ndarray) -> np.ndarray:
+    half = 0.4 * times
+    return np.column_stack([0 * half, 0 * half, np.sin(half), np.cos(half)])
+
+
+def clip(stop: int = 21, horizon: float | None = None) -> Clip:
+    times = TIMES[:stop]
+    rings = np.arange(stop, dtype=float)[:, None]
+    scale = np.column_stack([times, 0.0 * times, 1.0 + 0.0 * times])
+    tracks = [
+        Track(JOINT, "quaternion", times, turns(times)),
+        Track(JOINT, "position", times, np.outer(times, [1.0, 2.0, 3.0])),
+        Track(JOINT, "scale", times[::4], scale[::4]),
+        Track(f"{JOINT}/link1", "visible", times, (times < 2.0).astype(float)[:, None]),
+        Track(TRAIL, "length", times, rings),
+        Track("/nobody/knows", "position", times, np.zeros((stop, 3))),
+    ]
+    return Clip(1.0, float(times[-1]), tracks, horizon)
+
+
+def trail() -> list[Any]:
+    points = np.column_stack([np.cos(TIMES), np.sin(TIMES), 0 * TIMES])
+    return [set_trail(TRAIL, points, 0.02, 0x0072B2)]
+
+
+def tell(viewer: Viewer, commands: list[Any]) -> None:
+    viewer.transport.send(commands)
+    assert viewer.wait_for_browser(20.0)
+
+
+def player(page: Any, name: str) -> Any:
+    return page.evaluate(f"player.{name}")
+
+
+def until(page: Any, expression: str, timeout: float = 20.0) -> None:
+    deadline = time.monotonic() + timeout
+    while not page.evaluate(expression):
+        assert time.monotonic() < deadline, f"never: {expression}"
+        time.sleep(0.02)
+
+
+def thing(page: Any, name: str) -> Any:
+    return page.evaluate(f"node('{JOINT}').{name}.toArray()")
+
+
+def test_a_time_is_shown_exactly(page: Any) -> None:
+    for moment in (1.0, 1.234, 2.5, 3.0):
+        page.evaluate("(t) => player.seek(t)", moment)
+        angle = np.array(thing(page, "quaternion"))
+        expected = turns(np.array([moment]))[0]
+        assert abs(angle @ expected) == pytest.approx(1.0, abs=1e-7)
+        place = thing(page, "position")
+        np.testing.assert_allclose(place, np.outer(moment, [1, 2, 3])[0], atol=1e-6)
+        size = thing(page, "scale")
+        assert size[0] == pytest.approx(moment, abs=1e-6)
+        assert 0.0 < size[1] < 1e-6  # none, but not without an inverse
+        rings = page.evaluate(
+            f"node('{TRAIL}').children[0].geometry.drawRange.count / 48"
+        )
+        assert rings == int((moment - 1.0) * 10.0 + 1e-6)
+    page.evaluate("player.seek(-5)")
+    assert player(page, "time") == 1.0
+    page.evaluate("player.seek(50)")
+    assert player(page, "time") == 3.0
+    assert page.evaluate("viewer.scene_tree.children.nobody === undefined")
+
+
+def test_between_keys_the_turn_is_on_the_sphere(page: Any, viewer: Viewer) -> None:
+    ends = np.array([[0, 0, 0, 1.0], [0, 0, -np.sin(1.0), -np.cos(1.0)]])
+    track = Track(JOINT, "quaternion", np.array([0.0, 1.0]), ends)
+    tell(viewer, set_clip(Clip(0.0, 1.0, [track])))
+    page.evaluate("player.seek(0.3)")
+    start, end = (pin.Quaternion(*q[[3, 0, 1, 2]]) for q in ends)
+    expected = start.slerp(0.3, end).coeffs()
+    assert abs(np.array(thing(page, "quaternion")) @ expected) == pytest.approx(1.0)
+
+
+def test_a_jump_leaves_the_users_switch_alone(page: Any, viewer: Viewer) -> None:
+    inner = f"node('{JOINT}/link1').children[0].visible"
+    for moment, seen in ((1.0, True), (1.99, True), (2.0, False), (3.0, False)):
+        page.evaluate("(t) => player.seek(t)", moment)
+        assert page.evaluate(inner) is seen
+    tell(viewer, [set_property(JOINT, "visible", False)])
+    page.evaluate("player.seek(1)")
+    assert page.evaluate(f"node('{JOINT}').visible") is False
+    tell(viewer, [set_property(JOINT, "visible", True)])
+
+
+def test_it_is_steered_from_the_keyboard(page: Any) -> None:
+    page.keyboard.press("End")
+    assert player(page, "time") == 3.0
+    page.keyboard.press("ArrowLeft")
+    assert player(page, "time") == pytest.approx(3.0 - 1 / 30)
+    page.keyboard.press("Shift+ArrowLeft")
+    assert player(page, "time") == pytest.approx(2.0 - 1 / 30)
+    page.keyboard.press("Home")
+    assert player(page, "time") == 1.0
+    page.keyboard.press("+")
+    assert player(page, "speed") == 2
+    for speed in (1, 0.5, 0.25, 0.1, 0.05, 0.05):
+        page.keyboard.press("-")
+        assert player(page, "speed") == speed
+    page.keyboard.press("l")
+    assert player(page, "loop") is True
+    page.keyboard.press(" ")
+    assert player(page, "playing") is True
+    until(page, "player.time > 1.005")
+    page.keyboard.press(" ")
+    assert player(page, "playing") is False
+
+
+def test_it_is_steered_from_the_page(page: Any) -> None:
+    bar = page.locator(".player")
+    assert bar.is_visible()
+    box = page.locator(".timeline").bounding_box()
+    page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    assert player(page, "time") == pytest.approx(2.0, abs=0.05)
+    assert page.locator(".clock").inner_text() == f"{player(page, 'time'):.2f} / 3.00 s"
+    page.locator(".start").click()
+    assert player(page, "time") == 1.0
+    page.locator(".speed").select_option("4")
+    assert player(page, "speed") == 4
+    page.locator(".toggle").click()
+    until(page, "!player.playing && player.time === player.end")  # once, to its end
+    page.locator(".loop").click()
+    page.locator(".toggle").click()  # from the start again
+    until(page, "player.playing && player.time < 2")
+    until(page, "player.time > 2")
+    until(page, "player.time < 2")  # round it goes
+    page.locator(".toggle").click()
+    # The bar's keys are still the page's, wherever the focus is.
+    page.locator(".timeline").focus()
+    page.keyboard.press("Home")
+    assert player(page, "time") == 1.0
+    page.locator(".speed").select_option("0.05")
+    page.keyboard.press("ArrowRight")
+    assert player(page, "time") == pytest.approx(1.0 + 1 / 30)
+    page.locator(".toggle").click()
+    assert player(page, "playing") is True
+    page.keyboard.press(" ")  # once, not by the button in focus as well
+    assert player(page, "playing") is False
+
+
+def test_others_are_told_the_time(page: Any) -> None:
+    page.evaluate(
+        """window.told = [];
+        player.addEventListener("time", ({detail}) => told.push(detail))"""
+    )
+    page.evaluate("player.seek(2.25)")
+    assert page.evaluate("told") == [{"time": 2.25, "start": 1, "end": 3}]
+
+
+def test_a_clip_that_grows_is_followed_to_its_end(page: Any, viewer: Viewer) -> None:
+    """As a run does that is computed more slowly than it is played."""
+    tell(viewer, [*trail(), *set_clip(clip(6, horizon=3.0), play=True, speed=4.0)])
+    assert page.evaluate("[player.open, player.horizon, player.end]") == [True, 3, 1.5]
+    until(page, "player.time > 1.45")
+    assert player(page, "playing") is True  # it waits
+    rest = clip()
+    tracks = [
+        track._replace(times=track.times[k:], values=track.values[k:])
+        for track in rest.tracks
+        for k in [int(np.searchsorted(track.times, 1.55))]
+    ]
+    more = np.zeros((2, 3))
+    part = rest._replace(tracks=tracks)
+    tell(viewer, [extend_trail(TRAIL, more, 1), extend_clip(part, 1)])
+    assert page.evaluate("[player.open, player.end]") == [False, 3]
+    points = page.evaluate(
+        f"node('{TRAIL}').children[0].geometry.userData.points.length"
+    )
+    assert points == 3 * (len(TIMES) + 2)
+    until(page, "!player.playing && player.time === 3")
+    for moment in (1.2, 1.52, 2.7):
+        page.evaluate("(t) => player.seek(t)", moment)
+        angle = np.array(thing(page, "quaternion"))
+        assert abs(angle @ turns(np.array([moment]))[0]) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_another_clip_can_go_on_where_the_last_one_was(
+    page: Any, viewer: Viewer
+) -> None:
+    page.evaluate("player.seek(2.2); player.setSpeed(0.5)")
+    tell(viewer, set_clip(clip(), play=True, speed=1.0, keep=True))
+    assert page.evaluate("[player.time, player.playing, player.speed]") == [
+        2.2, False, 0.5,
+    ]  # fmt: skip
+    tell(viewer, set_clip(clip(6), keep=True))
+    assert player(page, "time") == 1.5  # there is no more
+    tell(viewer, set_clip(clip(), play=False, speed=1.0))
+    assert page.evaluate("[player.time, player.speed]") == [1, 1]
+
+
+def test_without_a_clip_there_is_nothing_to_play(page: Any, viewer: Viewer) -> None:
+    tell(viewer, no_clip())
+    assert page.locator(".player").is_hidden()
+    page.keyboard.press(" ")
+    assert player(page, "playing") is False
+    q = viewer.robot.integrate(viewer.robot.neutral(), np.array([0.3, 0.0, 0.0]))
+    viewer.show(q)
+    tell(viewer, [])
+    expected = [0.0, 0.0, np.sin(0.15), np.cos(0.15)]
+    np.testing.assert_allclose(thing(page, "quaternion"), expected, atol=1e-9)
+
+
+def test_a_trail_lies_about_its_path_even_where_that_rests_or_turns_back(
+    page: Any, viewer: Viewer
+) -> None:
+    points = np.array([[0, 0, 0], [0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 0, 0.0]])
+    tell(viewer, [set_trail("/paths/odd", points, 0.1, 0)])
+    found = page.evaluate(
+        "Array.from(node('/paths/odd').children[0].geometry.attributes.position.array)"
+    )
+    rings = np.reshape(found, (-1, 8, 3))
+    distances = np.linalg.norm(rings - points[:, None, :], axis=2)
+    np.testing.assert_allclose(distances, 0.1, atol=1e-6)
+
+
+def test_a_page_opened_again_shows_the_same(
+    page: Any, viewer: Viewer, chromium: Any
+) -> None:
+    again = chromium.new_page()
+    again.goto(viewer.url)
+    assert viewer.wait_for_browser(60.0)
+    until(again, "player.loaded && player.end === 3")
+    page.evaluate("player.seek(2)")
+    again.evaluate("player.seek(2)")
+    assert thing(again, "quaternion") == thing(page, "quaternion")
+    again.close()
+
+
+MULTICOLOURED = """<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><up_axis>Z_UP</up_axis></asset>
+<library_effects>
+  <effect id="red"><profile_COMMON><technique sid="c"><lambert><diffuse>
+    <color>1 0 0 1</color></diffuse></lambert></technique></profile_COMMON></effect>
+  <effect id="blue"><profile_COMMON><technique sid="c"><lambert><diffuse>
+    <color>0 0 1 1</color></diffuse></lambert></technique></profile_COMMON></effect>
+</library_effects>
+<library_materials>
+  <material id="m-red"><instance_effect url="#red"/></material>
+  <material id="m-blue"><instance_effect url="#blue"/></material>
+</library_materials>
+<library_geometries>{geometries}</library_geometries>
+<library_visual_scenes>
+  <visual_scene id="s">{nodes}</visual_scene>
+</library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene>
+</COLLADA>"""
+GEOMETRY = """<geometry id="g{k}"><mesh>
+  <source id="p{k}">
+    <float_array id="a{k}" count="12">0 0 0 1 0 0 0 1 0 0 0 1</float_array>
+    <technique_common><accessor source="#a{k}" count="4" stride="3">
+      <param type="float"/><param type="float"/><param type="float"/>
+    </accessor></technique_common>
+  </source>
+  <vertices id="v{k}"><input semantic="POSITION" source="#p{k}"/></vertices>
+  <triangles material="red" count="1">
+    <input semantic="VERTEX" source="#v{k}" offset="0"/>
+    <p>0 1 2</p>
+  </triangles>
+  <triangles material="blue" count="2">
+    <input semantic="VERTEX" source="#v{k}" offset="0"/>
+    <p>0 1 3 0 2 3</p>
+  </triangles>
+</mesh></geometry>"""
+NODE = """<node id="n{k}"><instance_geometry url="#g{k}"><bind_material>
+  <technique_common>
+    <instance_material symbol="red" target="#m-red"/>
+    <instance_material symbol="blue" target="#m-blue"/>
+  </technique_common>
+</bind_material></instance_geometry></node>"""
+
+
+@pytest.mark.parametrize("parts", [1, 2])
+def test_every_triangle_of_a_mesh_file_has_its_surface(
+    page: Any, viewer: Viewer, tmp_path: Any, parts: int
+) -> None:
+    """Two surfaces within one part, as in the UR5's files, in one part and in two."""
+    file = tmp_path / "mesh.dae"
+    text = MULTICOLOURED.format(
+        geometries="".join(GEOMETRY.format(k=k) for k in range(parts)),
+        nodes="".join(NODE.format(k=k) for k in range(parts)),
+    )
+    file.write_text(text)
+    tell(viewer, [set_object("/mesh", threejs.group([collada_object(file)]))])
+    groups = page.evaluate(
+        """() => {
+          const found = [];
+          node("/mesh").traverse(({geometry, material}) => {
+            if (!geometry) return;
+            for (const {start, count, materialIndex} of geometry.groups) {
+              const {r, g, b} = material[materialIndex].color;
+              found.push([start, count, [r, g, b]]);
+            }
+          });
+          return found;
+        }"""
+    )
+    expected = [
+        [start, count, color]
+        for k in range(parts)
+        for start, count, color in (
+            (9 * k, 3, [1, 0, 0]),
+            (9 * k + 3, 6, [0, 0, 1]),
+        )
+    ]
+    assert groups == expected

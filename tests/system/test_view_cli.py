@@ -1,0 +1,145 @@
+"""``hsp view`` and ``hsp run --view`` as a person uses them, with a browser or none."""
+
+import re
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from pages import Page
+
+from hsp_control import Rollout
+from hsp_control.cli import main
+from hsp_control.visualization.viewer import browser, server
+
+MOVING = "paper/4_moving_obstacle"
+SHORT = ["--set", "simulation.duration=0.2"]
+
+
+@pytest.fixture(autouse=True)
+def nobody_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(browser.sys, "platform", "linux")
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("logs")
+    assert main(["run", MOVING, "--out", str(folder), *SHORT]) == 0
+    return folder / "4_moving_obstacle.npz"
+
+
+@pytest.fixture
+def taken() -> Iterator[int]:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        yield other.getsockname()[1]
+
+
+def refused(port: int) -> bool:
+    with socket.socket() as client:
+        return client.connect_ex(("127.0.0.1", port)) != 0
+
+
+def address(printed: str) -> int:
+    (line,) = [line for line in printed.splitlines() if line.startswith("View: ")]
+    return int(line.rpartition(":")[2].strip("/"))
+
+
+def test_view_prints_its_address_and_keeps_no_script_waiting(
+    log: Path,
+    capsys: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    begin = time.monotonic()
+    assert main(["view", str(log)]) == 0
+    assert time.monotonic() - begin < 10.0
+    port = address(capsys.readouterr().out)
+    assert refused(port)  # it left nothing behind
+    assert f"the view is at http://127.0.0.1:{port}/" in caplog.text
+    caplog.clear()
+    assert main(["view", "--no-browser", str(log), str(log), "--beside"]) == 0
+    assert not caplog.records
+
+
+def test_run_shows_what_it_computes_and_keeps_its_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", MOVING, "--view", "--out", str(tmp_path), *SHORT]) == 0
+    assert refused(address(capsys.readouterr().out))
+    assert len(Rollout.load(tmp_path / "4_moving_obstacle.npz")) == 21
+
+
+def test_a_port_in_use_is_said_and_the_run_goes_on(
+    tmp_path: Path, log: Path, taken: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    port = ["--port", str(taken)]
+    assert main(["view", str(log), *port]) == 2
+    message = f"cannot listen on 127.0.0.1:{taken}: Address already in use"
+    assert message in capsys.readouterr().err
+    out = ["--out", str(tmp_path)]
+    assert main(["run", MOVING, "--view", *port, *out, *SHORT]) == 2
+    captured = capsys.readouterr()
+    assert f"{message}; the run goes on unseen" in captured.err
+    assert "completed" in captured.out
+    assert len(Rollout.load(tmp_path / "4_moving_obstacle.npz")) == 21
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (None, "made from Python and does not say how its robot 'planar3r'"),
+        ({"name": "planar4r"}, "robot cannot be found again: .*'planar4r'"),
+    ],
+)
+def test_a_log_without_its_robot_is_said(
+    log: Path,
+    tmp_path: Path,
+    change: dict[str, str] | None,
+    message: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    rollout = Rollout.load(log)
+    config = rollout.meta.pop("config")
+    if change is not None:
+        rollout.meta["config"] = {**config, "robot": change}
+    path = rollout.save(tmp_path / "lost.npz")
+    assert main(["view", str(path)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"hsp: {path}: ")
+    assert re.search(message, error)
+
+
+def test_what_makes_no_sense_is_refused(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["view", str(log), "--speed", "0"]) == 2
+    assert "speed 0.0 must be positive" in capsys.readouterr().err
+    assert main(["view", str(log.with_name("4_moving_obstacel.npz"))]) == 2
+    assert "did you mean '4_moving_obstacle.npz'" in capsys.readouterr().err
+
+
+def test_with_a_browser_it_stays_until_the_page_is_closed(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "RELOAD_TIMEOUT", 0.5)
+    monkeypatch.setenv("DISPLAY", ":0")
+    graphical = browser.webbrowser.BackgroundBrowser("firefox")
+    monkeypatch.setattr(browser.webbrowser, "get", lambda: graphical)
+    pages: list[Page] = []
+
+    def look(url: str, new: int) -> None:
+        page = Page(url)
+        pages.append(page)
+        time.sleep(1.5)
+        page.leave()
+
+    monkeypatch.setattr(browser.webbrowser, "open", look)
+    begin = time.monotonic()
+    assert main(["view", str(log)]) == 0
+    assert 1.5 < time.monotonic() - begin < 20.0
+    (page,) = pages
+    assert ("clip", "/clip") in [(c["type"], c.get("path")) for c in page.commands]

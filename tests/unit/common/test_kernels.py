@@ -1,0 +1,431 @@
+"""What a step costs beside time: no memory; and what kernels give without a compiler.
+
+All ready tasks, fields and metrics are run, compiled and as plain Python.
+"""
+
+import gc
+import json
+import os
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from oracles import slope
+from places import ROOT
+
+from hsp_control import (
+    Circle,
+    ConstantMetric,
+    Controller,
+    FrameOrientation,
+    FramePose,
+    FramePosition,
+    Gains,
+    IdentityMetric,
+    JointPosture,
+    Limits,
+    MassMatrixMetric,
+    Obstacle,
+    Pointing,
+    Robot,
+    RobotState,
+)
+from hsp_control.common import kernels, native
+from hsp_control.control.actuation import EXACT
+from hsp_control.geometry import Proximity, link_shapes
+from hsp_control.geometry.by_coal import ByCoal
+from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
+from hsp_control.null_space.fields import (
+    EqualJointAngles,
+    FieldSample,
+    InverseCondition,
+    JointCentering,
+    LimitBarrier,
+    Manipulability,
+    NullSpaceField,
+    ObstacleClearance,
+    PointDistance,
+    Ramp,
+    Rest,
+    SelfClearance,
+    TargetPosture,
+    Transmission,
+)
+from hsp_control.null_space.metrics import MetricSample
+from hsp_control.tasks import Task, TaskSample
+from hsp_control.trajectories import (
+    Blend,
+    BlendOrientation,
+    ComposedPose,
+    HoldPose,
+    Lissajous,
+    OrientationPath,
+    Spin,
+    Spline,
+)
+
+HERE = Path(__file__).parent
+GAINS = Gains.from_frequency(8.0)
+CIRCLE = Circle([0.5, 0.0, 0.4], 0.1, 2.0, normal=[0.0, 0.6, 0.8])
+TURNED = pin.exp3(np.array([0.3, -0.5, 0.4]))
+SPIN = Spin(TURNED, [0.0, 0.6, 0.8], 0.7)
+SHAPES: dict[str, Shape] = {
+    "sphere": Sphere(0.1),
+    "capsule": Capsule(0.05, 0.3),
+    "box": Box((0.2, 0.3, 0.1)),
+    "cylinder": Cylinder(0.1, 0.3),
+    "plane": HalfSpace(),
+}
+
+
+def obstacle(shape: Shape) -> Obstacle:
+    height = -0.5 if isinstance(shape, HalfSpace) else 0.5
+    path = Lissajous([0.4, 0.3, height], [0.1, 0.2, 0.1], [1.0, 2.0, 1.5])
+    return Obstacle("it", shape, path, SPIN)
+
+
+def tasks(robot: Robot, frame: str) -> dict[str, Task]:
+    blended = Blend([0.4, 0.1, 0.5], CIRCLE, 2.0)
+    path = OrientationPath([np.eye(3), TURNED], [0.0, 2.0])
+    turning = BlendOrientation(TURNED, SPIN, 2.0)
+    motion = Spline(np.eye(3, 7)[:, : len(robot.single_joints)], [0.0, 0.5, 1.0])
+    all_joints = motion.dimension == len(robot.single_joints)
+    return {
+        "position": FramePosition(robot, frame, blended, GAINS),
+        "axes": FramePosition(
+            robot, frame, Lissajous([0, 0], [1, 1], [1, 2]), GAINS, axes="zx"
+        ),
+        "orientation": FrameOrientation(robot, frame, path, GAINS),
+        "pose": FramePose(robot, frame, ComposedPose(CIRCLE, turning), GAINS),
+        "held pose": FramePose(
+            robot, frame, HoldPose(pin.SE3(TURNED, np.array([0.4, 0, 0.5]))), GAINS
+        ),
+        "pointing": Pointing(robot, frame, [0.0, 0.6, 0.8], SPIN, GAINS),
+        "posture": JointPosture(
+            robot, robot.home(), GAINS, displacement=motion if all_joints else None
+        ),
+    }
+
+
+def fields(robot: Robot, frame: str) -> dict[str, NullSpaceField]:
+    ball = obstacle(Sphere(0.1))
+    middle = robot.joint_names[len(robot.joint_names) // 2]
+    made: dict[str, NullSpaceField] = {
+        "rest": Rest(robot),
+        "centering": JointCentering(robot),
+        "limits": LimitBarrier(robot, zone=1.0),
+        "posture": TargetPosture(robot, robot.home()),
+        "equal": EqualJointAngles(robot, [robot.joint_names[0], middle]),
+        "root": Manipulability(robot, frame, rows="pose", length=0.5),
+        "log": Manipulability(robot, frame, form="log", metric=2.0 * np.eye(robot.nv)),
+        "condition": InverseCondition(robot, frame),
+        "velocity": Transmission(robot, frame, [0.0, 0.6, 0.8]),
+        "force": Transmission(robot, frame, [0.0, 0.6, 0.8], kind="force"),
+        "point": PointDistance(robot, [frame], ball),
+        "sum": JointCentering(robot)
+        + Ramp(0.0, 1.0, start=0.0, duration=2.0) * Manipulability(robot, frame),
+    }
+    return made
+
+
+def clearances(robot: Robot) -> dict[str, NullSpaceField]:
+    made: dict[str, NullSpaceField] = {
+        name: ObstacleClearance(robot, [obstacle(shape)], influence=0.8)
+        for name, shape in SHAPES.items()
+    }
+    return made | {"self": SelfClearance(robot, influence=0.5)}
+
+
+METRICS = {
+    "identity": IdentityMetric(),
+    "constant": ConstantMetric(np.linspace(1.0, 2.0, 7)),
+    "mass matrix": MassMatrixMetric(),
+}
+
+
+# -- with and without the compiler -----------------------------------------------------
+
+
+def everything() -> dict[str, list[float]]:
+    """Return what all tasks and fields give at random states."""
+    robot, rng = Robot.load("panda"), np.random.default_rng(31)
+    frame, results = "panda_tcp", {}
+    samples = {name: MetricSample.allocate(7) for name in METRICS}
+    all_fields = fields(robot, frame) | clearances(robot)
+    all_tasks, out = tasks(robot, frame), FieldSample.allocate(7)
+    state = RobotState(robot)
+    for k in range(3):
+        q = robot.integrate(robot.home(), 0.3 * rng.standard_normal(7))
+        state.update(0.9 * k - 0.3, q, rng.standard_normal(7))
+        for name, task in all_tasks.items():
+            sample = task.evaluate(state)
+            results[f"{name} {k}"] = np.concatenate([np.ravel(a) for a in sample])
+        for form, metric in METRICS.items():
+            at = metric.evaluate(state, samples[form])
+            for name, field in all_fields.items():
+                field.evaluate(state, at, metric.form, out)
+                parts = [*out.g, *out.g_dot, field.value(state)]
+                results[f"{name} {form} {k}"] = np.array(parts)
+    return {name: values.tolist() for name, values in results.items()}
+
+
+def test_all_tasks_and_fields_are_the_same_without_the_compiler() -> None:
+    """The very same functions, as plain Python: there is no second implementation."""
+    if not hasattr(kernels.kernel(lambda: None), "py_func"):
+        pytest.skip("NUMBA_DISABLE_JIT is set: there is one form only")
+    environment = os.environ | {
+        "NUMBA_DISABLE_JIT": "1",
+        "PYTHONPATH": os.pathsep.join(map(str, (HERE, ROOT / "tests/support", ROOT))),
+    }
+    code = "import json, test_kernels as t; print(json.dumps(t.everything()))"
+    run = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    plain, compiled = json.loads(run.stdout), everything()
+    assert plain.keys() == compiled.keys()
+    for name, values in compiled.items():
+        # Sums are the same to the last bit but for functions of the C library.
+        scale = max(1.0, float(np.abs(values).max()))
+        np.testing.assert_allclose(
+            plain[name], values, rtol=1e-12, atol=1e-12 * scale, err_msg=name
+        )
+
+
+def test_a_bound_kernel_follows_its_arrays_and_takes_the_time() -> None:
+    a, out = np.zeros(2), np.zeros(2)
+    call = native.bind(_scale, a, out, timed=True)
+    a[:] = [1.0, 2.0]
+    call(3.0)
+    np.testing.assert_array_equal(out, [3.0, 6.0])
+    call(0.5)
+    np.testing.assert_array_equal(out, [0.5, 1.0])
+    strided = np.arange(4.0)[::2]
+    native.bind(_scale, strided, out, 2.0)()
+    np.testing.assert_array_equal(out, [0.0, 4.0])
+
+
+@kernels.kernel
+def _scale(a: Any, out: Any, by: float) -> None:
+    for i in range(a.shape[0]):
+        out[i] = by * a[i]
+
+
+def test_what_is_bound_to_one_state_or_sample_is_not_given_to_another() -> None:
+    """Turn by turn, as finite differences do, and with samples that come and go."""
+    robot, frame = Robot.load("panda"), "panda_tcp"
+    first, second = RobotState(robot), RobotState(robot)
+    rng = np.random.default_rng(5)
+    first.update(0.1, robot.home(), rng.standard_normal(7))
+    second.update(0.7, robot.home() + 0.1, rng.standard_normal(7))
+    metric = MetricSample.allocate(7)
+    for task in tasks(robot, frame).values():
+        kept = [task.evaluate(state) for state in (first, second)]
+        out = TaskSample.allocate(task.rows, 7)
+        for k in (0, 1, 0):
+            sample = task.evaluate((first, second)[k], out)
+            assert sample is out
+            for one, other in zip(sample, kept[k], strict=True):
+                np.testing.assert_array_equal(one, other)
+    for field in (fields(robot, frame) | clearances(robot)).values():
+        outs = FieldSample.allocate(7), FieldSample.allocate(7)
+        for k in (0, 1):
+            field.evaluate((first, second)[k], metric, 0, outs[k])
+        again = FieldSample.allocate(7)
+        for k in (0, 1, 0):
+            field.evaluate((first, second)[k], metric, 0, again)
+            np.testing.assert_array_equal(again.g, outs[k].g)
+            np.testing.assert_array_equal(again.g_dot, outs[k].g_dot)
+
+
+# -- formulas and Coal -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [*SHAPES, "self"])
+def test_formulas_agree_with_coal_and_with_differences(kind: str) -> None:
+    """Distances and gradients with Coal's, rates with differences along the flow.
+
+    Capsules stand for the links before balls, capsules and each other; balls before
+    boxes, cylinders and planes.
+    """
+    robot, rng = Robot.load("panda"), np.random.default_rng(17)
+    rounded = kind in ("sphere", "capsule", "self")
+    links = link_shapes(robot, "capsules" if rounded else "spheres")
+    if kind == "self":
+        pairs = [(i, j) for i in range(4) for j in range(6, len(links))]
+        proximity = Proximity(robot, links, [], pairs)
+    else:
+        pairs = [(i, len(links)) for i in range(len(links))]
+        proximity = Proximity(robot, links, [obstacle(SHAPES[kind])], pairs)
+    assert proximity.others is None
+    assert proximity.formulas is not None
+    count = len(pairs)
+    coal = ByCoal(robot, links, proximity.obstacles, np.array(pairs), np.arange(count))
+    agreed = 0
+    while agreed < 6:
+        q, v = robot.random_configuration(rng), 0.5 * rng.standard_normal(7)
+        state = robot.state(0.4, q, v)
+        weights = rng.uniform(0.5, 1.0, count)
+        theirs, distances = np.zeros(count), proximity.measure(state).copy()
+        coal.measure(state, theirs)
+        apart = distances > 1e-3
+        # GJK's tolerance is 1e-10 of squares; formulas on both sides agree better.
+        np.testing.assert_allclose(distances[apart], theirs[apart], atol=2e-6)
+        weights[~apart] = 0.0
+        by_coal = np.zeros(7)
+        coal.add_gradient(state, weights, by_coal)
+        gradient, rate = np.zeros(7), np.zeros(7)
+        proximity.formulas.differentiate(
+            state, weights, np.zeros(count), gradient, rate
+        )
+        np.testing.assert_allclose(gradient, by_coal, atol=1e-4)
+
+        def along(s: float, q: Any = q, v: Any = v, weights: Any = weights) -> Any:
+            here = robot.state(0.4 + s, robot.integrate(q, s * v), v)
+            return proximity.gradient(here, weights)
+
+        halves = [slope(along, h) for h in (1e-4, 5e-5)]
+        if np.abs(halves[0] - halves[1]).max() > 1e-6:
+            continue  # a feature changes between the steps: the rate jumps
+        agreed += 1
+        np.testing.assert_allclose(rate, halves[1], atol=1e-6)
+
+
+# -- no memory -------------------------------------------------------------------------
+
+JOINTS = 150
+
+
+@pytest.fixture(scope="module")
+def chain(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    """Return a chain so long that a vector of its freedoms is seen among the rest."""
+    axes, ball = (
+        ("0 0 1", "0 1 0", "1 0 0"),
+        '<geometry><sphere radius="0.01"/></geometry>',
+    )
+    text = '<robot name="chain"><link name="link0"/>'
+    for k in range(1, JOINTS + 1):
+        collision = f"<collision>{ball}</collision>" if k % 15 == 0 else ""
+        text += (
+            f'<joint name="joint{k}" type="revolute"><parent link="link{k - 1}"/>'
+            f'<child link="link{k}"/><axis xyz="{axes[k % 3]}"/>'
+            '<origin xyz="0 0 0.02"/>'
+            '<limit lower="-2" upper="2" effort="1e9" velocity="9"/></joint>'
+            f'<link name="link{k}"><inertial><mass value="0.1"/>'
+            '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
+            f"</inertial>{collision}</link>"
+        )
+    file = tmp_path_factory.mktemp("robot") / "chain.urdf"
+    file.write_text(text + "</robot>")
+    return Robot.load(file)
+
+
+def allocated(step: Callable[[], Any], steps: int) -> tuple[int, int]:
+    """Return the most memory [bytes] that steps held at once, and blocks they left."""
+    for _ in range(20):
+        step()
+    gc.collect()
+    gc.disable()
+    before = sys.getallocatedblocks()
+    for _ in range(steps):
+        step()
+    left = sys.getallocatedblocks() - before
+    tracemalloc.start()
+    step()
+    tracemalloc.reset_peak()
+    held, _ = tracemalloc.get_traced_memory()
+    for _ in range(20):
+        step()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    gc.enable()
+    return peak - held, left
+
+
+VECTOR = 8 * JOINTS
+"""Bytes of the smallest array of freedoms; objects of Python hold fewer."""
+
+
+@pytest.mark.parametrize("name", tasks(Robot.load("panda"), "panda_tcp"))
+def test_no_allocation_in_a_task(name: str, chain: Robot) -> None:
+    robot = chain
+    task = tasks(robot, f"link{JOINTS}")[name]
+    state = robot.state(0.1, robot.home() + 0.1, np.full(JOINTS, 0.1))
+    out = TaskSample.allocate(task.rows, JOINTS)
+
+    def step() -> None:
+        state.instant[0] += 1  # the frame anew, too
+        task.evaluate(state, out)
+
+    peak, left = allocated(step, 2000)
+    assert peak < VECTOR, name
+    assert left < 50
+
+
+@pytest.mark.parametrize(
+    "name", [*fields(Robot.load("panda"), "panda_tcp"), *SHAPES, "self"]
+)
+def test_no_allocation_in_a_field(name: str, chain: Robot) -> None:
+    robot = chain
+    frame = f"link{JOINTS}"
+    if name in SHAPES:
+        field: NullSpaceField = ObstacleClearance(
+            robot, [obstacle(SHAPES[name])], influence=9.0
+        )
+    elif name == "self":
+        field = SelfClearance(robot, influence=0.5)
+    else:
+        field = fields(robot, frame)[name]
+    state = robot.state(0.1, robot.home() + 0.1, np.full(JOINTS, 0.1))
+    metric, out = MetricSample.allocate(JOINTS), FieldSample.allocate(JOINTS)
+
+    def step() -> None:
+        state.instant[0] += 1
+        field.evaluate(state, metric, 0, out)
+
+    peak, left = allocated(step, 200 if name in SHAPES or name == "self" else 2000)
+    assert peak < VECTOR, name
+    assert left < 50
+
+
+def test_a_step_allocates_what_pinocchio_returns_and_nothing_else(
+    chain: Robot,
+) -> None:
+    """Pinocchio hands out a copy of its Jacobians' rates, and of the effort."""
+    name, q, v = f"link{JOINTS}", chain.home() + 0.1, np.full(JOINTS, 1e-3)
+    state = chain.state(0.1, q, v)
+    frame = state.frame(name)
+    here = HoldPose(pin.SE3(frame.rotation, frame.position))
+    pose = FramePose(chain, name, here, GAINS)
+    clearance = ObstacleClearance(chain, [obstacle(Sphere(0.1))], influence=9.0)
+    field = JointCentering(chain) + 0.1 * clearance
+    controller = Controller(chain, [pose], field, limits=Limits(chain))
+    assert controller.compute(state).status == EXACT
+
+    peak, left = allocated(lambda: state.update(0.1, q, v), 500)
+    assert 6 * VECTOR <= peak < 7 * VECTOR
+    assert left < 50
+
+    def compute() -> None:
+        state.instant[0] += 1
+        controller.compute(state)
+
+    peak, left = allocated(compute, 500)
+    assert VECTOR <= peak < 2 * VECTOR
+    assert left < 50
+
+
+def test_allocations_are_seen() -> None:
+    """Both tests can fail: a vector of freedoms is seen, and what stays is seen."""
+    kept = []
+    assert allocated(lambda: np.zeros(JOINTS), 100)[0] >= VECTOR
+    assert allocated(lambda: kept.append([1]), 100)[1] >= 100

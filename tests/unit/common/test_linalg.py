@@ -1,0 +1,479 @@
+"""Kernels against NumPy, rank loss included, and compiled against uncompiled."""
+
+import inspect
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from places import ROOT
+
+from hsp_control import (
+    ConstantMetric,
+    Controller,
+    FrameOrientation,
+    FramePosition,
+    Gains,
+    Hold,
+    IdentityMetric,
+    MassMatrixMetric,
+    Metric,
+    Robot,
+    TargetPosture,
+)
+from hsp_control.common import linalg
+from hsp_control.common.linalg import (
+    cholesky,
+    least_singular_value_bound,
+    multiply,
+    multiply_transposed,
+    orthogonalise_rows,
+    orthonormalise_rows,
+    solve_lower,
+    solve_lower_transposed,
+    solve_rows,
+    solve_rows_transposed,
+)
+from hsp_control.law import law
+from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY, raise_covector
+from hsp_control.robot import kinematics, robot
+from hsp_control.trajectories import HoldOrientation
+
+Array = NDArray[np.float64]
+HERE = Path(__file__).parent
+EPS = float(np.finfo(float).eps)
+
+seeds = st.integers(0, 2**32 - 1)
+sizes = st.integers(1, 9)
+exponents = st.floats(-12.0, 0.0)
+scales = st.floats(-6.0, 6.0).map(lambda k: 10.0**k)
+
+
+def normal(seed: int, *shape: int) -> Array:
+    return np.random.default_rng(seed).standard_normal(shape)
+
+
+def orthogonal(seed: int, n: int, m: int) -> Array:
+    """Return n × m orthonormal columns."""
+    return np.linalg.qr(normal(seed, n, n))[0][:, :m]
+
+
+def spectrum(seed: int, n: int, m: int, singular_values: Array) -> Array:
+    """Return an n × m matrix with given singular values, shape (m,)."""
+    left, right = orthogonal(seed, n, m), orthogonal(seed + 1, m, m)
+    return (left * singular_values) @ right.T
+
+
+def junk(*shape: int) -> Array:
+    """Return an output that must be written in full."""
+    return np.full(shape, np.nan)
+
+
+def close(actual: Array, expected: Array, atol: float) -> None:
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=atol)
+
+
+# --- products ------------------------------------------------------------------------
+
+
+@given(seeds, sizes, sizes, scales)
+def test_products(seed: int, n: int, m: int, scale: float) -> None:
+    A, x, y = scale * normal(seed, n, m), normal(seed + 1, m), normal(seed + 2, n)
+    out, transposed = junk(n), junk(m)
+    multiply(A, x, out)
+    multiply_transposed(A, y, transposed)
+    # A sum of k terms errs by k ε of the sum of their magnitudes.
+    assert (np.abs(out - A @ x) <= 2 * m * EPS * np.abs(A) @ np.abs(x)).all()
+    bound = 2 * n * EPS * np.abs(A).T @ np.abs(y)
+    assert (np.abs(transposed - A.T @ y) <= bound).all()
+
+
+def test_products_of_views() -> None:
+    """Rows, columns and transposes of other arrays are arguments, too."""
+    A, x = normal(0, 6, 8), normal(1, 8, 3)
+    out = junk(3, 2)
+    multiply(A[::2, 1:4], x[:3, 1], out[:, 0])
+    multiply(A.T[1:4, ::2], A[::2, 5], out[:, 1])
+    close(out[:, 0], A[::2, 1:4] @ x[:3, 1], 1e-14)
+    close(out[:, 1], A.T[1:4, ::2] @ A[::2, 5], 1e-14)
+
+
+# --- triangles -----------------------------------------------------------------------
+
+
+@given(seeds, sizes, exponents, scales)
+def test_cholesky(seed: int, n: int, exponent: float, scale: float) -> None:
+    """L is lower triangular, of positive diagonal, and L Lᵀ = A to rounding."""
+    values = np.logspace(0.0, exponent, n)
+    U = orthogonal(seed, n, n)
+    A = scale * (U * values) @ U.T
+    A = 0.5 * (A + A.T)
+    L = junk(n, n)
+    assert cholesky(A, L)
+    assert (np.diag(L) > 0.0).all()
+    np.testing.assert_array_equal(np.triu(L, 1), 0.0)
+    close(L @ L.T, A, 4 * n * EPS * scale)
+    # The factor itself is as uncertain as A's condition number says.
+    close(L, np.linalg.cholesky(A), 10 * n * EPS * np.sqrt(scale) * 10.0**-exponent)
+
+
+@given(seeds, st.integers(2, 9), st.floats(1e-6, 1e6))
+def test_cholesky_refuses_an_indefinite_matrix(seed: int, n: int, size: float) -> None:
+    values = np.ones(n)
+    values[-1] = -size
+    U = orthogonal(seed, n, n)
+    A = (U * values) @ U.T
+    assert not cholesky(0.5 * (A + A.T), junk(n, n))
+
+
+@pytest.mark.parametrize(
+    "A",
+    [
+        np.zeros((1, 1)),
+        -np.eye(2),
+        np.ones((2, 2)),  # singular, exactly
+        np.diag([1.0, 0.0, 1.0]),
+        np.diag([1.0, np.nan]),
+        np.array([[1.0, np.nan], [np.nan, 1.0]]),
+    ],
+)
+def test_cholesky_refuses(A: Array) -> None:
+    assert not cholesky(A, junk(*A.shape))
+
+
+@given(seeds, sizes, exponents)
+def test_triangular_solves(seed: int, n: int, exponent: float) -> None:
+    """Backward stable: |L x - b| ≤ n ε |L||x|, however ill-conditioned L is."""
+    L = np.tril(normal(seed, n, n))
+    L[np.diag_indices(n)] = np.logspace(0.0, exponent, n)
+    b = normal(seed + 1, n)
+    x, y = b.copy(), b.copy()
+    solve_lower(L, x)
+    solve_lower_transposed(L, y)
+    bound = 2 * n * EPS
+    assert (np.abs(L @ x - b) <= bound * np.abs(L) @ np.abs(x)).all()
+    assert (np.abs(L.T @ y - b) <= bound * np.abs(L).T @ np.abs(y)).all()
+
+
+def test_triangular_solves_read_the_lower_triangle_only() -> None:
+    L = np.tril(normal(2, 4, 4)) + 3 * np.eye(4)
+    dirty = L + np.triu(np.full((4, 4), np.nan), 1)
+    b = normal(3, 4)
+    for solve, matrix in ((solve_lower, L), (solve_lower_transposed, L.T)):
+        x = b.copy()
+        solve(dirty, x)
+        close(x, np.linalg.solve(matrix, b), 1e-13)
+
+
+def test_rows_are_solved_one_by_one() -> None:
+    L, X = np.tril(normal(2, 4, 4)) + 3 * np.eye(4), normal(3, 5, 4)
+    for solve, inverse in (
+        (solve_rows, np.linalg.inv(L.T)),
+        (solve_rows_transposed, np.linalg.inv(L)),
+    ):
+        solved = X.copy()
+        solve(L, solved)
+        close(solved, X @ inverse, 1e-13)
+
+
+@pytest.mark.parametrize("n", [1, 3, 7])
+def test_raising_a_covector(n: int) -> None:
+    """W⁻¹ c with W = L Lᵀ; nothing to do for the identity."""
+    B, covector = normal(n, n, n), normal(n + 1, n)
+    W = B @ B.T + np.eye(n)
+    raised = covector.copy()
+    raise_covector(raised, np.linalg.cholesky(W), CONSTANT)
+    close(W @ raised, covector, 1e-13)
+    kept = covector.copy()
+    raise_covector(kept, np.linalg.cholesky(W), IDENTITY)
+    np.testing.assert_array_equal(kept, covector)
+
+
+# --- orthogonalisation ---------------------------------------------------------------
+
+
+@given(seeds, sizes, sizes, exponents, scales)
+def test_orthonormalise(
+    seed: int, n: int, m: int, exponent: float, scale: float
+) -> None:
+    """Q = X J to rounding, and Q is orthonormal to rounding at every condition."""
+    assume(m <= n)
+    J = scale * spectrum(seed, n, m, np.logspace(0.0, exponent, m)).T
+    Q, X = junk(m, n), junk(m, m)
+    bound = orthonormalise_rows(J, Q, X)
+    close(Q @ Q.T, np.eye(m), 10 * n * EPS)
+    # Rounding relative to what is added up, and to what that cancels: the condition.
+    slack = 20 * n * EPS * np.abs(X) @ np.abs(J) * 10.0**-exponent
+    assert (np.abs(X @ J - Q) <= slack + 1e-15).all()
+    np.testing.assert_array_equal(np.triu(X, 1), 0.0)
+    assert (np.diag(X) > 0.0).all()
+    # X is the inverse of the triangular factor, which is Householder's but for signs.
+    T = np.linalg.qr(J.T)[1].T
+    T *= np.sign(np.diag(T))
+    close(T @ X, np.eye(m), 100 * n * EPS * 10.0**-exponent)
+    # A bound of the least singular value, within √m.
+    least = scale * (10.0**exponent if m > 1 else 1.0)
+    allowed = 1.0 + 100 * n * EPS * 10.0**-exponent
+    assert bound <= least * allowed
+    assert bound * np.sqrt(m) * allowed >= least
+
+
+@given(seeds, st.integers(2, 9), st.data())
+def test_orthonormalise_at_rank_loss(seed: int, n: int, data: st.DataObject) -> None:
+    """What is left after the rank is rounding, and the bound says so."""
+    m = data.draw(st.integers(2, n))
+    rank = data.draw(st.integers(0, m - 1))
+    J = normal(seed, m, rank) @ normal(seed + 1, rank, n)
+    Q, X = junk(m, n), junk(m, m)
+    bound = orthonormalise_rows(J, Q, X)
+    scale = max(1.0, np.abs(J).max())
+    assert bound <= 100 * EPS * scale * n
+    norms = np.linalg.norm(Q, axis=1)
+    assert ((np.abs(norms - 1.0) < 4 * n * EPS) | (norms == 0.0)).all()
+    close(Q[:rank] @ Q[:rank].T, np.eye(rank), 10 * n * EPS)
+
+
+def test_orthonormalise_a_zero_row() -> None:
+    J = normal(4, 3, 5)
+    J[1] = 0.0
+    Q, X = junk(3, 5), junk(3, 3)
+    assert orthonormalise_rows(J, Q, X) == 0.0
+    np.testing.assert_array_equal(Q[1], 0.0)
+    np.testing.assert_array_equal(X[1], 0.0)
+    close(Q[::2] @ Q[::2].T, np.eye(2), 1e-15)
+
+
+def test_orthonormalise_twice_is_needed() -> None:
+    """Läuchli's matrix: one sweep of Gram-Schmidt leaves rows at 60 degrees."""
+    J = np.vstack([np.ones(3), 1e-9 * np.eye(3)]).T.copy()
+    Q, X = junk(3, 4), junk(3, 3)
+    orthonormalise_rows(J, Q, X)
+    close(Q @ Q.T, np.eye(3), 1e-15)
+
+
+@given(seeds, sizes, st.data(), scales)
+def test_orthogonalise_rows(
+    seed: int, n: int, data: st.DataObject, scale: float
+) -> None:
+    """U Y has orthogonal rows whose norms are the singular values; any rank."""
+    m = data.draw(st.integers(1, n))
+    rank = data.draw(st.integers(0, m))
+    exponent = data.draw(exponents)
+    values = np.zeros(m)
+    values[:rank] = scale * np.logspace(0.0, exponent, rank)
+    Y = spectrum(seed, n, m, values).T.copy()
+    turned, U = Y.copy(), junk(m, m)
+    orthogonalise_rows(turned, U)
+    close(U @ U.T, np.eye(m), 20 * m * EPS)
+    close(turned, U @ Y, 20 * m * EPS * scale)
+    norms = np.linalg.norm(turned, axis=1)
+    close(np.sort(norms)[::-1], np.linalg.svd(Y)[1], 20 * n * EPS * scale)
+    # Orthogonal in the sense of cosines, not only of small products.
+    gram = turned @ turned.T
+    cosines = np.abs(gram) / np.maximum(np.outer(norms, norms), 1e-300)
+    kept = norms > 1e-13 * max(norms.max(), 1e-300)
+    off = cosines[np.ix_(kept, kept)] - np.eye(int(kept.sum()))
+    assert np.abs(off).max(initial=0.0) < 1e-12
+
+
+@given(st.lists(st.integers(-999, 999), min_size=8, max_size=8), st.integers(20, 60))
+def test_small_singular_values_to_high_relative_accuracy(
+    entries: list[int], shift: int
+) -> None:
+    """Rows of very different size: σ_min to 1e-13 of itself (LAPACK: of σ_max).
+
+    Exactly: σ_max σ_min = √det(YᵀY), in rational numbers.
+    """
+    Y = np.array(entries, dtype=float).reshape(4, 2)
+    Y[:, 1] *= 2.0**-shift  # exact
+    exact = [[Fraction(value) for value in row] for row in Y.tolist()]
+    a = sum(row[0] ** 2 for row in exact)
+    b = sum(row[0] * row[1] for row in exact)
+    c = sum(row[1] ** 2 for row in exact)
+    determinant = a * c - b * b
+    # Columns at an angle of less than 0.01 are ill-conditioned beyond their scaling.
+    assume(determinant > a * c / 10_000)
+    turned, U = Y.T.copy(), junk(2, 2)
+    orthogonalise_rows(turned, U)
+    small, large = np.sort(np.linalg.norm(turned, axis=1))
+    product = float(determinant) ** 0.5
+    np.testing.assert_allclose(small * large, product, rtol=1e-11)
+    np.testing.assert_allclose(large, np.linalg.norm(Y, 2), rtol=1e-13)
+
+
+# --- compiled and uncompiled ---------------------------------------------------------
+
+
+def uncompiled(function: Any) -> Any:
+    """Return a kernel's Python source as a function, or itself if JIT is off."""
+    return getattr(function, "py_func", function)
+
+
+def triangular(n: int) -> Array:
+    return np.tril(normal(6, n, n)) + 3 * np.eye(n)
+
+
+def arguments(name: str) -> tuple[Any, ...]:
+    """Return arguments that take a kernel through all of its branches."""
+    spd = triangular(6) @ triangular(6).T
+    deficient = normal(7, 5, 7)
+    deficient[3] = 0.0
+    independent = normal(7, 5, 7)
+    independent[2] = independent[1] + 0.01 * independent[2]  # cleaned twice
+    turned = np.linalg.qr(normal(23, 3, 3))[0]
+    n, m = 7, 4
+    sample = [normal(k, n) for k in range(9, 12)]
+    J, J_dot = normal(12, m, n), normal(13, m, n)
+    world = [normal(k, 6, n) for k in (15, 16)]
+    index = np.arange(n)
+    shared = np.array([0, 1, 2, 3, 4, 5, 5])  # the last joint mimics its neighbour
+    return {
+        "multiply": (J, sample[0], np.zeros(m)),
+        "multiply_transposed": (J, sample[0][:m], np.zeros(n)),
+        "cholesky": (spd, np.zeros((6, 6))),
+        "solve_lower": (triangular(6), normal(17, 6)),
+        "solve_lower_transposed": (triangular(6), normal(17, 6)),
+        "solve_rows": (triangular(6), normal(17, 4, 6)),
+        "solve_rows_transposed": (triangular(6), normal(17, 4, 6)),
+        "solve_columns": (triangular(6), normal(21, 6, n)),
+        "gram": (J, J_dot, True, np.zeros((m, m))),
+        "norm": (spd, normal(17, 6)),
+        "orthonormalise_rows": (independent, np.zeros((5, 7)), np.zeros((5, 5))),
+        "_share_row": (independent.copy(), triangular(5), 2),
+        "_square": (sample[0],),
+        "least_singular_value_bound": (triangular(6),),
+        "orthogonalise_rows": (deficient.copy(), np.zeros((5, 5))),
+        "acceleration": (
+            *(J, J_dot, normal(14, m, n), triangular(4), triangular(7), CONSTANT),
+            *(sample[0], sample[1][:m], sample[2], np.zeros((6, n)), np.zeros(n)),
+        ),
+        "frame_kinematics": (
+            *(np.array([2]), np.array([1]), *world),
+            *(np.eye(3), normal(18, 3), turned, normal(22, 3)),
+            *(normal(19, n - 1), index, shared, np.zeros((3, 3)), np.zeros(3)),
+            *(np.zeros((6, n - 1)), np.zeros((6, n - 1)), np.zeros(6), np.zeros(6)),
+        ),
+        "_take": (
+            *(0.5, np.array([0.6, 0.8, 3.0]), sample[0], np.zeros(3), np.zeros(n)),
+            *(np.array([[0, 2]]), np.array([4])),
+        ),
+    }[name]
+
+
+KERNELS: dict[str, Callable[..., Any]] = {
+    **{
+        name: function
+        for name, function in vars(linalg).items()
+        if callable(function) and uncompiled(function).__module__ == linalg.__name__
+    },
+    "acceleration": law.acceleration,
+    "frame_kinematics": kinematics.frame_kinematics,
+    "_take": robot._take,
+}
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_compiled_equals_uncompiled(name: str) -> None:
+    function = KERNELS[name]
+    if function is uncompiled(function):
+        pytest.skip("NUMBA_DISABLE_JIT is set: there is one form only")
+    compiled, plain = arguments(name), arguments(name)
+    result = function(*compiled)
+    expected = uncompiled(function)(*plain)
+    assert result == (expected if expected is None else pytest.approx(expected, 1e-13))
+    for mine, other in zip(compiled, plain, strict=True):
+        # Rounding: compiled sums are added in another order, and fused.
+        np.testing.assert_allclose(mine, other, rtol=1e-13, atol=1e-13)
+
+
+def test_every_kernel_of_linalg_has_arguments() -> None:
+    source = inspect.getsource(linalg)
+    assert source.count("@kernel") == len([k for k in KERNELS if k in vars(linalg)])
+    for name in KERNELS:
+        assert arguments(name)
+
+
+METRICS: dict[str, Callable[[int], Metric]] = {
+    "identity": lambda nv: IdentityMetric(),
+    "constant": lambda nv: ConstantMetric.from_coordinates(np.tril(np.ones((nv, nv)))),
+    "mass_matrix": lambda nv: MassMatrixMetric(),
+}
+SINGULAR = np.zeros(7)  # the Panda upright: rank 5 of 6
+
+
+def step_results() -> dict[str, list[float]]:
+    """Return one whole controller step for each metric, in general and singular."""
+    panda, rng = Robot.load("panda"), np.random.default_rng(20)
+    home, v = panda.home(), rng.standard_normal(7)
+    at = panda.state(0.0, panda.integrate(home, 0.1 * v), v)
+    frame = at.frame("panda_tcp")
+    gains = Gains(25.0, 10.0)
+    tasks = (
+        FramePosition(panda, "panda_tcp", Hold(frame.position + 0.1), gains),
+        FrameOrientation(panda, "panda_tcp", HoldOrientation(frame.rotation), gains),
+    )
+    field = TargetPosture(panda, home, weights=3.0)
+    results = {}
+    for name, metric in METRICS.items():
+        controller = Controller(
+            panda, tasks, field, metric=metric(7), singularity_threshold=0.01
+        )
+        for where, q in (("general", home), ("singular", SINGULAR)):
+            state = panda.state(0.2, q, v)
+            out = controller.compute(state)
+            diagnosis = controller.diagnose(state)
+            results[f"{name} {where}"] = [
+                *(*out.tau, *out.acceleration, *out.null_space_error),
+                *(*out.task.acceleration, *diagnosis.singular_values),
+                *(*controller.flow(0.2, q), float(out.damped)),
+            ]
+    return results
+
+
+def test_a_controller_step_is_the_same_without_the_compiler() -> None:
+    """NUMBA_DISABLE_JIT=1 runs the very same functions, as plain Python."""
+    environment = os.environ | {
+        "NUMBA_DISABLE_JIT": "1",
+        "PYTHONPATH": os.pathsep.join(map(str, (HERE, ROOT / "tests/support", ROOT))),
+    }
+    code = (
+        "import json, test_linalg as t; assert not hasattr(t.multiply, 'py_func'); "
+        "print(json.dumps(t.step_results()))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    plain, compiled = json.loads(run.stdout), step_results()
+    assert plain.keys() == compiled.keys()
+    assert len(plain) == 6
+    for name, values in compiled.items():
+        assert values[-1] == ("singular" in name)  # damped there, and only there
+        # 1e-12 of efforts up to 1e3: sums are the same, hypot's last bit is not.
+        np.testing.assert_allclose(plain[name], values, rtol=1e-12, atol=1e-11)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 12))
+def test_bounds_of_the_least_singular_value(seed: int, m: int) -> None:
+    """Both lie below it, the second within m to the power of a quarter."""
+    rng = np.random.default_rng(seed)
+    J = rng.standard_normal((m, m + 2))
+    Q, X = np.zeros((m, m + 2)), np.zeros((m, m))
+    loose = orthonormalise_rows(J, Q, X)
+    tight = least_singular_value_bound(X)
+    true = np.linalg.svd(J, compute_uv=False)[-1]
+    assert loose <= true * (1.0 + 1e-9)
+    assert tight <= true * (1.0 + 1e-9)
+    assert tight >= true * m**-0.25 * (1.0 - 1e-9)

@@ -1,0 +1,191 @@
+"""Calls that are packed once: the same as calling the kernels, in order, on time."""
+
+import copy
+import gc
+import pickle
+import weakref
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import NativeCall, Timed, bind, sequence
+from hsp_control.common.step_plan import CallSequence, StepPlan, TimeWindow, steps
+
+compiled = pytest.mark.skipif(
+    not hasattr(kernel(lambda: None), "py_func"), reason="NUMBA_DISABLE_JIT is set"
+)
+
+
+@kernel
+def _note(log: Array, who: float) -> float:
+    """Write who was called at the next place, which log[0] counts; return who."""
+    log[0] += 1.0
+    log[int(log[0])] = who
+    return who
+
+
+@kernel
+def _note_time(log: Array, who: float, t: float) -> None:
+    log[0] += 1.0
+    log[int(log[0])] = who + t
+
+
+@kernel
+def _combine(
+    flag: bool, count: int, factor: float, A: Array, x: Array, places: Array, out: Array
+) -> bool:
+    """Write A x, scaled where flagged, and place by place."""
+    for i in range(A.shape[0]):
+        total = 0.0
+        for j in range(A.shape[1]):
+            total += A[i, j] * x[j]
+        out[places[i]] = factor * total if flag else total + count
+    return flag
+
+
+def called(log: Array) -> list[float]:
+    """Return who was called, and forget it."""
+    names = log[1 : 1 + int(log[0])].tolist()
+    log[:] = 0.0
+    return names
+
+
+@pytest.mark.parametrize("layout", ["C", "F", "strided", "reversed", "read-only"])
+@settings(max_examples=20, deadline=None)
+@given(
+    flag=st.booleans(),
+    count=st.integers(-5, 5),
+    rows=st.integers(1, 5),
+    columns=st.integers(0, 4),
+    seed=st.integers(0, 99),
+)
+def test_a_bound_call_is_the_kernel(
+    layout: str, flag: bool, count: int, rows: int, columns: int, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    A = rng.standard_normal((rows, columns))
+    if layout == "F":
+        A = np.asfortranarray(A)
+    elif layout == "strided":
+        A = rng.standard_normal((2 * rows, 3 * columns))[::2, 1::3]
+    elif layout == "reversed":
+        A = A[::-1]
+    elif layout == "read-only":
+        A.flags.writeable = False
+    x, places = rng.standard_normal(columns), rng.permutation(rows)
+    direct, bound = np.zeros((2, rows))
+    arguments = flag, count, 0.7, A, x, places
+    call = bind(_combine, *arguments, bound)
+    assert bool(call()) == _combine(*arguments, direct) == flag
+    np.testing.assert_array_equal(bound, direct)
+    x[:] = rng.standard_normal(columns)  # arrays are followed
+    call()
+    _combine(*arguments, direct)
+    np.testing.assert_array_equal(bound, direct)
+
+
+@compiled
+def test_a_call_keeps_its_arrays_alive_and_lets_them_go() -> None:
+    log = np.zeros(4)
+    watched = weakref.ref(log)
+    call = sequence([Timed(bind(_note, log, 3.0), -np.inf, np.inf)])
+    del log
+    gc.collect()
+    for _ in range(3):
+        assert call(0.0) == 3.0
+    assert watched() is not None
+    del call
+    gc.collect()
+    assert watched() is None
+
+
+@compiled
+@pytest.mark.parametrize("way", ["deepcopy", "pickle"])
+def test_a_copy_is_of_the_copied_arrays(way: str) -> None:
+    """And not of the addresses: the originals may be gone."""
+    log = np.zeros(4)
+    held = {"log": log, "call": bind(_note, log, 3.0)}
+    held["sequence"] = sequence([Timed(held["call"], -np.inf, 1.0)])
+    if way == "pickle":
+        copied = pickle.loads(pickle.dumps(held))
+    else:
+        copied = copy.deepcopy(held)
+    assert copied["call"]() == 3.0
+    assert copied["sequence"](0.0) == 3.0
+    assert called(copied["log"]) == [3.0, 3.0]
+    assert called(log) == []
+
+
+@compiled
+def test_calls_are_made_in_turn_and_when_it_is_time() -> None:
+    log = np.zeros(9)
+    first, last = bind(_note, log, 1.0), bind(_note, log, 2.0)
+    timed = bind(_note_time, log, 10.0, timed=True)
+    calls = [
+        Timed(timed, -np.inf, np.inf),
+        Timed(last, 1.0, 2.0),
+        Timed(first, -np.inf, 1.5),
+    ]
+    call = sequence(calls)
+    assert call(0.0) == 1.0
+    assert called(log) == [10.0, 1.0]
+    assert call(1.0) == 1.0
+    assert called(log) == [11.0, 2.0, 1.0]
+    assert call(1.5) == 2.0
+    assert called(log) == [11.5, 2.0]
+    call(2.0)  # the end is not within
+    assert called(log) == [12.0]
+
+
+def test_steps_are_references_then_what_reads_them_then_the_law() -> None:
+    """Whatever is compiled, and whatever is somebody's own Python."""
+    log = np.zeros(20)
+
+    def own(t: float) -> None:
+        _note(log, 100.0 + t)
+
+    def own_write() -> None:
+        _note(log, 7.0)
+
+    early = TimeWindow(
+        CallSequence(bind(_note_time, log, 20.0, timed=True), own), -np.inf, 1.0
+    )
+    bounds = [
+        StepPlan(
+            (early, TimeWindow(own, 0.5, 3.0)), (bind(_note, log, 1.0), own_write)
+        ),
+        StepPlan(
+            (), (CallSequence(bind(_note, log, 2.0), bind(_note, log, 3.0), result=0),)
+        ),
+    ]
+    found = steps(bounds, bind(_note, log, 4.0))
+    outcome = [step(0.5) for step in found][-1]
+    assert outcome == 4.0
+    assert called(log) == [20.5, 100.5, 100.5, 1.0, 7.0, 2.0, 3.0, 4.0]
+    for step in found:
+        step(1.0)
+    assert called(log) == [101.0, 1.0, 7.0, 2.0, 3.0, 4.0]
+
+
+@compiled
+def test_native_calls_that_follow_one_another_are_one() -> None:
+    log = np.zeros(20)
+    notes = [bind(_note, log, float(k)) for k in range(5)]
+    found = steps(
+        [StepPlan((), tuple(notes[:2])), StepPlan((), tuple(notes[2:4]))], notes[4]
+    )
+    assert len(found) == 1
+    assert isinstance(found[0], NativeCall)
+    assert found[0](0.0) == 4.0
+
+
+def test_several_calls_as_one_return_what_one_of_them_says() -> None:
+    log = np.zeros(9)
+    calls = [bind(_note, log, float(k)) for k in range(3)]
+    assert CallSequence(*calls)() == 2.0
+    assert CallSequence(*calls, result=1)() == 1.0
+    assert called(log) == [0.0, 1.0, 2.0, 0.0, 1.0, 2.0]

@@ -1,0 +1,347 @@
+"""YAML and Python are two faces of the same objects, and every error says where."""
+
+import json
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+import yaml
+
+from hsp_control import (
+    ConstantMetric,
+    FramePose,
+    JointCentering,
+    MassMatrixMetric,
+    Rk4,
+    Rollout,
+    load_experiment,
+)
+from hsp_control.common import exceptions
+from hsp_control.common.resources import bundled, bundled_configs
+from hsp_control.config import json_schema
+
+MOVING = "paper/4_moving_obstacle"
+
+PANDA = {
+    "robot": {
+        "name": "panda",
+        "tool_frames": {"pen": {"parent": "panda_hand", "translation": [0, 0, 0.2]}},
+    },
+    "start": {"joints": {"panda_joint4": -2.0}},
+    "tasks": {
+        "pen": {
+            "type": "frame_pose",
+            "frame": "pen",
+            "blend": 0.5,
+            "gains": {"natural_frequency": [8, 8, 8, 5, 5, 5], "damping_ratio": 0.9},
+            "trajectory": {
+                "type": "composed",
+                "position": {
+                    "type": "circle",
+                    "origin": "start",
+                    "center": [0, 0, 0],
+                    "radius": 0.05,
+                    "angular_rate": 2,
+                    "normal": [0, 0, 1],
+                },
+            },
+        }
+    },
+    "null_space": {
+        "gain": 6,
+        "metric": {"type": "mass_matrix"},
+        "fields": [{"type": "joint_centering", "weight": 2.0}],
+    },
+    "simulation": {
+        "duration": 0.02,
+        "control_period": 0.001,
+        "integrator": {"type": "rk4", "step": 0.0005},
+    },
+}
+
+
+def changed(path: str, value: object) -> dict:
+    """Return the Panda's configuration with one value changed, made or removed."""
+    data = json.loads(json.dumps(PANDA))
+    *keys, last = path.split(".")
+    place = data
+    for key in keys:
+        place = place[int(key) if isinstance(place, list) else key]
+    if isinstance(place, list):
+        place[int(last)] = value
+    else:
+        place[last] = value
+    return data
+
+
+def test_every_bundled_configuration_follows_the_exported_schema() -> None:
+    schema = json_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for name, file in bundled_configs().items():
+        data = yaml.safe_load(file.read_text(encoding="utf-8"))
+        jsonschema.validate(data, schema)
+        assert load_experiment(name).scenario.title, name
+
+
+def test_the_bundled_schema_is_the_exported_one() -> None:
+    """Editors find it by the first line of each bundled configuration."""
+    file = bundled("configs") / "hsp_control.schema.json"
+    assert json.loads(file.read_text(encoding="utf-8")) == json_schema(), (
+        "refresh it with: hsp schema > configs/hsp_control.schema.json"
+    )
+    for path in bundled_configs().values():
+        first = path.read_text(encoding="utf-8").splitlines()[0]
+        where = first.removeprefix("# yaml-language-server: $schema=")
+        assert (path.parent / where).samefile(file), path
+
+
+def test_a_configuration_becomes_the_objects_it_names() -> None:
+    experiment = load_experiment(PANDA)
+    (task,) = experiment.controller.tasks
+    assert isinstance(task, FramePose)
+    assert task.name == task.frame == "pen"
+    np.testing.assert_allclose(np.diag(task.Kp), [64, 64, 64, 25, 25, 25])
+    np.testing.assert_allclose(np.diag(task.Kv), [14.4] * 3 + [9.0] * 3)
+    assert isinstance(experiment.controller.metric, MassMatrixMetric)
+    ((weight, field),) = experiment.controller.field.terms
+    assert weight.value == 2.0
+    assert isinstance(field, JointCentering)
+    assert isinstance(experiment.integrator, Rk4)
+    positions = experiment.robot.joint_positions(experiment.q0)
+    assert positions[3] == -2.0  # given by name
+    assert positions[1] == experiment.robot.joint_positions(experiment.robot.home())[1]
+    # The blend starts where the robot does, so that the run starts without error.
+    assert len(experiment.run()) == 3
+    np.testing.assert_allclose(experiment.run()["task.pen.error"][0], 0.0, atol=1e-12)
+
+
+def test_the_same_run_from_yaml_and_from_python(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump(PANDA))
+    from_yaml, from_data = load_experiment(file), load_experiment(PANDA)
+    np.testing.assert_array_equal(from_yaml.run().q, from_data.run().q)
+
+
+def test_a_run_is_repeated_from_its_own_log(tmp_path: Path) -> None:
+    first = load_experiment(MOVING, "simulation.duration=0.2").run()
+    log = first.save(tmp_path / "run.npz")
+    again = load_experiment(log).run()
+    np.testing.assert_array_equal(first.tau, again.tau)
+    assert Rollout.load(log).config == again.config
+
+
+def test_a_log_of_a_robot_file_can_be_repeated_from_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from hsp_control.common.resources import bundled_robots
+
+    urdf = (bundled_robots()["planar3r"] / "planar3r.urdf").read_text()
+    (tmp_path / "arm.urdf").write_text(urdf)
+    data = {
+        "robot": {"name": "arm.urdf"},
+        "start": {"joints": [0.3, 0.8, 0.8]},
+        "tasks": {"tip": {"type": "frame_position", "frame": "tip", "axes": "xy",
+                          "trajectory": {"type": "hold"}}},
+        "simulation": {"duration": 0.02},
+    }  # fmt: skip
+    (tmp_path / "arm.yaml").write_text(yaml.safe_dump(data))
+    log = load_experiment(tmp_path / "arm.yaml").run().save(tmp_path / "arm.npz")
+    monkeypatch.chdir("/")
+    assert load_experiment(log).robot.nv == 3
+
+
+def test_flow_starts_without_a_transient() -> None:
+    experiment = load_experiment(MOVING, "start.velocity=flow", "simulation.duration=1")
+    rollout = experiment.run()
+    assert (
+        np.abs(rollout["task.tip.error"]).max() < 1e-7
+    )  # the start is printed to 1e-8
+    assert rollout["null_space_norm"].max() < 1e-9
+
+
+def test_metrics_and_postures_from_yaml() -> None:
+    matrix = [[2.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]]
+    for metric in ({"type": "constant", "matrix": matrix},
+                   {"type": "constant", "matrix": [2, 1, 1]}):  # fmt: skip
+        given = load_experiment(MOVING, f"null_space.metric={metric}").controller.metric
+        assert isinstance(given, ConstantMetric)
+        np.testing.assert_array_equal(given.W, np.diag([2.0, 1, 1]))
+    data = changed("tasks", {"p": {"type": "joint_posture", "reference": "home"}})
+    assert load_experiment(data).controller.tasks[0].rows == 7
+
+
+TRAJECTORIES = [
+    {"type": "hold"},
+    {"type": "hold", "point": [0.4, 0, 0.5]},
+    {"type": "line", "end": [0.4, 0.1, 0.5], "duration": 2},
+    {"type": "uniform_line", "start": [0.4, 0, 0.5], "velocity": [0, 0.1, 0]},
+    {"type": "lissajous", "center": [0.4, 0, 0.5], "amplitudes": [0.1, 0.1, 0],
+     "rates": [1, 2, 0]},
+    {"type": "minimum_jerk", "origin": "start",
+     "waypoints": [[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], "times": [0, 1, 2]},
+    {"type": "spline", "origin": "start", "degree": 3,
+     "waypoints": [[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], "times": [0, 1, 2]},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("trajectory", TRAJECTORIES, ids=lambda t: t["type"])
+def test_every_trajectory_of_a_point(trajectory: dict) -> None:
+    task = {"type": "frame_position", "trajectory": trajectory}
+    experiment = load_experiment(changed("tasks", {"hand": task}))
+    assert experiment.controller.tasks[0].trajectory.sample(0.1).position.shape == (3,)
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        {"type": "frame_orientation", "trajectory": {"type": "hold"}, "blend": 1},
+        {"type": "frame_orientation",
+         "trajectory": {"type": "spin", "axis": [0, 0, 1], "rate": 1}},
+        {"type": "frame_orientation",
+         "trajectory": {"type": "path", "rpy": [[3, 0, 0], [3, 0.5, 0]],
+                        "times": [0, 1]}},
+        {"type": "pointing", "direction": [0, 0, -1]},
+        {"type": "frame_pose",
+         "trajectory": {"type": "screw", "position": [0.4, 0, 0.4],
+                        "rpy": [3.1, 0, 0], "duration": 2}},
+        {"type": "joint_posture", "joints": ["panda_joint1"],
+         "displacement": {"type": "lissajous", "center": [0], "amplitudes": [0.2],
+                          "rates": [1]}},
+    ],
+    ids=lambda task: task["type"],
+)  # fmt: skip
+def test_every_task(task: dict) -> None:
+    experiment = load_experiment(changed("tasks", {"only": task}))
+    state = experiment.robot.state(0.0, experiment.q0, experiment.v0)
+    assert np.isfinite(experiment.controller.compute(state).tau).all()
+
+
+BALL = {"type": "sphere", "radius": 1.0}
+
+# Each row: what is changed, the class of the error, and what its message says.
+MISTAKES = [
+    ("robot.name", "pandda", "RobotNotFoundError",
+     "robot.name: no robot 'pandda'; did you mean 'panda'?"),
+    ("robot.name", "missing/arm.urdf", "RobotNotFoundError",
+     "robot.name: missing/arm.urdf: no such file"),
+    ("robot.root", "flying", "ConfigError", "robot.root: unknown value 'flying'"),
+    ("robot.locked", {"panda_join1": 0.0}, "JointNotFoundError",
+     "did you mean 'panda_joint1'?"),
+    ("robot.gravity", [0, 0], "ConfigError", "robot.gravity: "),
+    ("robot.tool_frames.pen.parent", "panda_hnd", "FrameNotFoundError",
+     "no parent frame 'panda_hnd'; did you mean 'panda_hand'?"),
+    ("start.joints", {"joint9": 1.0}, "JointNotFoundError",
+     "start.joints.joint9: no joint 'joint9'"),
+    ("start.joints", [0.0] * 6, "ShapeError", "start.joints: joints has shape (6,)"),
+    ("start.configuration", [0.0] * 7, "ConfigError", "the start is said twice"),
+    ("start.velocity", [0.0] * 3, "ShapeError", "start.velocity: v0 has shape (3,)"),
+    ("start", {"coordinates": [0.0] * 7}, "ConfigurationError",
+     "start.coordinates: panda has no joint coordinates of its own"),
+    ("tasks", {}, "ConfigError", "tasks: "),
+    ("tasks.pen.frame", "pan", "FrameNotFoundError",
+     "tasks.pen.frame: no frame 'pan'; did you mean 'pen'?"),
+    ("tasks.pen.type", "frame_pos", "ConfigError", "unknown type 'frame_pos'"),
+    ("tasks.pen.wieght", 1, "ConfigError", "unknown key 'wieght'"),
+    ("tasks.pen.gains", {"kp": -1, "kv": 1}, "ConfigError",
+     "tasks.pen.gains.kp: -1 is negative; must be greater than 0"),
+    ("tasks.pen.gains", {"kp": 1}, "GainError",
+     "tasks.pen.gains: kp and kv belong together"),
+    ("tasks.pen.gains", {"kp": 1, "kv": 1, "natural_frequency": 1}, "GainError",
+     "tasks.pen.gains: give kp and kv, or natural_frequency"),
+    ("tasks.pen.gains", {}, "GainError", "tasks.pen.gains: give kp and kv"),
+    ("tasks.pen.gains", {"kp": [1, 2], "kv": 1}, "GainError",
+     "tasks.pen: kp has shape (2,); needs a number, 6 numbers"),
+    ("tasks.pen.gains", {"kp": float("nan"), "kv": 1}, "ConfigError",
+     "is not a finite number"),
+    ("tasks.pen.trajectory.position.center", [0, 0], "TrajectoryError",
+     "tasks.pen.trajectory: a point of 2 numbers"),
+    ("tasks.pen.trajectory.position.radius", "wide", "ConfigError",
+     "tasks.pen.trajectory.position.radius: 'wide'"),
+    ("tasks.pen.trajectory.position.normal", [0, 0, 0], "TrajectoryError", "normal"),
+    ("tasks.more", {"type": "joint_posture"}, "ControllerError",
+     "null_space: the tasks have 13 rows (pen: 6, more: 7)"),
+    ("tasks.more", {"type": "pointing", "direction": [0, 0, 0]}, "TaskError",
+     "tasks.more: direction: [0, 0, 0] is none"),
+    ("tasks.more", {"type": "frame_position", "axes": "xw",
+                    "trajectory": {"type": "hold"}}, "TaskError",
+     "tasks.more.axes: axes 'xw': name distinct axes"),
+    ("null_space.gain", [1, 2], "GainError",
+     "null_space: null_space_gain has shape (2,)"),
+    ("null_space.gain", 0, "ConfigError", "null_space.gain: "),
+    ("null_space.metric", {"type": "coordinates"}, "MetricError",
+     "null_space.metric: panda has no joint coordinates of its own; give matrix"),
+    ("null_space.metric", {"type": "constant", "matrix": [[1, 2], [2, 1]]},
+     "MetricError", "null_space.metric: metric is not positive definite"),
+    ("null_space.metric", {"type": "constant", "matrix": [[1, 2], [2]]},
+     "MetricError", "rows differ in length"),
+    ("null_space.metric", {"type": "constant", "matrix": [1, 1]}, "MetricError",
+     "null_space: metric has shape (2, 2); the robot needs (7, 7)"),
+    ("null_space.fields.0", {"type": "point_distance", "frames": ["pen"],
+                             "obstacle": "ball"}, "SceneError",
+     "null_space.fields.0.obstacle: no obstacle 'ball' (the scene has none)"),
+    ("null_space.fields.0", {"type": "equal_joint_angles", "joints": ["a", "b"]},
+     "JointNotFoundError", "null_space.fields.0.joints: no joint 'a'"),
+    ("null_space.fields.0", {"type": "target_posture", "target": [1.0]},
+     "ShapeError", "null_space.fields.0.target: posture has shape (1,)"),
+    ("null_space.fields.0", {"type": "joint_centering", "weights": [1, 1]},
+     "FieldError", "null_space.fields.0: field 'joint_centering': weights"),
+    ("null_space.fields", [{"type": "rest"}, {"type": "uncontrolled"}],
+     "ConfigError", "null_space.fields.1: an uncontrolled null space"),
+    ("scene", {"obstacles": {"b": {"shape": BALL, "center": {"type": "hold"}}}},
+     "TrajectoryError", "scene.obstacles.b.center: give the point"),
+    ("scene", {"obstacles": {"b": {"shape": {"type": "mesh", "file": "b.stl"},
+                                   "center": {"type": "hold", "point": [0, 0, 0]}}}},
+     "SceneError", "scene.obstacles.b.shape: mesh: no file"),
+    ("scene", {"obstacles": {"b": {"shape": BALL, "center":
+                                   {"type": "hold", "point": [0, 0]}}}},
+     "SceneError", "scene.obstacles.b: obstacle 'b': its centre has dimension 2"),
+    ("simulation.integrator.step", 0.0007, "SimulationError",
+     "simulation.integrator.step: 0.0007 s is not an integer fraction of "
+     "control_period = 0.001 s"),
+    ("simulation.duration", -1, "ConfigError", "simulation.duration: -1 is negative"),
+    ("view", {"camera": [1, 2]}, "ConfigError", "view.camera: "),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "error", "message"), MISTAKES, ids=lambda x: str(x)[:40]
+)
+def test_every_mistake_is_named(
+    path: str, value: object, error: str, message: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump(changed(path, value), sort_keys=False))
+    with pytest.raises(getattr(exceptions, error)) as caught:
+        load_experiment(file)
+    text = str(caught.value)
+    assert text.startswith(f"{file}:"), text
+    assert message in text
+    line = int(text.removeprefix(f"{file}:").split(":")[0])
+    assert 1 <= line <= len(file.read_text().splitlines())
+    assert "\n" not in text or type(caught.value).__name__ == "ConfigError"
+
+
+def test_periods_that_do_not_fit_are_named() -> None:
+    message = r"^configuration: simulation: .* is not a whole multiple"
+    with pytest.raises(exceptions.SimulationError, match=message):
+        load_experiment(changed("simulation.log_period", 0.0015))
+
+
+def test_mistakes_in_data_that_came_from_no_file_are_named() -> None:
+    with pytest.raises(exceptions.RobotNotFoundError, match=r"^configuration: robot"):
+        load_experiment(changed("robot.name", "pandda"))
+    with pytest.raises(exceptions.ConfigError, match=r"^configuration: tasks"):
+        load_experiment(changed("tasks", {}))
+
+
+def test_unknown_configuration_names_the_nearest() -> None:
+    with pytest.raises(exceptions.ConfigError, match=r"did you mean 'paper/2_rest'\?"):
+        load_experiment("paper/2_rset")
+
+
+def test_a_log_made_from_python_holds_no_configuration(tmp_path: Path) -> None:
+    rollout = load_experiment(MOVING, "simulation.duration=0.01").run()
+    del rollout.meta["config"]
+    with pytest.raises(exceptions.ConfigError, match="made from Python"):
+        load_experiment(rollout.save(tmp_path / "run.npz"))

@@ -1,0 +1,280 @@
+"""Plants from YAML: the configurations on another engine, and every imperfection."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from places import ROOT
+
+from hsp_control import Rollout, load_experiment
+from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.resources import bundled_configs
+from hsp_control.geometry.shapes import Box
+from hsp_control.simulation.plants import (
+    ImperfectPlant,
+    IntegratedPlant,
+    RigidBodyPlant,
+    StickingPlant,
+)
+from hsp_control.simulation.plants.mujoco import ContactShape, MujocoPlant
+
+FIXED_BASE = [name for name in bundled_configs() if "/" not in name]
+
+
+def errors(rollout: Rollout) -> np.ndarray:
+    """Return the largest error of any task at every row [m or rad]."""
+    tasks = [rollout[f"task.{task}.error"] for task in rollout.meta["tasks"]]
+    return np.max([np.abs(error).max(axis=1) for error in tasks], axis=0)
+
+
+@pytest.mark.parametrize("name", FIXED_BASE)
+def test_a_configuration_runs_on_mujoco_with_the_same_tracking(name: str) -> None:
+    """As written, for 1 s: no task is off by more than 0.15 mm on either engine.
+
+    Both errors are mostly the effort's being held: MuJoCo's own step adds as much.
+    """
+    pytest.importorskip("mujoco")
+    short = "simulation.duration=1"
+    ours = load_experiment(name, short).run()
+    theirs = load_experiment(name, short, "plant=mujoco").run()
+    assert theirs.meta["plant"]["type"] == "MujocoPlant"
+    assert errors(ours).max() < 3e-4
+    assert errors(theirs).max() < 1.5e-4
+    assert np.abs(theirs.q - ours.q).max() < 2e-3
+    assert np.abs(theirs.q - ours.q).max() > 1e-9  # it is another engine
+
+
+EVERYTHING: dict[str, Any] = {
+    "type": "rigid_body",
+    "inertias": {
+        "mass_factor": 1.1,
+        "com_shift": [0.001, 0.0, 0.0],
+        "random_mass": 0.1,
+        "random_inertia": 0.2,
+        "random_com": 0.001,
+    },
+    "payload": {"frame": "panda_tcp", "mass": 0.5, "radius": 0.03},
+    "motor_inertia": 0.01,
+    "friction": {"coulomb": 0.3, "viscous": [0.1] * 7},
+    "pushes": [{"frame": "panda_tcp", "force": [5, 0, 0], "start": 0.01}],
+    "sensors": {
+        "delay": 1,
+        "position_noise": 1e-5,
+        "encoder_resolution": 1.2e-5,
+        "differenced_velocity": True,
+        "velocity_noise": 0.001,
+    },
+    "drives": {
+        "dropped": 0.05,
+        "delay": 1,
+        "jitter": 0.0003,
+        "noise": 0.05,
+        "saturation": "model",
+    },
+    "seed": 7,
+}
+
+
+def panda(plant: Any) -> dict[str, Any]:
+    return {
+        "robot": {"name": "panda"},
+        "tasks": {"hand": {"type": "frame_position", "trajectory": {"type": "hold"}}},
+        "plant": plant,
+        "simulation": {"duration": 0.1, "control_period": 0.001},
+    }
+
+
+@pytest.mark.parametrize("kind", ["rigid_body", "mujoco"])
+def test_everything_at_once(kind: str, tmp_path: Path) -> None:
+    """It runs on both engines, and its log is enough to run it again."""
+    if kind == "mujoco":
+        pytest.importorskip("mujoco")
+    experiment = load_experiment(panda({**EVERYTHING, "type": kind}))
+    plant = experiment.plant
+    assert isinstance(plant, ImperfectPlant)
+    assert (
+        type(plant.plant) is {"rigid_body": StickingPlant, "mujoco": MujocoPlant}[kind]
+    )
+    sensors = [type(sensor).__name__ for sensor in plant.sensors]
+    assert sensors == [
+        "SensorDelay",
+        "PositionNoise",
+        "Encoder",
+        "DifferencedVelocity",
+        "VelocityNoise",
+    ]
+    drives = [type(drive).__name__ for drive in plant.drives]
+    assert drives == [
+        "DroppedPeriods",
+        "EffortDelay",
+        "Jitter",
+        "EffortNoise",
+        "Saturation",
+    ]
+    nominal = experiment.robot.model
+    assert experiment.controller.robot is experiment.robot
+    assert plant.robot is not experiment.robot
+    assert plant.robot.model.inertias[7].mass > nominal.inertias[7].mass + 0.4
+    np.testing.assert_allclose(plant.robot.model.armature - nominal.armature, 0.01)
+    run = experiment.run()
+    described = run.meta["plant"]
+    assert described["friction"]["coulomb"] == [0.3] * 7
+    assert described["pushes"][0]["force"] == [5.0, 0.0, 0.0]
+    assert described["sensors"][1]["seed"] == 7
+    again = load_experiment(run.save(tmp_path / "run.npz")).run()
+    for name in run.columns:
+        np.testing.assert_array_equal(again[name], run[name], err_msg=name)
+    other = load_experiment(panda({**EVERYTHING, "type": kind, "seed": 8})).run()
+    assert np.abs(other.q - run.q).max() > 1e-7
+
+
+def test_without_a_word_the_plant_is_the_model() -> None:
+    experiment = load_experiment("panda_limits")
+    assert type(experiment.plant) is RigidBodyPlant
+    assert experiment.plant.robot is experiment.robot
+
+
+def test_continuous_plants_take_the_integrator_of_the_simulation() -> None:
+    experiment = load_experiment(panda({"type": "rigid_body", "drives": {"delay": 1}}))
+    assert isinstance(experiment.plant, ImperfectPlant)
+    assert isinstance(experiment.plant.plant, IntegratedPlant)
+    assert experiment.plant.plant.integrator is experiment.integrator
+
+
+def test_friction_as_the_urdf_says() -> None:
+    """0.003 N·m·s/rad of damping in the first joint of the panda's URDF."""
+    experiment = load_experiment(panda({"type": "rigid_body", "friction": "urdf"}))
+    assert isinstance(experiment.plant, StickingPlant)
+    expected = experiment.robot.model.damping
+    np.testing.assert_array_equal(experiment.plant.friction.viscous, expected)
+    assert expected.max() == 0.003
+
+
+def test_another_description_of_the_robot_as_the_plant(tmp_path: Path) -> None:
+    """A copy of the URDF with other masses, beside the configuration."""
+    source = load_experiment("panda_limits").robot.source.urdf
+    text = source.read_text(encoding="utf-8")
+    changed = text.replace('<mass value="', '<mass value="1')
+    assert changed != text
+    (tmp_path / "real.urdf").write_text(changed, encoding="utf-8")
+    config = panda({"type": "rigid_body", "robot": {"name": "real.urdf"}})
+    config["robot"]["locked"] = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}
+    (tmp_path / "run.yaml").write_text(str(config), encoding="utf-8")
+    experiment = load_experiment(tmp_path / "run.yaml")
+    mine, real = experiment.robot.model, experiment.plant.robot.model
+    assert real.inertias[3].mass > mine.inertias[3].mass + 5.0
+    assert experiment.run().meta["config"]["plant"]["robot"]["name"] == str(
+        tmp_path / "real.urdf"
+    )
+
+
+def test_the_page_s_configurations_run() -> None:
+    pytest.importorskip("mujoco")
+    page = ROOT / "docs" / "plants.md"
+    text = page.read_text(encoding="utf-8")
+    blocks = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert len(blocks) == 2
+    for block in blocks:
+        experiment = load_experiment(yaml.safe_load(block), "simulation.duration=0.02")
+        assert experiment.run().status == "completed"
+
+
+def test_feet_from_yaml() -> None:
+    pytest.importorskip("mujoco")
+    plant = load_experiment(
+        panda(
+            {
+                "type": "mujoco",
+                "timestep": 0.0005,
+                "integrator": "RK4",
+                "joint_limits": False,
+                "contacts": {
+                    "panda_tcp": {
+                        "shape": {"type": "box", "size": [0.1, 0.2, 0.3]},
+                        "position": [0, 0, 0.1],
+                    },
+                    "panda_link6": {},
+                },
+                "ground": {"height": -0.1, "friction": 0.3},
+            }
+        )
+    ).plant
+    assert isinstance(plant, MujocoPlant)
+    assert (plant.timestep, plant.integrator, plant.joint_limits) == (
+        5e-4,
+        "RK4",
+        False,
+    )
+    assert plant.contacts[0] == ContactShape(
+        "panda_tcp", Box((0.1, 0.2, 0.3)), [0, 0, 0.1], [0, 0, 0]
+    )
+    assert plant.contacts[1].shape is None
+    assert (plant.ground.height, plant.ground.friction) == (-0.1, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("plant", "message"),
+    [
+        ("mujcoo", r"plant: 'mujcoo' is text; .* did you mean 'mujoco'\?$"),
+        (
+            {"type": "mujcoo"},
+            r"plant.type: unknown type 'mujcoo'; did you mean 'mujoco'",
+        ),
+        (
+            {"type": "mujoco", "timstep": 1},
+            r"plant.timstep: unknown key 'timstep'; did you mean 'timestep'\?",
+        ),
+        (
+            {"type": "rigid_body", "payload": {"frame": "panda_tpc", "mass": 1}},
+            r"plant.payload: no frame 'panda_tpc'; did you mean 'panda_tcp'\?",
+        ),
+        (
+            {"type": "rigid_body", "pushes": [{"frame": "panda_tpc"}]},
+            r"plant.pushes.0: no frame 'panda_tpc'; did you mean 'panda_tcp'\?",
+        ),
+        (
+            {"type": "rigid_body", "friction": {"coulomb": [1, 2]}},
+            r"plant.friction: coulomb has shape \(2,\); needs one number, or one",
+        ),
+        (
+            {"type": "rigid_body", "motor_inertia": [1, 2]},
+            r"plant.motor_inertia: motor inertia has shape \(2,\); needs one num",
+        ),
+        (
+            {"type": "rigid_body", "sensors": {"velocity_noise": [1]}},
+            r"plant.sensors: velocity noise has shape \(1,\); needs one number, or one",
+        ),
+        (
+            {"type": "rigid_body", "drives": {"noise": [1]}},
+            r"plant.drives: effort noise has shape \(1,\); needs one number, or one",
+        ),
+        (
+            {"type": "rigid_body", "drives": {"dropped": 1.0}},
+            r"plant.drives.dropped: 1.0 is too large; must be less than 1$",
+        ),
+        (
+            {"type": "rigid_body", "robot": {"name": "planar3r"}},
+            r"plant: the plant moves planar3r with the joints joint1, joint2, joint3; ",
+        ),
+    ],
+)
+def test_plants_that_are_none(plant: Any, message: str) -> None:
+    with pytest.raises(HspControlError, match=message):
+        load_experiment(panda(plant))
+
+
+@pytest.mark.parametrize(
+    "plant",
+    ["mujoco", {"type": "rigid_body", "friction": "urdf"},
+     {"type": "rigid_body", "drives": {"delay": 1}}],
+)  # fmt: skip
+def test_what_moves_by_itself_needs_a_control_period(plant: Any) -> None:
+    pytest.importorskip("mujoco")
+    config = panda(plant)
+    del config["simulation"]["control_period"]
+    message = r"plant: efforts are held on this plant: set simulation.control_period"
+    with pytest.raises(HspControlError, match=message):
+        load_experiment(config)

@@ -1,0 +1,188 @@
+"""Mistakes about contacts, limits, priorities and the base: a located message each."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from hsp_control import load_experiment
+from hsp_control.common import exceptions
+
+pytest.importorskip("example_robot_data")
+
+FEET = {"front_left": "FL", "front_right": "FR", "hind_left": "HL", "hind_right": "HR"}
+HOLD = {"type": "frame_position", "trajectory": {"type": "hold"}}
+SOLO: dict[str, Any] = {
+    "robot": {"name": "solo12"},
+    "start": {"ground": 0},
+    "contacts": {
+        name: {"type": "ball", "frame": f"{foot}_FOOT", "radius": 0.0165}
+        for name, foot in FEET.items()
+    },
+    "tasks": {"trunk": {**HOLD, "frame": "base_link"}},
+    "simulation": {"duration": 0.01, "control_period": 0.001},
+}
+PANDA: dict[str, Any] = {
+    "robot": {"name": "panda"},
+    "tasks": {"hand": HOLD},
+    "limits": {},
+    "simulation": {"duration": 0.01},
+}
+SOLE = {"type": "surface", "frame": "FL_FOOT"}
+LINE = [[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]]
+FOOT = "contacts.front_left"
+TWICE = {"intervals": [[0, 2], [1, 3]]}
+REMOVED = object()
+
+# Each row: the robot, what is changed, the class of the error, and its message.
+MISTAKES: list[tuple[dict[str, Any], str, Any, str, str]] = [
+    (SOLO, f"{FOOT}.frame", "FL_FOT", "FrameNotFoundError",
+     f"{FOOT}.frame: no frame 'FL_FOT'; did you mean 'FL_FOOT'?"),
+    (SOLO, f"{FOOT}.friction", -0.5, "ConfigError",
+     f"{FOOT}.friction: -0.5 is negative; must be greater than 0"),
+    (SOLO, f"{FOOT}.radius", 0, "ConfigError",
+     f"{FOOT}.radius: 0 is too small; must be greater than 0"),
+    (SOLO, f"{FOOT}.normal", [0, 0, 0], "ContactError",
+     f"{FOOT}: contact 'front_left': normal [0.0, 0.0, 0.0] is no direction"),
+    (SOLO, FOOT, {**SOLE, "type": "sphere"}, "ConfigError",
+     f"{FOOT}.type: unknown type 'sphere' (allowed: surface, point, ball)"),
+    (SOLO, FOOT, SOLE, "ContactError",
+     f"{FOOT}: give length and width of the sole, or its corners"),
+    (SOLO, FOOT, {**SOLE, "length": 0.1}, "ContactError",
+     f"{FOOT}: give length and width of the sole, or its corners"),
+    (SOLO, FOOT, {**SOLE, "corners": LINE}, "ContactError",
+     "span no surface; needs three points or more, not on one line"),
+    (SOLO, f"{FOOT}.schedule", TWICE, "ScheduleError",
+     f"{FOOT}.schedule: the interval from 1 to 3 s begins before the one before it"),
+    (SOLO, f"{FOOT}.schedule", {"intervals": [[2, 1]]}, "ScheduleError",
+     f"{FOOT}.schedule: the interval from 2 to 1 s is empty"),
+    (SOLO, f"{FOOT}.schedule", {"intervals": [[0, 1]], "ramp": 2}, "ScheduleError",
+     f"{FOOT}.schedule: the interval from 0 to 1 s is shorter than its ramps, 4 s"),
+    (SOLO, f"{FOOT}.schedule", {"intervals": [[0, 1, 2]]}, "ConfigError",
+     f"{FOOT}.schedule.intervals.0: [0, 1, 2] has 3 entries, needs 2"),
+    (SOLO, "contacts", {}, "ContactError",
+     "start.ground: solo12 has no contact to put on the ground"),
+    (SOLO, "base", "drivn", "ConfigError",
+     "base: unknown value 'drivn'; did you mean 'driven'?"),
+    (SOLO, "base", "driven", "ContactError", "base: base='driven' needs no contacts"),
+    (SOLO, "tasks.trunk.priority", 0, "ConfigError",
+     "tasks.trunk.priority: 0 is too small; must be at least 1"),
+    (SOLO, "tasks.trunk.priority", 1.5, "ConfigError",
+     "tasks.trunk.priority: 1.5 is a decimal number; expected an integer"),
+    (SOLO, "tasks.trunk.schedule", TWICE, "ScheduleError",
+     "tasks.trunk.schedule: the interval from 1 to 3 s begins before"),
+    (PANDA, "base", "flying", "ContactError",
+     "base: panda has no free-flyer root: contacts and base are for"),
+    (PANDA, "contacts", {"hand": {"type": "point", "frame": "panda_tcp"}},
+     "ContactError", "contacts: panda has no free-flyer root"),
+    (PANDA, "start", {"ground": 0}, "ContactError",
+     "start.ground: panda has no free-flyer root to put on the ground"),
+    (PANDA, "limits.efort", 1, "ConfigError",
+     "limits.efort: unknown key 'efort'; did you mean 'effort'?"),
+    (PANDA, "limits.effort", -1, "ConfigError",
+     "limits.effort: -1 is negative; must be greater than 0"),
+    (PANDA, "limits.effort", {"scale": 0}, "ConfigError",
+     "limits.effort.scale: 0 is too small; must be greater than 0"),
+    (PANDA, "limits.effort", {"scale": {"panda_joint9": 0.5}}, "JointNotFoundError",
+     "limits.effort.scale.panda_joint9: no joint 'panda_joint9'; did you mean"),
+    (PANDA, "limits.effort", {"scale": {"panda_joint1": -1}}, "ConfigError",
+     "limits.effort.scale"),
+    (SOLO, "limits", {"effort": {"scale": {"root_joint": 0.5}}}, "LimitError",
+     "limits.effort.scale.root_joint: root_joint has no effort limit of its own"),
+    (PANDA, "limits.static_effort", 1.5, "ConfigError",
+     "limits.static_effort: 1.5 is too large; must be at most 1"),
+    (PANDA, "limits.null_space_speed", 0, "ConfigError",
+     "limits.null_space_speed: 0 is too small; must be greater than 0"),
+    (PANDA, "limits.null_space_weight", 1, "ConfigError",
+     "limits.null_space_weight: 1 is too large; must be less than 1"),
+    (PANDA, "limits.effort", [1, 2], "LimitError",
+     "limits: effort has shape (2,); needs one number or 7"),
+    (PANDA, "limits.effort", "robt", "ConfigError", "did you mean 'robot'?"),
+    (PANDA, "limits.effort_rate", 0, "ConfigError",
+     "limits.effort_rate: 0 is too small; must be greater than 0"),
+    (PANDA, "limits.position", {"lower": [0] * 7, "upper": [0] * 7}, "LimitError",
+     "limits: position limits of panda_joint1 leave no room: 0 to 0 with a margin"),
+    (PANDA, "limits.position", {"lower": [-1] * 7, "upper": [1] * 6}, "LimitError",
+     "limits: position's upper limit has shape (6,); needs one number or 7"),
+    (PANDA, "limits.position", {"lower": [-1] * 7}, "ConfigError",
+     "limits.position: missing key 'upper'"),
+    (PANDA, "limits.position_margin", 4, "LimitError",
+     "limits: position limits of panda_joint1 leave no room"),
+    (PANDA, "limits.velocity_margin", 1, "ConfigError",
+     "limits.velocity_margin: 1 is too large; must be less than 1"),
+    (PANDA, "limits.bandwidth", 0, "ConfigError", "limits.bandwidth: 0 is too small"),
+    (PANDA, "limits.distances", [{"type": "obstacle"}], "ConfigError",
+     "limits.distances.0.type: unknown type 'obstacle'; did you mean 'obstacles'?"),
+    (PANDA, "limits.distances", [{"type": "obstacles", "obstacles": ["ball"]}],
+     "SceneError", "limits.distances.0: no obstacle 'ball' (the scene has none)"),
+    (PANDA, "limits.distances", [{"type": "self", "least": -1}], "ConfigError",
+     "limits.distances.0.least: -1 is negative; must be at least 0"),
+    (PANDA, "limits.position", {"lower": [-3] * 7, "upper": [-1] * 7}, "LimitError",
+     "start: the start is outside the limits: panda_joint1 is at 0, its limits are"),
+    (PANDA, "start", {"joints": {"panda_joint4": 0.1}}, "LimitError",
+     "start: the start is outside the limits: panda_joint4 is at 0.1, its limits are"),
+]  # fmt: skip
+
+
+def changed(base: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """Return a configuration with one value changed, made or removed."""
+    data: dict[str, Any] = json.loads(json.dumps(base))
+    *keys, last = path.split(".")
+    place = data
+    for key in keys:
+        place = place[key]
+    if value is REMOVED:
+        del place[last]
+    else:
+        place[last] = value
+    return data
+
+
+def check(data: dict[str, Any], error: str, message: str, file: Path) -> None:
+    """The one message names the file, a line of it, and the culprit."""
+    file.write_text(yaml.safe_dump(data, sort_keys=False))
+    with pytest.raises(getattr(exceptions, error)) as caught:
+        load_experiment(file)
+    text = str(caught.value)
+    assert text.startswith(f"{file}:"), text
+    assert message in text, text
+    assert "\n" not in text
+    line = int(text.removeprefix(f"{file}:").split(":")[0])
+    lines = file.read_text().splitlines()
+    section = message.split(":")[0].split(".")[0]
+    starts = [k for k, each in enumerate(lines, 1) if each.startswith(f"{section}:")]
+    assert max(starts, default=1) <= line <= len(lines), text
+
+
+@pytest.mark.parametrize(
+    ("base", "path", "value", "error", "message"),
+    MISTAKES,
+    ids=[f"{path}-{k}" for k, (_, path, *_) in enumerate(MISTAKES)],
+)
+def test_every_mistake_is_named(
+    base: dict[str, Any],
+    path: str,
+    value: Any,
+    error: str,
+    message: str,
+    tmp_path: Path,
+) -> None:
+    check(changed(base, path, value), error, message, tmp_path / "mine.yaml")
+
+
+def test_a_floating_base_needs_support(tmp_path: Path) -> None:
+    data = changed(changed(SOLO, "contacts", REMOVED), "start", REMOVED)
+    message = "no motor moves the free-flyer root of solo12: declare contacts, or"
+    check(data, "ContactError", message, tmp_path / "mine.yaml")
+
+
+def test_start_too_near_an_obstacle(tmp_path: Path) -> None:
+    ball = {"shape": {"type": "sphere", "radius": 0.1},
+            "center": {"type": "hold", "point": [0.3, 0.0, 0.65]}}  # fmt: skip
+    limit = [{"type": "obstacles", "least": 0.4}]
+    data = changed(PANDA, "scene", {"obstacles": {"ball": ball}})
+    data["limits"] = {"distances": limit}
+    message = "start: the start is outside the limits: "
+    check(data, "LimitError", message, tmp_path / "mine.yaml")

@@ -1,0 +1,517 @@
+"""Contacts and floating bases: rows, forces, the law on constrained plants, schedules.
+
+Rows against differences; the effort against a plant that solves the constraint for
+itself; the laws of errors and of the null space along motions of that plant.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hsp_control import (
+    BallContact,
+    Blend,
+    CenterOfMass,
+    Circle,
+    Contact,
+    Controller,
+    Dop853,
+    FrameOrientation,
+    FramePose,
+    FramePosition,
+    Gains,
+    Hold,
+    HoldOrientation,
+    JointPosture,
+    Limits,
+    PointContact,
+    Robot,
+    RobotState,
+    Schedule,
+    SurfaceContact,
+    TargetPosture,
+    Task,
+    simulate,
+)
+from hsp_control.common.exceptions import (
+    ContactError,
+    ControllerError,
+    FrameNotFoundError,
+    ScheduleError,
+)
+from hsp_control.constraints.contacts.unactuated import UnactuatedRows
+from hsp_control.control.actuation import EXACT, REDISTRIBUTED, RELAXED
+from hsp_control.simulation.plants import ContactPlant, RigidContact
+from hsp_control.tasks import TaskSample
+from hsp_control.trajectories import HoldPose
+
+pytest.importorskip("example_robot_data")
+Array = NDArray[np.float64]
+seeds = st.integers(0, 2**32 - 1)
+GAINS = Gains.from_frequency(8.0)
+SOLES = ("left_sole_link", "right_sole_link")
+FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
+
+
+@cache
+def talos() -> Robot:
+    return Robot.load(
+        "talos", locked={"gripper_left_joint": 0, "gripper_right_joint": 0}
+    )
+
+
+@cache
+def solo() -> Robot:
+    return Robot.load("solo12")
+
+
+def sole(frame: str, **options: Any) -> SurfaceContact:
+    return SurfaceContact.rectangle(
+        talos(), frame, length=0.16, width=0.1, name=frame, **options
+    )
+
+
+def random_state(robot: Robot, seed: int, speed: float = 0.3) -> RobotState:
+    rng = np.random.default_rng(seed)
+    q = robot.integrate(robot.home(), 0.2 * rng.standard_normal(robot.nv))
+    return robot.state(0.0, q, speed * rng.standard_normal(robot.nv))
+
+
+def sample_of(contact: Contact, state: RobotState) -> TaskSample:
+    return contact.evaluate(state, TaskSample.allocate(contact.rows, state.robot.nv))
+
+
+def slope(function: Callable[[float], Array], h: float = 1e-3) -> Array:
+    """Return f'(0) by six points."""
+    weights = ((1, 45.0), (2, -9.0), (3, 1.0))
+    total = sum(w * (function(k * h) - function(-k * h)) for k, w in weights)
+    return np.asarray(total / (60.0 * h))
+
+
+# --- rows ----------------------------------------------------------------------------
+
+CONTACTS: dict[str, Callable[[], Contact]] = {
+    "sole": lambda: sole(SOLES[0]),
+    "point": lambda: PointContact(talos(), SOLES[1], point=[0.1, 0.02, -0.03]),
+    "ball": lambda: BallContact(solo(), FEET[2], radius=0.02, normal=[0.1, 0.2, 1.0]),
+}
+
+
+@pytest.mark.parametrize("kind", CONTACTS)
+@given(seeds)
+@settings(max_examples=10)
+def test_rows_are_the_velocity_of_what_touches(kind: str, seed: int) -> None:
+    contact = CONTACTS[kind]()
+    robot = contact.robot
+    state = random_state(robot, seed)
+    q, v = state.q.copy(), state.v.copy()
+    sample = sample_of(contact, state)
+    data = robot.model.createData()
+    index = robot.model.getFrameId(contact.frame)
+
+    def place(s: float) -> pin.SE3:
+        pin.framesForwardKinematics(robot.model, data, robot.integrate(q, s * v))
+        return data.oMf[index].copy()
+
+    here = place(0.0)
+    turning = slope(lambda s: pin.log3(place(s).rotation @ here.rotation.T))
+    if kind == "sole":
+        moving = np.concatenate([slope(lambda s: place(s).translation), turning])
+    elif kind == "point":
+        moving = slope(lambda s: place(s).act(contact.points[0]))
+    else:
+        assert isinstance(contact, BallContact)
+        arm = -contact.radius * contact.axes[:, 2]
+        moving = slope(lambda s: place(s).translation) + np.cross(turning, arm)
+    np.testing.assert_allclose(sample.jacobian @ v, moving, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(sample.acceleration, -40.0 * moving, atol=1e-7)
+
+    def rows(s: float) -> Array:
+        there = robot.state(0.0, robot.integrate(q, s * v), v)
+        return sample_of(contact, there).jacobian.copy()
+
+    np.testing.assert_allclose(sample.jacobian_dot, slope(rows), rtol=0, atol=1e-8)
+
+
+@given(seeds)
+@settings(max_examples=10)
+def test_unactuated_rows_ask_for_no_effort(seed: int) -> None:
+    """Two point feet: Uᵀ(M a + N) = 0 is a row of the law, and J' is its derivative."""
+    robot = solo()
+    base = np.array(robot.unactuated)
+    feet = [BallContact(robot, foot, radius=0.016) for foot in FEET[::3]]
+    rest = UnactuatedRows(robot, base, 1)
+    state = random_state(robot, seed)
+    q, v = state.q.copy(), state.v.copy()
+
+    def rows(there: RobotState) -> TaskSample:
+        held = TaskSample.allocate(6, robot.nv)
+        for k, foot in enumerate(feet):
+            foot.evaluate(there, held.rows(3 * k, 3 * k + 3))
+        return rest.evaluate(there, held, TaskSample.allocate(1, robot.nv))
+
+    sample = rows(state)
+    a = np.random.default_rng(seed).standard_normal(robot.nv)
+    effort = state.inverse_dynamics(a).copy()
+    held = np.vstack([sample_of(foot, state).jacobian for foot in feet])
+    u = np.linalg.svd(held[:, base])[2][-1]
+    found = sample.jacobian @ a + sample.jacobian_dot @ v - sample.acceleration
+    mass = sum(inertia.mass for inertia in robot.model.inertias)
+    assert abs(found[0]) == pytest.approx(abs(u @ effort[base]) / mass, rel=1e-9)
+
+    def projector(s: float) -> Array:
+        """The row space, which does not depend on U's sign."""
+        row = rows(robot.state(0.0, robot.integrate(q, s * v), v)).jacobian
+        held = np.vstack(
+            [
+                sample_of(f, robot.state(0.0, robot.integrate(q, s * v), v)).jacobian
+                for f in feet
+            ]
+        )
+        whole = np.vstack([held, row])
+        return np.linalg.pinv(whole) @ whole
+
+    # P' of the stacked rows from J' alone: P' = -(J⁺J'P + (J⁺J'P)ᵀ), P = I - J⁺J.
+    J = np.vstack([held, sample.jacobian])
+    J_dot = np.vstack(
+        [*(sample_of(foot, state).jacobian_dot for foot in feet), sample.jacobian_dot]
+    )
+    P = np.eye(robot.nv) - np.linalg.pinv(J) @ J
+    turned = np.linalg.pinv(J) @ J_dot @ P
+    np.testing.assert_allclose(turned + turned.T, slope(projector), atol=1e-6)
+
+
+# --- the law on a constrained plant --------------------------------------------------
+
+
+def standing(**options: Any) -> Controller:
+    """Return Talos on two soles: centre of mass, hand, trunk, and a posture."""
+    robot = talos()
+    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+    com = state.centroidal.position.copy()
+    hand = "gripper_right_base_link"
+    at = state.position(hand).copy()
+    up, offset = np.array([0.0, 0.0, 1.0]), np.array([0.05, 0.0, 0.1])
+    levels = [
+        [
+            CenterOfMass(
+                robot, Blend(com, Circle(com, 0.02, 2.0, normal=up), 0.5), GAINS
+            ),
+            FrameOrientation(
+                robot,
+                "torso_2_link",
+                HoldOrientation(state.frame("torso_2_link").rotation.copy()),
+                GAINS,
+                name="trunk",
+            ),
+        ],
+        [
+            FramePosition(
+                robot,
+                hand,
+                Blend(at, Circle(at + offset, 0.05, 3.0, normal=[1, 0, 0]), 0.5),
+                GAINS,
+                name="hand",
+            )
+        ],
+    ]
+    contacts = [sole(frame) for frame in SOLES]
+    return Controller(
+        robot,
+        levels,
+        TargetPosture(robot, robot.home()),
+        null_space_gain=6.0,
+        contacts=contacts,
+        **options,
+    )
+
+
+@given(seeds)
+@settings(max_examples=20)
+def test_effort_and_forces_are_one_solution(seed: int) -> None:
+    """M a + N = Sᵀτ + Jcᵀλ, J_c a + J_c'v = -Kd J_c v, forces in their cones."""
+    controller = standing(limits=Limits(talos(), velocity=None, position=None))
+    state = random_state(talos(), seed, speed=0.05)
+    out = controller.compute(state)
+    support = controller.mode.support
+    rest = state.inverse_dynamics(out.acceleration) - out.tau
+    rest = rest - support.map @ out.forces
+    assert np.abs(rest).max() < 1e-6  # [N] of 900 N: what the solver leaves
+    assert not out.tau[:6].any()
+    if out.status < RELAXED:
+        for contact in controller.contacts:
+            sample = sample_of(contact, state)
+            moved = sample.jacobian @ out.acceleration + sample.jacobian_dot @ state.v
+            np.testing.assert_allclose(moved, sample.acceleration, rtol=0, atol=1e-7)
+    forces = out.forces.reshape(-1, 3)
+    assert (forces[:, 2] >= 0.0).all()
+    tangential = np.linalg.norm(forces[:, :2], axis=1)
+    assert (tangential <= 0.7 * forces[:, 2] + 1e-5).all()
+    assert (np.abs(out.tau) <= controller.limits.effort).all()  # type: ignore[union-attr]
+
+
+def test_propositions_hold_for_a_humanoid() -> None:
+    """On the constrained plant both levels' errors obey their equation."""
+    controller = standing()
+    robot = controller.robot
+    plant = ContactPlant(robot, [RigidContact(f) for f in SOLES], damping=40.0)
+    q0 = robot.integrate(
+        robot.home(), np.r_[np.zeros(6), 0.02 * np.cos(np.arange(robot.nv - 6))]
+    )
+    rollout = simulate(
+        controller,
+        q0,
+        controller.flow(0.0, q0),  # a start that the contacts allow
+        duration=0.3,
+        log_period=0.02,
+        integrator=Dop853(rtol=1e-9, atol=1e-9),
+        plant=plant,
+    )
+    assert not rollout["damped"].any()
+    t, w = rollout.t, 8.0
+    for name in ("center_of_mass", "trunk", "hand"):
+        e = rollout[f"task.{name}.error"]
+        rate = rollout[f"task.{name}.error_rate"]
+        expected = np.exp(-w * t)[:, None] * (e[0] + (rate[0] + w * e[0]) * t[:, None])
+        np.testing.assert_allclose(e, expected, rtol=0, atol=1e-6)
+    assert rollout["singular_values"].shape[1] == 9
+
+
+def test_null_space_decays_on_the_constrained_plant() -> None:
+    """Self-motion that is not the field's dies out like exp(-K_N t)."""
+    controller = standing()
+    robot = controller.robot
+    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+    controller.compute(state)
+    J = controller.mode.stack.jacobian
+    rng = np.random.default_rng(3)
+    v0 = 0.3 * rng.standard_normal(robot.nv)
+    v0 -= np.linalg.pinv(J) @ (J @ v0)  # self-motion: no task and no contact moves
+    rollout = simulate(
+        controller,
+        robot.home(),
+        v0,
+        duration=0.3,
+        log_period=0.02,
+        integrator=Dop853(rtol=1e-10, atol=1e-10),
+        plant=ContactPlant(robot, [RigidContact(f) for f in SOLES], damping=40.0),
+    )
+    norm = rollout["null_space_norm"]
+    assert norm[0] > 0.5
+    np.testing.assert_allclose(norm, norm[0] * np.exp(-6.0 * rollout.t), rtol=1e-6)
+    assert np.abs(rollout["task.hand.error"]).max() < 1e-7
+
+
+def test_in_the_air_only_what_is_possible_is_asked() -> None:
+    """A flying robot: no effort at the root, the centre of mass falls, arms move."""
+    robot = talos()
+    posture = JointPosture(
+        robot, robot.integrate(robot.home(), 0.1 * np.ones(robot.nv)), GAINS
+    )
+    controller = Controller(robot, [posture], base="flying")
+    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+    out = controller.compute(state)
+    assert not out.tau[:6].any()
+    wanted = state.inverse_dynamics(out.acceleration)
+    np.testing.assert_allclose(wanted[:6], 0.0, atol=1e-8 * np.abs(wanted).max())
+    mass = state.centroidal
+    fall = mass.jacobian @ out.acceleration + mass.jacobian_dot @ state.v
+    np.testing.assert_allclose(fall, [0.0, 0.0, -9.81], atol=1e-8)
+    np.testing.assert_allclose(
+        out.task.jacobian[controller.task_rows["posture"]] @ out.acceleration,
+        out.task.acceleration[controller.task_rows["posture"]],
+        atol=1e-8,
+    )
+
+
+def test_forces_are_redistributed_before_the_law_is_touched() -> None:
+    """A low friction that the least forces miss, and others do not."""
+    robot = talos()
+    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+    com = state.centroidal.position + np.array([0.0, 0.065, 0.0])
+    task = CenterOfMass(robot, Hold(com), Gains.from_frequency(3.0))
+    controller = Controller(
+        robot,
+        [task],
+        contacts=[sole(frame, friction=0.12) for frame in SOLES],
+    )
+    out = controller.compute(state)
+    assert out.status in (EXACT, REDISTRIBUTED)
+    moved = out.task.jacobian[12:] @ out.acceleration
+    np.testing.assert_allclose(moved, out.task.acceleration[12:], atol=1e-9)
+
+
+# --- schedules -----------------------------------------------------------------------
+
+
+def test_a_contact_is_released_without_a_jump() -> None:
+    """The sole's force fades, its rows become a task's: efforts are continuous in t."""
+    robot = talos()
+    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+    foot = state.frame(SOLES[0])
+    over = state.centroidal.position * [1, 0, 1] + [0, state.position(SOLES[1])[1], 0]
+    tasks: list[Task] = [
+        CenterOfMass(robot, Hold(over), GAINS),
+        FramePose(
+            robot,
+            SOLES[0],
+            HoldPose(pin.SE3(foot.rotation.copy(), foot.position.copy())),
+            GAINS,
+            name="swing",
+        ),
+    ]
+    contacts = [
+        sole(SOLES[1]),
+        sole(SOLES[0], schedule=Schedule([(-np.inf, 1.0)], ramp=0.4)),
+    ]
+    controller = Controller(
+        robot,
+        tasks,
+        contacts=contacts,
+        schedules={"swing": Schedule([(1.0, np.inf)])},
+    )
+    # Over the right sole already: the left one bears little.
+    q = robot.home()
+    for _ in range(50):  # a Newton walk of the centre of mass, feet still
+        state.update(0.0, q, np.zeros(robot.nv))
+        rows = np.vstack(
+            [state.centroidal.jacobian, *(state.frame(f).jacobian for f in SOLES)]
+        )
+        step = np.r_[over - state.centroidal.position, np.zeros(12)]
+        q = robot.integrate(q, np.linalg.pinv(rows) @ step)
+
+    def effort(t: float) -> Array:
+        return controller.compute(robot.state(t, q, np.zeros(robot.nv))).tau.copy()
+
+    times = np.linspace(0.5, 1.1, 121)
+    efforts = np.array([effort(t) for t in times])
+    jumps = np.abs(np.diff(efforts, axis=0)).max(axis=1)
+    across = np.abs(effort(1.0 - 1e-9) - effort(1.0)).max()
+    assert across < 1e-2 * np.abs(efforts).max()
+    assert jumps.max() < 0.2 * np.abs(efforts).max()
+    out = controller.compute(robot.state(1.05, q, np.zeros(robot.nv)))
+    assert out.forces.size == 12  # one sole is left
+
+
+def test_tasks_come_and_go_without_a_jump() -> None:
+    """On a Panda: a task is added, its gains change, it is removed; always exact."""
+    robot = Robot.load("panda")
+    q, v = robot.home(), 0.1 * np.ones(7)
+    here = robot.state(0.0, q, v).position("panda_tcp").copy()
+    hand = FramePosition(robot, "panda_tcp", Hold(here + 0.05), GAINS, name="hand")
+    wrist = JointPosture(
+        robot, robot.integrate(q, 0.3 * np.ones(7)), GAINS, joints=["panda_joint7"]
+    )
+    controller = Controller(robot, [hand])
+    controller.compute(robot.state(0.0, q, v))
+    controller.add_task(wrist, start=1.0, ramp=0.5)
+    controller.change_gains("hand", Gains.from_frequency(4.0), start=2.0, ramp=0.5)
+    controller.remove_task("posture", start=3.0, ramp=0.5)
+    assert controller.level_of("posture") == 0
+    last = None
+    for t in np.arange(0.9, 3.8, 0.005):
+        out = controller.compute(robot.state(t, q, v))
+        rows = controller.task_rows["hand"]
+        reached = out.task.jacobian[rows] @ out.acceleration
+        reached += out.task.jacobian_dot[rows] @ v
+        np.testing.assert_allclose(reached, out.task.acceleration[rows], atol=1e-9)
+        if last is not None:
+            assert np.abs(out.tau - last).max() < 1.0, t
+        last = out.tau.copy()
+    assert "posture" not in controller.task_rows
+    assert hand.Kp[0, 0] == pytest.approx(16.0)
+
+
+def test_schedule() -> None:
+    schedule = Schedule([(-np.inf, 1.0), (2.0, 4.0)], ramp=0.5)
+    assert [schedule.weight(t) for t in (-9.0, 0.4, 1.0, 1.5, 2.0, 3.0, 4.0)] == [
+        *(1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+    ]
+    assert schedule.weight(0.75) == pytest.approx(0.5)
+    assert schedule.active(2.0)
+    assert not schedule.active(4.0)
+    for intervals, ramp, message in (
+        ([(1.0, 1.0)], 0.0, "is empty"),
+        ([(0.0, 2.0), (1.0, 3.0)], 0.0, "before the one before it ends"),
+        ([(0.0, 0.5)], 0.3, "shorter than its ramps"),
+        ([(0.0, 1.0)], -1.0, "at least 0"),
+    ):
+        with pytest.raises(ScheduleError, match=message):
+            Schedule(intervals, ramp=ramp)
+
+
+# --- what is refused -----------------------------------------------------------------
+
+
+def test_a_floating_base_needs_support() -> None:
+    robot = solo()
+    task = CenterOfMass(robot, Hold(np.zeros(3)), GAINS)
+    with pytest.raises(
+        ContactError, match="no motor moves the free-flyer root of solo12"
+    ):
+        Controller(robot, [task])
+    with pytest.raises(ContactError, match="base='driven' needs no contacts"):
+        Controller(
+            robot,
+            [task],
+            base="driven",
+            contacts=[BallContact(robot, FEET[0], radius=0.016)],
+        )
+    foot = BallContact(robot, FEET[0], radius=0.016)
+    with pytest.raises(ContactError, match="two contacts are called 'FL_FOOT'"):
+        Controller(robot, [task], contacts=[foot, foot])
+    panda = Robot.load("panda")
+    still = JointPosture(panda, panda.home(), GAINS)
+    with pytest.raises(ContactError, match="panda has no free-flyer root"):
+        Controller(panda, [still], base="flying")
+
+
+@pytest.mark.parametrize(
+    ("build", "error", "message"),
+    [
+        (
+            lambda: BallContact(solo(), "FL_FOTO", radius=0.1),
+            FrameNotFoundError,
+            "did you mean 'FL_FOOT'",
+        ),
+        (
+            lambda: BallContact(solo(), "FL_FOOT", radius=-0.1),
+            ContactError,
+            "radius is -0.1",
+        ),
+        (
+            lambda: PointContact(solo(), "FL_FOOT", friction=0.0),
+            ContactError,
+            "friction is 0.0",
+        ),
+        (
+            lambda: PointContact(solo(), "FL_FOOT", normal=[0, 0, 0]),
+            ContactError,
+            "is no direction",
+        ),
+        (
+            lambda: SurfaceContact(
+                solo(), "FL_FOOT", corners=[[0, 0, 0], [1, 0, 0], [2, 0, 0]]
+            ),
+            ContactError,
+            "span no surface",
+        ),
+    ],
+)
+def test_impossible_contacts(build: Any, error: Any, message: str) -> None:
+    with pytest.raises(error, match=message):
+        build()
+
+
+def test_schedules_of_nothing() -> None:
+    panda = Robot.load("panda")
+    still = JointPosture(panda, panda.home(), GAINS)
+    with pytest.raises(ControllerError, match="did you mean 'posture'"):
+        Controller(panda, [still], schedules={"postrue": Schedule.always()})

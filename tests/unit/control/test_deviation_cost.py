@@ -1,0 +1,254 @@
+"""How far the null space gives way, and postures that motors can hold."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Circle,
+    ConstantMetric,
+    Controller,
+    FramePosition,
+    Gains,
+    Hold,
+    IdentityMetric,
+    JointCentering,
+    Limits,
+    MassMatrixMetric,
+    Metric,
+    Rk4,
+    Robot,
+    RobotState,
+    Rollout,
+    simulate,
+)
+from hsp_control.constraints.limits import StaticEffort
+from hsp_control.control.actuation import EXACT, LIMITED, RELAXED
+from hsp_control.control.actuation.deviation_cost import (
+    decay_rate,
+    deviation_cost,
+    null_space_rows,
+)
+from hsp_control.control.actuation.qp import solve
+
+Array = NDArray[np.float64]
+seeds = st.integers(0, 2**32 - 1)
+NOWHERE = np.zeros(0, dtype=np.int64)
+SPEED = 0.4
+
+
+@cache
+def panda() -> Robot:
+    return Robot.load("panda")
+
+
+def hand(**circle: Any) -> FramePosition:
+    options = {"angular_rate": 2.0, "normal": [0.0, 0.0, 1.0], **circle}
+    path = Circle([0.45, 0.0, 0.45], 0.15, **options)
+    return FramePosition(panda(), "panda_tcp", path, Gains.from_frequency(10.0))
+
+
+METRICS: dict[str, Metric] = {
+    "identity": IdentityMetric(),
+    "constant": ConstantMetric(np.diag([1.0, 2.0, 1.0, 3.0, 1.0, 2.0, 1.0])),
+    "mass": MassMatrixMetric(),
+}
+
+
+# --- how far the null space gives way ------------------------------------------------
+
+
+@pytest.mark.parametrize("metric", METRICS)
+@given(seeds)
+@settings(max_examples=15)
+def test_the_bound_leaves_the_law_alone(metric: str, seed: int) -> None:
+    """No other limit active: closed form and programme are one to 1e-8."""
+    robot, rng = panda(), np.random.default_rng(seed)
+    q, v = robot.random_configuration(rng), 2.0 * rng.standard_normal(7)
+    options: dict[str, Any] = {"metric": METRICS[metric]}
+    field = JointCentering(robot)
+    wide = {"effort": 1e6, "velocity": None, "position": None}
+    limits = Limits(robot, **wide, null_space_speed=1e-3)
+    state = robot.state(0.3, q, v)
+    free = Controller(robot, [hand()], field, **options)
+    bounded = Controller(robot, [hand()], field, limits=limits, **options)
+    law, out = free.compute(state), bounded.compute(state)
+    assert out.status == EXACT
+    np.testing.assert_array_equal(out.tau, law.tau)
+    # And solving it all the same gives nothing else.
+    order = deviation_cost(free.mode.resolution, supported=False)
+    speed = np.full(7, 1e-3)
+    rows = null_space_rows(free.mode.resolution, order.projector, speed, 7)
+    delta = solve(order.metric, np.zeros(7), rows)
+    assert delta is not None
+    np.testing.assert_allclose(delta, 0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("metric", METRICS)
+@given(seeds)
+@settings(max_examples=10)
+def test_the_projector_is_the_law_s(metric: str, seed: int) -> None:
+    """P(g - v) is the law's own null-space error, to rounding."""
+    robot, rng = panda(), np.random.default_rng(seed)
+    state = robot.state(0.1, robot.random_configuration(rng), rng.standard_normal(7))
+    controller = Controller(
+        robot, [hand()], JointCentering(robot), metric=METRICS[metric]
+    )
+    out = controller.compute(state)
+    if out.damped:  # then e_N keeps a part of the direction that is being lost
+        return
+    P = deviation_cost(controller.mode.resolution, supported=False).projector
+    e_N = P @ (out.field.g - state.v)
+    np.testing.assert_allclose(e_N, out.null_space_error, rtol=0, atol=1e-9)
+
+
+@given(seeds)
+@settings(max_examples=30)
+def test_decay_rate_is_the_least(seed: int) -> None:
+    """xᵀW K_N x ≥ λ xᵀW x, met with equality by one x; a scalar gain is its own."""
+    rng = np.random.default_rng(seed)
+    root = rng.standard_normal((5, 5))
+    W = root @ root.T + np.eye(5)
+    L = np.linalg.cholesky(W)
+    assert decay_rate(3.0 * np.eye(5), L) == 3.0
+    half = rng.standard_normal((5, 5))
+    gain = np.linalg.solve(W, half @ half.T + 0.1 * np.eye(5))
+    rate = decay_rate(gain, L)
+    x = rng.standard_normal((5, 200))
+    parts = np.einsum("ik,ik->k", x, W @ gain @ x) / np.einsum("ik,ik->k", x, W @ x)
+    assert parts.min() >= rate * (1.0 - 1e-9)
+    assert rate == pytest.approx(np.linalg.eigvals(gain).real.min(), rel=1e-6)
+
+
+def limited(seed: int, **options: Any) -> tuple[Controller, Array]:
+    """Return a weak arm that is asked for more than it can do, and a start."""
+    robot, rng = panda(), np.random.default_rng(seed)
+    own = Limits(robot)
+    limits = Limits(
+        robot,
+        effort=own.effort * rng.uniform(0.45, 0.6),
+        velocity=None,
+        position=None,
+        **options,
+    )
+    path = Circle([0.45, 0.0, 0.45], 0.2, rng.uniform(4.0, 6.0), normal=[0, 0, 1])
+    task = FramePosition(robot, "panda_tcp", path, Gains.from_frequency(10.0))
+    field = JointCentering(robot)
+    return Controller(robot, [task], field, limits=limits), robot.home()
+
+
+def run(controller: Controller, q0: Array, duration: float) -> Rollout:
+    return simulate(
+        controller,
+        q0,
+        duration=duration,
+        control_period=1e-3,
+        log_period=1e-3,
+        integrator=Rk4(1e-3),
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_null_space_error_stays_bounded(seed: int) -> None:
+    """‖e_N‖ ≤ ‖s‖ throughout, and at each step |P δ| ≤ λ s, where limits bind."""
+    controller, q0 = limited(seed, null_space_speed=SPEED)
+    rollout = run(controller, q0, 0.8)
+    assert rollout.meta["status"] == "completed"
+    assert rollout["status"].max() == LIMITED
+    # Efforts held for 1 ms leave the error half a period behind: λ h / 2 = 0.5 %.
+    norm = rollout["null_space_norm"]
+    most = max(SPEED * np.sqrt(7.0), norm[0])
+    assert norm.max() <= 1.005 * most
+    free = Controller(panda(), [controller.tasks[0]], controller.field)
+    state, binds = RobotState(panda()), False
+    for k in np.flatnonzero(rollout["status"] == LIMITED)[::10]:
+        state.update(rollout.t[k], rollout["q"][k], rollout["v"][k])
+        law = free.compute(state).acceleration.copy()
+        delta = controller.compute(state).acceleration - law
+        P = deviation_cost(free.mode.resolution, supported=False).projector
+        assert np.abs(P @ delta).max() <= 10.0 * SPEED * (1.0 + 1e-6)
+        binds = binds or np.abs(P @ delta).max() > 9.9 * SPEED
+    assert binds
+    loose, _ = limited(seed)
+    assert run(loose, q0, 0.8)["null_space_norm"].max() > norm.max() * 1.2
+
+
+def test_the_bound_gives_way_to_every_limit() -> None:
+    """A joint that only a greater deviation keeps from its limit: it is kept."""
+    robot = panda()
+    q, v = robot.home(), np.zeros(7)
+    _, upper = robot.position_limits()
+    # The last joint does not move the hand: it is in the null space alone.
+    q[6], v[6] = upper[6] - 0.1, 1.5
+    outs = []
+    for speed in (None, 0.01):
+        limits = Limits(robot, effort=1e4, velocity=None, null_space_speed=speed)
+        here = robot.state(0.0, q, v).position("panda_tcp").copy()
+        task = FramePosition(robot, "panda_tcp", Hold(here), Gains.from_frequency(10))
+        controller = Controller(robot, [task], null_space_gain=1.0, limits=limits)
+        out = controller.compute(robot.state(0.0, q, v))
+        assert out.status == LIMITED
+        outs.append(out.acceleration[6])
+    most = 100.0 * (0.1 - 0.005) - 20.0 * 1.5
+    np.testing.assert_allclose(outs, most, rtol=1e-5)
+
+
+# --- postures that motors can hold ---------------------------------------------------
+
+
+def test_static_rows_are_the_second_derivative() -> None:
+    """∇G·a + drift = G'' along q + s v + ½ s² a, by differences."""
+    robot, rng = panda(), np.random.default_rng(4)
+    effort, share, alpha, h = np.full(7, 20.0), 0.6, 7.0, 1e-3
+    limit = StaticEffort(robot, effort, share)
+    q, v, a = robot.home(), 0.5 * rng.standard_normal(7), rng.standard_normal(7)
+    A, b = limit.rows(robot.state(0.0, q, v), alpha, NOWHERE)
+    assert len(A) > 0
+
+    def room(s: float) -> Array:
+        there = robot.integrate(q, s * v + 0.5 * s * s * a)
+        still = robot.inverse_dynamics(there, np.zeros(7), np.zeros(7))
+        return share - np.abs(still) / effort
+
+    rate = (room(h) - room(-h)) / (2.0 * h)
+    second = (room(h) - 2.0 * room(0.0) + room(-h)) / h**2
+    barrier = second + 2.0 * alpha * rate + alpha**2 * room(0.0)
+    near = np.flatnonzero(share - room(0.0) + 0.5 * np.maximum(-rate, 0.0) > 0.3)
+    assert len(near) == len(A)
+    np.testing.assert_allclose(A @ a - b, barrier[near], rtol=0, atol=1e-4)
+
+
+def test_what_bears_a_contact_is_left_out() -> None:
+    robot = panda()
+    limit = StaticEffort(robot, np.full(7, 1.0), 1.0)
+    state = robot.state(0.0, robot.home(), np.zeros(7))
+    A, _ = limit.rows(state, 10.0, NOWHERE)
+    fewer, _ = limit.rows(state, 10.0, np.array([1, 3]))
+    assert len(A) == len(fewer) + 2
+
+
+def test_an_arm_goes_where_it_can_be_held() -> None:
+    """A target that its shoulder cannot hold: it comes to rest before it."""
+    robot = panda()
+    q0 = robot.home()
+    share = 0.35  # of 87 N·m at the shoulder, which takes 37 with the arm stretched
+    far = FramePosition(
+        robot, "panda_tcp", Hold([0.7, 0.0, 0.4]), Gains.from_frequency(6.0)
+    )
+    used = {}
+    for static in (None, share):
+        limits = Limits(robot, static_effort=static)
+        rollout = run(Controller(robot, [far], limits=limits), q0, 1.5)
+        assert rollout["status"].max() < RELAXED
+        held = np.array(
+            [robot.inverse_dynamics(q, 0 * q, 0 * q) for q in rollout["q"][::20]]
+        )
+        used[static] = (np.abs(held) / limits.effort).max()
+    assert used[None] > share + 0.02
+    # A barrier is kept to the error of an acceleration held for 1 ms, over α².
+    assert used[share] < share + 1e-3

@@ -1,0 +1,447 @@
+"""Limits: the programme is the law where none binds, and keeps them where one does."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import quadprog
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Circle,
+    Controller,
+    FramePosition,
+    Gains,
+    Hold,
+    JointCentering,
+    JointPosture,
+    Limits,
+    Lissajous,
+    MinimumDistance,
+    Obstacle,
+    ObstacleClearance,
+    Rk4,
+    Robot,
+    RobotState,
+    Rollout,
+    Sphere,
+    simulate,
+)
+from hsp_control.common.exceptions import LimitError
+from hsp_control.constraints.limits.acceleration_bounds import acceleration_bounds
+from hsp_control.control.actuation import EXACT, LIMITED
+from hsp_control.control.actuation.actuation import _relax
+from hsp_control.control.actuation.deviation_cost import deviation_cost
+from hsp_control.control.actuation.qp import Rows, solve
+
+Array = NDArray[np.float64]
+seeds = st.integers(0, 2**32 - 1)
+
+
+@cache
+def panda() -> Robot:
+    return Robot.load("panda")
+
+
+def hand(frequency: float = 10.0, **circle: Any) -> FramePosition:
+    options = {"angular_rate": 2.0, "normal": [0.0, 0.0, 1.0], **circle}
+    path = Circle([0.45, 0.0, 0.45], 0.15, **options)
+    gains = Gains.from_frequency(frequency)
+    return FramePosition(panda(), "panda_tcp", path, gains, name="hand")
+
+
+# --- the bounds ----------------------------------------------------------------------
+
+
+def bounds(limits: Limits, q: Array, v: Array) -> tuple[Array, Array]:
+    least, greatest = np.zeros(7), np.zeros(7)
+    acceleration_bounds(
+        q,
+        v,
+        panda().dof_indices,
+        limits.guarded_lower,
+        limits.guarded_upper,
+        limits.guarded_velocity,
+        limits.acceleration,
+        limits.bandwidth,
+        least,
+        greatest,
+    )
+    return least, greatest
+
+
+def test_bounds_are_the_barriers() -> None:
+    robot = panda()
+    limits = Limits(robot, bandwidth=8.0, position_margin=0.0, velocity_margin=0.0)
+    q, v = robot.home(), np.full(7, 0.1)
+    least, greatest = bounds(limits, q, v)
+    lower, upper = robot.position_limits()
+    expected = np.minimum(64.0 * (upper - q) - 16.0 * v, 16.0 * (limits.velocity - v))
+    np.testing.assert_allclose(greatest, expected, rtol=1e-14)
+    expected = np.maximum(-64.0 * (q - lower) - 16.0 * v, -16.0 * (limits.velocity + v))
+    np.testing.assert_allclose(least, expected, rtol=1e-14)
+
+
+def test_too_fast_is_slowed_down_more_steeply() -> None:
+    """Beyond the guarded speed the barrier is four times as steep."""
+    limits = Limits(panda(), velocity=1.0, position=None, bandwidth=8.0)
+    guarded = limits.guarded_velocity[0]
+    for excess, slope in ((-0.01, 16.0), (0.01, 64.0)):
+        _, greatest = bounds(limits, panda().home(), np.full(7, guarded + excess))
+        np.testing.assert_allclose(greatest, -slope * excess, rtol=1e-12)
+        least, _ = bounds(limits, panda().home(), np.full(7, -guarded - excess))
+        np.testing.assert_allclose(least, slope * excess, rtol=1e-12)
+
+
+@given(seeds)
+def test_bounds_never_cross(seed: int) -> None:
+    """Position goes before velocity before acceleration: something is always left."""
+    rng = np.random.default_rng(seed)
+    limits = Limits(panda(), acceleration=rng.uniform(0.1, 5.0))
+    lower, upper = panda().position_limits()
+    q = lower + (upper - lower) * rng.uniform(-0.2, 1.2, 7)
+    least, greatest = bounds(limits, q, rng.normal(0.0, 5.0, 7))
+    assert (least <= greatest).all()
+
+
+# --- the programme -------------------------------------------------------------------
+
+
+def oracle(H: Array, f: Array, rows: Rows) -> Array:
+    """Return what quadprog makes of the same programme."""
+    same = rows.upper - rows.lower < 1e-12
+    C = np.vstack([rows.A[same], rows.A[~same], -rows.A[~same]])
+    b = np.concatenate([rows.lower[same], rows.lower[~same], -rows.upper[~same]])
+    finite = np.isfinite(b)
+    return quadprog.solve_qp(H, -f, C[finite].T, b[finite], int(same.sum()))[0]
+
+
+@given(seeds)
+def test_solver_agrees_with_another(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n, k = 9, 12
+    root = rng.standard_normal((n, n))
+    H = root @ root.T + 0.1 * np.eye(n)
+    f, inside = 10.0 * rng.standard_normal(n), rng.standard_normal(n)
+    A = rng.standard_normal((k, n))
+    width = rng.uniform(0.0, 1.0, k)
+    width[:2] = 0.0  # equalities
+    rows = Rows(A, A @ inside - width, A @ inside + width)
+    x = solve(H, f, rows)
+    assert x is not None
+    np.testing.assert_allclose(x, oracle(H, f, rows), rtol=0, atol=1e-6)
+
+
+def test_solver_says_when_there_is_nothing() -> None:
+    A = np.array([[1.0, 0.0], [1.0, 0.0]])
+    rows = Rows(A, np.array([1.0, -np.inf]), np.array([np.inf, -1.0]))
+    assert solve(np.eye(2), np.zeros(2), rows) is None
+
+
+@given(seeds)
+@settings(max_examples=50)
+def test_without_an_active_limit_the_programme_is_the_law(seed: int) -> None:
+    """Wide limits: the optimum is δ = 0, solved or not; to 1e-8 over random states."""
+    robot, rng = panda(), np.random.default_rng(seed)
+    q, v = robot.random_configuration(rng), 0.3 * rng.standard_normal(7)
+    field = JointCentering(robot)
+    free = Controller(robot, [hand()], field)
+    wide = Limits(robot, effort=1e6, velocity=None, position=None)
+    limited = Controller(robot, [hand()], field, limits=wide)
+    state = robot.state(0.3, q, v)
+    out, same = free.compute(state), limited.compute(state)
+    assert same.status == EXACT
+    np.testing.assert_array_equal(same.tau, out.tau)
+    # And solving it all the same gives nothing else.
+    H = deviation_cost(free.mode.resolution, supported=False).metric
+    M, a = state.mass_matrix, out.acceleration
+    tau = state.inverse_dynamics(a)
+    rows = Rows(np.vstack([M, np.eye(7)]), *np.split(np.full(28, 0.0), 2))
+    rows = Rows(
+        rows.A,
+        np.concatenate([-1e6 - tau, np.full(7, -1e6)]),
+        np.concatenate([1e6 - tau, np.full(7, 1e6)]),
+    )
+    delta = solve(H, np.zeros(7), rows)
+    assert delta is not None
+    np.testing.assert_allclose(delta, 0.0, atol=1e-8)
+
+
+def test_null_space_gives_way_first_then_the_lower_task() -> None:
+    """One effort limit that binds: what is left exact shows the order."""
+    robot = panda()
+    q, v = robot.home(), np.zeros(7)
+    posture = JointPosture(
+        robot,
+        robot.integrate(q, np.full(7, 0.5)),
+        Gains.from_frequency(10.0),
+        joints=["panda_joint1", "panda_joint2"],
+        name="posture",
+    )
+    levels = [[hand()], [posture]]
+    field = 20.0 * JointCentering(robot)
+    free = Controller(robot, levels, field)
+    state = robot.state(0.3, q, v)
+    wanted = free.compute(state)
+    tau, a = wanted.tau.copy(), wanted.acceleration.copy()
+    joint = int(np.abs(tau - state.nonlinear_effects).argmax())
+    for shrink, exact in ((0.999, 2), (0.9, 1)):
+        effort = np.full(7, 1e3)
+        still = state.nonlinear_effects[joint]
+        effort[joint] = abs(still + shrink * (tau[joint] - still))
+        limits = Limits(robot, effort=effort, velocity=None, position=None)
+        controller = Controller(robot, levels, field, limits=limits)
+        out = controller.compute(state)
+        assert out.status == LIMITED
+        assert abs(out.tau[joint]) <= effort[joint]
+        given_up = out.task.jacobian @ (out.acceleration - a)
+        # What the costs' ratios, 1e-4 a level, leave of strict order.
+        scale = np.abs(out.acceleration - a).max()
+        if exact >= 1:
+            assert np.abs(given_up[:3]).max() < 2e-3 * scale
+        consistent = state.mass_matrix @ out.acceleration + state.nonlinear_effects
+        np.testing.assert_allclose(out.tau, consistent, rtol=0, atol=1e-8)
+
+
+# --- along motions -------------------------------------------------------------------
+
+
+def run(controller: Controller, q0: Array, duration: float = 1.5) -> Rollout:
+    return simulate(
+        controller,
+        q0,
+        duration=duration,
+        control_period=1e-3,
+        log_period=1e-3,
+        integrator=Rk4(1e-3),
+    )
+
+
+def violations(rollout: Rollout, limits: Limits) -> dict[str, float]:
+    """Return the worst excess over each limit, in the log alone."""
+    q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
+    rates = np.abs(np.diff(tau, axis=0)) / 1e-3
+    return {
+        "effort": float((np.abs(tau) - limits.effort).max()),
+        "effort rate": float((rates - limits.effort_rate).max()),
+        "velocity": float((np.abs(v) - limits.velocity).max()),
+        "position": float(np.maximum(q - limits.upper, limits.lower - q).max()),
+    }
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_limit_is_violated(seed: int) -> None:
+    """Limit-rich rollouts; benchmarks/limit_rollouts.py runs a thousand of them."""
+    robot, rng = panda(), np.random.default_rng(seed)
+    lower, upper = robot.position_limits()
+    q0 = 0.5 * (lower + upper) + 0.35 * (upper - lower) * rng.uniform(-1.0, 1.0, 7)
+    own = Limits(robot)
+    limits = Limits(
+        robot,
+        effort=own.effort * rng.uniform(0.7, 1.0),
+        effort_rate=1000.0,
+        velocity=own.velocity * rng.uniform(0.2, 0.5),
+    )
+    start = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp")
+    path = Circle(
+        start + rng.normal(0.0, 0.4, 3),
+        0.2,
+        rng.uniform(1, 6),
+        normal=rng.normal(size=3),
+    )
+    task = FramePosition(
+        robot, "panda_tcp", path, Gains.from_frequency(rng.uniform(5, 12))
+    )
+    controller = Controller(robot, [task], JointCentering(robot), limits=limits)
+    rollout = run(controller, q0, 0.8)
+    assert rollout.meta["status"] == "completed"
+    assert (rollout["status"] == LIMITED).any()  # limits did bind
+    worst = violations(rollout, limits)
+    assert max(worst.values()) <= 1e-8, worst
+
+
+def test_a_joint_limit_is_approached_and_not_crossed() -> None:
+    """A posture beyond the limit: the joint comes to rest before it, and stays."""
+    robot = panda()
+    _, upper = robot.position_limits()
+    beyond = robot.home()
+    beyond[3] = upper[3] + 0.5
+    task = JointPosture(robot, beyond, Gains.from_frequency(6.0), name="beyond")
+    limits = Limits(robot)
+    rollout = run(Controller(robot, [task], limits=limits), robot.home(), 2.5)
+    joint = rollout["q"][:, 3]
+    assert joint.max() <= upper[3]
+    assert joint[-1] > upper[3] - 0.01  # as near as the margin lets it
+    assert np.abs(rollout["v"][-200:, 3]).max() < 1e-3
+    assert np.abs(np.diff(rollout["tau"][-200:, 3])).max() < 1e-2
+
+
+def test_contradiction_is_relaxed_and_told() -> None:
+    """A joint that its motor cannot stop before the limit: least violation."""
+    robot = panda()
+    q, v = robot.home(), np.zeros(7)
+    _, upper = robot.position_limits()
+    q[3], v[3] = upper[3] - 0.02, 2.0
+    limits = Limits(robot, effort=1.0)
+    out = Controller(robot, [hand()], limits=limits).compute(robot.state(0.0, q, v))
+    assert np.isfinite(out.tau).all()
+    assert (np.abs(out.tau) <= 1.0).all()
+    assert out.status > LIMITED
+    assert 0.0 < out.relaxation < np.inf
+
+
+def test_least_violation_is_the_least() -> None:
+    """However far the law's acceleration is: against the same programme, alone."""
+    rng = np.random.default_rng(3)
+    effort = rng.standard_normal((3, 5))
+    hard = Rows(effort, np.full(3, -1.0), np.full(3, 1.0))
+    for far in (1.0, 1e4):
+        center = far * rng.standard_normal(5)
+        soft = Rows(np.eye(5), center - 0.1, center + 0.1)
+        _, x, relaxation = _relax(hard, {"motion": soft})
+        assert x is not None
+        H = np.diag(np.concatenate([np.full(5, 1e-9), np.ones(5)]))
+        rows = Rows(
+            np.block([[effort, np.zeros((3, 5))], [np.eye(5), np.eye(5)]]),
+            np.concatenate([hard.lower, soft.lower]),
+            np.concatenate([hard.upper, soft.upper]),
+        )
+        least = np.abs(oracle(H, np.zeros(10), rows)[5:]).max()
+        assert relaxation == pytest.approx(least, rel=1e-5)
+
+
+def test_effort_rate_needs_to_know_what_went_out() -> None:
+    robot = panda()
+    limits = Limits(robot, effort_rate=1000.0)
+    controller = Controller(robot, [hand()], limits=limits)
+    state = RobotState(robot).update(0.0, robot.home(), np.zeros(7))
+    before = state.nonlinear_effects.copy()
+    controller.applied(before, 1e-3)
+    out = controller.compute(state)
+    assert np.abs(out.tau - before).max() <= 1.0 + 1e-9
+    controller.restart()
+    assert np.abs(controller.compute(state).tau - before).max() > 1.0
+
+
+# --- what is refused -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"effort": -1.0}, "effort limit is .* must be greater than 0"),
+        ({"effort": [1.0, 2.0]}, r"effort has shape \(2,\); needs one number or 7"),
+        ({"effort": "URDF"}, "effort is 'URDF'; needs numbers, None or \"robot\""),
+        ({"effort_rate": "robot"}, "effort_rate is 'robot'; needs numbers or None"),
+        ({"position": (0.0, 0.0)}, "position limits of panda_joint1 leave no room"),
+        ({"position_margin": 5.0}, "leave no room"),
+        ({"velocity_margin": 1.0}, "velocity_margin is 1.0"),
+        ({"bandwidth": 0.0}, "bandwidth is 0.0; must be positive"),
+        ({"static_effort": 0.0}, "static_effort is 0.0; must be a part of the effort"),
+        ({"null_space_speed": 0.0}, "null_space_speed limit is .* greater than 0"),
+        ({"null_space_weight": 1.0}, "null_space_weight is 1.0; must be between"),
+        ({"velocity": np.nan}, "velocity holds a NaN"),
+    ],
+)
+def test_impossible_limits(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(LimitError, match=message):
+        Limits(panda(), **options)
+
+
+def test_start_outside_the_limits_names_the_joint() -> None:
+    q = panda().home()
+    q[3] = 0.1
+    with pytest.raises(LimitError, match=r"panda_joint4 is at 0.1, its limits are"):
+        Limits(panda()).check_start(q, np.zeros(7))
+    fast = np.zeros(7)
+    fast[0] = 3.0
+    with pytest.raises(LimitError, match=r"joint1 moves at 3, its limit is 2.175"):
+        Limits(panda()).check_start(panda().home(), fast)
+
+
+def test_hold_with_limits_is_still_the_paper() -> None:
+    """A still target within all limits: not one step is limited."""
+    robot = panda()
+    here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
+    task = FramePosition(robot, "panda_tcp", Hold(here), Gains.from_frequency(10.0))
+    rollout = run(Controller(robot, [task], limits=Limits(robot)), robot.home(), 0.2)
+    assert not rollout["status"].any()
+
+
+# --- distances -----------------------------------------------------------------------
+
+
+def swinging() -> Obstacle:
+    """Return a ball that comes into the arm's elbow and goes again."""
+    robot = panda()
+    elbow = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_link4")
+    center = elbow + np.array([0.0, 0.35, 0.0])
+    path = Lissajous(center, [0.0, 0.28, 0.0], [1.0, 2.0, 1.0], [0.0, 3.14, 0.0])
+    return Obstacle("ball", Sphere(0.08), path)
+
+
+def elbow(limits: Limits | None) -> Controller:
+    robot = panda()
+    here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
+    task = FramePosition(
+        robot, "panda_tcp", Hold(here), Gains.from_frequency(10.0), name="hand"
+    )
+    return Controller(
+        robot, [task], JointCentering(robot), null_space_gain=6.0, limits=limits
+    )
+
+
+def test_distance_rows_are_its_second_derivative() -> None:
+    """∇d·a + drift = d'' along q ⊕ (s v + ½ s² a) at t + s, by differences."""
+    robot = panda()
+    proximity = ObstacleClearance(robot, [swinging()]).proximity
+    limit = MinimumDistance(proximity, 0.02)
+    rng = np.random.default_rng(2)
+    q, v, a = robot.home(), 0.3 * rng.standard_normal(7), rng.standard_normal(7)
+    state = robot.state(0.4, q, v)
+    A, b = limit.rows(state, 10.0)
+
+    def distances(s: float) -> Array:
+        there = robot.integrate(q, s * v + 0.5 * s * s * a)
+        return proximity.measure(robot.state(0.4 + s, there, v)).copy()
+
+    h = 1e-3
+    near, d = distances(0.0) - 0.02, distances(0.0)
+    rate = (distances(h) - distances(-h)) / (2.0 * h)
+    second = (distances(h) - 2.0 * d + distances(-h)) / h**2
+    barrier = second + 20.0 * rate + 100.0 * near
+    chosen = np.flatnonzero(near + 0.5 * np.minimum(rate, 0.0) < 0.2)
+    assert len(chosen) == len(A) > 0
+    np.testing.assert_allclose(A @ a - b, barrier[chosen], rtol=0, atol=1e-3)
+
+
+def test_things_stay_apart() -> None:
+    """A ball swings into the elbow: without the limit it hits, with it it does not."""
+    robot = panda()
+    proximity = ObstacleClearance(robot, [swinging()]).proximity
+    least: dict[bool, float] = {}
+    for limited in (False, True):
+        limits = Limits(robot, distances=[MinimumDistance(proximity, 0.02)])
+        rollout = run(elbow(limits if limited else None), robot.home(), 1.6)
+        least[limited] = min(
+            float(proximity.measure(robot.state(t, q, v)).min())
+            for t, q, v in zip(rollout.t, rollout["q"], rollout["v"], strict=True)
+        )
+        error = np.abs(rollout["task.hand.error"]).max()
+        assert error < 1e-4  # the elbow gives way, the hand stays
+    assert least[False] < 0.0
+    assert least[True] > 0.02 - 1e-3
+
+
+def test_start_too_near() -> None:
+    robot = panda()
+    ball = Obstacle("ball", Sphere(0.1), Hold([0.3, 0.0, 0.5]))
+    proximity = ObstacleClearance(robot, [ball]).proximity
+    limits = Limits(robot, distances=[MinimumDistance(proximity, 0.05)])
+    with pytest.raises(LimitError, match=r"to ball are .* must be at least 0.05 m"):
+        limits.check_start(robot.home(), np.zeros(7))
+    with pytest.raises(LimitError, match="least distance is -1"):
+        MinimumDistance(proximity, -1.0)

@@ -1,0 +1,510 @@
+"""What a loop's rate allows: in theory, in the links of the chain, and on the robot."""
+
+import re
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hsp_control import (
+    Command,
+    Compensation,
+    Controller,
+    FramePosition,
+    Gains,
+    Hold,
+    ImperfectPlant,
+    IntegralAction,
+    IntegratedPlant,
+    JointPosture,
+    MassMatrixMetric,
+    MomentumObserver,
+    Predictor,
+    Rest,
+    RigidBodyPlant,
+    Rk4,
+    Robot,
+    Uncontrolled,
+    VelocityFilter,
+    check_rate,
+    load_experiment,
+    simulate,
+)
+from hsp_control.cli.main import main
+from hsp_control.common.exceptions import (
+    HspControlError,
+    SimulationError,
+    UnstableRateError,
+)
+from hsp_control.control.compensation.linear_loop import LinearLoop, _coupled
+from hsp_control.control.compensation.rate_check import null_space_rates, rate_findings
+from hsp_control.null_space.fields import TargetPosture
+from hsp_control.simulation.plants.drives import EffortDelay
+from hsp_control.simulation.plants.model_changes import ScaledInertias, changed
+from hsp_control.simulation.plants.sensors import SensorDelay
+
+H = 1e-3
+ONE, ZERO = np.eye(1), np.zeros((1, 1))
+
+
+def pd(frequency: float, damping: float = 1.0, **options: Any) -> LinearLoop:
+    kp, kv = frequency**2 * ONE, 2.0 * damping * frequency * ONE
+    return LinearLoop(kp, kv, options.pop("ki", 0.0) * ONE, H, **options)
+
+
+def rate(gain: float, **options: Any) -> LinearLoop:
+    return LinearLoop(ZERO, gain * ONE, ZERO, H, **options)
+
+
+@pytest.mark.parametrize(
+    ("make", "limit"),
+    [
+        (rate, 2.0),
+        (pd, 1.0),
+        (lambda x: rate(x, effort_delay=1), 1.0),
+        (lambda x: rate(x, sensor_delay=1), 1.0),
+        (lambda x: rate(x, effort_delay=1, sensor_delay=1), (5**0.5 - 1.0) / 2.0),
+        (lambda x: pd(x, effort_delay=1), 0.42616),
+        (lambda x: pd(x, 0.7, effort_delay=1), 0.49501),
+        (
+            lambda x: pd(
+                x, effort_delay=1, compensation=Compensation(predictor=Predictor())
+            ),
+            1,
+        ),
+        (
+            lambda x: pd(
+                x, effort_delay=2, sensor_delay=1,
+                compensation=Compensation(predictor=Predictor(2, 1)),
+            ),
+            1.0,
+        ),
+        # K_N h + α h < 2 for a field as stiff as the gain.
+        (lambda x: LinearLoop(x * x * ONE, 2.0 * x * ONE, ZERO, H), 1.0),
+    ],
+)  # fmt: skip
+def test_the_limits_of_theory(make: Any, limit: float) -> None:
+    """theory.md §8, in units of 1/h, to five digits."""
+    assert make(limit * (1.0 - 1e-5) / H).radius() <= 1.0 + 1e-9
+    assert make(limit * (1.0 + 1e-5) / H).radius() > 1.0 + 1e-7
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        pd(300.0),
+        pd(300.0, ki=500.0),
+        pd(300.0, effort_delay=1, sensor_delay=1),
+        pd(300.0, effort_delay=2, compensation=Compensation(predictor=Predictor(2))),
+    ],
+)
+def test_memory_that_is_not_used_does_not_decide(loop: LinearLoop) -> None:
+    """The radius is taken without zeros of the whole matrix, and only without those."""
+    whole = loop.transition()
+    assert len(_coupled(whole)) < len(whole)
+    expected = np.abs(np.linalg.eigvals(whole)).max()
+    assert loop.radius() == pytest.approx(expected, rel=1e-6)  # a double eigenvalue
+
+
+def test_an_integral_is_stable_up_to_routh_where_the_rate_is_high() -> None:
+    for share, stable in ((0.99, True), (1.01, False)):
+        loop = pd(1.0, ki=share * 2.0)  # ω0 h = 1e-3: as good as continuous
+        assert (loop.radius() < 1.0) is stable
+
+
+CARRIAGE = """<robot name="carriage"><link name="rail"/><link name="carriage">
+<inertial><mass value="2"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
+</inertial></link><joint name="slide" type="prismatic"><parent link="rail"/>
+<child link="carriage"/><axis xyz="1 0 0"/>
+<limit lower="-10" upper="10" effort="1000" velocity="100"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("heavy", [1.0, 3.0])
+@pytest.mark.parametrize(
+    ("delays", "compensation"),
+    [
+        ((0, 0), {}),
+        ((1, 0), {}),
+        ((1, 2), {}),
+        ((0, 0), {"velocity_filter": VelocityFilter(40.0)}),
+        ((0, 0), {"velocity_filter": VelocityFilter(40.0, 2)}),
+        ((1, 1), {"predictor": Predictor(1, 1)}),
+        ((2, 0), {"predictor": Predictor(1, 0)}),
+        ((1, 0), {"momentum_observer": MomentumObserver(50.0)}),
+        ((0, 0), {"integral_action": IntegralAction(20.0)}),
+        (
+            (1, 1),
+            {
+                "velocity_filter": VelocityFilter(60.0),
+                "predictor": Predictor(1, 0),
+                "momentum_observer": MomentumObserver(30.0),
+                "integral_action": IntegralAction(10.0),
+            },
+        ),
+    ],
+)
+def test_the_linear_loop_is_the_chain_link_by_link(
+    delays: tuple[int, int], compensation: dict[str, Any], heavy: float, tmp_path: Path
+) -> None:
+    """A carriage on a rail *is* the linear mode, also one heavier than its model.
+
+    By Cayley and Hamilton its positions obey the recurrence of the transition's
+    characteristic polynomial, once what was there before the run has passed.
+    """
+    file = tmp_path / "carriage.urdf"
+    file.write_text(CARRIAGE)
+    robot = Robot.load(str(file))
+    h, frequency = 0.01, 12.0
+    task = JointPosture(robot, np.zeros(1), Gains.from_frequency(frequency))
+    made, parts = Controller(robot, [task]), Compensation(**compensation)
+    plant = ImperfectPlant(
+        IntegratedPlant(
+            RigidBodyPlant(changed(robot, [ScaledInertias(heavy)])), Rk4(h)
+        ),
+        [SensorDelay(delays[1])],
+        [EffortDelay(delays[0])],
+    )
+    x = simulate(
+        made, [1.0], duration=0.6, control_period=h, log_period=h, plant=plant,
+        compensation=parts,
+    ).q[:, 0]  # fmt: skip
+    action = parts.integral_action
+    Ki = ZERO if action is None else action.gains([task])["posture"]
+    loop = LinearLoop(task.Kp, task.Kv, Ki, h, *delays, parts, 1.0 / heavy)
+    coefficients = np.poly(loop.transition())
+    n, begun = len(coefficients), 8
+    residuals = [coefficients[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
+    # Rounding of coefficients of up to 10, on positions of 1 m.
+    assert np.abs(residuals).max() < 1e-12
+    other = LinearLoop(1.1 * task.Kp, task.Kv, Ki, h, *delays, parts, 1.0 / heavy)
+    wrong = np.poly(other.transition())
+    missed = [wrong[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
+    assert np.abs(missed).max() > 1e3 * np.abs(residuals).max()
+
+
+def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
+    """The weightless arm agrees: 10 % beside what is told its motion dies or grows."""
+    robot = Robot.load("panda", gravity=[0.0, 0.0, 0.0])
+    task = JointPosture(robot, Q0, Gains.from_frequency(20.0))
+    made = Controller(robot, [task])
+    for observer in (None, MomentumObserver(20.0)):
+        strong = Compensation(
+            integral_action=IntegralAction(12.0), momentum_observer=observer
+        )
+        (found,) = check_rate(made, Q0, 1e-3, strong)
+        assert found.path == ("compensation", "integral_action")
+        assert not found.unstable
+        told = re.fullmatch(
+            r"where the robot is (.*) times as heavy at task 'posture' as its model, .*"
+            r"design for 5: Ki of at most (.*) times this, or a (faster )?momentum .*",
+            found.message,
+        )
+        assert told is not None
+        assert (told[3] is None) is (observer is None)
+        times, scale = float(told[1]), float(told[2])
+        if observer is None:
+            assert times == pytest.approx(40.0 / 12.0, rel=0.02)  # Kv Kp/Ki
+        for factor, grows in ((0.9 * times, False), (1.1 * times, True)):
+            log = simulate(
+                made, Q0 + 1e-4, duration=3.0, control_period=1e-3, log_period=0.01,
+                integrator=Rk4(1e-3), compensation=strong,
+                plant=RigidBodyPlant(changed(robot, [ScaledInertias(factor)])),
+            )  # fmt: skip
+            error = np.abs(log["task.posture.error"]).max(axis=1)
+            assert bool(error[200:].max() > error[100:200].max()) is grows
+        weaker = IntegralAction(12.0 * scale)
+        mild = Compensation(integral_action=weaker, momentum_observer=observer)
+        assert check_rate(made, Q0, 1e-3, mild) == []
+
+
+# ------------------------------------------------------------------------- the robot
+
+PANDA = Robot.load("panda")
+Q0 = np.array([0.0, -0.5, 0.1, -2.0, 0.2, 1.6, 0.7])
+TARGET = Q0 + 1e-3
+
+
+def holding(
+    frequency: float = 50.0, gain: float = 100.0, stiffness: float = 1.0, **more: Any
+) -> Controller:
+    position = PANDA.state(0.0, Q0, np.zeros(7)).position("panda_tcp") + 1e-4
+    gains = Gains.from_frequency(frequency)
+    hand = FramePosition(PANDA, "panda_tcp", Hold(position), gains, name="hand")
+    field = stiffness * TargetPosture(PANDA, TARGET)
+    return Controller(PANDA, [hand], field, null_space_gain=gain, **more)
+
+
+@pytest.mark.parametrize(
+    ("gains", "limit", "delay"),
+    [
+        (lambda x: {"gain": x}, 2.0 - 1e-3, 0),
+        (lambda x: {"frequency": x}, 0.42616, 1),
+        (lambda x: {"gain": x, "stiffness": x}, 1.0, 0),
+    ],
+    ids=["K_N", "ω0, one period late", "K_N and a stiff field"],
+)
+def test_the_robot_grows_just_above_and_dies_just_below(
+    gains: Any, limit: float, delay: int
+) -> None:
+    """3 % to either side of the limit; benchmarks/rate_limits.py has twenty such."""
+    for side in (-1.0, 1.0):
+        made = holding(**gains((1.0 + 0.03 * side) * limit / H))
+        engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
+        plant = ImperfectPlant(engine, [], [EffortDelay(delay)])
+        try:
+            log = simulate(
+                made, Q0, duration=0.3, control_period=H, log_period=H, plant=plant
+            )
+            speed = np.linalg.norm(log.v, axis=1)
+            growth = speed[-100:].max() / speed[:100].max()
+        except SimulationError:
+            growth = np.inf
+        assert growth < 0.5 if side < 0.0 else growth > 2.0
+        found = rate_findings(made, Q0, H, effort_delay=delay)
+        assert any(finding.unstable for finding in found) is (side > 0.0)
+
+
+@pytest.mark.parametrize(
+    ("made", "path", "message"),
+    [
+        (
+            lambda: holding(gain=2500.0),
+            ("null_space", "gain"),
+            r"unstable at this rate: K_N times the period is 2.5 \(a period multiplies "
+            r"the motion by up to 1.501\): K_N of at most 1990 1/s or a control_period "
+            r"of at most 0.000799 s would do",
+        ),
+        (
+            lambda: holding(frequency=1500.0),
+            ("tasks", "hand", "gains"),
+            r"unstable at this rate: ω0 of task 'hand' times the period is 1.5 \(.*\): "
+            r"ω0 of task 'hand' of at most (999|1000) 1/s or a control_period of at "
+            r"most 0.000666 s would do",
+        ),
+        (
+            lambda: holding(gain=1100.0, stiffness=1100.0),
+            ("null_space", "gain"),
+            r"K_N times the period is 1.1, with a field of stiffness 1100 1/s \(.*\): "
+            r"K_N of at most (899|900) 1/s or fields of at most 0.818 times these "
+            r"weights or a control_period of at most 0.000909 s would do",
+        ),
+    ],
+)
+def test_an_unstable_rate_is_told_with_numbers_that_would_do(
+    made: Any, path: tuple[str, ...], message: str
+) -> None:
+    (finding,) = [f for f in rate_findings(made(), Q0, H) if f.unstable]
+    assert finding.path == path
+    assert finding.radius > 1.0
+    assert re.search(message, finding.message), finding.message
+    with pytest.raises(UnstableRateError, match="unstable at this rate"):
+        check_rate(made(), Q0, H)
+
+
+@pytest.mark.parametrize(
+    ("compensation", "delay", "advice"),
+    [
+        (
+            {"momentum_observer": MomentumObserver(3000.0)},
+            1,
+            r"momentum_observer\.bandwidth of at most ([\d.]+) 1/s",
+        ),
+        (
+            {"velocity_filter": VelocityFilter(5.0, 2)},
+            0,
+            r"velocity_filter\.cutoff of at least ([\d.]+) Hz",
+        ),
+    ],
+)
+def test_the_advice_on_a_remedy_does(
+    compensation: dict[str, Any], delay: int, advice: str
+) -> None:
+    made = holding(frequency=40.0, gain=20.0)
+    options = {"effort_delay": delay}
+    found = rate_findings(made, Q0, H, Compensation(**compensation), **options)
+    numbers = [
+        float(match[1])
+        for finding in found
+        if finding.unstable and (match := re.search(advice, finding.message))
+    ]
+    assert numbers
+    (name,) = compensation
+    if name == "momentum_observer":
+        mended = Compensation(momentum_observer=MomentumObserver(min(numbers)))
+    else:
+        mended = Compensation(velocity_filter=VelocityFilter(max(numbers), 2))
+    check_rate(made, Q0, H, mended, **options)
+
+
+def test_what_misses_the_rule_is_said_and_not_refused() -> None:
+    found = check_rate(holding(frequency=250.0, gain=300.0), Q0, H)
+    assert [finding.path for finding in found] == [
+        ("tasks", "hand", "gains"),
+        ("null_space", "gain"),
+    ]
+    assert "is 0.25; design at no more than 0.2" in found[0].message
+    assert "K_N of at most 200 1/s, or a control_period of at most 0.000667 s" in (
+        found[1].message
+    )
+    (stiff,) = check_rate(holding(stiffness=400.0), Q0, H)
+    assert stiff.path == ("null_space", "fields")
+    assert "the field's stiffness times the period is 0.4" in stiff.message
+    (late,) = check_rate(holding(frequency=150.0), Q0, H, effort_delay=1)
+    assert "is 0.15; design at no more than 0.1" in late.message
+    assert not check_rate(holding(frequency=150.0), Q0, H)
+    predicted = Compensation(predictor=Predictor(1))
+    assert not check_rate(holding(frequency=150.0), Q0, H, predicted)
+
+
+def test_a_field_s_slope_is_taken_in_the_null_space_and_the_metric() -> None:
+    """TargetPosture has the Hessian 1; over M it is the slope of -M⁻¹∇f."""
+    state = PANDA.state(0.0, Q0, np.zeros(7))
+    K, A = null_space_rates(holding(stiffness=3.0), state)
+    np.testing.assert_allclose(K, 100.0 * np.eye(4), atol=1e-9)
+    np.testing.assert_allclose(A, 3.0 * np.eye(4), atol=1e-7)
+    K, A = null_space_rates(holding(stiffness=3.0, metric=MassMatrixMetric()), state)
+    np.testing.assert_allclose(K, 100.0 * np.eye(4), atol=1e-9)
+    M = state.mass_matrix
+    J = state.frame("panda_tcp").jacobian[:3]
+    # At the field's own minimum but for 1e-3 rad: 3 Zᵀ M⁻¹ Z', in M's own coordinates.
+    L = np.linalg.cholesky(M)
+    Z = np.linalg.svd(np.linalg.solve(L, J.T).T)[2][3:].T
+    slope = 3.0 * Z.T @ np.linalg.inv(L) @ np.linalg.inv(L).T @ Z
+    got, wanted = np.linalg.eigvalsh(A), np.linalg.eigvalsh(slope)
+    np.testing.assert_allclose(got, wanted, rtol=0.05)
+    for low, high in pairwise(got):
+        assert 0.0 < low < high
+    for field in (Rest(PANDA), Uncontrolled(PANDA)):
+        hand = FramePosition(
+            PANDA, "panda_tcp", Hold([0.4, 0.0, 0.5]), Gains.from_frequency(10.0)
+        )
+        K, A = null_space_rates(Controller(PANDA, [hand], field), state)
+        assert np.allclose(A, 0.0)
+        assert len(K) == (4 if field.controls else 0)
+
+
+# ---------------------------------------------------------------------- configuration
+
+
+def config(**sections: Any) -> dict[str, Any]:
+    return {
+        "robot": {"name": "panda"},
+        "tasks": {
+            "hand": {
+                "type": "frame_position",
+                "frame": "panda_tcp",
+                "trajectory": {"type": "hold"},
+            }
+        },
+        "simulation": {"duration": 0.02, "control_period": H},
+        **sections,
+    }
+
+
+ALL: dict[str, Any] = {
+    "velocity_filter": {"cutoff": 100, "order": 2},
+    "predictor": {"effort_delay": 1},
+    "momentum_observer": {"bandwidth": 20, "clip": [10] * 7},
+    "friction_feed_forward": {"coulomb": 0.1, "viscous": [0.1] * 7},
+    "integral_action": {"ki": {"hand": [[9, 0, 0], [0, 9, 0], [0, 0, 9]]}, "limit": 5},
+    "effort_rate": 1000,
+    "start_up_ramp": {"duration": 0.01, "natural_frequency": 2},
+}
+
+
+def test_all_remedies_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
+    file = tmp_path / "all.yaml"
+    import yaml
+
+    file.write_text(yaml.safe_dump(config(compensation=ALL)))
+    made = load_experiment(file)
+    assert made.compensation.names == tuple(ALL)
+    assert isinstance(Command(made.controller, made.compensation), Command)
+    log = made.run()
+    assert log["observer.disturbance"].shape == (len(log), 7)
+    for name in ALL:
+        rest = load_experiment(file, f"compensation.{name}=null").compensation.names
+        assert rest == tuple(other for other in ALL if other != name)
+    urdf = load_experiment(file, "compensation.friction_feed_forward=urdf").compensation
+    assert urdf.friction_feed_forward is not None
+    assert np.asarray(urdf.friction_feed_forward.viscous).tolist() == [0.003] * 7
+
+
+@pytest.mark.parametrize(
+    ("sections", "message"),
+    [
+        (
+            {"compensation": {"momentum_obsever": {}}},
+            "unknown key 'momentum_obsever'; did you mean 'momentum_observer'",
+        ),
+        (
+            {"compensation": {"momentum_observer": {"clip": [1, 2]}}},
+            r"compensation.momentum_observer: clip has shape \(2,\); needs one number",
+        ),
+        (
+            {"compensation": {"integral_action": {"rate": 1, "tasks": ["hnad"]}}},
+            r"compensation.integral_action: .*no task 'hnad'; did you mean 'hand'\?",
+        ),
+        (
+            {"compensation": {"predictor": {"effort_delay": 0}}},
+            "compensation.predictor: a pred",
+        ),
+        (
+            {"compensation": {"start_up_ramp": {}}, "simulation": {"duration": 1}},
+            "compensation: it acts once a period: set simulation.control_period",
+        ),
+        (
+            {"null_space": {"gain": 2500}},
+            "null_space.gain: unstable at this rate: K_N times the period is 2.5",
+        ),
+        (
+            {
+                "plant": {"type": "rigid_body", "drives": {"delay": 1}},
+                "tasks": {
+                    "hand": {
+                        "type": "frame_position",
+                        "frame": "panda_tcp",
+                        "trajectory": {"type": "hold"},
+                        "gains": {"natural_frequency": 500},
+                    }
+                },
+            },
+            "tasks.hand.gains: unstable at this rate: .* 0.5, 1 period late .*"
+            "ω0 of task 'hand' of at most 426 1/s",
+        ),
+        (
+            {"compensation": {"velocity_filter": {"cutoff": 600, "order": 2}}},
+            "compensation.velocity_filter: cutoff is 600 Hz; .* needs less than 500 Hz",
+        ),
+    ],
+)
+def test_mistakes_are_told_where_they_stand(
+    sections: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(HspControlError, match=message):
+        load_experiment(config(**sections))
+
+
+def test_the_check_can_be_left_out_and_asks_nothing_without_a_period() -> None:
+    wild = config(null_space={"gain": 2500})
+    load_experiment(wild, "simulation.check_rate=false")
+    load_experiment(wild, "simulation.control_period=null")
+
+
+def test_the_command_line_says_what_is_close(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "close.yaml"
+    import yaml
+
+    file.write_text(yaml.safe_dump(config(null_space={"gain": 500})))
+    for command in (["check", str(file)], ["run", str(file), "--out", str(tmp_path)]):
+        assert main(command) == 0
+        assert (
+            "hsp: null_space.gain: K_N times the period is 0.5; design at no more than"
+            in capsys.readouterr().err
+        )
+    assert main(["check", str(file), "--set", "null_space.gain=2500"]) == 2
+    assert "unstable at this rate" in capsys.readouterr().err

@@ -1,0 +1,275 @@
+"""Strict priorities: against an oracle of projectors, and along whole motions."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from law_numbers import Numbers, numbers, resolve
+from numpy.typing import NDArray
+
+from hsp_control import (
+    ConstantMetric,
+    Controller,
+    Dop853,
+    FramePosition,
+    Gains,
+    Hold,
+    IdentityMetric,
+    JointCentering,
+    JointPosture,
+    MassMatrixMetric,
+    Metric,
+    Robot,
+    simulate,
+)
+from hsp_control.common.exceptions import ControllerError
+from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY, VARYING
+from hsp_control.trajectories import Circle
+
+Array = NDArray[np.float64]
+FORMS = {"identity": IDENTITY, "constant": CONSTANT, "varying": VARYING}
+forms = pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def lexicographic(x: Numbers, levels: list[int]) -> tuple[Array, Array]:
+    """Return a and e_N by explicit projectors: law.md §4 with pseudo-inverses."""
+    n, start = len(x.v), 0
+    W_inverse = np.linalg.inv(x.W)
+    Q, a = W_inverse, np.zeros(n)
+    for rows in levels:
+        k = slice(start, start + rows)
+        J = x.J[k]
+        values, U = np.linalg.eigh(J @ Q @ J.T)
+        kept = values > 1e-6  # of order 1; absolute: a blocked level is all rounding
+        G_plus = (U[:, kept] / values[kept]) @ U[:, kept].T
+        a = a + Q @ J.T @ G_plus @ (x.a_x[k] - x.J_dot[k] @ x.v - J @ a)
+        Q = Q - Q @ J.T @ G_plus @ J @ Q
+        start += rows
+    P = Q @ x.W
+    error = x.g - x.v
+    e_N = P @ error
+    w = np.linalg.lstsq(x.J.T, x.W @ (error - e_N), rcond=1e-8)[0]
+    bend = x.J_dot.T @ w - x.W_dot @ (error - 0.5 * e_N)
+    return a + Q @ (x.W @ (x.g_dot + x.K_N @ e_N) - bend), e_N
+
+
+@forms
+@given(seeds, st.lists(st.integers(1, 3), min_size=2, max_size=3))
+def test_compatible_levels_are_one_stack(
+    form: int, seed: int, levels: list[int]
+) -> None:
+    """Where all tasks can be met, priorities change nothing: to the last bit."""
+    x = numbers(seed, sum(levels), 9, form)
+    together, apart = resolve(x, form), resolve(x, form, levels=levels)
+    for first, second in zip(together, apart, strict=True):
+        np.testing.assert_array_equal(first, second)
+
+
+@forms
+@given(seeds, st.lists(st.integers(1, 3), min_size=2, max_size=4))
+def test_recursion_is_the_stacked_law(form: int, seed: int, levels: list[int]) -> None:
+    """The recursion itself, which one singular direction of no account calls.
+
+    A last level repeats a row of the first, which the first fulfils: nothing changes.
+    """
+    m = sum(levels)
+    x = numbers(seed, m, 13, form)
+    repeated = x._replace(
+        J=np.vstack([x.J, x.J[:1]]),
+        J_dot=np.vstack([x.J_dot, x.J_dot[:1]]),
+        a_x=np.append(x.a_x, x.a_x[0]),
+    )
+    a, e_N, _ = resolve(x, form)
+    b, other, damped = resolve(repeated, form, levels=[*levels, 1])
+    assert damped
+    # Rounding, grown by 2/threshold² = 2e4 in the direction that is repeated.
+    np.testing.assert_allclose(b, a, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(other, e_N, rtol=1e-9, atol=1e-9)
+
+
+@forms
+@given(seeds, st.integers(1, 3), st.integers(1, 3))
+def test_conflict_leaves_the_upper_level_exact(
+    form: int, seed: int, upper: int, lower: int
+) -> None:
+    """A lower level that asks for the upper's rows, and others: the oracle's answer."""
+    rng = np.random.default_rng(seed)
+    x = numbers(seed, upper + lower, 7, form)
+    mix = rng.standard_normal((lower, upper))
+    # The first lower row is wholly blocked; the acceleration that it wants is its own.
+    x.J[upper] = mix[0] @ x.J[:upper]
+    x.J_dot[upper] = mix[0] @ x.J_dot[:upper]
+    a, e_N, damped = resolve(x, form, levels=[upper, lower])
+    assert damped
+    top = slice(0, upper)
+    scale = max(1.0, float(np.abs(a).max()))
+    np.testing.assert_allclose(
+        x.J[top] @ a + x.J_dot[top] @ x.v, x.a_x[top], rtol=0, atol=1e-10 * scale
+    )
+    np.testing.assert_allclose(x.J @ e_N, 0.0, rtol=0, atol=1e-9)
+    expected, expected_e_N = lexicographic(x, [upper, lower])
+    # What rounding leaves of the blocked row (1e-16) acts with 2/threshold² = 2e4.
+    np.testing.assert_allclose(e_N, expected_e_N, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(a, expected, rtol=1e-8, atol=1e-8)
+
+
+@given(seeds)
+def test_more_rows_than_freedoms(seed: int) -> None:
+    """Two levels of five rows on seven joints: the first exact, the second's rest."""
+    x = numbers(seed, 7, 7, IDENTITY)
+    extra = np.random.default_rng(seed).standard_normal((2, 3, 7))
+    x = x._replace(
+        J=np.vstack([x.J, extra[0]]),
+        J_dot=np.vstack([x.J_dot, extra[1]]),
+        a_x=np.arange(10.0),
+    )
+    a, e_N, _ = resolve(x, IDENTITY, levels=[5, 5])
+    # Three rows of the second level are blocked: rounding, grown by 2/threshold² = 2e4.
+    atol = 1e-9 * max(1.0, float(np.abs(a).max()))
+    np.testing.assert_allclose(
+        x.J[:5] @ a + x.J_dot[:5] @ x.v, x.a_x[:5], rtol=0, atol=atol
+    )
+    expected, _ = lexicographic(x, [5, 5])
+    np.testing.assert_allclose(e_N, 0.0, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(a, expected, rtol=1e-6, atol=1e-6)
+
+
+@given(seeds)
+def test_priorities_meet_the_stack_where_they_take_over(seed: int) -> None:
+    """Either side of the threshold: the same acceleration, so nothing jumps."""
+    x = numbers(seed, 4, 7, IDENTITY)
+    threshold = 0.5  # `numbers` gives the stack the singular values 2 ... 0.5
+    below, _, damped = resolve(x, IDENTITY, threshold=threshold * 1.0001, levels=[2, 2])
+    above, _, exact = resolve(x, IDENTITY, threshold=threshold * 0.9999, levels=[2, 2])
+    assert not exact
+    # The level's singular value is above the stack's: not damped at all, as a rule.
+    atol = 1e-9 if not damped else 1e-2
+    np.testing.assert_allclose(below, above, rtol=0, atol=atol)
+
+
+# --- along motions -------------------------------------------------------------------
+
+GAINS = Gains.from_frequency(8.0)
+SIDES = ("left", "right")
+
+
+@cache
+def panda() -> Robot:
+    return Robot.load("panda")
+
+
+def metric_of(kind: str) -> Metric:
+    if kind == "mass_matrix":
+        return MassMatrixMetric()
+    return IdentityMetric() if kind == "identity" else ConstantMetric(np.arange(1, 8))
+
+
+def conflicting(kind: str) -> Controller:
+    """Return a hand on a circle, above one that wants it elsewhere, and a wrist.
+
+    The second level's x row is the first's, at every state: rank 5 of 6, for good.
+    """
+    robot = panda()
+    circle = Circle([0.45, 0.0, 0.4], 0.1, 1.5, normal=[0.0, 0.0, 1.0])
+    hand = FramePosition(robot, "panda_tcp", circle, GAINS, name="hand")
+    rival = FramePosition(
+        robot, "panda_tcp", Hold([0.6]), GAINS, axes="x", name="rival"
+    )
+    wrist = JointPosture(
+        robot, robot.home(), GAINS, joints=["panda_joint7"], name="wrist"
+    )
+    return Controller(
+        robot,
+        [[hand], [rival, wrist]],
+        2.0 * JointCentering(robot),
+        null_space_gain=4.0,
+        metric=metric_of(kind),
+    )
+
+
+@pytest.mark.parametrize("kind", ["identity", "constant", "mass_matrix"])
+def test_propositions_hold_per_level(kind: str) -> None:
+    """Level 1 as if alone; level 2 on what is left of it; V decays exponentially."""
+    controller = conflicting(kind)
+    robot = controller.robot
+    q, v0 = robot.home(), 0.3 * np.cos(np.arange(7.0))
+    precise = Dop853(rtol=1e-11, atol=1e-11)
+    rollout = simulate(
+        controller, q, v0, duration=1.0, log_period=0.02, integrator=precise
+    )
+    assert rollout["damped"].all()  # the conflict is there throughout
+
+    t, w = rollout.t, 8.0
+
+    def decayed(e: Array, rate: Array) -> Array:
+        """Return the critically damped solution of e'' + 2w e' + w² e = 0."""
+        return np.exp(-w * t)[:, None] * (e + (rate + w * e) * t[:, None])
+
+    for name in ("hand", "wrist"):
+        error, rate = rollout[f"task.{name}.error"], rollout[f"task.{name}.error_rate"]
+        expected = decayed(error[0], rate[0])
+        np.testing.assert_allclose(error, expected, rtol=0, atol=1e-8)
+    assert np.abs(rollout["task.rival.error"][-1]) > 0.03
+
+    norm = rollout["null_space_norm"]
+    assert norm[0] > 0.05
+    np.testing.assert_allclose(norm, norm[0] * np.exp(-4.0 * t), rtol=1e-6, atol=0)
+
+
+def test_levels_are_lists_or_tasks_not_both() -> None:
+    hand, rival = conflicting("identity").tasks[:2]
+    with pytest.raises(ControllerError, match="mixes tasks and lists"):
+        Controller(panda(), [hand, [rival]])
+    with pytest.raises(ControllerError, match="at every level"):
+        Controller(panda(), [[hand], []])
+
+
+def test_propositions_hold_for_two_arms() -> None:
+    """Baxter's hands at two levels, the second asking for more than is left of it."""
+    pytest.importorskip("example_robot_data")
+    locked = {
+        "head_pan": 0.0,
+        "l_gripper_l_finger_joint": 0.01,
+        "r_gripper_l_finger_joint": 0.01,
+    }
+    robot = Robot.load("baxter", locked=locked)
+    bend = np.array([-0.5, -0.4, -0.8, 1.4, 0.4, 0.8, 0.0])
+    mirror = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0])
+    q = robot.integrate(robot.neutral(), np.r_[bend, mirror * bend])
+    state = robot.state(0.0, q, np.zeros(robot.nv))
+    left, right = (state.position(f"{side}_gripper").copy() for side in SIDES)
+    x_axis = np.array([1.0, 0.0, 0.0])
+    levels = [
+        [
+            FramePosition(
+                robot, "left_gripper", Circle(left, 0.08, 1.5, normal=x_axis), GAINS
+            )
+        ],
+        [
+            FramePosition(robot, "right_gripper", Hold(right + 0.05), GAINS),
+            FramePosition(  # the first level's own row, wanted elsewhere
+                robot, "left_gripper", Hold([0.3]), GAINS, axes="x", name="rival"
+            ),
+        ],
+    ]
+    controller = Controller(robot, levels, JointCentering(robot), null_space_gain=4.0)
+    v0 = 0.2 * np.cos(np.arange(robot.nv))
+    rollout = simulate(
+        controller,
+        q,
+        v0,
+        duration=0.6,
+        log_period=0.05,
+        integrator=Dop853(rtol=1e-10, atol=1e-10),
+    )
+    assert rollout["damped"].all()
+    t, w = rollout.t, 8.0
+    for name in ("left_gripper", "right_gripper"):
+        e, rate = rollout[f"task.{name}.error"], rollout[f"task.{name}.error_rate"]
+        expected = np.exp(-w * t)[:, None] * (e[0] + (rate[0] + w * e[0]) * t[:, None])
+        np.testing.assert_allclose(e, expected, rtol=0, atol=1e-7)
+    norm = rollout["null_space_norm"]
+    np.testing.assert_allclose(norm, norm[0] * np.exp(-4.0 * t), rtol=1e-5, atol=0)

@@ -1,0 +1,592 @@
+"""The live loop's logic: robots in this process, clocks that nobody waits for."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from live_rigs import (
+    PERIOD,
+    Rig,
+    Trick,
+    always,
+    law,
+    missing,
+    nan_velocity,
+    panda,
+    start,
+    watched,
+)
+from numpy.typing import NDArray
+
+import hsp_control as hsp
+from hsp_control import (
+    FramePosition,
+    FunctionField,
+    Gains,
+    Hold,
+    Limits,
+    Rollout,
+    TargetPosture,
+    simulate,
+)
+from hsp_control.common.exceptions import HardwareError, HspControlError, LiveError
+from hsp_control.control.compensation import Command
+from hsp_control.live import (
+    EffortInterface,
+    Hardware,
+    LoopReport,
+    Measurement,
+    Operator,
+    Phase,
+    StopSettings,
+    Tolerance,
+    run_loop,
+)
+
+Array = NDArray[np.float64]
+AT_REST = 0.02
+"""Speeds of a robot that holds: below twice the speed at which damping ends [rad/s]."""
+
+
+def gravity(q: Array) -> Array:
+    return panda().inverse_dynamics(q, np.zeros(7), np.zeros(7))
+
+
+def assert_held(rig: Rig, report: LoopReport) -> None:
+    """The loop brought the robot itself to rest before it let go."""
+    assert report.phase is Phase.HOLDING
+    assert not report.silent
+    assert report.speed < AT_REST
+    # What the loop sent until its end: `close` adds the robot's own stop afterwards.
+    assert rig.robot.reason == "the loop has ended"
+    assert np.abs(rig.robot.v).max() < AT_REST
+
+
+# --- what it does when all is well ---------------------------------------------------
+
+
+def test_it_is_the_simulation_then_stops(tmp_path: Path) -> None:
+    """Nothing is late in this process: to the last bit the sampled loop of simulate."""
+    rig, log = Rig(), tmp_path / "run.journal"
+    report = run_loop(law(), rig, duration=0.4, log=log, log_period=0.01)
+    assert isinstance(rig, Hardware)
+    assert (report.ended, report.reason) == ("completed", "its time is over")
+    assert_held(rig, report)
+    run = Rollout.load(log)
+    reference = simulate(
+        law(),
+        start(),
+        duration=0.4,
+        control_period=PERIOD,
+        log_period=0.01,
+        integrator=hsp.SemiImplicitEuler(PERIOD),
+    )
+    count = len(reference) - 1  # the last one is the safe stop's first
+    assert run["live.phase"][count] == Phase.DAMPING
+    np.testing.assert_array_equal(run["live.phase"][:count], Phase.RUNNING)
+    for name in ("t", "q", "v", "tau", "task.tip.error", "field.g", "null_space_norm"):
+        np.testing.assert_allclose(
+            run[name][:count], reference[name][:count], rtol=1e-12, atol=1e-12
+        )
+    assert run.status == "completed"
+    assert run.meta["live"]["phase"] == "holding"
+    assert (np.diff(run.t) > 0.0).all()
+    assert run["live.phase"][-1] == Phase.HOLDING
+
+
+def test_a_commander_of_ones_own_is_asked_and_restarted() -> None:
+    class Halved(Command):
+        restarts = 0
+
+        def restart(self) -> None:
+            self.restarts += 1
+            super().restart()
+
+        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
+            tau = super().effort(t, q, v, period)
+            return gravity(q) + 0.5 * (tau - gravity(q))
+
+    commander = Halved(law())
+    rig = Rig()
+    run_loop(commander, rig, duration=0.05)
+    assert commander.restarts == 2  # when it was made, and when the run began
+    state = panda().state(0.0, start(), np.zeros(7))
+    full = law().compute(state).tau
+    np.testing.assert_allclose(rig.sent[0], gravity(start()) + 0.5 * (
+        full - gravity(start())
+    ), atol=1e-9)  # fmt: skip
+
+
+def test_the_controller_is_told_what_acts() -> None:
+    told: list[Array] = []
+
+    class Told(Command):
+        def applied(self, tau: Array, period: float) -> None:
+            told.append(np.array(tau))
+            super().applied(tau, period)
+
+    interface = EffortInterface(compensates_gravity=True, effort_rate=50.0)
+    rig = Rig(watched(interface))
+    run_loop(Told(law()), rig, duration=0.05, interface=interface)
+    told, sent = told[: len(rig.sent)], np.array(rig.sent)
+    # tau = sent + g(q); at the start, where it barely moves, g is the start's.
+    np.testing.assert_allclose(told[0], sent[0] + gravity(start()), atol=1e-9)
+    # And the rate binds at first: the law wants to start at once.
+    assert np.abs(sent[0]).max() == pytest.approx(50.0 * PERIOD)
+
+
+# --- the robot's interface -----------------------------------------------------------
+
+
+def test_tau_less_gravity_is_the_same_motion() -> None:
+    plain, compensating = Rig(), None
+    run_loop(law(), plain, duration=0.3)
+    interface = EffortInterface(compensates_gravity=True)
+    compensating = Rig(watched(interface))
+    run_loop(law(), compensating, duration=0.3, interface=interface)
+    for sent, relieved in zip(plain.sent[:300:50], compensating.sent[:300:50]):  # noqa: B905
+        assert np.abs(sent - relieved).max() > 1.0  # gravity is not nothing
+    np.testing.assert_allclose(plain.robot.q, compensating.robot.q, atol=1e-9)
+    relieved = np.array(compensating.sent)
+    # At the end, held still, such a robot is sent nothing.
+    assert np.abs(relieved[-1]).max() < 0.05
+
+
+@pytest.mark.parametrize("compensates", [True, False])
+def test_what_is_sent_keeps_rate_and_effort(compensates: bool) -> None:
+    most, rate = 60.0, 200.0
+    interface = EffortInterface(compensates, rate, most)
+    rig = Rig(watched(interface))
+    wild = law()
+    tip = wild.tasks[0]
+    tip.Kp[:] *= 30.0  # more than such a motor can do
+    run_loop(wild, rig, duration=0.3, interface=interface)
+    sent = np.array(rig.sent)
+    # The first step is from what holds a robot at rest: g(q), or nothing.
+    at_rest = np.zeros(7) if compensates else gravity(start())
+    steps = np.abs(np.diff(np.vstack([at_rest, sent]), axis=0))
+    assert steps.max() <= rate * PERIOD * (1.0 + 1e-9)
+    assert steps.max() > 0.99 * rate * PERIOD
+    if not compensates:
+        assert np.abs(sent).max() <= most
+
+
+# --- whatever happens: the safe stop -------------------------------------------------
+
+
+def far(found: Measurement) -> Measurement:
+    q = found.q.copy()
+    q[3] = 0.1  # a Panda's fourth joint ends at -0.07
+    return found._replace(q=q)
+
+
+def fast(found: Measurement) -> Measurement:
+    v = found.v.copy()
+    v[1] = 2.5  # its limit is 2.175
+    return found._replace(v=v)
+
+
+def infinite(found: Measurement) -> Measurement:
+    q = found.q.copy()
+    q[0] = np.inf
+    return found._replace(q=q)
+
+
+def short(found: Measurement) -> Measurement:
+    return found._replace(q=found.q[:5])
+
+
+TRICKS: dict[str, tuple[dict[int, Trick], str]] = {
+    "nan": ({200: nan_velocity}, r"not finite: v\[2\] is nan"),
+    "infinite": ({200: infinite}, r"not finite: q\[0\] is inf"),
+    "short": ({200: short}, r"q has shape \(5,\)"),
+    "time": (
+        {200: lambda m: m._replace(t=np.nan)},
+        "the state's time is nan",
+    ),
+    "missing": (always(missing, 200, 21), "no new state for 21 periods"),
+    "frozen": (
+        always(lambda m: m._replace(sequence=199), 200, 21),
+        "no new state for 21 periods",
+    ),
+    "old": ({200: lambda m: m._replace(age=0.03)}, "0.03 s old; 0.02 s are allowed"),
+    "gap": (
+        always(lambda m: m._replace(sequence=m.sequence + 30), 200),
+        "30 states in a row were not seen",
+    ),
+    "far": ({200: far}, "panda_joint4 is at 0.1, beyond"),
+    "fast": ({200: fast}, "panda_joint2 moves at 2.5, beyond"),
+    "halted": ({200: lambda m: m._replace(halted=True)}, "has stopped by itself"),
+}
+
+
+@pytest.mark.parametrize("kind", TRICKS)
+def test_a_state_that_is_none_ends_in_the_safe_stop(kind: str, tmp_path: Path) -> None:
+    tricks, reason = TRICKS[kind]
+    rig, log = Rig(tricks=tricks), tmp_path / "run.journal"
+    report = run_loop(law(), rig, duration=5.0, log=log)
+    assert report.ended == "fault"
+    with pytest.raises(AssertionError, match=reason):
+        raise AssertionError(report.reason)
+    assert_held(rig, report)
+    assert np.isfinite(rig.sent).all()
+    run = Rollout.load(log)
+    assert (run.status, run.meta["message"]) == ("stopped", report.reason)
+    assert run.t[-1] < 1.5
+    assert np.isfinite(run.tau).all()
+
+
+def test_a_gap_that_is_allowed_is_held_over_and_counted() -> None:
+    tricks = always(missing, 200, 20) | always(missing, 300, 3)
+    rig = Rig(tricks=tricks)
+    report = run_loop(law(), rig, duration=0.5)
+    assert report.ended == "completed"
+    assert report.deadlines.silent == 23
+    assert report.deadlines.unseen == 23
+    # The first read is not answered, the second is by the first effort: 200 by 198.
+    held = np.array(rig.sent)[197:219]
+    still = np.abs(np.diff(held, axis=0)).max(axis=1) == 0.0
+    np.testing.assert_array_equal(still, [True] * 20 + [False])
+
+
+def test_without_any_state_the_model_stops_it_and_the_loop_falls_silent() -> None:
+    rig = Rig(tricks=always(missing, 200))
+    report = run_loop(law(), rig, duration=5.0)
+    assert report.ended == "fault"
+    assert report.silent
+    # What the model reckoned was true: plant and model are one here, and the robot
+    # had come to rest under the efforts sent blind, before its watchdog could know.
+    blind = Tolerance().blind / PERIOD
+    assert len(rig.sent) == pytest.approx(199 + blind, abs=3)
+    assert report.speed < 0.05
+    assert np.abs(rig.robot.v).max() < AT_REST
+
+
+def raising(error: Exception) -> Trick:
+    def trick(found: Measurement) -> Measurement:
+        raise error
+
+    return trick
+
+
+@pytest.mark.parametrize("error", [HardwareError("the cable"), OSError(5, "gone")])
+def test_a_robot_that_cannot_be_read_is_left_at_once(error: Exception) -> None:
+    rig = Rig(tricks=always(raising(error), 200))
+    report = run_loop(law(), rig, duration=5.0)
+    assert report.ended == "fault"
+    assert report.error is error
+    assert "no state can be read" in report.reason
+    assert report.silent
+    assert rig.reads == 200
+    assert rig.robot.phase is Phase.HOLDING  # by itself
+
+
+def test_a_robot_that_cannot_be_written_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = Rig()
+    write = rig.write
+
+    def broken(effort: Array) -> None:
+        if len(rig.sent) >= 100:
+            raise HardwareError("no route")
+        write(effort)
+
+    monkeypatch.setattr(rig, "write", broken)
+    report = run_loop(law(), rig, duration=5.0)
+    assert report.ended == "fault"
+    assert "cannot be sent: no route" in report.reason
+    assert rig.robot.reason.startswith("the watchdog")
+    assert rig.robot.phase is Phase.HOLDING
+
+
+def bad_field(t: float, what: Any) -> FunctionField:
+    def g(state: hsp.RobotState) -> Array:
+        if state.t < t:
+            return np.zeros(7)
+        if isinstance(what, Exception):
+            raise what
+        return np.full(7, what)
+
+    return FunctionField(panda(), g, rate=lambda _: np.zeros(7))
+
+
+@pytest.mark.parametrize("what", [np.nan, ZeroDivisionError("by zero")])
+def test_a_law_that_fails_ends_in_the_safe_stop(what: Any, tmp_path: Path) -> None:
+    controller = law()
+    controller.field = bad_field(0.2, what)
+    rig, log = Rig(), tmp_path / "run.journal"
+    report = run_loop(controller, rig, duration=5.0, log=log)
+    assert report.ended == "fault"
+    assert isinstance(report.error, HspControlError | ZeroDivisionError)
+    assert_held(rig, report)
+    run = Rollout.load(log)
+    ran = run["live.phase"] == Phase.RUNNING
+    assert np.isfinite(run["field.g"][ran]).all()
+    assert np.isnan(run["field.g"][~ran]).all()  # nobody asked the law again
+    assert np.isfinite(run.q).all()
+
+
+def test_a_commander_s_nan_never_goes_out() -> None:
+    class Broken(Command):
+        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
+            tau = super().effort(t, q, v, period)
+            return np.full(7, np.nan) if t > 0.1 else tau
+
+    rig = Rig()
+    report = run_loop(Broken(law()), rig, duration=5.0)
+    assert "the effort is not finite" in report.reason
+    assert np.isfinite(rig.sent).all()
+    assert_held(rig, report)
+
+
+def interrupt(found: Measurement) -> Measurement:
+    raise KeyboardInterrupt
+
+
+def call_from(t: float, what: Callable[[], object]) -> Callable[[float], None]:
+    def on_period(now: float) -> None:
+        if now >= t:
+            what()
+
+    return on_period
+
+
+def test_the_operator_s_stop_and_ctrl_c(tmp_path: Path) -> None:
+    operator, rig = Operator(), Rig()
+    on_period = call_from(0.1, operator.stop)
+    report = run_loop(law(), rig, operator=operator, on_period=on_period)
+    assert (report.ended, report.status) == ("operator", "interrupted")
+    assert_held(rig, report)
+
+    rig, log = Rig(tricks={150: interrupt}), tmp_path / "run.journal"
+    report = run_loop(law(), rig, log=log)
+    assert report.ended == "operator"
+    assert_held(rig, report)
+    assert Rollout.load(log).status == "interrupted"
+
+
+def test_a_second_ctrl_c_leaves_it_to_the_robot() -> None:
+    rig = Rig(tricks={150: interrupt, 160: interrupt})
+    report = run_loop(law(), rig)
+    assert report.silent
+    assert rig.reads == 160
+    assert rig.robot.phase is Phase.HOLDING
+
+
+def test_what_a_change_raises_stops_it() -> None:
+    operator, rig = Operator(), Rig()
+    gains = Gains.from_frequency(5.0)
+    operator.call(lambda: law().change_gains("tipp", gains, start=0.0, ramp=1.0))
+    report = run_loop(law(), rig, operator=operator)
+    assert "'tipp'" in report.reason
+    assert_held(rig, report)
+    rig = Rig()
+    report = run_loop(law(), rig, on_period=call_from(0.1, lambda: 1 // 0))
+    assert "ZeroDivisionError" in report.reason
+    assert_held(rig, report)
+
+
+def test_a_disk_that_is_full_stops_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from hsp_control.simulation import journal
+
+    real, rows = journal.os.write, []
+
+    def full(file: int, data: bytes) -> int:
+        rows.append(data)
+        if len(rows) > 20:
+            raise OSError(28, "No space left on device")
+        return real(file, data)
+
+    monkeypatch.setattr(journal.os, "write", full)
+    rig = Rig()
+    report = run_loop(law(), rig, duration=5.0, log=tmp_path / "run.journal")
+    assert "No space left" in report.reason
+    assert_held(rig, report)
+    monkeypatch.undo()
+    assert (
+        len(Rollout.load(tmp_path / "run.journal")) == 18
+    )  # 20 less magic and heading
+
+
+EVENTS = st.lists(
+    st.tuples(
+        st.integers(25, 400),
+        st.sampled_from(
+            [
+                missing,
+                nan_velocity,
+                infinite,
+                far,
+                fast,
+                short,
+                lambda m: m._replace(sequence=m.sequence - 3),
+                lambda m: m._replace(t=m.t - 0.1),
+                lambda m: m._replace(t=-np.inf),
+                lambda m: m._replace(age=0.5),
+                lambda m: m._replace(halted=True),
+                interrupt,
+            ]
+        ),
+        st.integers(1, 60),
+    ),
+    max_size=6,
+)
+
+
+@settings(max_examples=12)
+@given(events=EVENTS, compensates=st.booleans())
+def test_whatever_comes_it_ends_and_no_effort_is_beyond_limits(
+    events: list[tuple[int, Trick, int]], compensates: bool
+) -> None:
+    tricks: dict[int, Trick] = {}
+    for begin, trick, count in events:
+        tricks |= always(trick, begin, 1 if trick is interrupt else count)
+    most, rate = 80.0, 1000.0
+    interface = EffortInterface(compensates, rate, most)
+    rig = Rig(watched(interface), tricks)
+    report = run_loop(law(), rig, duration=0.3, interface=interface)
+    sent = np.array(rig.sent)
+    assert np.isfinite(sent).all()
+    at_rest = np.zeros(7) if compensates else gravity(start())
+    steps = np.abs(np.diff(np.vstack([at_rest, sent]), axis=0))
+    # Rounding: sums of numbers as large as the efforts.
+    assert steps.max() <= rate * PERIOD + 1e-9
+    if not compensates:
+        assert np.abs(sent).max() <= most + 1e-9
+    assert report.reason
+    assert rig.robot.phase is Phase.HOLDING
+    assert np.abs(rig.robot.v).max() < AT_REST
+    assert rig.closed
+
+
+# --- changes while it runs -----------------------------------------------------------
+
+
+def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
+    controller, operator, rig = law(), Operator(), Rig()
+    q = start()
+    q[0] -= 0.5
+    new = TargetPosture(panda(), q, name="other")
+    elbow = FramePosition(
+        panda(), "panda_link4", Hold([0.6]), Gains.from_frequency(5.0),
+        name="elbow", axes="z",
+    )  # fmt: skip
+    changes = {
+        0.1: lambda: controller.change_field(new, start=0.12, ramp=0.2),
+        0.2: lambda: controller.change_gains(
+            "tip", Gains.from_frequency(15.0), start=0.22, ramp=0.2
+        ),
+        0.3: lambda: controller.add_task(elbow, start=0.32, ramp=0.2),
+        0.6: lambda: controller.remove_task("elbow", start=0.62, ramp=0.2),
+    }
+    for_now = sorted(changes.items())
+
+    def on_period(t: float) -> None:
+        while for_now and t >= for_now[0][0]:
+            operator.call(for_now.pop(0)[1])
+
+    log = tmp_path / "run.journal"
+    report = run_loop(
+        controller, rig, duration=1.0, operator=operator, on_period=on_period, log=log,
+        log_period=PERIOD,
+    )  # fmt: skip
+    assert report.ended == "completed", report.reason
+    assert_held(rig, report)
+    assert controller.field is new
+    run = Rollout.load(log)
+    ran = run["live.phase"] == Phase.RUNNING
+    steps = np.abs(np.diff(run.tau[ran], axis=0)).max(axis=1)
+    # Without a change they are as large: the motion's own, see the first 0.1 s.
+    assert steps.max() < 5.0 * steps[10:100].max()
+    assert np.isfinite(run["task.elbow.error"][(run.t > 0.4) & (run.t < 0.6), 0]).all()
+    assert np.isnan(run["task.elbow.error"][run.t > 0.83]).all()
+    assert np.isnan(run["field.other.g"][run.t < 0.09]).all()
+
+
+# --- what is refused -----------------------------------------------------------------
+
+
+def test_a_floating_base_is_refused() -> None:
+    robot = hsp.Robot.load("panda", root="free_flyer")
+    task = hsp.JointPosture(robot, robot.neutral(), Gains.from_frequency(5.0))
+    controller = hsp.Controller(robot, [task], base="driven")
+    rig = Rig()
+    with pytest.raises(LiveError, match="floating base; a live loop is for fixed ones"):
+        run_loop(controller, rig)
+    assert rig.closed
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"duration": 0.0}, "duration is 0.0 s; must be positive"),
+        ({"log_period": 1e-4}, "log_period is 0.0001 s; must be a period, 0.001 s"),
+        (
+            {"stop": StopSettings(damping=600.0)},
+            "damping is 600; at a period of 0.001 s it may be 500 at most",
+        ),
+        (
+            {"interface": EffortInterface(effort_rate=[1.0, 2.0])},
+            r"effort_rate has shape \(2,\); needs one number or 7",
+        ),
+        (
+            {"interface": EffortInterface(effort=-1.0)},
+            "must be greater than 0",
+        ),
+        (
+            {"interface": EffortInterface(effort_rate="fast")},
+            "effort_rate is 'fast'; needs numbers",
+        ),
+    ],
+)
+def test_settings_that_are_none(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(LiveError, match=message):
+        run_loop(law(), Rig(), **options)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Tolerance(missing=-1),
+        lambda: Tolerance(missing=1.5),  # type: ignore[arg-type]
+        lambda: Tolerance(age=0.0),
+        lambda: Tolerance(blind=np.nan),
+        lambda: StopSettings(rest_speed=0.0),
+        lambda: StopSettings(hold=-1.0),
+        lambda: StopSettings(damping=np.inf),
+    ],
+)
+def test_numbers_that_are_none(make: Callable[[], object]) -> None:
+    with pytest.raises(LiveError):
+        make()
+
+
+def test_a_robot_that_is_silent_or_unfit_is_not_started() -> None:
+    clock = iter(np.arange(0.0, 1e4, 0.1))
+    rig = Rig(tricks=always(missing, 1))
+    with pytest.raises(HardwareError, match="no state of the robot came in 10 s"):
+        run_loop(law(), rig, clock=lambda: float(next(clock)))
+    assert rig.closed
+    assert not rig.sent
+    for trick, why in ((nan_velocity, "not finite"), (far, "panda_joint4 is at")):
+        rig = Rig(tricks=always(trick, 1))
+        with pytest.raises(HardwareError, match=f"not fit to start: .*{why}"):
+            run_loop(law(), rig)
+        assert not rig.sent
+        assert rig.closed
+
+
+def test_limits_of_the_controller_are_the_guard_s() -> None:
+    q = start()
+    limits = Limits(panda(), position=(q - 0.05, q + 0.05))
+    controller = law()  # does not know of them, and swings by 0.5 rad
+    controller.limits = limits
+    report = run_loop(controller, Rig(), duration=5.0)
+    assert report.ended == "fault"
+    assert "beyond" in report.reason
+    assert report.t < 3.0

@@ -1,0 +1,296 @@
+"""Datagrams, faults and links: every packet is sorted, every fault is counted."""
+
+import struct
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from live_rigs import PERIOD, panda, start, watched
+
+from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.live import Faults, Hardware, Link, Phase, UdpHardware, serve
+from hsp_control.live.faults import FaultInjector
+from hsp_control.live.link import Ages
+from hsp_control.live.packets import Kind, Packet, decode, encode
+from hsp_control.live.udp_robot import BYE
+
+numbers = st.lists(st.floats(allow_nan=False), max_size=20)
+
+
+def packet(sequence: int = 1, payload: list[float] | None = None) -> Packet:
+    values = np.array([1.5, -2.0] if payload is None else payload)
+    return Packet(Kind.STATE, 1, 7, sequence, 3, -5, 0.25, values)
+
+
+def same(a: Packet, b: Packet) -> bool:
+    return a[:-1] == b[:-1] and np.array_equal(a.payload, b.payload, equal_nan=True)
+
+
+# --- packets -------------------------------------------------------------------------
+
+
+@given(payload=numbers, sequence=st.integers(0, 2**64 - 1))
+def test_a_packet_comes_back(payload: list[float], sequence: int) -> None:
+    sent = packet(sequence, payload)
+    found = decode(encode(sent))
+    assert found is not None
+    assert same(found, sent)
+    assert len(encode(sent)) == 56 + 8 * len(payload)
+
+
+@given(payload=numbers, data=st.data())
+def test_one_bit_is_enough_to_be_refused(
+    payload: list[float], data: st.DataObject
+) -> None:
+    sent = bytearray(encode(packet(1, payload)))
+    bit = data.draw(st.integers(0, 8 * len(sent) - 1))
+    sent[bit // 8] ^= 1 << (bit % 8)
+    assert decode(bytes(sent)) is None
+
+
+@given(junk=st.binary(max_size=200), cut=st.integers(0, 71))
+def test_junk_and_pieces_are_refused(junk: bytes, cut: int) -> None:
+    whole = encode(packet())
+    assert decode(whole[:cut]) is None
+    assert decode(whole + junk) is None or not junk
+    assume(junk != whole)
+    assert decode(junk) is None
+
+
+def test_other_versions_kinds_and_lengths_are_refused() -> None:
+    import zlib
+
+    whole = encode(packet())
+    for at, value in ((0, b"X"), (4, b"\x02"), (5, b"\x09"), (8, b"\x03")):
+        body = whole[:at] + value + whole[at + 1 : -4]
+        assert decode(body + struct.pack("<I", zlib.crc32(body))) is None
+
+
+def test_not_finite_numbers_pass_the_line_and_are_the_guard_s() -> None:
+    found = decode(encode(packet(1, [np.nan, np.inf])))
+    assert found is not None
+    assert same(found, packet(1, [np.nan, np.inf]))
+
+
+# --- faults --------------------------------------------------------------------------
+
+
+@given(seed=st.integers(0, 1000), delay=st.integers(1, 5))
+def test_each_fault_does_what_it_says_and_is_counted(seed: int, delay: int) -> None:
+    faults = Faults(0.2, 0.2, 0.2, 0.2, delay=delay, seed=seed)
+    injector = FaultInjector(faults)
+    came: list[int | None] = []
+    for k in range(1, 201):
+        for data in injector.pass_on(encode(packet(k))):
+            found = decode(data)
+            came.append(None if found is None else found.sequence)
+    came += [found.sequence for d in injector.rest() if (found := decode(d))]
+    done = injector.injected
+    whole = [k for k in came if k is not None]
+    assert came.count(None) == done["corrupted"]
+    assert len(whole) - len(set(whole)) == done["duplicated"]
+    assert 200 - len(set(whole)) == done["lost"] + done["corrupted"]
+    behind = [k for i, k in enumerate(whole) if whole[:i] and k < max(whole[:i])]
+    assert len(behind) <= done["late"]
+    assert sum(done.values()) == pytest.approx(160, abs=30)
+    again = FaultInjector(faults)  # the same seed, the same faults
+    for k in range(1, 201):
+        again.pass_on(encode(packet(k)))
+    assert again.injected == done
+
+
+def test_no_faults_change_nothing() -> None:
+    injector = FaultInjector(Faults())
+    data = [encode(packet(k)) for k in range(1, 50)]
+    assert [injector.pass_on(each) for each in data] == [[each] for each in data]
+
+
+def test_faults_are_parsed_and_refused() -> None:
+    assert Faults.parse("") == Faults()
+    assert Faults.parse("late=0.1, lost=0.02,delay=7,seed=3") == Faults(
+        late=0.1, lost=0.02, delay=7, seed=3
+    )
+    for text, message in (
+        ("loss=0.1", "no fault 'loss'; did you mean 'lost'"),
+        ("lost", "fault lost is ''; needs a number"),
+        ("seed=0.5", "fault seed is '0.5'"),
+        ("lost=1.5", "lost is 1.5; needs a probability"),
+        ("lost=0.6,late=0.6", "add up to more than 1"),
+        ("delay=0", "delay is 0"),
+    ):
+        with pytest.raises(LiveError, match=message.replace("'", ".")):
+            Faults.parse(text)
+
+
+# --- links ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def links() -> Iterator[tuple[Link, Link]]:
+    receiver = Link(7)
+    sender = Link(7, peer=receiver.address)
+    yield sender, receiver
+    sender.close()
+    receiver.close()
+
+
+def test_a_link_sorts_what_comes(links: tuple[Link, Link]) -> None:
+    sender, receiver = links
+    raw = sender._socket
+    foreign = encode(packet(1)._replace(session=8))
+    data = [encode(packet(k)) for k in range(1, 7)]
+    broken = data[4][:-1]
+    for each in (data[0], data[0], data[2], data[1], broken, foreign, data[5], data[5]):
+        raw.sendto(each, receiver.address)
+    accepted = receiver.receive(5.0)
+    assert [p.sequence for p in accepted] == [1, 3, 6]
+    assert receiver.counts == {
+        "sent": 0, "accepted": 3, "duplicated": 2, "stale": 1, "corrupted": 1,
+        "foreign": 1,
+    }  # fmt: skip
+    # 1, 3 and 6 are here, 2 came late, one was corrupted: one more never came.
+    assert receiver.lost == 1
+    assert receiver.peer == sender.address
+    assert receiver.receive(0.0) == []
+
+
+@settings(max_examples=15)
+@given(seed=st.integers(0, 1000))
+def test_a_link_counts_what_was_injected(seed: int) -> None:
+    receiver = Link(7)
+    sender = Link(
+        7, peer=receiver.address, faults=Faults(0.1, 0.1, 0.1, 0.1, seed=seed)
+    )
+    try:
+        for _ in range(200):
+            sender.send(Kind.EFFORT, np.zeros(7))
+            receiver.receive(0.0)
+        sender.send(Kind.BYE)
+        accepted = receiver.receive(5.0)
+        assert accepted[-1].kind is Kind.BYE
+        done, counts = sender.injected, receiver.counts
+        assert counts["corrupted"] == done["corrupted"]
+        assert counts["duplicated"] == done["duplicated"]
+        assert receiver.lost == done["lost"]
+        # One that nothing overtook, since the next were lost too, is late and new.
+        assert counts["stale"] <= done["late"]
+        assert counts["accepted"] + counts["stale"] == 201 - (
+            done["lost"] + done["corrupted"]
+        )
+    finally:
+        sender.close()
+        receiver.close()
+
+
+def test_a_peer_that_is_gone_is_no_error(links: tuple[Link, Link]) -> None:
+    sender, receiver = links
+    receiver.close()
+    for _ in range(5):
+        sender.send(Kind.EFFORT, np.zeros(7))
+        assert sender.receive(0.0) == []
+    assert sender.receive(0.01) == []
+
+
+def test_nobody_to_send_to_and_nowhere_to_listen() -> None:
+    link = Link(7)
+    with pytest.raises(HardwareError, match="nothing was heard of the robot yet"):
+        link.send(Kind.EFFORT)
+    with pytest.raises(HardwareError, match=r"cannot listen at 127\.0\.0\.1"):
+        Link(7, link.address)
+    link.close()
+
+
+@given(
+    offset=st.floats(-1e6, 1e6),
+    drift=st.floats(-1e-5, 1e-5),
+    delays=st.lists(st.floats(0.0, 0.1), min_size=200, max_size=200),
+)
+def test_age_is_what_a_packet_waited_longer_than_the_quickest(
+    offset: float, drift: float, delays: list[float]
+) -> None:
+    ages = Ages(window=1.0)
+    delays = [0.0 if k % 10 == 0 else delay for k, delay in enumerate(delays)]
+    for k, delay in enumerate(delays):
+        sent = 0.1 * k
+        age = ages.age(sent + delay, offset + sent * (1.0 + drift))
+        # Clocks drift by 1e-5 of the two windows; 1e6 s have 1e-10 s of rounding.
+        assert age == pytest.approx(delay, abs=2.5e-5)
+
+
+# --- a robot at the other end, both in this process ----------------------------------
+
+
+def test_a_served_robot_runs_stops_and_says_why() -> None:
+    hardware = UdpHardware(panda(), PERIOD)
+    assert isinstance(hardware, Hardware)
+    robot = watched()
+    link = Link(hardware.session, peer=hardware.address)
+    tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
+    seen: list[int] = []
+
+    def pilot() -> None:  # the server asks every period: the loop's turn
+        found = hardware.read(0.0)
+        if found is None:
+            return
+        seen.append(found.sequence)
+        if len(seen) < 50:
+            hardware.write(tau)
+        elif not hardware.closed:
+            hardware.close()
+
+    served = serve(robot, link, orphaned=pilot)  # type: ignore[arg-type]
+    assert robot.reason == BYE
+    assert robot.phase is Phase.HOLDING
+    assert robot.done
+    assert not served.waited
+    assert link.counts["accepted"] == 49 + 3
+    hardware.drain()
+    assert hardware.link.counts["accepted"] == link.counts["sent"]
+    link.close()
+
+
+def test_efforts_that_answer_old_states_are_nobody_s() -> None:
+    """All efforts come, in order, and too late: that is silence."""
+    receiver, robot = Link(7), watched(watchdog=10)
+    link = Link(7, peer=receiver.address)
+    tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
+    receiver.seen = 0
+
+    def pilot() -> None:
+        newest = receiver.receive(0.0)
+        if newest and robot.t > 0.05:
+            receiver.seen = 20  # what it answers is long ago
+        if newest:
+            receiver.send(Kind.EFFORT, tau)
+
+    served = serve(robot, link, orphaned=pilot)  # type: ignore[arg-type]
+    assert robot.reason.startswith("the watchdog")
+    assert served.outdated > 10
+    receiver.close()
+    link.close()
+
+
+def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
+    hardware = UdpHardware(panda(), PERIOD)
+    link = Link(hardware.session, peer=hardware.address)
+    assert serve(watched(), link, orphaned=lambda: None, patience=0.05).waited
+    robot = watched()
+    assert serve(robot, link, orphaned=lambda: "gone").waited
+    assert robot.phase is Phase.WAITING
+    periods = iter(range(100_000))
+
+    def dies() -> str | None:
+        k = next(periods)
+        if k < 20 and hardware.read(0.0) is not None:
+            hardware.write(np.zeros(7))
+        return "its parent is gone" if k == 30 else None
+
+    served = serve(robot, link, orphaned=dies)
+    assert not served.waited
+    assert robot.reason == "its parent is gone"
+    assert robot.phase is Phase.HOLDING
+    hardware.close()
+    hardware.drain()
+    link.close()

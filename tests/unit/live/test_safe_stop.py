@@ -1,0 +1,270 @@
+"""The safe stop and what is around it: damping dissipates, hold holds."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from live_rigs import PERIOD, panda, start, watched
+from numpy.typing import NDArray
+
+from hsp_control import IntegratedPlant, RigidBodyPlant, Rk4, Robot
+from hsp_control.common.exceptions import LiveError
+from hsp_control.live import EffortInterface, Phase, SafeStop, StopSettings
+from hsp_control.live.dead_reckoning import DeadReckoning
+from hsp_control.live.deadlines import Deadlines
+from hsp_control.live.effort_port import EffortPort
+from hsp_control.live.safe_stop import share_within
+from hsp_control.simulation.plants.model_changes import ScaledInertias, changed
+
+Array = NDArray[np.float64]
+FREE = np.full(7, np.inf)
+LIMITED = np.array([87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])
+seeds = st.integers(0, 2**32 - 1)
+
+
+def at_random(seed: int) -> tuple[Array, Array]:
+    rng = np.random.default_rng(seed)
+    return panda().random_configuration(rng), rng.standard_normal(7)
+
+
+def gravity(q: Array) -> Array:
+    return panda().inverse_dynamics(q, np.zeros(7), np.zeros(7))
+
+
+@given(seed=seeds, limited=st.booleans())
+def test_damping_takes_energy_whatever_the_inertia(seed: int, limited: bool) -> None:
+    q, v = at_random(seed)
+    most = LIMITED if limited else FREE
+    stop = SafeStop(panda(), StopSettings(), most, PERIOD)
+    tau = stop.effort(panda().state(0.0, q, v))
+    power = float(v @ (tau - gravity(q)))  # what is not potential energy
+    M = panda().state(0.0, q, v).mass_matrix
+    assert stop.phase is Phase.DAMPING
+    assert power < 0.0
+    assert (np.abs(tau) <= most * (1.0 + 1e-12)).all()
+    if not limited:
+        np.testing.assert_allclose(power, -20.0 * v @ M @ v, rtol=1e-9)
+
+
+def test_a_share_of_the_damping_brakes_where_clipped_damping_would_drive() -> None:
+    rng = np.random.default_rng(0)
+    driven = 0
+    state = panda().state(0.0, start(), np.zeros(7))
+    for _ in range(1000):
+        q = panda().random_configuration(rng)
+        v = rng.standard_normal(7) * rng.choice([0.0, 1.0, 3.0], 7)
+        most = np.abs(gravity(q)) + rng.uniform(0.5, 20.0, 7)  # little is left to brake
+        stop = SafeStop(panda(), StopSettings(rest_speed=1e-9), most, PERIOD)
+        tau = stop.effort(state.update(0.0, q, v))
+        assert v @ (tau - gravity(q)) <= 1e-9
+        assert (np.abs(tau) <= most * (1.0 + 1e-12)).all()
+        clipped = np.clip(gravity(q) - 20.0 * state.mass_matrix @ v, -most, most)
+        driven += v @ (clipped - gravity(q)) > 1.0  # [W]
+    assert driven > 0
+
+
+@pytest.mark.parametrize(("seed", "factor"), [(0, 0.6), (1, 1.0), (2, 1.6)])
+def test_it_stops_a_robot_that_is_not_the_model(seed: int, factor: float) -> None:
+    """Wrong masses: it comes to rest, and the hold keeps it within gravity's error."""
+    _, v = at_random(seed)
+    own = changed(panda(), [ScaledInertias(factor, 1.0, [0.0, 0.0, 0.0])])
+    plant = IntegratedPlant(RigidBodyPlant(own), Rk4(PERIOD))
+    stop = SafeStop(panda(), StopSettings(), LIMITED, PERIOD)
+    q, t = start(), 0.0
+    plant.reset(0.0, q, v)
+    state = panda().state(0.0, q, v)
+    for k in range(4000):
+        tau = stop.effort(state.update(t, q, v))
+        q, v = plant.advance(t, (k + 1) * PERIOD, tau)
+        t = (k + 1) * PERIOD
+    assert stop.phase is Phase.HOLDING
+    assert np.abs(v).max() < 0.01
+    # In equilibrium K (q - q0) = (factor - 1) g: the PD's sag, first order in it.
+    sag = np.abs(panda().difference(stop._held_q, q))
+    assert sag.max() < 0.5 * abs(factor - 1.0) + 1e-6
+
+
+def test_with_the_right_model_energy_falls_like_the_exponential() -> None:
+    _, v = at_random(1)
+    q, k = start(), 8.0
+    settings = StopSettings(damping=k)
+    stop = SafeStop(panda(), settings, FREE, 1e-4)
+    plant = IntegratedPlant(RigidBodyPlant(panda()), Rk4(1e-4))
+    plant.reset(0.0, q, v)
+    state = panda().state(0.0, q, v)
+    energies = []
+    for i in range(1000):
+        tau = stop.effort(state.update(1e-4 * i, q, v))
+        energies.append(0.5 * v @ state.mass_matrix @ v)
+        q, v = plant.advance(1e-4 * i, 1e-4 * (i + 1), tau)
+    times = 1e-4 * np.arange(1000)
+    # The effort is held for 1e-4 s: first order in k h = 8e-4, over k t = 0.8.
+    np.testing.assert_allclose(
+        energies, energies[0] * np.exp(-2.0 * k * times), rtol=3e-3
+    )
+
+
+def test_noise_that_hides_the_rest_ends_the_damping_all_the_same() -> None:
+    settings = StopSettings(longest_damping=0.05, hold=0.02)
+    stop = SafeStop(panda(), settings, FREE, PERIOD)
+    rng = np.random.default_rng(0)
+    phases = []
+    while not stop.done:
+        v = 0.1 * rng.standard_normal(7)
+        stop.effort(panda().state(0.0, start(), v))
+        phases.append(stop.phase)
+    assert phases.count(Phase.DAMPING) == 50
+    assert phases.count(Phase.HOLDING) == 20
+
+
+@given(seed=seeds)
+def test_the_share_is_the_greatest_that_fits(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    most = rng.uniform(0.1, 5.0, 6)
+    most[0] = np.inf
+    base = rng.uniform(-1.3, 1.3, 6) * np.where(np.isfinite(most), most, 1.0)
+    direction = rng.standard_normal(6) * rng.choice([0.0, 0.1, 10.0], 6)
+    s = share_within(base, direction, most)
+    assert 0.0 <= s <= 1.0
+    inside = (np.abs(base) <= most).all()
+    if inside:
+        assert (np.abs(base + s * direction) <= most * (1.0 + 1e-12)).all()
+        if s < 1.0:
+            more = np.abs(base + 1.01 * s * direction + 1e-9 * direction)
+            assert (more > most).any()
+
+
+@given(seed=seeds, compensates=st.booleans())
+def test_the_port_keeps_both_limits_where_both_can_be(
+    seed: int, compensates: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    rate, most = 500.0, 40.0
+    interface = EffortInterface(compensates, rate, most)
+    port = EffortPort(panda(), interface, PERIOD)
+    q = start()
+    port.begin(q)
+    for _ in range(30):
+        before = port.sent.copy()
+        q = panda().integrate(q, 1e-3 * rng.standard_normal(7))
+        assert port.pass_on(100.0 * rng.standard_normal(7), q)
+        assert (np.abs(port.sent - before) <= rate * PERIOD + 1e-12).all()
+        borne = gravity(q) if compensates else 0.0
+        np.testing.assert_allclose(port.acting, port.sent + borne, atol=1e-12)
+        # q moves by 1e-3 rad a period: gravity by less than the step of 0.5 N·m.
+        assert (np.abs(port.acting) <= most + 1e-9).all()
+    before = port.sent.copy()
+    assert not port.pass_on(np.full(7, np.nan), q)
+    np.testing.assert_array_equal(port.sent, before)
+
+
+def test_the_urdf_s_limits_are_the_port_s() -> None:
+    port = EffortPort(panda(), EffortInterface(), PERIOD)
+    np.testing.assert_array_equal(port.greatest, panda().model.effortLimit)
+    endless = Robot.load("planar3r")
+    limits = EffortInterface().effort_limits(endless)
+    assert (limits > 0.0).all()
+
+
+def test_reckoning_is_the_model_s_motion() -> None:
+    q, v = at_random(3)
+    reckoning = DeadReckoning(panda(), PERIOD)
+    reckoning.see(0.0, q, v)
+    tau = gravity(q)
+    for _ in range(50):
+        reckoning.reckon(tau)
+    assert reckoning.blind == pytest.approx(0.05)
+    plant = IntegratedPlant(RigidBodyPlant(panda()), Rk4(PERIOD))
+    plant.reset(0.0, q, v)
+    for i in range(50):
+        q, v = plant.advance(i * PERIOD, (i + 1) * PERIOD, tau)
+    # Semi-implicit Euler: first order, |a| h t/2 of about 40 · 1e-3 · 0.025.
+    assert np.abs(panda().difference(q, reckoning.state.q)).max() < 2e-3
+    assert reckoning.state.t == pytest.approx(0.05)
+    before = reckoning.state.q.copy()
+    reckoning.reckon(np.full(7, np.nan))
+    np.testing.assert_array_equal(reckoning.state.q, before)
+
+
+# --- the robot that watches itself ---------------------------------------------------
+
+
+def test_it_waits_under_its_brakes_until_the_first_effort() -> None:
+    robot = watched()
+    for _ in range(50):
+        robot.advance([])
+    assert (robot.phase, robot.t) == (Phase.WAITING, 0.0)
+    robot.advance([gravity(start())])
+    assert (robot.phase, robot.t) == (Phase.RUNNING, PERIOD)
+
+
+def test_its_watchdog_counts_and_forgives() -> None:
+    robot = watched(watchdog=5)
+    tau = gravity(start()) + 3.0
+    for _ in range(3):
+        robot.advance([tau])
+        for _ in range(5):
+            robot.advance([])
+            np.testing.assert_array_equal(robot.tau, tau)  # held
+    assert robot.phase is Phase.RUNNING
+    robot.advance([])
+    assert robot.phase is Phase.DAMPING
+    assert robot.reason == "the watchdog: no valid effort for 6 periods"
+    for _ in range(1500):
+        robot.advance([tau + 50.0])  # it follows nobody any more
+        assert np.isfinite(robot.tau).all()
+    assert robot.done
+    assert np.abs(robot.v).max() < 0.01
+    assert robot.reason.startswith("the watchdog")
+
+
+def test_of_several_efforts_the_last_counts_and_none_may_be_nan() -> None:
+    robot = watched()
+    first, second = gravity(start()), gravity(start()) + 1.0
+    robot.advance([first, second])
+    np.testing.assert_array_equal(robot.tau, second)
+    robot.advance([np.full(7, np.inf)])
+    assert robot.phase is Phase.DAMPING
+    assert "not finite" in robot.reason
+    assert np.isfinite(robot.tau).all()
+
+
+def test_a_watchdog_needs_a_period() -> None:
+    with pytest.raises(LiveError, match="watchdog is 0"):
+        watched(watchdog=0)
+
+
+def test_compensation_is_of_the_robot_s_own_mass() -> None:
+    heavy = changed(panda(), [ScaledInertias(1.3, 1.0, [0.0, 0.0, 0.0])])
+    plant = IntegratedPlant(RigidBodyPlant(heavy), Rk4(PERIOD))
+    from hsp_control.live import WatchedRobot
+
+    interface = EffortInterface(compensates_gravity=True)
+    robot = WatchedRobot(plant, start(), np.zeros(7), PERIOD, interface=interface)
+    for _ in range(200):
+        robot.advance([np.zeros(7)])
+    g = np.array(pin.computeGeneralizedGravity(heavy.model, heavy._data, start()))
+    np.testing.assert_allclose(robot.tau, g, atol=1e-9)
+    assert np.abs(robot.v).max() < 1e-10
+
+
+# --- deadlines -----------------------------------------------------------------------
+
+
+def test_deadlines_are_counted_over_all_and_sorted_over_the_last() -> None:
+    deadlines = Deadlines(0.001, kept=100)
+    assert deadlines.response is None
+    deadlines.add(0.5, 0.01)  # the worst, and long ago
+    for k in range(150):
+        deadlines.add(0.001, 1e-5 * (k % 100 + 1))
+    assert deadlines.periods == 151
+    assert deadlines.missed == 1
+    response, gap = deadlines.response, deadlines.gap
+    assert response is not None
+    assert gap is not None
+    assert response.worst == 0.01
+    assert gap.worst == 0.5
+    assert response.median == pytest.approx(0.00051, rel=0.03)
+    assert response.p99 == pytest.approx(0.001, rel=0.02)
+    assert gap.median == 0.001

@@ -1,0 +1,587 @@
+"""Weights that move, sums of fields, and the barrier at joint limits."""
+
+import re
+from collections.abc import Callable
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from oracles import gradient, slope
+
+from hsp_control import (
+    ConstantMetric,
+    Controller,
+    FramePosition,
+    FunctionField,
+    Gains,
+    Hold,
+    IdentityMetric,
+    JointCentering,
+    MassMatrixMetric,
+    Metric,
+    NullSpaceField,
+    Obstacle,
+    PointDistance,
+    Rest,
+    Rk4,
+    Robot,
+    RobotState,
+    TargetPosture,
+    Uncontrolled,
+    WeightedSum,
+    simulate,
+)
+from hsp_control.common.exceptions import FieldError
+from hsp_control.geometry.shapes import Sphere
+from hsp_control.null_space.fields import (
+    ConstantWeight,
+    FieldSample,
+    LimitBarrier,
+    Manipulability,
+    ObstacleClearance,
+    Ramp,
+    StateWeight,
+    Weight,
+)
+from hsp_control.null_space.fields.weight import Product
+from hsp_control.null_space.metrics import MetricSample
+from hsp_control.trajectories import Lissajous
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+METRICS: dict[str, Metric] = {
+    "identity": IdentityMetric(),
+    "constant": ConstantMetric(np.arange(1.0, 8.0)),
+    "mass matrix": MassMatrixMetric(),
+}
+
+
+@cache
+def load(name: str, root: str | None = None) -> Robot:
+    """Return a robot; skip if example-robot-data is asked for and not there."""
+    if name not in {"panda", "iiwa14", "planar3r"}:
+        pytest.importorskip("example_robot_data")
+    return Robot.load(name, root=root)  # type: ignore[arg-type]
+
+
+def evaluate(field: NullSpaceField, metric: Metric, state: RobotState) -> FieldSample:
+    """Return g and g' at a state, in memory of their own."""
+    nv = state.robot.nv
+    sample = metric.evaluate(state, MetricSample.allocate(nv))
+    out = FieldSample(np.full(nv, np.nan), np.full(nv, np.nan))
+    assert field.evaluate(state, sample, metric.form, out) is out
+    return out
+
+
+def random_state(robot: Robot, seed: int, t: float = 0.8) -> RobotState:
+    """Return a state within the limits, moving."""
+    rng = np.random.default_rng(seed)
+    q = robot.random_configuration(rng)
+    return robot.state(t, q, 0.7 * rng.normal(size=robot.nv))
+
+
+def along(
+    state: RobotState, function: Callable[[RobotState], Any], step: float
+) -> Array:
+    """Return d/dt of a function along (q ⊕ s v, t + s), by sixth order."""
+    robot, q, v = state.robot, state.q.copy(), state.v.copy()
+    return slope(
+        lambda s: function(robot.state(state.t + s, robot.integrate(q, s * v), v)), step
+    )
+
+
+# -- weights ---------------------------------------------------------------------------
+
+at_time = st.floats(-1.0, 3.0)
+weights = st.floats(0.0, 5.0)
+
+
+@given(t=at_time, a=weights, b=weights, start=st.floats(-0.5, 0.5),
+       duration=st.floats(0.1, 2.0))  # fmt: skip
+def test_ramp_and_its_rate(
+    t: float, a: float, b: float, start: float, duration: float
+) -> None:
+    """The quintic between the ends, the ends outside; the rate is its derivative.
+
+    By differences of fourth order it has no error in s⁵ but h⁴ f⁽⁵⁾/30.
+    """
+    state = at(t)
+    w, w_dot = Ramp(a, b, start=start, duration=duration).sample(state)
+    s = np.clip((t - start) / duration, 0.0, 1.0)
+    expected = a + (b - a) * (10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5)
+    assert w == pytest.approx(expected, rel=1e-14, abs=1e-14)
+    assert min(a, b) - 1e-14 <= w <= max(a, b) + 1e-14
+    rate = (b - a) * 30.0 * s**2 * (1.0 - s) ** 2 / duration
+    assert w_dot == pytest.approx(rate, rel=1e-13, abs=1e-13)
+    if s in {0.0, 1.0}:
+        assert (w, w_dot) == (a if s == 0.0 else pytest.approx(b, rel=1e-15), 0.0)
+    step = 1e-3 * duration
+    if 2.0 * step < (t - start) < duration - 2.0 * step:
+        ramp = Ramp(a, b, start=start, duration=duration)
+        by_differences = slope(lambda h: ramp.sample(at(t + h))[0], 0.5 * step)
+        assert w_dot == pytest.approx(float(by_differences), abs=1e-11 / step)
+
+
+def at(t: float) -> RobotState:
+    """Return the Panda's state at home at a time; one place in memory."""
+    return memory().update(t, load("panda").home(), np.zeros(7))
+
+
+@cache
+def memory() -> RobotState:
+    """Return memory for a state."""
+    return load("panda").state(0.0, load("panda").home(), np.zeros(7))
+
+
+@pytest.mark.parametrize("edge", [0.5, 2.5])
+def test_a_ramp_is_twice_continuously_differentiable(edge: float) -> None:
+    """w' and w'' vanish at both ends like s² and s: 30 · 1 · s²/T and 60 s/T²."""
+    ramp = Ramp(1.0, 2.0, start=0.5, duration=2.0)
+    for tiny in (1e-3, 1e-5):
+        inside = edge + tiny * np.sign(1.5 - edge)
+        (w, w_dot), (w0, w0_dot) = ramp.sample(at(inside)), ramp.sample(at(edge))
+        assert w0_dot == 0.0
+        assert abs(w - w0) <= 10.0 * (tiny / 2.0) ** 3 + 1e-15
+        assert 0.0 < w_dot <= 15.0 * (tiny / 2.0) ** 2
+        bend = (w_dot - w0_dot) / tiny
+        assert abs(bend) <= 15.0 * (tiny / 2.0)
+
+
+@pytest.mark.parametrize(("a", "b"), [(0.0, 3.0), (3.0, 0.5)])
+def test_a_ramp_is_monotone(a: float, b: float) -> None:
+    ramp = Ramp(a, b, start=0.2, duration=0.7)
+    values, rates = zip(
+        *(ramp.sample(at(t)) for t in np.linspace(0, 1, 301)), strict=True
+    )
+    assert all((y - x) * (b - a) >= 0.0 for x, y in pairwise(values))
+    assert all(rate * (b - a) >= 0.0 for rate in rates)
+    assert (values[0], values[-1]) == (a, pytest.approx(b))
+
+
+def test_a_weight_of_the_state_and_its_rate() -> None:
+    """Exact by the product rule where the function is written out."""
+    robot = load("panda")
+    weight = StateWeight(
+        lambda s: 1.5 + np.sin(2.0 * s.t + s.position("panda_hand")[0])
+    )
+    for seed in range(5):
+        state = random_state(robot, seed)
+        w, w_dot = weight.sample(state)
+        hand = state.frame("panda_hand")
+        angle = 2.0 * state.t + hand.position[0]
+        assert w == pytest.approx(1.5 + np.sin(angle), rel=1e-15)
+        assert w_dot == pytest.approx(
+            np.cos(angle) * (2.0 + hand.velocity[0]), rel=0, abs=1e-10
+        )
+
+
+def test_products_of_weights() -> None:
+    state = at(0.7)
+    ramp = Ramp(0.0, 2.0, start=0.0, duration=1.0)
+    of_time = StateWeight(lambda s: np.exp(-s.t))
+    w, w_dot = Product(ramp, of_time).sample(state)
+    (a, a_dot), (b, b_dot) = ramp.sample(state), of_time.sample(state)
+    assert (w, w_dot) == (a * b, a_dot * b + a * b_dot)
+    assert ConstantWeight(3.0).sample(state) == (3.0, 0.0)
+    assert ConstantWeight(0).sample(state) == (0.0, 0.0)
+
+
+# -- sums ------------------------------------------------------------------------------
+
+BALL = Obstacle(
+    "ball", Sphere(0.1), Lissajous([0.5, 0.4, 0.5], [0.1, 0.1, 0.1], [1, 2, 3])
+)
+
+
+def swirl(robot: Robot) -> FunctionField:
+    """Return a field of time that is no gradient."""
+    i = np.arange(robot.nv)
+    return FunctionField(
+        robot,
+        lambda s: np.sin(s.t + i) * s.position("panda_hand")[0],
+        rate=lambda s: (
+            np.cos(s.t + i) * s.position("panda_hand")[0]
+            + np.sin(s.t + i) * s.frame("panda_hand").velocity[0]
+        ),
+    )
+
+
+def moving_sum(robot: Robot) -> WeightedSum:
+    """Return a sum of a sum, all weights moving."""
+    inner = WeightedSum(
+        [
+            (Ramp(0.2, 2.0, start=0.1, duration=1.5), JointCentering(robot)),
+            (3.0, TargetPosture(robot, robot.home())),
+        ]
+    )
+    return WeightedSum(
+        [
+            (
+                StateWeight(lambda s: 1.2 + np.cos(s.t + s.position("panda_hand")[2])),
+                inner,
+            ),
+            (Ramp(2.0, 0.0, start=0.0, duration=2.0), swirl(robot)),
+            (0.7, PointDistance(robot, ["panda_hand", "panda_link4"], BALL)),
+            (0.0, Manipulability(robot, "panda_hand")),
+        ]
+    )
+
+
+@pytest.mark.parametrize("metric", METRICS)
+@pytest.mark.parametrize("seed", range(3))
+def test_rate_of_a_sum_whose_weights_move(metric: str, seed: int) -> None:
+    """g' = Σ w g_k' + w' g_k, against differences of g along the flow.
+
+    Good to 1e-10 of the field's scale: a state's weight is differenced as well.
+    """
+    robot = load("panda")
+    field = moving_sum(robot)
+    state = random_state(robot, seed)
+    g, g_dot = evaluate(field, METRICS[metric], state)
+    expected = along(state, lambda s: evaluate(field, METRICS[metric], s).g, 3e-3)
+    scale = max(float(np.abs(g).max()), float(np.abs(expected).max()))
+    np.testing.assert_allclose(g_dot, expected, rtol=0, atol=1e-10 * scale)
+    assert np.abs(g_dot).max() > 1e-2
+    # Leaving out the weights' own rates would be seen.
+    unmoved = np.zeros(7)
+    for (weight, term), _ in zip(field.terms, field.samples, strict=True):
+        unmoved += (
+            weight.sample(state)[0] * evaluate(term, METRICS[metric], state).g_dot
+        )
+    assert np.abs(unmoved - expected).max() > 1e-3 * scale
+
+
+def test_each_terms_share_is_kept_and_they_add_up() -> None:
+    robot = load("panda")
+    field = moving_sum(robot)
+    state = random_state(robot, 7)
+    g, g_dot = evaluate(field, METRICS["mass matrix"], state)
+    assert len(field.terms) == len(field.samples) == 5
+    np.testing.assert_allclose(sum(s.g for s in field.samples), g, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(
+        sum(s.g_dot for s in field.samples), g_dot, rtol=0, atol=1e-12
+    )
+    value = 0.0
+    for (weight, term), sample in zip(field.terms, field.samples, strict=True):
+        w, w_dot = weight.sample(state)
+        own = evaluate(term, METRICS["mass matrix"], state)
+        np.testing.assert_allclose(sample.g, w * own.g, rtol=1e-14, atol=1e-14)
+        np.testing.assert_allclose(
+            sample.g_dot, w * own.g_dot + w_dot * own.g, rtol=1e-13, atol=1e-13
+        )
+        value += w * term.value(state)
+    assert field.value(state) == pytest.approx(value, rel=1e-14)
+    assert not field.samples[-1].g.any()  # of weight 0
+
+
+def test_sums_are_flattened_and_weights_multiplied() -> None:
+    """2 (a + 3 b) + ramp c has the three terms 2 a, 6 b and ramp c."""
+    robot = load("panda")
+    a, b, c = JointCentering(robot), Rest(robot), TargetPosture(robot, robot.home())
+    ramp = Ramp(1.0, 0.0, start=0.0, duration=1.0)
+    field = 2 * (a + 3.0 * b) + ramp * c
+    assert [term for _, term in field.terms] == [a, b, c]
+    state = at(0.5)
+    assert [weight.sample(state) for weight, _ in field.terms] == [
+        (2.0, 0.0),
+        (6.0, 0.0),
+        ramp.sample(state),
+    ]
+    assert ramp.sample(state) == (0.5, -1.875)
+    assert field.name == "joint_centering + rest + target_posture"
+
+
+def test_the_log_tells_who_moves_the_arm() -> None:
+    """Columns ``field.<name>.g`` add up to ``field.g`` in every row of a run."""
+    robot = load("panda")
+    centering = JointCentering(robot)
+    twin = JointCentering(robot, weights=np.arange(7.0))
+    ball = ObstacleClearance(robot, [BALL], influence=0.4)
+    barrier = LimitBarrier(robot)
+    field = WeightedSum(
+        [
+            (Ramp(0.0, 1.0, start=0.02, duration=0.1), centering),
+            (0.5, twin),
+            (2.0, ball),
+            (1.0, barrier),
+        ]
+    )
+    state = robot.state(0.0, robot.home(), np.zeros(7))
+    hold = FramePosition(
+        robot, "panda_tcp", Hold(state.position("panda_tcp")), Gains(100, 20)
+    )
+    rollout = simulate(
+        Controller(robot, [hold], field),
+        robot.home(),
+        duration=0.1,
+        integrator=Rk4(0.005),
+    )
+    names = [
+        "joint_centering_0", "joint_centering_1", "obstacle_clearance", "limit_barrier"
+    ]  # fmt: skip
+    found = {
+        name.removeprefix("field.").removesuffix(".g")
+        for name in rollout.columns
+        if re.fullmatch(r"field\..+\.g", name)
+    }
+    assert found == set(names)
+    shares = [rollout[f"field.{name}.g"] for name in names]
+    np.testing.assert_allclose(sum(shares), rollout["field.g"], rtol=0, atol=1e-14)
+    np.testing.assert_array_equal(shares[0][:3], 0.0)  # its ramp begins at 0.02 s
+    assert np.abs(shares[0][-1]).max() > 1e-3
+    assert np.abs(shares[2]).max() > 1e-2
+    parts = [rollout[f"field.{name}.value"] for name in names]
+    w = [Ramp(0.0, 1.0, start=0.02, duration=0.1).sample(at(t))[0] for t in rollout.t]
+    total = w * parts[0] + 0.5 * parts[1] + 2.0 * parts[2] + parts[3]
+    np.testing.assert_allclose(total, rollout["field.value"], rtol=1e-13)
+    assert (rollout["distance.obstacle_clearance"] < 0.4).all()
+    described = rollout.meta["columns"]
+    assert all(f"field.{name}.g" in described for name in names)
+
+
+# -- the barrier at joint limits -------------------------------------------------------
+
+LIMITED = {
+    "panda": ("panda", None),
+    "kinova": ("kinova", None),  # three continuous joints among six
+    "tiago": ("tiago_no_hand", None),  # on a prismatic torso; wheels turn on and on
+    "floating talos_arm": ("talos_arm", "free_flyer"),
+}
+
+
+def limits(robot: Robot) -> tuple[Array, Array]:
+    """Return the limits of every freedom, 0 and 0 where there are none."""
+    lower, upper = robot.position_limits()
+    bounded = np.isfinite(lower) & np.isfinite(upper)
+    return np.where(bounded, lower, 0.0), np.where(bounded, upper, 0.0)
+
+
+def middle(robot: Robot) -> Array:
+    """Return the middle of every range, 0 where there is none."""
+    return np.asarray(0.5 * np.add(*limits(robot)))
+
+
+def half_range(robot: Robot) -> Array:
+    """Return half of every range, 0 where there is none."""
+    return np.asarray(-0.5 * np.subtract(*limits(robot)))
+
+
+@pytest.mark.parametrize("name", LIMITED)
+@pytest.mark.parametrize("zone", [0.2, 0.6, 1.0])
+def test_limit_barrier_value_gradient_and_rate(name: str, zone: float) -> None:
+    """Σ w b of both distances in units of the zone, and its derivatives.
+
+    Written out joint by joint from the model's own limits; free where there are none.
+    """
+    robot = load(*LIMITED[name])
+    weights = np.linspace(0.5, 2.0, robot.nv)
+    field = LimitBarrier(robot, zone=zone, weights=weights)
+    rng = np.random.default_rng([3, *name.encode()])
+    grown = 0
+    for _ in range(6):
+        x = middle(robot) + 0.97 * half_range(robot) * rng.uniform(-1, 1, robot.nv)
+        q, v = robot.integrate(robot.neutral(), x), rng.normal(size=robot.nv)
+        state = robot.state(0.0, q, v)
+        f, g, g_dot = 0.0, np.zeros(robot.nv), np.zeros(robot.nv)
+        for joint in robot.joints.values():
+            if joint.nq != 1:
+                continue
+            i, x = joint.idx_v, q[joint.idx_q]
+            low = robot.model.lowerPositionLimit[joint.idx_q]
+            high = robot.model.upperPositionLimit[joint.idx_q]
+            unit = 0.5 * zone * (high - low)
+            for sign, away in ((1.0, x - low), (-1.0, high - x)):
+                s = away / unit
+                if s >= 1.0:
+                    continue
+                assert s > 0.02, "below lies the core, which has its own test"
+                grown += 1
+                f += weights[i] * -((1.0 - s) ** 2) * np.log(s)
+                b1 = 2.0 * (1.0 - s) * np.log(s) - (1.0 - s) ** 2 / s
+                b2 = -2.0 * np.log(s) + 4.0 * (1.0 - s) / s + ((1.0 - s) / s) ** 2
+                g[i] += sign * weights[i] * b1 / unit
+                g_dot[i] += weights[i] * b2 / unit**2 * v[i]
+        assert field.value(state) == pytest.approx(f, rel=1e-11, abs=1e-13)
+        scale = 1.0 + float(np.abs(g_dot).max())
+        np.testing.assert_allclose(field.gradient(state), g, rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(
+            field.gradient_rate(state), g_dot, rtol=0, atol=1e-10 * scale
+        )
+    assert grown > 2
+
+
+def test_limit_barrier_against_differences_and_in_its_core() -> None:
+    """Also at the limit itself and beyond, where its parabola goes on."""
+    robot = load("panda")
+    field = LimitBarrier(robot, zone=0.5)
+    lower, upper = robot.position_limits()
+    fraction = np.array([0.02, 0.1, 0.999, 1.02, -0.01, 0.5, 0.9])
+    q = lower + fraction * (upper - lower)
+    v = np.linspace(-1.0, 1.0, 7)
+    state = robot.state(0.0, q, v)
+    by_value = gradient(lambda x: field.value(robot.state(0.0, q + x, v)), 7, 1e-4)
+    g = field.gradient(state)
+    np.testing.assert_allclose(g, by_value, rtol=1e-8, atol=1e-8)
+    rate = along(state, field.gradient, 1e-4)
+    np.testing.assert_allclose(field.gradient_rate(state), rate, rtol=1e-8, atol=1e-7)
+    assert g[5] == 0.0
+    assert (
+        g[[0, 1, 4]] < 0.0
+    ).all()  # the field -∇f leads upwards, off the lower limit
+    assert (g[[2, 3, 6]] > 0.0).all()
+    assert np.isfinite(g).all()
+
+
+@pytest.mark.parametrize("name", LIMITED)
+def test_limit_barrier_is_exactly_0_in_the_middle(name: str) -> None:
+    """Over the whole of the flat part, in value, field and rate, and then it grows."""
+    robot = load(*LIMITED[name])
+    field = LimitBarrier(robot, zone=0.4)
+    half = half_range(robot)
+    rng = np.random.default_rng(4)
+    for part in (0.0, 0.3, -0.5999, 0.5999):
+        q = robot.integrate(robot.neutral(), middle(robot) + part * half)
+        state = robot.state(0.0, q, rng.normal(size=robot.nv))
+        assert field.value(state) == 0.0
+        g, g_dot = evaluate(field, IdentityMetric(), state)
+        np.testing.assert_array_equal(g, 0.0)
+        np.testing.assert_array_equal(g_dot, 0.0)
+    values = []
+    for part in (0.61, 0.7, 0.8, 0.9, 0.99):
+        q = robot.integrate(robot.neutral(), middle(robot) + part * half)
+        values.append(field.value(robot.state(0.0, q, np.zeros(robot.nv))))
+    assert all(y > 2.0 * x > 0.0 for x, y in pairwise(values))
+
+
+def test_joints_without_limits_are_left_free() -> None:
+    """Continuous joints and floating roots, wherever they are."""
+    for name, free in (
+        ("kinova", ["j2s6s200_joint_1", "j2s6s200_joint_4", "j2s6s200_joint_6"]),
+        ("tiago", ["wheel_left_joint", "wheel_right_joint"]),
+        ("floating talos_arm", ["root_joint"]),
+    ):
+        robot = load(*LIMITED[name])
+        field = LimitBarrier(robot, zone=1.0)
+        state = random_state(robot, 5)
+        g = field.gradient(state)
+        at_all = np.zeros(robot.nv, dtype=bool)
+        for joint in free:
+            at_all[robot.velocity_index(joint)] = True
+        assert not g[at_all].any()
+        assert not field.gradient_rate(state)[at_all].any()
+        lower, upper = robot.position_limits()
+        assert (np.isfinite(lower) & np.isfinite(upper) == ~at_all).all()
+        # Up to the torso's 0.35 m, every bounded joint is off its very middle here.
+        assert g[~at_all].all()
+
+
+def test_limits_that_are_not_written_count_as_none(tmp_path: Path) -> None:
+    """A URDF's revolute joint without numbers has a range of 0 to 0, which is none."""
+    inertial = (
+        '<inertial><origin xyz="0.1 0.1 0"/><mass value="1"/>'
+        '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+    numbers = ('lower="-1" upper="2"', "")
+    links = "".join(f'<link name="l{k}">{inertial}</link>' for k in range(3))
+    joints = "".join(
+        f'<joint name="j{k}" type="revolute">'
+        f'<parent link="l{k}"/><child link="l{k + 1}"/>'
+        '<origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>'
+        f'<limit {two} effort="1" velocity="1"/></joint>'
+        for k, two in enumerate(numbers)
+    )
+    file = tmp_path / "loose.urdf"
+    file.write_text(f'<robot name="loose">{links}{joints}</robot>')
+    field = LimitBarrier(Robot.load(file), zone=1.0)
+    g = field.gradient(field.robot.state(0.0, np.array([1.5, 0.5]), np.zeros(2)))
+    assert g[0] > 0.0
+    assert g[1] == 0.0
+
+
+def test_the_field_keeps_a_pushed_joint_off_its_limit() -> None:
+    """A field that drives joint 4 up into its limit is balanced before it is there."""
+    robot = load("panda")
+    push = FunctionField(
+        robot, lambda s: np.eye(7)[3] * 0.8, rate=lambda s: np.zeros(7), name="push"
+    )
+    upper = robot.position_limits()[1][3]
+    start = robot.home()
+    state = robot.state(0.0, start, np.zeros(7))
+    height = FramePosition(
+        robot,
+        "panda_tcp",
+        Hold(state.position("panda_tcp")[:1]),
+        Gains(100, 20),
+        axes="y",
+    )
+    ends = {}
+    for name, field in (("with", push + 0.05 * LimitBarrier(robot)), ("without", push)):
+        rollout = simulate(
+            Controller(robot, [height], field),
+            start,
+            duration=6.0,
+            log_period=0.1,
+            integrator=Rk4(0.01),
+        )
+        ends[name] = rollout.q[:, 3].max() - upper
+    assert ends["without"] > 1.0
+    assert -0.5 < ends["with"] < -0.01
+
+
+# -- what cannot be --------------------------------------------------------------------
+
+MISTAKES: list[tuple[Callable[[Robot], Any], str]] = [
+    (lambda r: ConstantWeight(-1.0), "weight is -1.0; must be at least 0"),
+    (lambda r: ConstantWeight(np.nan), "weight is nan; must be at least 0"),
+    (lambda r: ConstantWeight(np.inf), "weight is inf; must be at least 0"),
+    (lambda r: Ramp(-1.0, 1.0, start=0.0, duration=1.0), "weight is -1.0"),
+    (lambda r: Ramp(1.0, np.nan, start=0.0, duration=1.0), "weight is nan"),
+    (lambda r: Ramp(0.0, 1.0, start=0.0, duration=0.0),
+     "a ramp from 0.0 s over 0.0 s; needs a positive duration"),
+    (lambda r: Ramp(0.0, 1.0, start=0.0, duration=-2.0), "over -2.0 s"),
+    (lambda r: Ramp(0.0, 1.0, start=np.nan, duration=1.0), "a ramp from nan s"),
+    (lambda r: Ramp(0.0, 1.0, start=0.0, duration=np.inf), "over inf s"),
+    (lambda r: StateWeight(lambda s: -0.5).sample(at(0.0)), "weight is -0.5"),
+    (lambda r: StateWeight(lambda s: np.nan).sample(at(0.0)), "weight is nan"),
+    (lambda r: WeightedSum([]), "a sum of fields needs at least one term"),
+    (lambda r: WeightedSum([(-2.0, Rest(r))]),
+     "field 'rest': weight is -2.0; must be at least 0"),
+    (lambda r: -1.0 * JointCentering(r), "field 'joint_centering': weight is -1.0"),
+    (lambda r: Rest(r) + Uncontrolled(r),
+     "an uncontrolled null space cannot be part of a sum"),
+    (lambda r: Rest(r) + Rest(load("iiwa14")),
+     "the fields of a sum belong to different robots"),
+    (lambda r: LimitBarrier(r, zone=0.0),
+     "field 'limit_barrier': zone 0.0 must be within (0, 1]"),
+    (lambda r: LimitBarrier(r, zone=1.1), "zone 1.1 must be within (0, 1]"),
+    (lambda r: LimitBarrier(r, zone=np.nan, name="mine"), "field 'mine': zone nan"),
+    (lambda r: LimitBarrier(r, weights=-1.0), "field 'limit_barrier': weight"),
+    (lambda r: LimitBarrier(r, weights=[1.0, 2.0]), "field 'limit_barrier': weight"),
+    (lambda r: LimitBarrier(load("planar3r")),
+     "field 'limit_barrier': no joint of planar3r has limits"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("make", "message"), MISTAKES, ids=[message[:40] for _, message in MISTAKES]
+)
+def test_every_mistake_is_named(make: Callable[[Robot], Any], message: str) -> None:
+    with pytest.raises(FieldError) as caught:
+        make(load("panda"))
+    assert message in str(caught.value)
+
+
+def test_what_is_no_weight_and_no_field() -> None:
+    field = Rest(load("panda"))
+    with pytest.raises(TypeError):
+        "2" * field  # type: ignore[operator]
+    with pytest.raises(TypeError):
+        field + 1.0  # type: ignore[operator]
+    with pytest.raises(TypeError):
+        Weight()  # type: ignore[abstract]

@@ -1,0 +1,316 @@
+"""Several robots as one: each block is the robot alone, where it was put."""
+
+import copy
+import pickle
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Controller,
+    FramePosition,
+    Gains,
+    Hold,
+    JointCentering,
+    Rk4,
+    Robot,
+    simulate,
+)
+from hsp_control.common.exceptions import (
+    FrameNotFoundError,
+    HspControlError,
+    JointNotFoundError,
+    ModelError,
+)
+from hsp_control.common.resources import bundled_robots
+from hsp_control.geometry import link_shapes
+from hsp_control.robot.description.combining import Part, combine, placement
+from hsp_control.robot.description.sources import RobotSource
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+LEFT = placement([0.0, 0.3, 0.1], [0.0, 0.0, 0.0])
+RIGHT = placement([0.9, -0.4, 0.2], [0.7, -0.4, 2.5])  # tilted: gravity pulls otherwise
+
+
+@cache
+def load(name: str) -> Robot:
+    """Return a robot; skip if example-robot-data is asked for and not there."""
+    if name not in bundled_robots():
+        pytest.importorskip("example_robot_data")
+    return Robot.load(name)
+
+
+@cache
+def pair() -> Robot:
+    """Return two Pandas, the second one tilted."""
+    return Robot.combine(
+        {"left": (load("panda"), LEFT), "right": (load("panda"), RIGHT)}
+    )
+
+
+def alone(place: pin.SE3) -> Robot:
+    """Return one Panda that feels gravity as if it stood there."""
+    down = place.rotation.T @ np.array([0.0, 0.0, -9.81])
+    return Robot.load("panda", gravity=down)
+
+
+ARMS = {"left": (slice(0, 7), LEFT), "right": (slice(7, 14), RIGHT)}
+
+
+def draw(seed: int) -> tuple[Array, Array, Array]:
+    """Return a configuration, a velocity and an acceleration of both arms."""
+    rng = np.random.default_rng(seed)
+    q = pair().random_configuration(rng)
+    v, a = rng.normal(size=(2, 14))
+    return q, v, a
+
+
+def test_placement_is_a_position_and_roll_pitch_yaw() -> None:
+    """As in a URDF: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    place = placement([1.0, 2.0, 3.0], [0.3, -0.2, 1.1])
+    (cr, cp, cy), (sr, sp, sy) = (f([0.3, -0.2, 1.1]) for f in (np.cos, np.sin))
+    Rz = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    Ry = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    Rx = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    np.testing.assert_allclose(place.rotation, Rz @ Ry @ Rx, atol=1e-15)
+    np.testing.assert_array_equal(place.translation, [1.0, 2.0, 3.0])
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("arm", ARMS)
+def test_dynamics_are_block_diagonal_and_each_block_is_the_robots_own(
+    arm: str, seed: int
+) -> None:
+    """M, M', N, RNEA and ABA, to rounding; nothing couples the arms."""
+    own, place = ARMS[arm]
+    q, v, a = draw(seed)
+    both, single = pair().state(0.0, q, v), alone(place).state(0.0, q[own], v[own])
+    exactly = {"rtol": 0, "atol": 5e-13}  # of torques up to 1e2
+    for what in ("mass_matrix", "mass_matrix_rate"):
+        whole, part = getattr(both, what), getattr(single, what)
+        np.testing.assert_allclose(whole[own, own], part, **exactly)
+        across = whole[own].copy()
+        across[:, own] = 0.0
+        assert not across.any()
+    np.testing.assert_allclose(
+        both.nonlinear_effects[own], single.nonlinear_effects, **exactly
+    )
+    tau = both.inverse_dynamics(a).copy()
+    np.testing.assert_allclose(tau[own], single.inverse_dynamics(a[own]), **exactly)
+    back = pair().forward_dynamics(q, v, tau)
+    np.testing.assert_allclose(back, a, rtol=0, atol=1e-9)  # M of condition 1e4
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("arm", ARMS)
+@pytest.mark.parametrize("frame", ["panda_tcp", "panda_link4", "panda_link0"])
+def test_frames_are_the_robots_own_moved_to_where_it_stands(
+    frame: str, arm: str, seed: int
+) -> None:
+    """J, J', drift and pose, turned with the placement; 0 for the other arm."""
+    own, place = ARMS[arm]
+    q, v, _ = draw(seed)
+    here = pair().state(0.0, q, v).frame(f"{arm}_{frame}")
+    there = load("panda").state(0.0, q[own], v[own]).frame(frame)
+    R = np.kron(np.eye(2), place.rotation)
+    np.testing.assert_allclose(here.position, place.act(there.position), atol=1e-14)
+    np.testing.assert_allclose(
+        here.rotation, place.rotation @ there.rotation, atol=1e-14
+    )
+    for what in ("jacobian", "jacobian_dot"):
+        J = getattr(here, what).copy()
+        np.testing.assert_allclose(J[:, own], R @ getattr(there, what), atol=1e-12)
+        J[:, own] = 0.0
+        assert not J.any()
+    np.testing.assert_allclose(here.drift, R @ there.drift, atol=1e-12)
+
+
+def test_names_limits_and_home() -> None:
+    both, panda = pair(), load("panda")
+    assert both.name == "panda+panda"
+    assert both.joint_names == tuple(
+        f"{arm}_{joint}" for arm in ARMS for joint in panda.joint_names
+    )
+    for arm, (own, _) in ARMS.items():
+        for name in panda.frame_names[1:]:
+            assert f"{arm}_{name}" in both.frame_names
+        assert both.velocity_index(f"{arm}_panda_joint4").start == own.start + 3
+        lower, upper = both.position_limits()
+        np.testing.assert_array_equal(lower[own], panda.position_limits()[0])
+        np.testing.assert_array_equal(upper[own], panda.position_limits()[1])
+        np.testing.assert_array_equal(both.home()[own], panda.home())
+        for what in ("upperEffortLimit", "upperVelocityLimit", "armature", "damping"):
+            np.testing.assert_array_equal(
+                getattr(both.model, what)[own], getattr(panda.model, what)
+            )
+    assert both.frame_names.count("universe") == 1
+    np.testing.assert_array_equal(both.model.gravity.linear, [0.0, 0.0, -9.81])
+
+
+def test_robots_of_other_kinds_beside_each_other() -> None:
+    """A planar arm (cos, sin), a Panda and a dog that floats: nq and home line up."""
+    arm, panda, dog = load("planar3r"), load("panda"), load("solo12")
+    zoo = Robot.combine(
+        {"arm": (arm, LEFT), "panda": (panda, RIGHT), "dog": (dog, pin.SE3.Identity())}
+    )
+    assert (zoo.nq, zoo.nv) == (6 + 7 + 19, 3 + 7 + 18)
+    home = zoo.home()
+    np.testing.assert_allclose(home[:6], arm.home(), atol=1e-15)
+    np.testing.assert_allclose(home[6:13], panda.home(), atol=1e-15)
+    np.testing.assert_allclose(home[13:], dog.home(), atol=1e-15)
+    q = zoo.random_configuration(np.random.default_rng(1))
+    state = zoo.state(0.0, q, np.zeros(zoo.nv))
+    tip = arm.state(0.0, q[:6], np.zeros(3)).position("tip")
+    np.testing.assert_allclose(state.position("arm_tip"), LEFT.act(tip), atol=1e-14)
+    foot = dog.state(0.0, q[13:], np.zeros(18)).position("FL_FOOT")
+    np.testing.assert_allclose(state.position("dog_FL_FOOT"), foot, atol=1e-14)
+
+
+@pytest.mark.parametrize("proxy", ["capsules", "spheres", "meshes"])
+def test_geometry_stands_where_the_robots_stand(proxy: str) -> None:
+    """Each shape of each arm, the base included, where the arm alone has it, moved."""
+    q, _, _ = draw(5)
+    shapes = link_shapes(pair(), proxy)  # type: ignore[arg-type]
+    own_shapes = link_shapes(load("panda"), proxy)  # type: ignore[arg-type]
+    assert len(shapes) == 2 * len(own_shapes)
+    data = pair().model.createData()
+    pin.forwardKinematics(pair().model, data, q)
+    for k, (arm, (own, place)) in enumerate(ARMS.items()):
+        single = load("panda").model.createData()
+        pin.forwardKinematics(load("panda").model, single, q[own])
+        of_arm = shapes[k * len(own_shapes) : (k + 1) * len(own_shapes)]
+        for ours, theirs in zip(of_arm, own_shapes, strict=True):
+            assert ours.link == f"{arm}_{theirs.link}"
+            there = place * (single.oMi[theirs.joint] * theirs.placement)
+            here = data.oMi[ours.joint] * ours.placement
+            np.testing.assert_allclose(here.homogeneous, there.homogeneous, atol=1e-13)
+            assert type(ours.geometry) is type(theirs.geometry)
+            for size in ("radius", "halfLength"):
+                one, other = (getattr(s.geometry, size, 0.0) for s in (ours, theirs))
+                assert one == other
+
+
+@pytest.mark.parametrize(
+    "duplicate",
+    [lambda robot: pickle.loads(pickle.dumps(robot)), copy.deepcopy],
+    ids=["pickle", "deepcopy"],
+)
+def test_copies_are_whole(duplicate: Callable[[Robot], Robot]) -> None:
+    """Dynamics, home and geometry, whose parts a copy has to know."""
+    twin, both = duplicate(pair()), pair()
+    q, v, a = draw(6)
+    one, two = both.state(0.0, q, v), twin.state(0.0, q, v)
+    np.testing.assert_array_equal(one.inverse_dynamics(a), two.inverse_dynamics(a))
+    np.testing.assert_array_equal(both.home(), twin.home())
+    assert [part.prefix for part in twin.parts] == ["left_", "right_"]
+    for part, place in zip(twin.parts, (LEFT, RIGHT), strict=True):
+        np.testing.assert_array_equal(part.placement.homogeneous, place.homogeneous)
+    for ours, theirs in zip(link_shapes(both), link_shapes(twin), strict=True):
+        assert (ours.link, ours.joint) == (theirs.link, theirs.joint)
+        np.testing.assert_array_equal(
+            ours.placement.homogeneous, theirs.placement.homogeneous
+        )
+
+
+def test_the_robots_that_are_combined_stay_as_they_were() -> None:
+    panda = Robot.load("panda")
+    frames = panda.frame_names
+    Robot.combine({"a": (panda, LEFT), "b": (panda, RIGHT)})
+    assert tuple(frame.name for frame in panda.model.frames) == frames
+    assert list(panda.model.names)[1:] == list(panda.joint_names)
+
+
+def test_each_arm_moves_as_if_alone() -> None:
+    """Two tasks and centering on both: the same path as the arm by itself.
+
+    The law of a block-diagonal Jacobian and metric falls into blocks. Rk4 takes the
+    same steps, so that what is left is rounding.
+    """
+    both = pair()
+    q0 = both.home() + np.tile(0.1 * np.arange(7), 2)
+
+    def task(robot: Robot, prefix: str, target: Array) -> FramePosition:
+        name = f"{prefix}panda_tcp"
+        return FramePosition(robot, name, Hold(target), Gains(100.0, 20.0))
+
+    away = np.array([0.05, -0.05, 0.03])
+    state = both.state(0.0, q0, np.zeros(14))
+    tasks = [
+        task(both, f"{arm}_", state.position(f"{arm}_panda_tcp") + away) for arm in ARMS
+    ]
+    options = {"duration": 0.3, "log_period": 0.1, "integrator": Rk4(0.005)}
+    together = simulate(
+        Controller(both, tasks, JointCentering(both)),
+        q0,
+        **options,  # type: ignore[arg-type]
+    )
+    for arm, (own, place) in ARMS.items():
+        single = alone(place)
+        start = single.state(0.0, q0[own], np.zeros(7)).position("panda_tcp")
+        turned = place.rotation.T @ away
+        apart = simulate(
+            Controller(
+                single, [task(single, "", start + turned)], JointCentering(single)
+            ),
+            q0[own],
+            **options,  # type: ignore[arg-type]
+        )
+        for what in ("q", "v", "tau"):
+            np.testing.assert_allclose(
+                together[what][:, own], apart[what], rtol=0, atol=1e-10, err_msg=arm
+            )
+
+
+# -- what cannot be --------------------------------------------------------------------
+
+HERE = pin.SE3.Identity()
+
+
+def source() -> RobotSource:
+    """Return where the Panda comes from."""
+    return load("panda").source
+
+
+MISTAKES: list[tuple[Callable[[], object], type[HspControlError], str]] = [
+    (lambda: Robot.combine({"only": (load("panda"), HERE)}), ModelError,
+     "robots to combine need different names, two or more: got ['only_']"),
+    (lambda: combine([]), ModelError, "two or more: got []"),
+    (lambda: combine([(Part("a_", source(), HERE), load("panda").model)] * 2),
+     ModelError, "need different names, two or more: got ['a_', 'a_']"),
+    (lambda: Robot.combine({"a": (load("panda"), HERE),
+                            "b": (Robot.load("panda", gravity=[0, 0, 0]), HERE)}),
+     ModelError, "robots to combine differ in gravity; load them with the same"),
+    (lambda: Robot.combine({"a": (load("panda"), HERE),
+                            "b": (Robot.load("panda", locked={}), HERE)}),
+     ModelError, "b_panda: joints that mimic others cannot be combined; lock them, or "
+     "load with mimic: false"),
+    (lambda: Robot.combine({"a": (pair(), HERE), "b": (load("panda"), HERE)}),
+     ModelError, "a_panda+panda: is combined already; combine all robots at once"),
+    (lambda: pair().frame_id("panda_tcp"), FrameNotFoundError,
+     "no frame 'panda_tcp'; did you mean"),
+    (lambda: pair().velocity_index("left_panda_joint8"), JointNotFoundError,
+     "no joint 'left_panda_joint8'; did you mean 'left_panda_joint"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "message"), MISTAKES, ids=[m[2][:40] for m in MISTAKES]
+)
+def test_every_mistake_is_named(
+    make: Callable[[], object], error: type[HspControlError], message: str
+) -> None:
+    with pytest.raises(error) as caught:
+        make()
+    assert message in str(caught.value)
+
+
+def test_mimic_joints_combine_as_free_ones() -> None:
+    free = Robot.load("panda", locked={}, mimic=False)
+    both = Robot.combine({"a": (free, LEFT), "b": (load("panda"), RIGHT)})
+    assert both.nv == 9 + 7

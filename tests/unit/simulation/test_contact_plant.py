@@ -1,0 +1,322 @@
+"""Rigid contacts: against Pinocchio's own solver, and by what they must conserve."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from hsp_control import Robot, load_experiment
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import (
+    FrameNotFoundError,
+    HspControlError,
+    SimulationError,
+)
+from hsp_control.robot.integrators import Dop853
+from hsp_control.simulation.plants import (
+    ContactPlant,
+    Push,
+    RigidBodyPlant,
+    RigidContact,
+)
+
+FEET = {
+    "talos": ("surface", ["left_sole_link", "right_sole_link"]),
+    "g1": ("surface", ["left_ankle_roll_link"]),
+    "solo12": ("point", ["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"]),
+    "go2": ("point", ["FL_foot", "FR_foot", "RL_foot"]),
+}
+
+
+@cache
+def load(name: str) -> Robot:
+    pytest.importorskip("example_robot_data")
+    return Robot.load(name)
+
+
+def plant_of(name: str, **options: Any) -> ContactPlant:
+    kind, feet = FEET[name]
+    contacts = [RigidContact(foot, kind) for foot in feet]  # type: ignore[arg-type]
+    return ContactPlant(load(name), contacts, **options)
+
+
+def contact_rows(plant: ContactPlant, q: Array, v: Array) -> tuple[Array, Array]:
+    """Return J and J'v of all contacts."""
+    state = plant.robot.state(0.0, q, v)
+    frames = [(state.frame(c.frame), c.rows) for c in plant.contacts]
+    J = np.vstack([frame.jacobian[:rows] for frame, rows in frames])
+    return J, np.concatenate([frame.drift[:rows] for frame, rows in frames])
+
+
+def stance(plant: ContactPlant, seed: int, speed: float = 1.0) -> tuple[Array, Array]:
+    """Return a random configuration, and a velocity that moves no contact."""
+    robot, rng = plant.robot, np.random.default_rng(seed)
+    q = robot.integrate(robot.home(), 0.4 * rng.normal(size=robot.nv))
+    v = speed * rng.normal(size=robot.nv)
+    J, _ = contact_rows(plant, q, v)
+    return q, v - np.linalg.pinv(J) @ J @ v
+
+
+def joint_effort(robot: Robot, seed: int) -> Array:
+    tau = np.random.default_rng(seed).normal(size=robot.nv)
+    tau[:6] = 0.0
+    return tau
+
+
+@pytest.mark.parametrize("name", FEET)
+def test_acceleration_and_forces_agree_with_pinocchio(name: str) -> None:
+    plant = plant_of(name)
+    robot = plant.robot
+    model = robot.model
+    kinds = {"point": pin.ContactType.CONTACT_3D, "surface": pin.ContactType.CONTACT_6D}
+    constraints = pin.StdVec_RigidConstraintModel()
+    for contact in plant.contacts:
+        frame = model.frames[robot.frame_id(contact.frame)]
+        constraints.append(
+            pin.RigidConstraintModel(
+                kinds[contact.kind],
+                model,
+                frame.parentJoint,
+                frame.placement,
+                pin.ReferenceFrame.LOCAL,
+            )
+        )
+    data, found = model.createData(), pin.StdVec_RigidConstraintData()
+    found.extend([constraint.createData() for constraint in constraints])
+    pin.initConstraintDynamics(model, data, constraints, found)
+    settings = pin.ProximalSettings(1e-14, 0.0, 1)
+    for seed in range(5):
+        q, v = stance(plant, seed)
+        tau = joint_effort(robot, seed)
+        expected = pin.constraintDynamics(
+            model, data, q, v, tau, constraints, found, settings
+        )
+        ours = plant.acceleration(0.0, q, v, tau)
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(ours, expected, rtol=0, atol=1e-10 * scale)
+        log_channels = plant.log_channels(0.0, q, v, tau)
+        state = robot.state(0.0, q, v)
+        for contact, theirs in zip(plant.contacts, found, strict=True):
+            turn = state.frame(contact.frame).rotation
+            force = np.asarray(
+                log_channels[f"plant.contact.{contact.frame}.force"].value
+            )
+            size = np.abs(force).max()
+            np.testing.assert_allclose(
+                force, turn @ theirs.contact_force.linear, rtol=0, atol=1e-9 * size
+            )
+            moment = np.asarray(
+                log_channels[f"plant.contact.{contact.frame}.moment"].value
+            )
+            if contact.kind == "surface":
+                np.testing.assert_allclose(
+                    moment,
+                    turn @ theirs.contact_force.angular,
+                    rtol=0,
+                    atol=1e-9 * size,
+                )
+            else:
+                assert not moment.any()
+
+
+@pytest.mark.parametrize("name", FEET)
+def test_the_equations_of_motion_hold(name: str) -> None:
+    """M v' + N = tau + Σ Jᵀ wrench, and J v' + J'v = -k J v for any velocity."""
+    plant = plant_of(name, damping=30.0)
+    robot = plant.robot
+    q, _ = stance(plant, 1)
+    v = np.random.default_rng(2).normal(size=robot.nv)
+    tau = joint_effort(robot, 3)
+    a = plant.acceleration(0.0, q, v, tau)
+    state = robot.state(0.0, q, v)
+    rest = state.inverse_dynamics(a) - tau
+    log_channels = plant.log_channels(0.0, q, v, tau)
+    for contact in plant.contacts:
+        wrench = [
+            log_channels[f"plant.contact.{contact.frame}.{k}"].value
+            for k in ("force", "moment")
+        ]
+        rest -= state.frame(contact.frame).jacobian.T @ np.concatenate(wrench)
+    np.testing.assert_allclose(rest, 0.0, atol=1e-7)
+    J, drift = contact_rows(plant, q, v)
+    np.testing.assert_allclose(J @ a + drift, -30.0 * J @ v, rtol=0, atol=1e-7)
+
+
+def test_a_contact_holds_and_does_no_work() -> None:
+    """Solo12 falls about four held feet for 0.3 s: they stay, and energy with them."""
+    plant = plant_of("solo12")
+    robot = plant.robot
+    q, v = stance(plant, 0, speed=0.5)
+    tau = np.zeros(robot.nv)
+
+    def energy(q: Array, v: Array) -> float:
+        data = robot.model.createData()
+        return float(pin.computeMechanicalEnergy(robot.model, data, q, v))
+
+    before = {
+        c.frame: robot.state(0, q, v).position(c.frame).copy() for c in plant.contacts
+    }
+    q_end, v_end = Dop853(1e-11, 1e-11).advance(
+        robot, lambda t, q, v: plant.acceleration(t, q, v, tau), 0.0, 0.3, q, v
+    )
+    assert np.abs(robot.difference(q, q_end)).max() > 0.1
+    assert energy(q_end, v_end) == pytest.approx(energy(q, v), abs=1e-8)
+    after = robot.state(0.0, q_end, v_end)
+    for frame, place in before.items():
+        np.testing.assert_allclose(after.position(frame), place, rtol=0, atol=1e-9)
+
+
+def test_velocity_of_a_contact_dies_out() -> None:
+    """J v = exp(-k t) J v of the start."""
+    plant = plant_of("go2", damping=20.0)
+    robot = plant.robot
+    q, _ = stance(plant, 0)
+    v = 0.3 * np.random.default_rng(4).normal(size=robot.nv)
+    tau = np.zeros(robot.nv)
+    q_end, v_end = Dop853(1e-11, 1e-11).advance(
+        robot, lambda t, q, v: plant.acceleration(t, q, v, tau), 0.0, 0.1, q, v
+    )
+    J, _ = contact_rows(plant, q, v)
+    J_end, _ = contact_rows(plant, q_end, v_end)
+    np.testing.assert_allclose(J_end @ v_end, np.exp(-2.0) * J @ v, rtol=0, atol=1e-8)
+
+
+def test_contacts_are_switched_by_the_clock() -> None:
+    robot = load("solo12")
+    contacts = [
+        RigidContact("FL_FOOT", "point", on=[(0.0, 1.0), (2.0, 3.0)]),
+        RigidContact("FR_FOOT", "point", on=[]),
+    ]
+    plant = ContactPlant(robot, contacts)
+    q, v = stance(plant, 0)
+    tau = joint_effort(robot, 0)
+    free = RigidBodyPlant(robot).acceleration(0.0, q, v, tau)
+    for t, holds in [
+        (-0.1, False),
+        (0.0, True),
+        (0.9, True),
+        (1.0, False),
+        (2.5, True),
+    ]:
+        a = plant.acceleration(t, q, v, tau)
+        log_channels = plant.log_channels(t, q, v, tau)
+        assert (
+            np.asarray(log_channels["plant.contact.FL_FOOT.force"].value).any() == holds
+        )
+        assert not np.asarray(log_channels["plant.contact.FR_FOOT.force"].value).any()
+        assert np.allclose(a, free, atol=1e-9) != holds
+
+
+@pytest.mark.parametrize("kind", ["point", "surface"])
+def test_redundant_contacts_share_the_force(kind: Any) -> None:
+    """A foot held at its ankle too: the same motion, the force in all, none in vain."""
+    robot = load("talos")
+    foot, also = "left_sole_link", "leg_left_6_link"
+    one = ContactPlant(robot, [RigidContact(foot)])
+    both = ContactPlant(robot, [RigidContact(foot), RigidContact(also, kind)])
+    q, v = stance(one, 0)
+    tau = joint_effort(robot, 1)
+    expected = one.acceleration(0.0, q, v, tau)
+    found = both.acceleration(0.0, q, v, tau)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8 * abs(expected).max())
+    log_channels = both.log_channels(0.0, q, v, tau)
+    forces = [
+        np.asarray(log_channels[f"plant.contact.{f}.force"].value) for f in (foot, also)
+    ]
+    alone = np.asarray(
+        one.log_channels(0.0, q, v, tau)[f"plant.contact.{foot}.force"].value
+    )
+    np.testing.assert_allclose(sum(forces), alone, rtol=1e-8, atol=1e-6)
+    moment = np.asarray(
+        one.log_channels(0.0, q, v, tau)[f"plant.contact.{foot}.moment"].value
+    )
+    wrench = np.concatenate([alone, moment])
+    shared = [np.asarray(reading.value) for reading in log_channels.values()]
+    assert np.linalg.norm(np.concatenate(shared)) <= np.linalg.norm(wrench)
+
+
+def test_what_a_solver_leaves_on_the_root_is_dropped() -> None:
+    plant = plant_of("solo12")
+    q, v = stance(plant, 0)
+    tau = joint_effort(plant.robot, 1)
+    left = tau.copy()
+    left[:6] = 5e-4
+    np.testing.assert_array_equal(
+        plant.acceleration(0.0, q, v, left), plant.acceleration(0.0, q, v, tau)
+    )
+
+
+def test_a_push_is_felt() -> None:
+    """It is an effort Jᵀ f on the joints and the root."""
+    name, push = "solo12", Push("base_link", (3.0, 0.0, 1.0), start=0.1, duration=0.2)
+    plant, pushed = plant_of(name), plant_of(name, pushes=[push])
+    q, v = stance(plant, 0)
+    tau = joint_effort(plant.robot, 1)
+    at_rest = plant.acceleration(0.0, q, v, tau)
+    np.testing.assert_array_equal(pushed.acceleration(0.05, q, v, tau), at_rest)
+    state = plant.robot.state(0.0, q, v)
+    a = pushed.acceleration(0.2, q, v, tau)
+    assert np.abs(a - at_rest).max() > 1.0
+    rest = state.inverse_dynamics(a) - tau
+    rest -= state.frame("base_link").jacobian[:3].T @ np.array([3.0, 0.0, 1.0])
+    log_channels = pushed.log_channels(0.2, q, v, tau)
+    for contact in pushed.contacts:
+        force = np.asarray(log_channels[f"plant.contact.{contact.frame}.force"].value)
+        rest -= state.frame(contact.frame).jacobian[:3].T @ force
+    np.testing.assert_allclose(rest, 0.0, atol=1e-8)
+
+
+def test_contacts_that_are_none() -> None:
+    robot = load("solo12")
+    with pytest.raises(
+        SimulationError, match=r"^contact of 'FL_FOOT': kind 'line': cho"
+    ):
+        RigidContact("FL_FOOT", "line")  # type: ignore[arg-type]
+    with pytest.raises(
+        SimulationError, match=r"^contact of 'FL_FOOT': on from 2 to 1 s"
+    ):
+        RigidContact("FL_FOOT", on=[(2, 1)])
+    with pytest.raises(FrameNotFoundError, match=r"^no frame 'FL_FOO'; did you mean"):
+        ContactPlant(robot, [RigidContact("FL_FOO")])
+    with pytest.raises(
+        SimulationError, match=r"^two contacts are of the frame 'FL_FOO"
+    ):
+        ContactPlant(robot, [RigidContact("FL_FOOT"), RigidContact("FL_FOOT", "point")])
+    with pytest.raises(
+        SimulationError, match=r"^contacts: damping is -1.0; must not be"
+    ):
+        ContactPlant(robot, [], damping=-1.0)
+    plant = ContactPlant(robot, [])
+    with pytest.raises(
+        SimulationError, match=r"^the effort at t = 0 s pushes the floa"
+    ):
+        plant.acceleration(0.0, robot.home(), np.zeros(18), np.ones(18))
+
+
+def test_contacts_from_yaml() -> None:
+    """A fixed arm whose hand the world holds for a while: an effort alone moves it."""
+    config = {
+        "robot": {"name": "panda"},
+        "tasks": {"hand": {"type": "frame_position", "trajectory": {
+            "type": "line", "origin": "start", "end": [0.1, 0, 0], "duration": 0.3}}},
+        "plant": {"type": "rigid_contacts", "contacts": {
+            "panda_tcp": {"kind": "point", "on": [[0, 0.2]]}}},
+        "simulation": {"duration": 0.4},
+    }  # fmt: skip
+    experiment = load_experiment(config)
+    assert isinstance(experiment.plant, ContactPlant)
+    run = experiment.run()
+    hand = run["task.hand.actual"]
+    held = run.t < 0.2
+    assert np.abs(hand[held] - hand[0]).max() < 1e-6
+    assert np.abs(hand[-1] - hand[0]).max() > 0.01
+    forces = np.linalg.norm(run["plant.contact.panda_tcp.force"], axis=1)
+    assert forces[held][-1] > 1.0
+    assert not forces[~held].any()
+    config["plant"]["contacts"] = {"panda_tpc": {}}  # type: ignore[index]
+    with pytest.raises(
+        HspControlError, match=r"plant.contacts.panda_tpc: no frame 'pan"
+    ):
+        load_experiment(config)

@@ -1,0 +1,690 @@
+"""Plants that are not the model: each imperfection alone, and all in the loop."""
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from hsp_control import Controller, FramePosition, Gains, Robot, Rollout, simulate
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import FrameNotFoundError, SimulationError
+from hsp_control.robot.description.sources import find_robot
+from hsp_control.robot.friction import JointFriction
+from hsp_control.robot.integrators import Dop853, Rk4
+from hsp_control.simulation.plants import (
+    ImperfectPlant,
+    IntegratedPlant,
+    Push,
+    RigidBodyPlant,
+    SampledPlant,
+    StickingPlant,
+)
+from hsp_control.simulation.plants.drives import (
+    Drive,
+    DroppedPeriods,
+    EffortDelay,
+    EffortNoise,
+    Jitter,
+    Saturation,
+)
+from hsp_control.simulation.plants.model_changes import (
+    ModelChange,
+    MotorInertia,
+    Payload,
+    RandomInertias,
+    ScaledInertias,
+    changed,
+)
+from hsp_control.simulation.plants.sensors import (
+    DifferencedVelocity,
+    Encoder,
+    PositionNoise,
+    Sensor,
+    SensorDelay,
+    VelocityNoise,
+)
+from hsp_control.trajectories import Circle
+
+
+@cache
+def load(name: str) -> Robot:
+    if name == "go2":
+        pytest.importorskip("example_robot_data")
+    return Robot.load(name)
+
+
+ROBOTS = ["planar3r", "panda", "go2"]
+"""Continuous joints, revolute ones, and a floating root."""
+
+
+def some_state(robot: Robot, seed: int = 0) -> tuple[Array, Array]:
+    rng = np.random.default_rng(seed)
+    return robot.random_configuration(rng), rng.normal(size=robot.nv)
+
+
+def mass_matrix(robot: Robot, q: Array) -> Array:
+    M = robot.state(0.0, q, np.zeros(robot.nv)).mass_matrix.copy()
+    return np.triu(M) + np.triu(M, 1).T
+
+
+def gravity(robot: Robot, q: Array) -> Array:
+    return robot.state(0.0, q, np.zeros(robot.nv)).nonlinear_effects.copy()
+
+
+# --- model changes -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_heavier_bodies_scale_the_mass_matrix(name: str) -> None:
+    """M and N are linear in the inertias; the robot itself stays as it was."""
+    robot = load(name)
+    q, _ = some_state(robot)
+    M, N = mass_matrix(robot, q), gravity(robot, q)
+    heavier = changed(robot, [ScaledInertias(mass=1.2)])
+    np.testing.assert_allclose(mass_matrix(heavier, q), 1.2 * M, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(gravity(heavier, q), 1.2 * N, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(mass_matrix(robot, q), M)
+    assert heavier.joint_names == robot.joint_names
+    assert heavier.frame_names == robot.frame_names
+
+
+def test_shifted_centres_and_harder_turning() -> None:
+    robot = load("panda")
+    other = changed(robot, [ScaledInertias(inertia=2.0, com=(0.01, 0.0, -0.02))])
+    for k in range(1, robot.model.njoints):
+        before, after = robot.model.inertias[k], other.model.inertias[k]
+        assert after.mass == before.mass
+        np.testing.assert_allclose(after.lever - before.lever, [0.01, 0.0, -0.02])
+        np.testing.assert_allclose(after.inertia, 2.0 * before.inertia, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_random_inertias_are_possible_ones_within_their_bounds(name: str) -> None:
+    robot = load(name)
+    change = RandomInertias(mass=0.2, inertia=0.5, com=0.01, seed=3)
+    other = changed(robot, [change])
+    again = changed(robot, [change])
+    ratios = []
+    for k in range(1, robot.model.njoints):
+        before, after = robot.model.inertias[k], other.model.inertias[k]
+        if before.mass == 0.0:
+            continue
+        assert after == again.model.inertias[k]
+        ratios.append(after.mass / before.mass)
+        assert np.abs(after.lever - before.lever).max() <= 0.01
+        least, middle, greatest = np.linalg.eigvalsh(after.inertia)
+        assert least >= -1e-15
+        # As possible as before: some URDFs are not, beyond this by themselves.
+        low, mid, high = np.linalg.eigvalsh(before.inertia)
+        if low + mid >= high:
+            assert least + middle >= greatest - 1e-12
+    assert np.ptp(ratios) > 0.05
+    assert 0.8 <= min(ratios) <= max(ratios) <= 1.2
+    third = changed(robot, [RandomInertias(mass=0.2, seed=4)])
+    for before, after in zip(robot.model.inertias, third.model.inertias, strict=True):
+        if before.mass > 0.0:  # another mass alone: another density
+            density = after.mass / before.mass
+            np.testing.assert_allclose(
+                after.inertia, density * before.inertia, rtol=1e-9, atol=1e-15
+            )
+    assert third.model.inertias[2] != other.model.inertias[2]
+
+
+@pytest.mark.parametrize(("name", "frame"), [("panda", "panda_tcp"), ("go2", "base")])
+def test_a_payload_is_felt_where_it_is(name: str, frame: str) -> None:
+    """M grows by m JᵀJ and gravity's effort by -Jᵀ m g, J of the ball's centre."""
+    robot = load(name)
+    q, _ = some_state(robot)
+    center, mass = np.array([0.02, -0.01, 0.1]), 2.0
+    other = changed(robot, [Payload(frame, mass, tuple(center))])
+    state = robot.state(0.0, q, np.zeros(robot.nv))
+    at = state.frame(frame)
+    arm = at.rotation @ center
+    J = at.jacobian[:3] - pin.skew(arm) @ at.jacobian[3:]
+    np.testing.assert_allclose(
+        mass_matrix(other, q), mass_matrix(robot, q) + mass * J.T @ J, atol=1e-10
+    )
+    np.testing.assert_allclose(
+        gravity(other, q),
+        gravity(robot, q) - J.T @ (mass * robot.model.gravity.linear),
+        atol=1e-10,
+    )
+    ball = changed(robot, [Payload(frame, mass, tuple(center), radius=0.1)])
+    turn = at.jacobian[3:]
+    np.testing.assert_allclose(
+        mass_matrix(ball, q),
+        mass_matrix(other, q) + 0.4 * mass * 0.1**2 * turn.T @ turn,
+        atol=1e-10,
+    )
+
+
+def test_motors_add_to_the_diagonal_of_joints_alone() -> None:
+    robot = load("go2")
+    q, v = some_state(robot)
+    other = changed(robot, [MotorInertia(0.05), MotorInertia(0.01 * np.ones(18))])
+    expected = np.diag([0.01] * 6 + [0.06] * 12)
+    added = mass_matrix(other, q) - mass_matrix(robot, q)
+    np.testing.assert_allclose(added, expected, atol=1e-12)
+    tau = np.ones(18)
+    plant = RigidBodyPlant(other)
+    rest = tau - other.state(0.0, q, v).nonlinear_effects
+    np.testing.assert_allclose(
+        mass_matrix(other, q) @ plant.acceleration(0.0, q, v, tau), rest, atol=1e-8
+    )
+
+
+# --- friction ------------------------------------------------------------------------
+
+
+def cart(mass: float = 2.0) -> Robot:
+    """Return a mass on a horizontal rail."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "rail")
+    body = pin.Inertia(mass, np.zeros(3), 0.1 * np.eye(3))
+    model.appendBodyToJoint(joint, body, pin.SE3.Identity())
+    return Robot(model, find_robot("planar3r"))
+
+
+def moved(plant: SampledPlant, v: float, duration: float, tau: float) -> Array:
+    plant.reset(0.0, np.zeros(1), np.array([v]))
+    return np.concatenate(plant.advance(0.0, duration, np.array([tau])))
+
+
+def test_a_cart_slides_stops_and_sticks() -> None:
+    """2 kg at 1 m/s against 4 N: it stops after 0.5 s and 0.25 m, and stays there."""
+    robot = cart()
+    plant = StickingPlant(robot, JointFriction.of(robot, coulomb=4.0), step=1e-3)
+    np.testing.assert_allclose(moved(plant, 1.0, 0.25, 0.0), [0.1875, 0.5], rtol=1e-12)
+    x, v = moved(plant, 1.0, 2.0, 0.0)
+    assert x == pytest.approx(0.25, abs=1e-9)
+    assert v == 0.0
+    for push in (-3.999, 3.999):
+        assert moved(plant, 0.0, 1.0, push).tolist() == [0.0, 0.0]
+    np.testing.assert_allclose(moved(plant, 0.0, 1.0, 5.0), [0.25, 0.5], rtol=1e-9)
+    np.testing.assert_allclose(moved(plant, 0.0, 1.0, -5.0), [-0.25, -0.5], rtol=1e-9)
+
+
+def test_a_cart_in_oil_slows_down() -> None:
+    """v = v0 exp(-d t / m), to the second order of the step."""
+    robot = cart()
+    friction = JointFriction.of(robot, viscous=3.0)
+    errors = [
+        moved(StickingPlant(robot, friction, step), 1.0, 1.0, 0.0)[1] - np.exp(-1.5)
+        for step in (0.02, 0.01)
+    ]
+    assert abs(errors[1]) < 1e-5
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_without_friction_it_is_the_ideal_plant_to_second_order(name: str) -> None:
+    robot = load(name)
+    q, v = some_state(robot)
+    tau = np.zeros(robot.nv)
+    exact = Dop853(1e-13, 1e-13).advance(
+        robot, lambda t, q, v: robot.forward_dynamics(q, v, tau), 0.0, 0.1, q, v
+    )
+    errors = []
+    for step in (1e-3, 5e-4, 2.5e-4):
+        plant = StickingPlant(robot, JointFriction.of(robot), step)
+        plant.reset(0.0, q, v)
+        end = plant.advance(0.0, 0.1, tau)
+        apart = [robot.difference(exact[0], end[0]), exact[1] - end[1]]
+        errors.append(float(np.abs(apart).max()))
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    np.testing.assert_allclose(orders, 2.0, atol=0.15)
+
+
+def test_a_step_obeys_coulombs_law_in_every_joint() -> None:
+    """What is left of M Δv - h(tau - N) is h c sign(v), or less where v = 0."""
+    robot = load("panda")
+    coulomb = np.array([5.0, 5.0, 3.0, 3.0, 1.0, 1.0, 0.5])
+    plant = StickingPlant(robot, JointFriction.of(robot, coulomb), step=1e-4)
+    rng = np.random.default_rng(1)
+    stuck = 0
+    for _ in range(20):
+        q = robot.random_configuration(rng)
+        v = np.where(rng.random(7) < 0.5, 0.0, 0.5 * rng.normal(size=7))
+        N = robot.state(0.0, q, v).nonlinear_effects.copy()
+        tau = N + rng.normal(size=7) * coulomb
+        plant.reset(0.0, q, v)
+        _, after = plant.advance(0.0, 1e-4, tau)
+        force = (tau - N) - mass_matrix(robot, q) @ (after - v) / 1e-4
+        slips = after != 0.0
+        np.testing.assert_allclose(
+            force[slips], (coulomb * np.sign(after))[slips], atol=0.05
+        )
+        assert (np.abs(force[~slips]) <= coulomb[~slips] + 0.05).all()
+        stuck += int((~slips).sum())
+    assert 20 < stuck < 120
+
+
+def test_mujocos_friction_is_the_same() -> None:
+    """A panda let go against friction in all joints: two engines, one motion."""
+    pytest.importorskip("mujoco")
+    from hsp_control.simulation.plants.mujoco import MujocoPlant
+
+    robot = load("panda")
+    friction = JointFriction.of(robot, coulomb=2.0, viscous=0.5)
+    q = robot.home()
+    tau = 0.5 * gravity(robot, q)
+    ends = []
+    for plant in (
+        StickingPlant(robot, friction, step=2e-4),
+        MujocoPlant(robot, friction=friction, timestep=2e-4, joint_limits=False),
+    ):
+        plant.reset(0.0, q, np.zeros(7))
+        ends.append(np.concatenate(plant.advance(0.0, 0.3, tau)))
+    assert np.abs(ends[0][:7] - q).max() > 0.1
+    np.testing.assert_allclose(*ends, rtol=0, atol=3e-3)
+
+
+# --- sensors -------------------------------------------------------------------------
+
+
+def shown(
+    sensor: Sensor, robot: Robot, states: Sequence[tuple[Array, Array]]
+) -> list[tuple[Array, Array]]:
+    sensor.reset(robot, 0.0, *states[0])
+    return [sensor.measure(0.01 * k, *state) for k, state in enumerate(states)]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_an_encoder_counts(name: str) -> None:
+    """Within half a count everywhere, on counts alone; a root is measured exactly."""
+    robot = load(name)
+    states = [some_state(robot, seed) for seed in range(20)]
+    count = 2.0 * np.pi / 2**10
+    for (q, v), (q_shown, v_shown) in zip(
+        states, shown(Encoder(count), robot, states), strict=True
+    ):
+        robot.check_configuration(q_shown)
+        off = robot.difference(q, q_shown)
+        assert np.abs(off).max() <= 0.5 * count + 1e-12
+        joints = robot.joint_positions(q_shown)[6 if name == "go2" else 0 :]
+        np.testing.assert_allclose(joints / count, np.round(joints / count), atol=1e-9)
+        np.testing.assert_array_equal(v_shown, v)
+        if name == "go2":
+            assert np.abs(off[:6]).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_noise_has_its_size_and_its_seed(name: str) -> None:
+    robot = load(name)
+    states = [some_state(robot)] * 2000
+    q, v = states[0]
+    positions = shown(PositionNoise(0.01, seed=1), robot, states)
+    velocities = shown(VelocityNoise(0.02, seed=1), robot, states)
+    off = np.array([robot.difference(q, q_shown) for q_shown, _ in positions])
+    rate = np.array([v_shown - v for _, v_shown in velocities])
+    joints = slice(6 if name == "go2" else 0, None)
+    np.testing.assert_allclose(off[:, joints].std(axis=0), 0.01, rtol=0.1)
+    np.testing.assert_allclose(rate[:, joints].std(axis=0), 0.02, rtol=0.1)
+    assert np.abs(off[:, joints].mean(axis=0)).max() < 0.001
+    alike = np.corrcoef(off[:, -1], rate[:, -1])[0, 1]
+    assert abs(alike) < 0.1  # the same seed, but each kind has its own numbers
+    again = shown(PositionNoise(0.01, seed=1), robot, states)
+    other = shown(PositionNoise(0.01, seed=2), robot, states)
+    np.testing.assert_array_equal(again[-1][0], positions[-1][0])
+    assert (other[-1][0] != positions[-1][0]).any()
+    if name == "go2":
+        assert np.abs(off[:, :6]).max() < 1e-12
+        own = shown(PositionNoise(np.full(18, 0.01)), robot, states[:1])
+        assert np.abs(robot.difference(q, own[0][0])[:6]).min() > 1e-6
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_differenced_velocity(name: str) -> None:
+    """Of an even motion it is the velocity; at first, and of a root, what is passed."""
+    robot = load(name)
+    q, v = some_state(robot)
+    wrong = np.full(robot.nv, 9.0)
+    states = [(robot.integrate(q, 0.01 * k * v), wrong) for k in range(4)]
+    found = [v_shown for _, v_shown in shown(DifferencedVelocity(), robot, states)]
+    np.testing.assert_array_equal(found[0], wrong)
+    expected = v.copy()
+    if name == "go2":
+        expected[:6] = 9.0
+    for rate in found[1:]:
+        np.testing.assert_allclose(rate, expected, rtol=1e-9)
+
+
+def test_a_late_sensor_shows_what_was() -> None:
+    robot = load("panda")
+    states = [some_state(robot, seed) for seed in range(5)]
+    late = shown(SensorDelay(2), robot, states)
+    for k, (q, v) in enumerate(late):
+        expected = states[max(0, k - 2)]
+        np.testing.assert_array_equal(q, expected[0])
+        np.testing.assert_array_equal(v, expected[1])
+
+
+# --- drives --------------------------------------------------------------------------
+
+
+def driven(drive: Drive, efforts: Sequence[Array]) -> list[Array]:
+    drive.reset(load("panda"))
+    return [drive.apply(effort) for effort in efforts]
+
+
+EFFORTS = [np.full(7, float(k)) for k in range(1, 9)]
+
+
+def test_a_saturated_drive() -> None:
+    effort = np.array([100.0, -100.0, 5.0, 0.0, -13.0, 12.1, 11.9])
+    own = load("panda").model.upperEffortLimit
+    np.testing.assert_array_equal(own[[0, 6]], [87.0, 12.0])
+    np.testing.assert_array_equal(
+        driven(Saturation(), [effort])[0], [87.0, -87.0, 5.0, 0.0, -12.0, 12.0, 11.9]
+    )
+    half = np.array([50.0] + [0.0] * 6)
+    np.testing.assert_array_equal(
+        driven(Saturation(half), [effort])[0], [50.0, *effort[1:]]
+    )
+
+
+def test_a_noisy_drive() -> None:
+    found = np.array(driven(EffortNoise(0.5, seed=1), [np.ones(7)] * 2000))
+    np.testing.assert_allclose(found.mean(axis=0), 1.0, atol=0.06)
+    np.testing.assert_allclose(found.std(axis=0), 0.5, rtol=0.1)
+
+
+@pytest.mark.parametrize("periods", [0, 1, 3])
+def test_a_late_drive(periods: int) -> None:
+    found = [effort[0] for effort in driven(EffortDelay(periods), EFFORTS)]
+    assert found == [1.0] * periods + [float(k) for k in range(1, 9 - periods)]
+
+
+def test_a_drive_that_loses_efforts() -> None:
+    """Each is the commanded one, or what the last one was; the first is there."""
+    efforts = [np.full(7, float(k)) for k in range(2000)]
+    found = [effort[0] for effort in driven(DroppedPeriods(0.3, seed=2), efforts)]
+    lost = 0
+    for k, effort in enumerate(found):
+        assert effort in (k, found[k - 1] if k else 0.0)
+        lost += effort != k
+    assert 0.25 < lost / 2000 < 0.35
+
+
+def test_what_a_drive_remembers_is_its_own() -> None:
+    """A controller writes into the same array at every step."""
+    for drive in (DroppedPeriods(0.5), EffortDelay(1)):
+        drive.reset(load("panda"))
+        shared, found = np.zeros(7), []
+        for k in range(20):
+            shared[:] = k
+            found.append(float(drive.apply(shared)[0]))
+        assert all(effort <= k for k, effort in enumerate(found))
+        assert any(effort < k for k, effort in enumerate(found))
+
+
+class Spy(SampledPlant):
+    """A plant that writes down under what it moves."""
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__(robot)
+        self.calls: list[tuple[float, float, float]] = []
+
+    def reset(self, t: float, q: Array, v: Array) -> None:
+        self.calls.clear()
+
+    def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
+        self.calls.append((t, end, float(tau[0])))
+        return self.robot.neutral(), np.zeros(self.robot.nv)
+
+
+def timeline(*drives: Drive) -> list[tuple[float, float, float]]:
+    """Return (from, to, effort) as a plant moves for 8 periods of 1 s."""
+    spy = Spy(load("panda"))
+    plant = ImperfectPlant(spy, drives=drives)
+    plant.reset(0.0, spy.robot.neutral(), np.zeros(7))
+    for k, effort in enumerate(EFFORTS):
+        plant.advance(float(k), k + 1.0, effort)
+    return spy.calls
+
+
+def test_jitter_lets_the_last_effort_act_longer() -> None:
+    calls = timeline(Jitter(0.6, seed=1))
+    assert calls[0] == (0.0, 1.0, 1.0)
+    assert len(calls) == 15
+    lateness = []
+    for k in range(1, 8):
+        (begin, switch, before), (again, end, after) = calls[2 * k - 1 : 2 * k + 1]
+        assert (begin, again, end) == (k, switch, k + 1.0)
+        assert (before, after) == (k, k + 1.0)
+        lateness.append(switch - begin)
+    assert 0.0 < min(lateness) < max(lateness) < 0.6
+    assert np.ptp(lateness) > 0.1
+
+
+def test_an_effort_later_than_its_period_begins_the_next() -> None:
+    assert timeline(Jitter(1e9)) == [
+        (0.0, 1.0, 1.0),
+        *((float(k), k + 1.0, float(k)) for k in range(1, 8)),
+    ]
+
+
+def test_drives_make_a_chain_in_their_order() -> None:
+    calls = timeline(EffortDelay(1), Saturation(5.0))
+    assert [effort for _, _, effort in calls] == [1, 1, 2, 3, 4, 5, 5, 5]
+
+
+# --- pushes --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["ideal", "sticking", "mujoco"])
+def test_a_push_gives_its_impulse_whatever_the_plant(kind: str) -> None:
+    """3 N for 0.5 s on 2 kg: 0.75 m/s, and along the rail alone."""
+    robot = cart()
+    robot.model.addFrame(
+        pin.Frame("body", 1, 0, pin.SE3.Identity(), pin.FrameType.BODY)
+    )
+    robot = changed(robot, [])
+    push = Push("body", (3.0, 7.0, 0.0), (0.0, 0.0, 1.0), start=0.2, duration=0.5)
+    plant: SampledPlant
+    if kind == "ideal":
+        plant = IntegratedPlant(RigidBodyPlant(robot, [push]), Rk4(1e-3))
+    elif kind == "sticking":
+        plant = StickingPlant(robot, JointFriction.of(robot), pushes=[push])
+    else:
+        pytest.importorskip("mujoco")
+        from hsp_control.simulation.plants.mujoco import MujocoPlant
+
+        plant = MujocoPlant(robot, pushes=[push])
+    # In the stages of RK4 an edge may count for a third of a step more or less.
+    exact = 1e-9 if kind != "ideal" else 1e-3
+    assert moved(plant, 0.0, 1.0, 0.0)[1] == pytest.approx(0.75, rel=exact)
+
+
+# --- the whole loop ------------------------------------------------------------------
+
+
+def panda_controller() -> Controller:
+    robot = load("panda")
+    start = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
+    center = start - [0.0, 0.1, 0.0]
+    circle = Circle(center, 0.1, 2.0, phase=np.pi / 2, normal=(0.0, 0.0, 1.0))
+    task = FramePosition(robot, "panda_tcp", circle, Gains.from_frequency(20.0))
+    return Controller(robot, [task])
+
+
+def run(
+    sensors: Sequence[Sensor] = (),
+    drives: Sequence[Drive] = (),
+    changes: Sequence[ModelChange] = (),
+    friction: JointFriction | None = None,
+    duration: float = 0.5,
+) -> Rollout:
+    controller = panda_controller()
+    robot = changed(controller.robot, changes) if changes else controller.robot
+    plant: SampledPlant = IntegratedPlant(RigidBodyPlant(robot), Rk4(1e-3))
+    if friction is not None:
+        plant = StickingPlant(robot, friction)
+    return simulate(
+        controller,
+        robot.home(),
+        duration=duration,
+        control_period=1e-3,
+        plant=ImperfectPlant(plant, sensors, drives),
+    )
+
+
+@cache
+def ideal() -> Rollout:
+    return run()
+
+
+def test_without_imperfections_nothing_changes() -> None:
+    controller = panda_controller()
+    plain = simulate(
+        controller,
+        controller.robot.home(),
+        duration=0.5,
+        control_period=1e-3,
+        integrator=Rk4(1e-3),
+    )
+    imperfect = ideal()
+    for name in plain.columns:
+        np.testing.assert_array_equal(imperfect[name], plain[name], err_msg=name)
+    np.testing.assert_array_equal(imperfect["measured.q"], imperfect.q)
+    np.testing.assert_array_equal(imperfect["measured.v"], imperfect.v)
+
+
+ALL: dict[str, dict[str, Any]] = {
+    "masses": {"changes": [ScaledInertias(mass=1.2)]},
+    "random": {"changes": [RandomInertias(0.2, 0.2, 0.01)]},
+    "payload": {"changes": [Payload("panda_tcp", 2.0)]},
+    "motors": {"changes": [MotorInertia(0.1)]},
+    "friction": {"friction": JointFriction(np.full(7, 0.5), np.full(7, 0.2))},
+    "encoder": {"sensors": [Encoder(1e-4), DifferencedVelocity()]},
+    "noise": {"sensors": [PositionNoise(1e-4), VelocityNoise(0.02)]},
+    "late sensor": {"sensors": [SensorDelay(2)]},
+    "effort noise": {"drives": [EffortNoise(0.5)]},
+    "saturation": {"drives": [Saturation(20.0)]},
+    "delay": {"drives": [EffortDelay(2)]},
+    "jitter": {"drives": [Jitter(5e-4), EffortDelay(1)]},
+    "dropped": {"drives": [DroppedPeriods(0.3)]},
+}
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_imperfection_is_felt_and_repeats_itself(name: str) -> None:
+    """Another motion than the ideal loop's; the same settings give the same again."""
+    first, second = run(**ALL[name]), run(**ALL[name])
+    assert np.abs(first.q - ideal().q).max() > 1e-5
+    for column in first.columns:
+        np.testing.assert_array_equal(first[column], second[column], err_msg=column)
+    assert first.meta["plant"] == second.meta["plant"]
+
+
+def test_the_log_has_the_truth_beside_what_was_measured_and_what_acted() -> None:
+    rollout = run(
+        sensors=[Encoder(1e-3), VelocityNoise(0.02, seed=5)],
+        drives=[EffortDelay(1), Saturation(20.0)],
+    )
+    off = rollout["measured.q"] - rollout.q
+    assert 1e-4 < np.abs(off).max() <= 0.5e-3 + 1e-12
+    np.testing.assert_allclose(
+        (rollout["measured.v"] - rollout.v).std(), 0.02, rtol=0.2
+    )
+    assert np.abs(rollout.tau).max() > 20.0
+    assert np.abs(rollout["applied.tau"][1:]).max() == 20.0
+    described = rollout.meta["plant"]
+    assert described["type"] == "RigidBodyPlant"
+    assert described["sensors"][1] == {"type": "VelocityNoise", "std": 0.02, "seed": 5}
+    assert described["drives"][0] == {"type": "EffortDelay", "periods": 1}
+
+
+def test_a_plant_that_differs_is_written_down() -> None:
+    rollout = run(changes=[Payload("panda_tcp", 2.0)], duration=0.01)
+    bodies = rollout.meta["plant"]["bodies"]
+    own = load("panda").model.inertias[7].mass
+    assert bodies["panda_joint7"]["mass"] == pytest.approx(own + 2.0)
+    assert "bodies" not in run(duration=0.01).meta["plant"]
+
+
+# --- refusals ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ScaledInertias(mass=0.0), r"^mass factor is 0.0; must be positive$"),
+        (
+            lambda: ScaledInertias(com=(1.0,)),
+            r"^com shift is \(1.0,\); needs 3 numbers",
+        ),
+        (
+            lambda: RandomInertias(mass=1.0),
+            r"^random mass error is 1.0; must be in 0..1",
+        ),
+        (lambda: RandomInertias(com=-1.0), r"^random com error is -1.0; must be pos"),
+        (
+            lambda: Payload("hand", -2.0),
+            r"^payload at 'hand': mass is -2.0 kg; must be",
+        ),
+        (
+            lambda: Payload("hand", 1.0, (0.0,)),
+            r"^payload at 'hand': center is \(0.0,\)",
+        ),
+        (
+            lambda: Payload("hand", 1.0, radius=-1.0),
+            r"^payload at 'hand': radius is -1",
+        ),
+        (lambda: SensorDelay(-1), r"^sensor delay is -1; needs a number of periods$"),
+        (lambda: EffortDelay(0.5), r"^effort delay is 0.5; needs a number of periods$"),  # type: ignore[arg-type]
+        (lambda: DroppedPeriods(1.0), r"^dropped periods: probability is 1.0; must be"),
+        (lambda: Jitter(-1.0), r"^jitter: the longest lateness is -1.0 s; must be pos"),
+        (
+            lambda: Push("hand", (1.0, 2.0)),
+            r"^push on 'hand': force is \(1.0, 2.0\); n",
+        ),  # type: ignore[arg-type]
+        (
+            lambda: Push("hand", duration=0.0),
+            r"^push on 'hand': lasts 0.0 s from 0.0 s",
+        ),
+        (
+            lambda: JointFriction.of(load("panda"), [1.0, 2.0]),
+            r"^coulomb has shape \(2,\); needs one number, or one for each of the 7",
+        ),
+        (
+            lambda: JointFriction.of(load("panda"), -1.0),
+            r"^coulomb is -1.0; must not be",
+        ),
+        (
+            lambda: StickingPlant(load("panda"), JointFriction.of(load("panda")), -1.0),
+            r"^step is -1.0; must be positive$",
+        ),
+        (
+            lambda: changed(load("panda"), [Payload("panda_link0", 1.0)]),
+            r"^payload at 'panda_link0': the frame is fixed to the world$",
+        ),
+        (
+            lambda: Saturation().reset(load("planar3r")),
+            r"^saturation: the URDF of planar3r gives no effort limits; state them$",
+        ),
+        (
+            lambda: Encoder("fine").reset(
+                load("panda"), 0.0, load("panda").home(), np.zeros(7)
+            ),
+            r"^encoder resolution is 'fine'; needs numbers$",
+        ),
+    ],
+)
+def test_imperfections_that_are_none(make: Any, message: str) -> None:
+    with pytest.raises(SimulationError, match=message):
+        make()
+
+
+def test_frames_that_do_not_exist() -> None:
+    with pytest.raises(
+        FrameNotFoundError, match=r"^no frame 'panda_tpc'; did you mean"
+    ):
+        changed(load("panda"), [Payload("panda_tpc", 1.0)])
+    with pytest.raises(
+        FrameNotFoundError, match=r"^no frame 'panda_tpc'; did you mean"
+    ):
+        RigidBodyPlant(load("panda"), [Push("panda_tpc")])

@@ -1,0 +1,620 @@
+"""MuJoCo as a plant: the same mechanics as Pinocchio's, and a ground to stand on."""
+
+import pickle
+import re
+import sys
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from hsp_control import Robot
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import (
+    FrameNotFoundError,
+    ModelError,
+    SimulationError,
+)
+from hsp_control.common.resources import bundled_robots
+from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
+from hsp_control.robot import RobotState
+from hsp_control.robot.description.loading import load_model
+from hsp_control.robot.description.sources import find_robot
+from hsp_control.robot.friction import JointFriction
+from hsp_control.robot.integrators import Dop853
+from hsp_control.simulation.plants import Push
+from hsp_control.simulation.plants.mujoco import ContactShape, Ground, MujocoPlant
+
+mujoco = pytest.importorskip("mujoco")
+
+OTHERS = {
+    "ur5": None,
+    "tiago": None,
+    "tiago_no_hand": "planar",
+    "baxter": None,
+    "talos": None,
+    "g1": None,
+    "solo12": None,
+    "go2": None,
+    "kinova": None,
+    "pr2": None,
+}
+"""Robots of example-robot-data and their root: joints of every kind, and mimic ones."""
+
+
+@cache
+def load(name: str) -> Robot:
+    if name in bundled_robots():
+        return Robot.load(name)
+    if name == "zoo":
+        return zoo()
+    pytest.importorskip("example_robot_data")
+    if name == "placed":  # a floating robot whose root does not stand at the origin
+        whole = pin.Model()
+        place = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.5, 1.0), np.array([1.0, 2.0, 3.0]))
+        source = find_robot("solo12")
+        whole = pin.appendModel(whole, load_model(source), 0, place)
+        return Robot(whole, source)
+    return Robot.load(name, root=OTHERS[name])  # type: ignore[arg-type]
+
+
+def zoo() -> Robot:
+    """Return a robot with a joint of every kind that MuJoCo has too."""
+    model, parent = pin.Model(), 0
+    axis = np.array([0.6, 0.0, 0.8])
+    for joint in (
+        pin.JointModelPlanar(),
+        pin.JointModelPrismaticUnaligned(axis),
+        pin.JointModelSpherical(),
+        pin.JointModelRevoluteUnaligned(axis),
+        pin.JointModelRUBY(),
+        pin.JointModelPY(),
+    ):
+        place = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.5, 1.0), np.array([0.1, 0.2, 0.3]))
+        name = joint.shortname()
+        parent = model.addJoint(parent, joint, place, name)
+        body = pin.Inertia.FromEllipsoid(1.0, 0.1, 0.2, 0.3)
+        model.appendBodyToJoint(parent, body, place)
+        model.addFrame(pin.Frame(name, parent, 0, place, pin.FrameType.BODY))
+    return Robot(model, find_robot("planar3r"))
+
+
+def velocity_map(plant: MujocoPlant, q: Array) -> Array:
+    """Return T with qvel = T v."""
+    T = np.zeros((plant.model.nv, plant.robot.nv))
+    for column, unit in zip(T.T, np.eye(plant.robot.nv), strict=True):
+        plant.conventions.velocity_to_mujoco(q, unit, out := np.zeros(plant.model.nv))
+        column[:] = out
+    return T
+
+
+def random_state(robot: Robot, rng: np.random.Generator) -> tuple[Array, Array]:
+    return robot.random_configuration(rng), rng.normal(size=robot.nv)
+
+
+@pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS, "placed", "zoo"])
+def test_mass_matrix_and_bias_agree_with_pinocchio(name: str) -> None:
+    """M = TᵀM'T and N = Tᵀ(N' + M'T'v), T' by differences; power is kept."""
+    robot = load(name)
+    plant = MujocoPlant(robot)
+    rng = np.random.default_rng(1)
+    full = np.zeros((plant.model.nv, plant.model.nv))
+    for _ in range(3):
+        q, v = random_state(robot, rng)
+        plant.reset(0.0, q, v)
+        mujoco.mj_forward(plant.model, plant.data)
+        mujoco.mj_fullM(plant.model, plant.data, full)
+        state = robot.state(0.0, q, v)
+        M = np.triu(state.mass_matrix) + np.triu(state.mass_matrix, 1).T
+        N = state.nonlinear_effects
+        T, h = velocity_map(plant, q), 1e-6
+        ahead, behind = (
+            velocity_map(plant, robot.integrate(q, s * h * v)) for s in (1.0, -1.0)
+        )
+        T_rate = (ahead - behind) / (2.0 * h)
+        np.testing.assert_allclose(T.T @ full @ T, M, rtol=0, atol=1e-11 * M.max())
+        bias = T.T @ (plant.data.qfrc_bias + full @ T_rate @ v)
+        np.testing.assert_allclose(bias, N, rtol=0, atol=1e-9 * np.abs(N).max())
+        tau = rng.normal(size=robot.nv)
+        plant.conventions.effort_to_mujoco(q, tau, f := np.ones(plant.model.nv))
+        np.testing.assert_allclose(T.T @ f, tau, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS, "placed", "zoo"])
+def test_states_go_there_and_back(name: str) -> None:
+    robot = load(name)
+    plant = MujocoPlant(robot)
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        q, v = random_state(robot, rng)
+        plant.reset(0.0, q, v)
+        q_back, v_back = plant.conventions.from_mujoco(plant.data.qpos, plant.data.qvel)
+        assert np.abs(robot.difference(q, q_back)).max() < 1e-14
+        assert np.abs(v - v_back).max() < 1e-13
+
+
+@pytest.mark.parametrize(
+    "name", [*bundled_robots(), "tiago_no_hand", "go2", "placed", "zoo"]
+)
+def test_a_free_motion_is_pinocchios(name: str) -> None:
+    """0.05 s of falling, RK4 against DOP853: the equations of motion are the same."""
+    robot = load(name)
+    q, v = random_state(robot, np.random.default_rng(3))
+    tau = np.zeros(robot.nv)
+    plant = MujocoPlant(robot, timestep=2.5e-4, integrator="RK4", joint_limits=False)
+    plant.reset(0.0, q, v)
+    q_mujoco, v_mujoco = plant.advance(0.0, 0.05, tau)
+    exact = Dop853(1e-12, 1e-12).advance(
+        robot, lambda t, q, v: robot.forward_dynamics(q, v, tau), 0.0, 0.05, q, v
+    )
+    assert np.abs(robot.difference(exact[0], q_mujoco)).max() < 1e-6
+    assert np.abs(exact[1] - v_mujoco).max() < 1e-6 * max(1.0, np.abs(exact[1]).max())
+
+
+def test_joints_that_mimic_follow_their_leader() -> None:
+    """The tie is MuJoCo's own soft constraint: a tenth of a millimetre here."""
+    robot = load("baxter")
+    plant = MujocoPlant(robot)
+    q = robot.home()
+    plant.reset(0.0, q, np.zeros(robot.nv))
+    tau = robot.state(0.0, q, np.zeros(robot.nv)).nonlinear_effects.copy()
+    tau[robot.velocity_index("l_gripper_l_finger_joint")] += 0.1
+    plant.advance(0.0, 0.2, tau)
+    left, right = (
+        float(plant.data.joint(f"l_gripper_{side}_finger_joint").qpos[0])
+        for side in "lr"
+    )
+    assert left > 0.005
+    assert right == pytest.approx(-left, abs=1e-4)
+
+
+def test_a_joint_limit_holds() -> None:
+    """A panda pushed towards a limit goes past it without, and stays with it."""
+    robot = load("panda")
+    q = robot.home()
+    _, upper = robot.position_limits()
+    ends = []
+    for limited in (True, False):
+        plant = MujocoPlant(robot, joint_limits=limited)
+        plant.reset(0.0, q, np.zeros(7))
+        state = RobotState(robot)
+        x, v = q, np.zeros(7)
+        for k in range(500):
+            t = k * 0.001
+            effort = state.update(t, x, v).nonlinear_effects + 2.0 * np.eye(7)[5]
+            x, v = plant.advance(t, t + 0.001, effort)
+        ends.append(x[5] - upper[5])
+    assert ends[0] < 0.05
+    assert ends[1] > 0.3
+
+
+def test_dry_friction_sticks_and_viscous_friction_damps() -> None:
+    robot = load("panda")
+    q = robot.home()
+    hold = robot.state(0.0, q, np.zeros(7)).nonlinear_effects.copy()
+    push = np.eye(7)[6]
+
+    def moved(friction: JointFriction | None, effort: float) -> float:
+        plant = MujocoPlant(robot, friction=friction)
+        plant.reset(0.0, q, np.zeros(7))
+        return float(plant.advance(0.0, 0.2, hold + effort * push)[0][6] - q[6])
+
+    dry = JointFriction.of(robot, coulomb=0.5)
+    free = moved(None, 0.4)
+    assert abs(moved(dry, 0.4)) < 1e-4 * abs(free)
+    assert moved(dry, 0.9) == pytest.approx(free, rel=0.05)  # the others stick now
+    assert moved(JointFriction.of(robot, viscous=0.5), 0.4) < 0.5 * free
+
+
+# --- contacts ------------------------------------------------------------------------
+
+
+def standing(name: str) -> tuple[Robot, Array, list[str], Array]:
+    """Return a robot, its stance in the air, its feet and its springs [N·m/rad]."""
+    robot = load(name)
+    q = robot.home()
+    feet = {
+        "talos": ["left_sole_link", "right_sole_link"],
+        "g1": ["left_ankle_roll_link", "right_ankle_roll_link"],
+        "solo12": ["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"],
+        "go2": ["FL_foot", "FR_foot", "RL_foot", "RR_foot"],
+    }[name]
+    stance = {"talos": "half_sitting", "solo12": "straight_standing", "go2": "standing"}
+    if name in stance:
+        model = robot.model.copy()
+        pin.loadReferenceConfigurations(model, str(robot.source.srdf), False)
+        q = np.array(model.referenceConfigurations[stance[name]])
+    stiffness = {"talos": 5000.0, "g1": 500.0, "solo12": 10.0, "go2": 100.0}[name]
+    light = re.compile("gripper|head|wrist|arm_.*_[567]_")
+    springs = np.array(
+        [20.0 if light.search(f) else stiffness for f in robot.dof_names]
+    )
+    springs[:6] = 0.0
+    return robot, q, feet, springs
+
+
+def stand(
+    plant: MujocoPlant, q: Array, springs: Array, duration: float
+) -> tuple[Array, Array, dict[str, Array]]:
+    """Hold the joints with springs, from where the feet touch; return the end."""
+    robot = plant.robot
+    reference = q.copy()
+    reference[2] -= plant.clearance(q)
+    x, v = reference, np.zeros(robot.nv)
+    plant.reset(0.0, x, v)
+    for k in range(round(duration / 0.001)):
+        t, tau = 0.001 * k, springs * robot.difference(x, reference)
+        x, v = plant.advance(t, t + 0.001, tau)
+    tau = springs * robot.difference(x, reference)
+    log_channels = plant.log_channels(duration, x, v, tau)
+    found = {name: np.asarray(reading.value) for name, reading in log_channels.items()}
+    return robot.difference(reference, x)[:6], v, found
+
+
+def dampers(robot: Robot, springs: Array) -> JointFriction:
+    """Return what damps the springs: implicit, as such stiff ones must be."""
+    return JointFriction.of(robot, viscous=0.03 * springs)
+
+
+@pytest.mark.parametrize("name", ["talos", "g1", "solo12", "go2"])
+def test_a_legged_robot_stands_on_its_own_feet(name: str) -> None:
+    """On the collision geometry of its feet: less than 2 cm and 2°, and it rests.
+
+    What it sinks is what its springs give. The ground carries its weight, and the
+    moments of the forces about the centre of mass cancel.
+    """
+    robot, q, feet, springs = standing(name)
+    plant = MujocoPlant(
+        robot,
+        contacts=[ContactShape(foot) for foot in feet],
+        friction=dampers(robot, springs),
+    )
+    moved, v, forces = stand(plant, q, springs, 3.0)
+    assert np.abs(moved[:3]).max() < 0.02
+    assert np.abs(moved[3:]).max() < 0.035
+    assert np.abs(v).max() < 0.1
+    total = sum(forces[f"plant.contact.{foot}.force"] for foot in feet)
+    weight = 9.81 * sum(inertia.mass for inertia in robot.model.inertias)
+    np.testing.assert_allclose(total, [0.0, 0.0, weight], rtol=0, atol=0.01 * weight)
+    assert all(
+        forces[f"plant.contact.{foot}.force"][2] > 0.05 * weight for foot in feet
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "contacts"),
+    [
+        (
+            "talos",
+            [
+                ContactShape(f"{side}_sole_link", Box((0.2, 0.12, 0.02)), (0, 0, 0.01))
+                for side in ("left", "right")
+            ],
+        ),
+        (
+            "go2",
+            [
+                ContactShape(f"{leg}_foot", Sphere(0.022))
+                for leg in ("FL", "FR", "RL", "RR")
+            ],
+        ),
+        (
+            "solo12",
+            [
+                ContactShape(f"{leg}_FOOT", Capsule(0.014, 0.01), rpy=(np.pi / 2, 0, 0))
+                for leg in ("FL", "FR", "HL", "HR")
+            ],
+        ),
+    ],
+)
+def test_a_legged_robot_stands_on_stated_feet(
+    name: str, contacts: Sequence[ContactShape]
+) -> None:
+    robot, q, _, springs = standing(name)
+    plant = MujocoPlant(robot, contacts=contacts, friction=dampers(robot, springs))
+    moved, v, _ = stand(plant, q, springs, 2.0)
+    assert np.abs(moved[:3]).max() < 0.02
+    assert np.abs(v).max() < 0.1
+
+
+def ball(radius: float = 0.1) -> Robot:
+    """Return a ball of 2 kg that floats freely."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
+    model.appendBodyToJoint(
+        joint, pin.Inertia.FromSphere(2.0, radius), pin.SE3.Identity()
+    )
+    model.addFrame(pin.Frame("body", joint, 0, pin.SE3.Identity(), pin.FrameType.BODY))
+    return Robot(model, find_robot("planar3r"))
+
+
+@pytest.mark.parametrize("corners", [3, 4])
+def test_a_flat_mesh_is_a_contact(corners: int, tmp_path: Path) -> None:
+    """A plate's box has some height; three corners upright have no hull."""
+    places = np.array([[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0], [0, 0.1, 0]])[:corners]
+    if corners == 3:
+        places = places[:, [0, 2, 1]]  # no sole: its capsule
+    lines = [f"v {x} {y} {z}" for x, y, z in places]
+    lines += [f"f 1 {k} {k + 1}" for k in range(2, corners)]
+    (tmp_path / "plate.obj").write_text("\n".join(lines) + "\n")
+    (tmp_path / "plate.urdf").write_text(
+        '<robot name="plate"><link name="base"/><link name="plate"><inertial>'
+        '<mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        '</inertial><collision><geometry><mesh filename="plate.obj"/></geometry>'
+        '</collision></link><joint name="lift" type="prismatic"><parent link="base"/>'
+        '<child link="plate"/><axis xyz="0 0 1"/>'
+        '<limit lower="-9" upper="9" effort="100" velocity="9"/></joint></robot>'
+    )
+    robot = Robot.load(tmp_path / "plate.urdf")
+    plant = MujocoPlant(robot, contacts=[ContactShape("plate")])
+    assert -0.1 < plant.clearance(robot.neutral()) <= 0.0
+
+
+def test_a_contact_force_is_the_grounds_on_the_robot_about_the_frame() -> None:
+    """A block at rest under a frame beside it: f = m g, moment = r × f."""
+    robot = ball()
+    aside = pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.2]))
+    kind = pin.FrameType.OP_FRAME
+    robot.model.addFrame(pin.Frame("aside", 1, 0, aside, kind))
+    robot = Robot(robot.model, robot.source)
+    shape = ContactShape("aside", Box((0.2, 0.2, 0.2)), (-0.5, 0.0, -0.2))
+    plant = MujocoPlant(robot, contacts=[shape], ground=Ground(height=1.0))
+    q = np.array([0.0, 0.0, 1.1, 0.0, 0.0, 0.0, 1.0])
+    plant.reset(0.0, q, np.zeros(6))
+    q, v = plant.advance(0.0, 1.0, np.zeros(6))
+    log_channels = plant.log_channels(1.0, q, v, np.zeros(6))
+    force, moment = (
+        log_channels[f"plant.contact.aside.{k}"].value for k in ("force", "moment")
+    )
+    weight = 2.0 * 9.81
+    np.testing.assert_allclose(force, [0.0, 0.0, weight], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(moment, [0.0, 0.5 * weight, 0.0], rtol=0, atol=1e-3)
+    assert log_channels["plant.contact.aside.force"].unit == "N"
+
+
+@pytest.mark.parametrize(("mu", "slides"), [(0.3, True), (0.7, False)])
+def test_friction_of_the_ground_is_coulombs(mu: float, slides: bool) -> None:
+    """A block under gravity tilted by 27° (tan = 0.5): a = g (sin - µ cos) or rest."""
+    robot = ball()
+    tilt = np.arctan(0.5)
+    robot.model.gravity.linear = 9.81 * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
+    contact = ContactShape("body", Box((0.2, 0.2, 0.02)))
+    ground = Ground(friction=mu)
+    plant = MujocoPlant(robot, contacts=[contact], ground=ground)
+    plant.reset(0.0, np.array([0, 0, 0.01, 0, 0, 0, 1.0]), np.zeros(6))
+    _, v = plant.advance(0.0, 0.5, np.zeros(6))
+    expected = 9.81 * (np.sin(tilt) - mu * np.cos(tilt)) if slides else 0.0
+    assert v[0] == pytest.approx(0.5 * expected, abs=0.02)
+
+
+def test_shapes_touch_where_they_are() -> None:
+    robot = ball()
+    q = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
+    for shape, height in [
+        (Sphere(0.1), 0.9),
+        (Box((0.2, 0.4, 0.6)), 0.7),
+        (Capsule(0.1, 0.4), 0.7),
+        (Cylinder(0.1, 0.4), 0.8),
+    ]:
+        for offset in (0.0, 0.3):
+            contact = ContactShape("body", shape, (0.0, 0.0, offset))
+            plant = MujocoPlant(robot, contacts=[contact], ground=Ground(height=0.2))
+            found = plant.clearance(q)
+            assert found == pytest.approx(height + offset - 0.2, abs=1e-6), shape
+
+
+def test_a_push_gives_its_impulse() -> None:
+    """Half a second of 4 N on 2 kg, and of 0.01 N·m about z: m v = F T, I ω = M T."""
+    robot = ball()
+    robot.model.gravity.linear = np.zeros(3)
+    push = Push("body", (4.0, 0.0, 0.0), (0.0, 0.0, 0.01), start=0.1, duration=0.5)
+    plant = MujocoPlant(robot, pushes=[push])
+    q = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    plant.reset(0.0, q, np.zeros(6))
+    _, v = plant.advance(0.0, 1.0, np.zeros(6))
+    turned = 0.01 * 0.5 / (0.4 * 2.0 * 0.1**2)
+    speed = np.linalg.norm(v[:3])
+    assert speed == pytest.approx(4.0 * 0.5 / 2.0, rel=1e-9)
+    assert v[5] == pytest.approx(turned, rel=1e-9)
+
+
+def test_reading_contacts_changes_nothing() -> None:
+    robot, q, feet, springs = standing("go2")
+    ends = []
+    for looks in (False, True):
+        plant = MujocoPlant(
+            robot,
+            contacts=[ContactShape(foot) for foot in feet],
+            friction=dampers(robot, springs),
+        )
+        plant.reset(0.0, q, np.zeros(18))
+        x, v = q, np.zeros(18)
+        for k in range(100):
+            if looks:
+                plant.log_channels(0.001 * k, x, v, springs)
+            x, v = plant.advance(0.001 * k, 0.001 * (k + 1), np.zeros(18))
+        ends.append(np.concatenate([x, v]))
+    np.testing.assert_array_equal(*ends)
+
+
+# --- refusals ------------------------------------------------------------------------
+
+
+def test_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(SimulationError, match=r"pip install 'hsp_control\[mujoco\]'$"):
+        MujocoPlant(load("panda"))
+
+
+def test_a_floating_root_has_no_motor() -> None:
+    plant = MujocoPlant(ball())
+    plant.reset(0.0, np.array([0, 0, 0, 0, 0, 0, 1.0]), np.zeros(6))
+    with pytest.raises(
+        SimulationError, match=r"^the effort at t = 0 s pushes the floa"
+    ):
+        plant.advance(0.0, 0.01, np.full(6, 2e-3))
+
+
+def test_a_joint_without_counterpart_is_refused() -> None:
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelSphericalZYX(), pin.SE3.Identity(), "neck")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    robot = Robot(model, find_robot("planar3r"))
+    with pytest.raises(
+        ModelError, match=r"joint 'neck' is a JointModelSphericalZYX, wh"
+    ):
+        MujocoPlant(robot)
+
+
+def test_impossible_inertias_are_refused() -> None:
+    """MuJoCo wants A + B >= C of principal inertias; Pinocchio computes with any."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "hip")
+    inertia = pin.Inertia(1.0, np.zeros(3), np.diag([1.0, 1.0, 3.0]))
+    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    with pytest.raises(SimulationError, match=r"^MuJoCo refuses planar3r: .*inertia"):
+        MujocoPlant(Robot(model, find_robot("planar3r")))
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "message"),
+    [
+        ({"timestep": 0.0}, SimulationError, r"^mujoco: timestep is 0.0; must be posi"),
+        ({"integrator": "rk4"}, SimulationError, r"^mujoco: integrator 'rk4': choose"),
+        (
+            {"contacts": [ContactShape("panda_tpc", Sphere(0.1))]},
+            FrameNotFoundError,
+            r"^no frame 'panda_tpc'; did you mean 'panda_tcp'",
+        ),
+        (
+            {"pushes": [Push("panda_tpc")]},
+            FrameNotFoundError,
+            r"^no frame 'panda_tpc'; did you mean 'panda_tcp'",
+        ),
+    ],
+)
+def test_settings_that_are_none(options: Any, kind: Any, message: str) -> None:
+    with pytest.raises(kind, match=message):
+        MujocoPlant(load("panda"), **options)
+
+
+BARE = """<robot name="bare">
+  <link name="base"/>
+  <joint name="hip" type="revolute">
+    <parent link="base"/><child link="leg"/><axis xyz="1 0 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+  <link name="leg">
+    <inertial>
+      <mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
+    </inertial>
+  </link>
+</robot>"""
+
+
+def test_two_shapes_of_one_frame_share_its_force() -> None:
+    """A foot of two balls, 0.1 and 0.3 m from the weight: one force, one moment."""
+    robot = ball()
+    contacts = [
+        ContactShape("body", Sphere(0.05), (x, y, 0.0))
+        for x, y in ((-0.1, 0.1), (-0.1, -0.1), (0.3, 0.0))
+    ]
+    plant = MujocoPlant(robot, contacts=contacts)
+    q = np.array([0.0, 0.0, 0.05, 0.0, 0.0, 0.0, 1.0])
+    plant.reset(0.0, q, np.zeros(6))
+    q, v = plant.advance(0.0, 1.0, np.zeros(6))
+    log_channels = plant.log_channels(1.0, q, v, np.zeros(6))
+    assert set(log_channels) == {
+        "plant.contact.body.force",
+        "plant.contact.body.moment",
+    }
+    force, moment = (
+        log_channels[f"plant.contact.body.{k}"].value for k in ("force", "moment")
+    )
+    np.testing.assert_allclose(force, [0.0, 0.0, 2.0 * 9.81], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(moment, np.zeros(3), rtol=0, atol=1e-3)
+
+
+def test_the_ground_answers_a_push() -> None:
+    push = Push("body", (0.0, 0.0, -10.0), duration=5.0)
+    contact = ContactShape("body", Box((0.2, 0.2, 0.2)))
+    plant = MujocoPlant(ball(), contacts=[contact], pushes=[push])
+    plant.reset(0.0, np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]), np.zeros(6))
+    q, v = plant.advance(0.0, 1.0, np.zeros(6))
+    force = plant.log_channels(1.0, q, v, np.zeros(6))["plant.contact.body.force"].value
+    expected = [0.0, 0.0, 2.0 * 9.81 + 10.0]
+    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-3)
+
+
+def test_clearance_is_of_contacts() -> None:
+    with pytest.raises(
+        SimulationError, match=r"^panda has no contacts with the ground"
+    ):
+        MujocoPlant(load("panda")).clearance(load("panda").home())
+
+
+def test_a_base_that_turns_is_pushed_in_its_own_axes() -> None:
+    """A planar root that turns through 1.2 rad while an effort is held."""
+    robot = zoo()
+    q = robot.neutral()
+    v = np.eye(robot.nv)[2] * 4.0
+    tau = np.eye(robot.nv)[0] * 10.0
+    exact = Dop853(1e-12, 1e-12).advance(
+        robot, lambda t, q, v: robot.forward_dynamics(q, v, tau), 0.0, 0.3, q, v
+    )
+    plant = MujocoPlant(robot, timestep=2.5e-4, integrator="RK4")
+    plant.reset(0.0, q, v)
+    _, found = plant.advance(0.0, 0.3, tau)
+    np.testing.assert_allclose(found, exact[1], rtol=0, atol=2e-2)
+
+
+def test_a_foot_that_cannot_touch_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "bare.urdf").write_text(BARE)
+    robot = Robot.load(tmp_path / "bare.urdf")
+    with pytest.raises(SimulationError, match=r"^contact of 'leg': no collision geome"):
+        MujocoPlant(robot, contacts=[ContactShape("leg")])
+    with pytest.raises(SimulationError, match=r"^contact of 'leg': a HalfSpace cannot"):
+        ContactShape("leg", HalfSpace())
+    with pytest.raises(
+        SimulationError, match=r"^contact of 'base': it is fixed to the"
+    ):
+        MujocoPlant(robot, contacts=[ContactShape("base", Sphere(0.1))])
+
+
+def test_a_motion_that_diverges_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And it leaves no file behind, as MuJoCo does by default."""
+    monkeypatch.chdir(tmp_path)
+    robot = load("panda")
+    plant = MujocoPlant(robot)
+    plant.reset(0.0, robot.home(), np.zeros(7))
+    with pytest.raises(
+        SimulationError, match=r"^the motion diverged before t = 0.01 s"
+    ):
+        plant.advance(0.0, 0.01, np.full(7, 1e14))
+    assert not list(tmp_path.iterdir())
+
+
+def test_its_clock_begins_where_it_is_told() -> None:
+    plant = MujocoPlant(load("panda"))
+    plant.reset(3.0, plant.robot.home(), np.zeros(7))
+    plant.advance(3.0, 3.5, np.zeros(7))
+    assert plant.data.time == pytest.approx(3.5)
+
+
+def test_it_is_carried_to_another_process_with_its_state() -> None:
+    plant = MujocoPlant(load("panda"))
+    plant.reset(0.0, plant.robot.home(), np.zeros(7))
+    plant.advance(0.0, 0.1, np.zeros(7))
+    copy = pickle.loads(pickle.dumps(plant))
+    for ours, theirs in zip(
+        plant.advance(0.1, 0.2, np.ones(7)),
+        copy.advance(0.1, 0.2, np.ones(7)),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(ours, theirs)

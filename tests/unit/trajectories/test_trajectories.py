@@ -1,0 +1,637 @@
+"""One set of tests for all trajectories: points, orientations and poses."""
+
+import copy
+import pickle
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from math import cos, pi, sin
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+import hsp_control.trajectories as family
+from hsp_control.common.exceptions import ShapeError, TrajectoryError
+from hsp_control.common.rotations import log3
+from hsp_control.trajectories import (
+    Blend,
+    BlendOrientation,
+    CallableOrientation,
+    CallableTrajectory,
+    Circle,
+    ComposedPose,
+    Hold,
+    HoldOrientation,
+    HoldPose,
+    Line,
+    Lissajous,
+    MinimumJerk,
+    OrientationPath,
+    OrientationSample,
+    OrientationTrajectory,
+    PiecewisePolynomial,
+    PoseSample,
+    PoseTrajectory,
+    ScrewInterpolation,
+    Spin,
+    Spline,
+    Stops,
+    Trajectory,
+    TrajectorySample,
+    UniformLine,
+)
+
+Array = NDArray[np.float64]
+
+
+def pose(seed: int) -> pin.SE3:
+    rng = np.random.default_rng(seed)
+    return pin.SE3(pin.exp3(rng.uniform(-1.5, 1.5, 3)), rng.normal(size=3))
+
+
+def swinging(t: float) -> list[float]:
+    return [sin(2 * t), t * t, cos(t)]
+
+
+def swinging_velocity(t: float) -> list[float]:
+    return [2 * cos(2 * t), 2 * t, -sin(t)]
+
+
+def swinging_acceleration(t: float) -> list[float]:
+    return [-4 * sin(2 * t), 2.0, -cos(t)]
+
+
+def nodding(t: float) -> Array:
+    R: Array = pin.exp3(np.array([sin(t), 0.5 * t, 0.3])) @ R1
+    return R
+
+
+IDENTITY = np.eye(3)
+R1, R2, R3 = (pose(seed).rotation for seed in (1, 2, 3))
+POINTS = np.random.default_rng(4).normal(size=(4, 3))
+TIMES = [0.2, 0.9, 1.4, 2.2]
+LISSAJOUS = Lissajous([1, 2, 3], [0.5, -1, 2], [1, 2, 3], [0, 1, 2])
+CIRCLE = Circle([1, 1], 1, 3)
+SPIN = Spin(R1, [1, -2, 0.5], 2.5)
+BLENDED_SPIN = BlendOrientation(R2, SPIN, 1.5, [0.1, -0.4, 0.2], 0.5)
+
+# Members, and the times at which they join their holds or one piece the next.
+POINT_MEMBERS: dict[str, tuple[Trajectory, list[float]]] = {
+    "hold": (Hold([1, 2, 3, 4]), []),
+    "line": (Line([0, 1], [3, -1], 1.5, 0.5), [0.5, 2.0]),
+    "uniform line": (UniformLine([1, 0, 2], [0.3, 0.2, -1]), []),
+    "circle": (CIRCLE, []),
+    "circle across a normal": (Circle([0, 1, 2], 0.4, 2, 0.3, normal=[1, 2, 2]), []),
+    "circle from a start": (
+        Circle([0, 1, 2], 0.4, -2, normal=[0, 0, 3], start=[0, 2, 1]),
+        [],
+    ),
+    "circle in axes": (Circle(np.zeros(4), 2, 1, axes=np.eye(4)[[3, 1]]), []),
+    "lissajous": (LISSAJOUS, []),
+    "minimum jerk": (MinimumJerk(POINTS, TIMES), TIMES),
+    "stops": (Stops(POINTS, TIMES), TIMES),
+    "minimum jerk of two": (MinimumJerk(POINTS[:2], TIMES[:2]), TIMES[:2]),
+    "spline 3": (Spline(POINTS, TIMES, 3), TIMES),
+    "spline 5": (Spline(POINTS, TIMES), TIMES),
+    "spline 7": (Spline(POINTS, TIMES, 7), TIMES),
+    "polynomial": (
+        PiecewisePolynomial([0.5, 2], [[[1.0], [2.0], [-3.0], [0.5]]]),
+        [0.5, 2],
+    ),
+    "callable": (CallableTrajectory(swinging, 3), []),
+    "callable with velocity": (
+        CallableTrajectory(swinging, 3, swinging_velocity),
+        [],
+    ),
+    "callable with both": (
+        CallableTrajectory(swinging, 3, swinging_velocity, swinging_acceleration),
+        [],
+    ),
+    "callable with acceleration": (
+        CallableTrajectory(swinging, 3, acceleration=swinging_acceleration),
+        [],
+    ),
+    "blend": (Blend([0, 3], CIRCLE, 1.0, start_time=0.5), [0.5, 1.5]),
+    "blend in motion": (Blend([0, 3], CIRCLE, 1.5, [1, -2]), [0.0, 1.5]),
+}
+ORIENTATION_MEMBERS: dict[str, tuple[OrientationTrajectory, list[float]]] = {
+    "hold orientation": (HoldOrientation(R1), []),
+    "spin": (SPIN, []),
+    "orientation path": (OrientationPath([R1, R2, R3], TIMES[:3]), TIMES[:3]),
+    "callable orientation": (CallableOrientation(nodding), []),
+    "blend orientation": (BlendOrientation(R2, SPIN, 1.5, start_time=0.5), [0.5, 2.0]),
+    "blend orientation in motion": (BLENDED_SPIN, [0.5, 2.0]),
+}
+POSE_MEMBERS: dict[str, tuple[PoseTrajectory, list[float]]] = {
+    "composed pose": (ComposedPose(LISSAJOUS, SPIN), []),
+    "hold pose": (HoldPose(pose(5)), []),
+    "screw": (ScrewInterpolation(pose(5), pose(6), 1.5, 0.5), [0.5, 2.0]),
+    "screw without turn": (
+        ScrewInterpolation(pin.SE3(R1, POINTS[0]), pin.SE3(R1, POINTS[1]), 1.0),
+        [0.0, 1.0],
+    ),
+}
+MEMBERS: dict[str, tuple[Any, list[float]]] = {
+    **POINT_MEMBERS,
+    **ORIENTATION_MEMBERS,
+    **POSE_MEMBERS,
+}
+FINITE = [name for name, (_, knots) in MEMBERS.items() if knots]
+# These move already, or still accelerate, where they meet a hold: documented.
+ROUGH = {"spline 3", "polynomial", "blend in motion", "blend orientation in motion"}
+
+every_member = pytest.mark.parametrize("name", MEMBERS)
+quick = settings(max_examples=60, deadline=None, derandomize=True)
+
+
+def flat(sample: Any) -> list[Array]:
+    """Return the arrays of any sample, pose samples included."""
+    if isinstance(sample, PoseSample):
+        return [*sample.position, *sample.orientation]
+    return list(sample)
+
+
+def parts(sample: Any) -> Iterator[tuple[Array, Array, Array]]:
+    """Give place, rate and rate of the rate: once, or twice for a pose."""
+    arrays = flat(sample)
+    for i in range(0, len(arrays), 3):
+        yield arrays[i], arrays[i + 1], arrays[i + 2]
+
+
+def displacement(a: Array, b: Array) -> Array:
+    """Return b - a; for rotations the world's rotation vector from a to b."""
+    if a.ndim == 1:
+        return b - a
+    y = np.empty(3)
+    log3(b @ a.T, y)
+    return y
+
+
+def five_points(values: list[Array], h: float) -> Array:
+    """Return the first derivative from values at -2h, -h, h and 2h."""
+    before2, before1, after1, after2 = values
+    return (before2 - 8 * before1 + 8 * after1 - after2) / (12 * h)
+
+
+@every_member
+def test_rates_are_those_of_the_motion(name: str) -> None:
+    trajectory, knots = MEMBERS[name]
+    h = 1e-3
+    for t in np.random.default_rng(7).uniform(-0.3, 2.6, 40):
+        if any(abs(t - knot) < 3 * h for knot in knots):
+            continue
+        here = trajectory.sample(t)
+        around = [trajectory.sample(t + k * h) for k in (-2, -1, 1, 2)]
+        for i, (place, rate, acceleration) in enumerate(parts(here)):
+            near = [list(parts(s))[i] for s in around]
+            moved = five_points([displacement(place, n[0]) for n in near], h)
+            np.testing.assert_allclose(rate, moved, rtol=1e-8, atol=2e-8)
+            sped = five_points([n[1] for n in near], h)
+            np.testing.assert_allclose(acceleration, sped, rtol=1e-7, atol=2e-7)
+
+
+@every_member
+def test_motion_never_jumps(name: str) -> None:
+    """Each small step is the integral of the rate over it; each change of rate too."""
+    trajectory, knots = MEMBERS[name]
+    rough = {knots[0], knots[-1]} if name in ROUGH else set()
+    for one, other in pairwise(np.linspace(-0.3, 2.6, 500)):
+        if any(one <= knot <= other for knot in rough):
+            continue
+        h = other - one
+        before, after = trajectory.sample(one), trajectory.sample(other)
+        for a, b in zip(parts(before), parts(after), strict=True):
+            moved = displacement(a[0], b[0])
+            np.testing.assert_allclose(moved, h * (a[1] + b[1]) / 2, rtol=0, atol=1e-4)
+            sped = b[1] - a[1]
+            np.testing.assert_allclose(sped, h * (a[2] + b[2]) / 2, rtol=0, atol=1e-2)
+
+
+@pytest.mark.parametrize("name", FINITE)
+def test_motion_is_smooth_across_knots(name: str) -> None:
+    trajectory, knots = MEMBERS[name]
+    rough = {knots[0], knots[-1]} if name in ROUGH else set()
+    for knot in knots:
+        before = flat(trajectory.sample(knot - 1e-10))
+        after = flat(trajectory.sample(knot + 1e-10))
+        orders = 1 if knot in rough else 3
+        for i, (a, b) in enumerate(zip(before, after, strict=True)):
+            if i % 3 < orders:
+                np.testing.assert_allclose(a, b, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", sorted(set(FINITE) - {"blend", "blend in motion"}))
+def test_ends_are_held_exactly(name: str) -> None:
+    trajectory, knots = MEMBERS[name]
+    ends = [(knots[0] - 3.0, knots[0] - 1e-9)]
+    if not name.startswith("blend"):
+        ends.append((knots[-1], knots[-1] + 5.0))
+    for one, other in ends:
+        held, still = trajectory.sample(one), trajectory.sample(other)
+        for a, b in zip(flat(held), flat(still), strict=True):
+            np.testing.assert_array_equal(a, b)
+        for _, rate, acceleration in parts(held):
+            assert not rate.any()
+            assert not acceleration.any()
+
+
+@every_member
+def test_writing_into_out_equals_a_fresh_sample(name: str) -> None:
+    trajectory, _ = MEMBERS[name]
+    for t in (-0.5, 0.7, 1.0, 3):
+        fresh = trajectory.sample(t)
+        out = copy.deepcopy(fresh)
+        for array in flat(out):
+            array.fill(np.nan)
+        assert trajectory.sample(t, out) is out
+        for a, b in zip(flat(out), flat(fresh), strict=True):
+            np.testing.assert_array_equal(a, b)
+            assert np.isfinite(a).all()
+            assert a.dtype == np.float64
+
+
+@every_member
+def test_samples_are_the_callers_own(name: str) -> None:
+    trajectory, _ = MEMBERS[name]
+    for t in (-0.5, 0.7, 3.0):
+        before = copy.deepcopy(trajectory.sample(t))
+        for array in flat(trajectory.sample(t)):
+            array.fill(7.0)
+        for a, b in zip(flat(before), flat(trajectory.sample(t)), strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+@every_member
+@pytest.mark.parametrize("way", ["pickle", "copy", "deepcopy"])
+def test_copies_move_alike(name: str, way: str) -> None:
+    trajectory, _ = MEMBERS[name]
+    again = {
+        "pickle": lambda: pickle.loads(pickle.dumps(trajectory)),
+        "copy": lambda: copy.copy(trajectory),
+        "deepcopy": lambda: copy.deepcopy(trajectory),
+    }[way]()
+    for t in (-0.5, 0.7, 3.0):
+        for a, b in zip(flat(trajectory.sample(t)), flat(again.sample(t)), strict=True):
+            np.testing.assert_array_equal(a, b)
+    assert repr(again) == repr(trajectory)
+    assert_immutable(again)
+
+
+def slots(trajectory: Any) -> list[str]:
+    return [
+        name for c in type(trajectory).__mro__ for name in getattr(c, "__slots__", ())
+    ]
+
+
+def assert_immutable(trajectory: Any) -> None:
+    for attribute in slots(trajectory):
+        value = getattr(trajectory, attribute)
+        with pytest.raises(AttributeError, match="is immutable"):
+            setattr(trajectory, attribute, value)
+        with pytest.raises(AttributeError, match="is immutable"):
+            delattr(trajectory, attribute)
+        if isinstance(value, np.ndarray):
+            assert not value.flags.writeable
+    with pytest.raises(AttributeError):
+        trajectory.no_such_attribute = 1
+
+
+@every_member
+def test_members_are_immutable(name: str) -> None:
+    trajectory, _ = MEMBERS[name]
+    assert_immutable(trajectory)
+    assert type(trajectory).__name__ in repr(trajectory)
+
+
+def test_inputs_are_copied() -> None:
+    point = np.ones(2)
+    hold, blend = Hold(point), Blend(point, CIRCLE, 1.0)
+    point[:] = 9.0
+    assert point.flags.writeable
+    np.testing.assert_array_equal(hold.sample(0.0).position, [1, 1])
+    np.testing.assert_array_equal(blend.sample(0.0).position, [1, 1])
+
+
+@pytest.mark.parametrize("name", POINT_MEMBERS)
+def test_dimension(name: str) -> None:
+    trajectory, _ = POINT_MEMBERS[name]
+    n = trajectory.dimension
+    assert all(array.shape == (n,) for array in trajectory.sample(0.3))
+    message = f"out has dimension {n + 1}; this .* has dimension {n}"
+    with pytest.raises(ShapeError, match=message):
+        trajectory.sample(0.3, TrajectorySample.allocate(n + 1))
+
+
+@every_member
+def test_uncompiled_equals_compiled(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    trajectory, knots = MEMBERS[name]
+    times = [-0.5, 0.0, 0.6, 1.0, 1.3, *knots, 3.0]
+    compiled = [flat(trajectory.sample(t)) for t in times]
+    for module in vars(family).values():
+        for member, value in list(getattr(module, "__dict__", {}).items()):
+            if hasattr(value, "py_func"):
+                monkeypatch.setattr(module, member, value.py_func)
+    for t, sample in zip(times, compiled, strict=True):
+        for a, b in zip(flat(trajectory.sample(t)), sample, strict=True):
+            # Rounding, which differences of a Python function magnify.
+            slack = 1e-9 if name.startswith("callable") else 1e-13
+            np.testing.assert_allclose(a, b, rtol=slack, atol=slack)
+
+
+def test_paper_circle() -> None:
+    for t in (0.0, 0.4, 2.0):
+        x, x_dot, x_ddot = CIRCLE.sample(t)
+        c, s = cos(3 * t), sin(3 * t)
+        np.testing.assert_allclose(x, [1 + c, 1 + s], rtol=1e-15)
+        np.testing.assert_allclose(x_dot, [-3 * s, 3 * c], rtol=1e-15)
+        np.testing.assert_allclose(x_ddot, [-9 * c, -9 * s], rtol=1e-15)
+
+
+@quick
+@given(st.integers(0, 10**6))
+def test_circle_turns_by_the_right_hand_about_its_normal(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    center, normal, start = rng.normal(size=(3, 3))
+    radius, rate, phase = rng.uniform(0.1, 3.0, 3)
+    for toward in (None, start):
+        circle = Circle(center, radius, rate, phase, normal=normal, start=toward)
+        x, x_dot, x_ddot = circle.sample(rng.uniform(-5, 5))
+        arm = x - center
+        assert np.linalg.norm(arm) == pytest.approx(radius)
+        omega = rate * normal / np.linalg.norm(normal)
+        np.testing.assert_allclose(x_dot, np.cross(omega, arm), atol=1e-12)
+        np.testing.assert_allclose(x_ddot, np.cross(omega, x_dot), atol=1e-12)
+    first = Circle(center, radius, rate, normal=normal, start=start).sample(0.0)
+    assert start @ (first.position - center) > 0
+    assert start @ first.velocity == pytest.approx(0, abs=1e-12)
+
+
+@quick
+@given(st.integers(0, 10**6), st.integers(2, 8))
+def test_minimum_jerk_is_the_quintic_spline_at_rest(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(count, 2))
+    times = np.cumsum(rng.uniform(0.2, 2.0, count))
+    own, scipys = MinimumJerk(points, times), Spline(points, times)
+    for t, point in zip(times, points, strict=True):
+        np.testing.assert_allclose(own.sample(t).position, point, atol=1e-12)
+    for t in rng.uniform(times[0], times[-1], 10):
+        for a, b in zip(own.sample(t), scipys.sample(t), strict=True):
+            np.testing.assert_allclose(a, b, rtol=1e-8, atol=1e-8)
+
+
+def test_minimum_jerk_of_two_points_is_the_line() -> None:
+    line, jerk = (
+        Line([0, 1], [3, -1], 1.5, 0.5),
+        MinimumJerk([[0, 1], [3, -1]], [0.5, 2]),
+    )
+    for t in np.linspace(0, 2.5, 20):
+        for a, b in zip(line.sample(t), jerk.sample(t), strict=True):
+            np.testing.assert_allclose(a, b, atol=1e-14)
+
+
+def test_spline_waypoints_and_bending() -> None:
+    """A cubic spline bends least: less than the smoother quintic, and vice versa."""
+    splines = {degree: Spline(POINTS, TIMES, degree) for degree in (3, 5, 7)}
+    for spline in splines.values():
+        for t, point in zip(TIMES, POINTS, strict=True):
+            np.testing.assert_allclose(spline.sample(t).position, point, atol=1e-12)
+    grid = np.linspace(TIMES[0] + 1e-9, TIMES[-1] - 1e-9, 4001)
+    bending, jerk = {}, {}
+    for degree, spline in splines.items():
+        x_ddot = np.array([spline.sample(t).acceleration for t in grid])
+        bending[degree] = np.square(x_ddot).mean()
+        jerk[degree] = np.square(np.diff(x_ddot, axis=0)).mean()
+    assert bending[3] < bending[5] < bending[7]
+    assert jerk[5] < jerk[7]
+    np.testing.assert_allclose(
+        splines[3].sample(TIMES[0] + 1e-12).velocity, 0, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize(("rate", "tolerance"), [(1.0, 1e-10), (10.0, 5e-9)])
+def test_callable_is_as_accurate_as_it_says(rate: float, tolerance: float) -> None:
+    circle = Circle([1, 1], 1, rate)
+    numerical = CallableTrajectory(lambda t: circle.sample(t).position, 2)
+    for t in np.linspace(0, 3, 30):
+        exact, found = circle.sample(t), numerical.sample(t)
+        np.testing.assert_allclose(
+            found.acceleration, exact.acceleration, rtol=0, atol=tolerance
+        )
+
+
+def test_callable_orientation_finds_the_exact_rates() -> None:
+    turning = CallableOrientation(lambda t: BLENDED_SPIN.sample(t).rotation)
+    exact_turn, found_turn = BLENDED_SPIN.sample(1.2), turning.sample(1.2)
+    for a, b in zip(found_turn, exact_turn, strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-8)
+
+
+@quick
+@given(st.integers(0, 10**6))
+def test_blend_leads_from_the_start_into_the_trajectory(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    start, velocity = rng.normal(size=(2, 3))
+    t0, duration = rng.normal(), rng.uniform(0.1, 4.0)
+    blend = Blend(start, LISSAJOUS, duration, velocity, t0)
+    x, x_dot, x_ddot = blend.sample(t0)
+    np.testing.assert_array_equal(x, start)
+    np.testing.assert_array_equal(x_dot, velocity)
+    np.testing.assert_array_equal(x_ddot, np.zeros(3))
+    for t in (t0 + 1.0001 * duration, t0 + 9.0):
+        for a, b in zip(blend.sample(t), LISSAJOUS.sample(t), strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+@quick
+@given(st.integers(0, 10**6))
+def test_blend_orientation_leads_on_whatever_the_turn(seed: int) -> None:
+    """The spin passes half a turn away from the start, several times."""
+    rng = np.random.default_rng(seed)
+    start = pin.exp3(pi * rng.uniform(-1, 1, 3))
+    velocity = rng.normal(size=3)
+    spin = Spin(R1, rng.normal(size=3), rng.uniform(3.0, 9.0))
+    blend = BlendOrientation(start, spin, 2.0, velocity, 0.5)
+    R, omega, omega_dot = blend.sample(0.5)
+    np.testing.assert_allclose(R, start, atol=1e-14)
+    np.testing.assert_allclose(omega, velocity, atol=1e-12)
+    np.testing.assert_allclose(omega_dot, np.zeros(3), atol=1e-11)
+    for t in (2.5001, 9.0):
+        for a, b in zip(blend.sample(t), spin.sample(t), strict=True):
+            np.testing.assert_array_equal(a, b)
+    fastest = 0.0
+    for one, other in pairwise(np.linspace(0.5, 2.6, 300)):
+        step = displacement(blend.sample(one).rotation, blend.sample(other).rotation)
+        fastest = max(fastest, float(np.linalg.norm(step)) / (other - one))
+    assert fastest < 40.0  # no jump
+
+
+@quick
+@given(st.integers(0, 10**6))
+def test_screw_is_pinocchios(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    start, end = (
+        pin.SE3(pin.exp3(rng.uniform(-1.7, 1.7, 3)), rng.normal(size=3))
+        for _ in range(2)
+    )
+    screw = ScrewInterpolation(start, end, 2.0, -1.0)
+    weight = Line([0.0], [1.0], 2.0, -1.0)
+    for t in (-2.0, -1.0, -0.5, 0.0, 0.7, 1.0, 5.0):
+        s = weight.sample(t).position[0]
+        expected = start * pin.exp6(s * pin.log6(start.actInv(end)))
+        position, orientation = screw.sample(t)
+        np.testing.assert_allclose(position.position, expected.translation, atol=1e-11)
+        np.testing.assert_allclose(orientation.rotation, expected.rotation, atol=1e-12)
+    for t, held in ((-1.0, start), (1.0, end)):
+        position, orientation = screw.sample(t)
+        np.testing.assert_array_equal(position.position, held.translation)
+        np.testing.assert_array_equal(orientation.rotation, held.rotation)
+
+
+def test_orientation_path_takes_the_shortest_turns() -> None:
+    path = OrientationPath([R1, R2, R3], [0.0, 1.0, 3.0])
+    for t, R in ((0.0, R1), (1.0, R2), (3.0, R3)):
+        sample = path.sample(t)
+        np.testing.assert_array_equal(sample.rotation, R)
+        np.testing.assert_array_equal(sample.angular_velocity, np.zeros(3))
+    half = path.sample(0.5).rotation
+    np.testing.assert_allclose(
+        pin.log3(R1.T @ half), pin.log3(R1.T @ R2) / 2, atol=1e-14
+    )
+
+
+def test_spin_turns_about_the_worlds_axis() -> None:
+    R, omega, omega_dot = Spin(R1, [0, 0, 7], 2.0).sample(0.3)
+    np.testing.assert_allclose(R, pin.exp3(np.array([0, 0, 0.6])) @ R1, atol=1e-15)
+    np.testing.assert_array_equal(omega, [0, 0, 2])
+    np.testing.assert_array_equal(omega_dot, [0, 0, 0])
+
+
+def test_a_trajectory_of_ones_own() -> None:
+    class Fall(Trajectory):
+        __slots__ = ("height",)
+
+        def __init__(self, height: float) -> None:
+            self.height = height
+
+        @property
+        def dimension(self) -> int:
+            return 1
+
+        def sample(
+            self, t: float, out: TrajectorySample | None = None
+        ) -> TrajectorySample:
+            out = self._output(out)
+            out.position[0] = self.height - 4.9 * t * t
+            out.velocity[0] = -9.8 * t
+            out.acceleration[0] = -9.8
+            return out
+
+    assert Blend([0.0], Fall(2.0), 1.0).sample(3.0).velocity == pytest.approx(-29.4)
+    with pytest.raises(AttributeError, match="Fall is immutable: make a new one"):
+        Fall(2.0).height = 3.0
+
+
+def test_sample_allocation() -> None:
+    assert OrientationSample.allocate().rotation.tolist() == IDENTITY.tolist()
+    assert PoseSample.allocate().position.velocity.shape == (3,)
+
+
+MIRROR = np.diag([1.0, 1.0, -1.0])
+ERRORS: dict[str, Callable[[], Any]] = {
+    r"point must be numbers of shape \(n\); point = 'here'": lambda: Hold("here"),
+    r"point must have shape \(n\); it has \(\)": lambda: Hold(1.0),
+    r"point must have shape \(n\); it has \(0,\)": lambda: Hold([]),
+    r"point must be finite; point = \[1.0, nan\]": lambda: Hold([1, np.nan]),
+    r"end must have shape \(2\); it has \(3,\)": lambda: Line([0, 0], [1, 2, 3], 1),
+    r"duration must be positive; duration = 0.0": lambda: Line([0], [1], 0),
+    r"duration must be finite; duration = inf": lambda: Line([0], [1], np.inf),
+    r"start_time must be finite": lambda: Line([0], [1], 1, np.nan),
+    r"velocity must have shape \(2\)": lambda: UniformLine([0, 0], [1]),
+    r"radius must be positive; radius = -1.0": lambda: Circle([0, 0], -1, 1),
+    r"angular_rate must be numbers of shape \(\)": (
+        lambda: Circle([0, 0], 1, "fast")  # type: ignore[arg-type]
+    ),
+    r"dimension 3 needs axes or a normal": lambda: Circle([0, 0, 0], 1, 1),
+    r"a circle in dimension 4 needs axes": lambda: Circle(np.zeros(4), 1, 1),
+    r"give axes or a normal, not both": lambda: Circle(
+        [0, 0, 0], 1, 1, axes=np.eye(3)[:2], normal=[0, 0, 1]
+    ),
+    r"normal is for dimension 3; center has dimension 2": lambda: Circle(
+        [0, 0], 1, 1, normal=[0, 0, 1]
+    ),
+    r"start goes with normal": lambda: Circle([0, 0], 1, 1, start=[1, 0]),
+    r"normal must have a direction": lambda: Circle([0] * 3, 1, 1, normal=[0, 0, 0]),
+    r"start must not point along normal": lambda: Circle(
+        [0, 0, 0], 1, 1, normal=[0, 0, 1], start=[0, 0, -2]
+    ),
+    r"rows of axes must be orthonormal; they are off by 3.0e\+00": lambda: Circle(
+        [0, 0], 1, 1, axes=[[2, 0], [0, 1]]
+    ),
+    r"amplitudes must have shape \(2\)": lambda: Lissajous([0, 0], [1], [1, 1]),
+    r"waypoint times must increase; times\[2\] = 1.0 <= times\[1\] = 1.0": (
+        lambda: MinimumJerk(np.zeros((3, 2)), [0, 1, 1])
+    ),
+    r"times must have shape \(3\); it has \(2,\)": lambda: Spline(np.eye(3), [0, 1]),
+    r"a path needs two waypoints or more; it has 1": lambda: MinimumJerk([[1.0]], [0]),
+    r"degree must be 3, 5 or 7; degree = 4": lambda: Spline(np.eye(2), [0, 1], 4),
+    r"waypoints must have shape \(n, n\)": lambda: Spline([0, 1], [0, 1]),
+    r"coefficients must have shape": lambda: PiecewisePolynomial([0, 1], [[1.0, 2]]),
+    r"dimension must be a positive integer; dimension = 0": (
+        lambda: CallableTrajectory(swinging, 0)
+    ),
+    r"step must be positive": lambda: CallableTrajectory(swinging, 3, step=0),
+    r"function\(.*\) must have shape \(2\); it has \(3,\)": (
+        lambda: CallableTrajectory(swinging, 2).sample(0.5)
+    ),
+    r"velocity\(0.5\) must have shape \(3\)": (
+        lambda: CallableTrajectory(swinging, 3, lambda t: [t]).sample(0.5)
+    ),
+    r"start must have shape \(2\); it has \(3,\)": lambda: Blend([0] * 3, CIRCLE, 1),
+    r"start_velocity must have shape \(2\)": lambda: Blend([0, 0], CIRCLE, 1, [1]),
+    r"the rows of rotation must be orthonormal": lambda: HoldOrientation(2 * IDENTITY),
+    r"rotation must be a rotation; it mirrors": lambda: HoldOrientation(MIRROR),
+    r"rotation must have shape \(3, 3\); it has \(4,\)": lambda: Spin([0] * 4, [1], 1),
+    r"axis must have a direction; axis = \[0, 0, 0\]": (
+        lambda: Spin(IDENTITY, [0, 0, 0], 1)
+    ),
+    r"rotations\[1\] must be a rotation": (
+        lambda: OrientationPath([IDENTITY, MIRROR], [0, 1])
+    ),
+    r"times\[1\] = 0.0 <= times\[0\] = 0.0": lambda: OrientationPath([R1, R2], [0, 0]),
+    r"function\(0\) must be a rotation": (
+        lambda: CallableOrientation(lambda t: MIRROR).sample(0.0)
+    ),
+    r"start_angular_velocity must have shape \(3\)": (
+        lambda: BlendOrientation(R1, SPIN, 1.0, [1.0])
+    ),
+    r"position has dimension 2; the origin of a pose moves in dimension 3": (
+        lambda: ComposedPose(CIRCLE, SPIN)
+    ),
+    r"end.rotation must be orthonormal": (
+        lambda: ScrewInterpolation(
+            pin.SE3(R1, POINTS[0]), pin.SE3(2 * R1, POINTS[1]), 1
+        )
+    ),
+}
+
+
+@pytest.mark.parametrize("message", ERRORS)
+def test_bad_input_is_named(message: str) -> None:
+    with pytest.raises(TrajectoryError, match=message):
+        ERRORS[message]()
+
+
+def test_every_member_is_tested() -> None:
+    tested = {type(member).__name__ for member, _ in MEMBERS.values()}
+    bases = (Trajectory, OrientationTrajectory, PoseTrajectory)
+    public = {
+        name
+        for name, value in vars(family).items()
+        if isinstance(value, type) and issubclass(value, bases) and value not in bases
+    }
+    assert tested == public

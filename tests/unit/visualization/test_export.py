@@ -1,0 +1,679 @@
+"""An exported page holds what the log has, within its bounds, in few bytes."""
+
+import base64
+import gzip
+import io
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import trimesh
+import umsgpack
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+from scipy.spatial import cKDTree
+
+from hsp_control import Robot, Rollout, load_experiment
+from hsp_control.cli import main
+from hsp_control.common.exceptions import ExportError, ViewerError
+from hsp_control.visualization.viewer.export import (
+    FilmStyle,
+    encoding,
+    export_film,
+    export_html,
+)
+from hsp_control.visualization.viewer.export.meshes import read_mesh
+from hsp_control.visualization.viewer.export.packing import ArrayTable
+from hsp_control.visualization.viewer.export.panels import CURVE_BOUND, pack_panels
+from hsp_control.visualization.viewer.export.scene import VERTEX_STEP
+from hsp_control.visualization.viewer.export.shooting import frame_times
+from hsp_control.visualization.viewer.export.surfaces import (
+    in_order,
+    split_creases,
+    weld,
+)
+from hsp_control.visualization.viewer.export.thinning import (
+    angle,
+    distance,
+    on_line,
+    on_sphere,
+    stays,
+    thin,
+)
+from hsp_control.visualization.viewer.export.tracks import ANGLE_BOUND, POSITION_BOUND
+
+MEGABYTE = 1e6
+PLANAR = "paper/4_moving_obstacle"
+# As configured, a run takes minutes without compiled kernels.
+COARSE = (
+    "simulation.control_period=null",
+    "simulation.integrator={type: rk4, step: 0.01}",
+)
+TALOS = {
+    "title": "Talos",
+    "robot": {"name": "talos", "root": "fixed"},
+    "tasks": {
+        side: {
+            "type": "frame_position",
+            "frame": f"gripper_{side}_base_link",
+            "trajectory": {
+                "type": "circle",
+                "origin": "start",
+                "center": [0, 0, 0],
+                "radius": 0.08,
+                "angular_rate": 2,
+                "normal": [1, 0, 0],
+            },
+            "gains": {"natural_frequency": 10},
+            "blend": 1,
+        }
+        for side in ("left", "right")
+    },
+    "null_space": {"gain": 5, "fields": [{"type": "joint_centering", "weight": 1}]},
+    "simulation": {"duration": 10, "integrator": {"type": "rk4", "step": 0.01}},
+}
+
+
+@pytest.fixture(scope="module")
+def planar() -> Rollout:
+    return load_experiment(PLANAR, "simulation.duration=3").run()
+
+
+@pytest.fixture(scope="module")
+def panda() -> Rollout:
+    return load_experiment("panda_obstacle", *COARSE).run()
+
+
+# -- numbers --------------------------------------------------------------------------
+
+
+def unpacked(entry: dict[str, Any]) -> np.ndarray:
+    """The other half of packing.py, as unpack.js has it."""
+    data = entry["bytes"]
+    data = np.frombuffer(getattr(data, "data", data), np.uint8)
+    rows, columns, width = entry["rows"], entry["columns"], entry["width"]
+    planes = data.reshape(width, columns, rows).astype(np.int64)
+    zigzag = sum(planes[k] << 8 * k for k in range(width))
+    whole = np.asarray((zigzag >> 1) ^ -(zigzag & 1)).T
+    if entry["kind"] == "triangles":
+        corners, unused = np.empty(3 * rows, np.int64), 0
+        for i, difference in enumerate(whole.ravel()):
+            corners[i] = unused - difference
+            unused = max(unused, corners[i] + 1)
+        return corners.reshape(-1, 3)
+    return np.array(entry["offset"]) + np.cumsum(whole, axis=0) * entry["step"]
+
+
+@given(
+    st.lists(
+        st.tuples(*[st.floats(-1e6, 1e6, allow_nan=False, width=32)] * 2), max_size=40
+    ),
+    st.sampled_from([1e-6, 1e-3, 0.5, 1e4]),
+)
+def test_numbers_come_back_within_half_a_step(
+    rows: list[tuple[float, float]], step: float
+) -> None:
+    values = np.reshape(rows, (-1, 2))
+    table = ArrayTable()
+    table.numbers(values, step)
+    (entry,) = table.entries
+    steps = np.array(entry["step"])
+    assert (steps >= step).all()
+    assert (steps <= max(step, 2e6 / (2**31 - 1)) * 1.0001).all()
+    error = np.abs(unpacked(entry) - values)
+    assert (error <= 0.5 * steps * (1.0 + 1e-6) + 1e-9).all()
+
+
+def test_equal_arrays_are_kept_once() -> None:
+    table = ArrayTable()
+    wave = np.sin(np.arange(50.0))
+    first = table.numbers(wave, 1e-4)
+    assert table.numbers(wave.copy(), 1e-4) == first
+    assert table.numbers(wave + 1.0, 1e-4) != first
+    assert table.numbers(wave, 1e-3) != first
+    assert len(table.entries) == 3
+    whole = table.whole(np.array([7, 0, 255], np.uint8))
+    entry = table.entries[whole["$array"]]
+    assert entry["kind"] == "Uint8Array"
+    np.testing.assert_array_equal(unpacked(entry).ravel(), [7, 0, 255])
+
+
+# -- keyframes ------------------------------------------------------------------------
+
+T = np.linspace(0.0, 10.0, 1001)
+
+
+def played(times: np.ndarray, keys: np.ndarray, rows: np.ndarray, how: Any) -> Any:
+    """What the page shows at each time."""
+    left = np.clip(np.searchsorted(times[keys], times, side="right") - 1, 0, None)
+    right = np.minimum(left + 1, len(keys) - 1)
+    span = times[keys[right]] - times[keys[left]]
+    fraction = (times - times[keys[left]]) / np.where(span > 0.0, span, 1.0)
+    return how(rows[keys[left]], rows[keys[right]], fraction[:, None])
+
+
+def test_thinned_keyframes_stay_within_the_bound_and_are_few() -> None:
+    values = np.column_stack([np.sin(T), 0.3 * np.cos(2.0 * T), T])
+    rounded = np.round(values / 2.5e-5) * 2.5e-5
+    keys = thin(T, values, rounded, on_line, distance(2e-4))
+    error = np.linalg.norm(played(T, keys, rounded, on_line) - values, axis=1)
+    assert error.max() <= 2e-4
+    # A parabola of curvature c leaves its chord of length h by c h² / 8: with the
+    # strongest curvature, 1.6, everywhere that would be 310 keyframes; cutting where it
+    # is worst, not where it is best, may take twice as many.
+    assert len(keys) < 620
+    line = np.column_stack([T, -2.0 * T, 0.0 * T])
+    assert thin(T, line, line, on_line, distance(1e-9)).tolist() == [0, 1000]
+
+
+def test_a_jump_stays_a_jump() -> None:
+    values = np.where(T > 4.995, 1.0, 0.0)[:, None]
+    for how in (on_line, stays):
+        keys = thin(T, values, values, how, distance(0.25))
+        # Between two samples nobody knows when it was.
+        assert set(keys.tolist()) <= {0, 498, 499, 500, 501, 999, 1000}
+        np.testing.assert_array_equal(played(T, keys, values, how), values)
+
+
+def test_turning_is_thinned_on_the_sphere() -> None:
+    steady = np.column_stack([0.0 * T, 0.0 * T, np.sin(1.5 * T), np.cos(1.5 * T)])
+    keys = thin(T, steady, steady, on_sphere, angle(1e-5))
+    assert len(keys) < 20  # 30 rad in all; a short way is less than half a turn
+    rng = np.random.default_rng(5)
+    waves = np.cumsum(rng.standard_normal((3, 1001)), axis=1) * 0.002
+    turns = np.array([pin.Quaternion(pin.exp3(w)).coeffs() for w in waves.T])
+    keys = thin(T, turns, turns, on_sphere, angle(ANGLE_BOUND))
+    shown = played(T, keys, turns, on_sphere)
+    for a, b in zip(shown, turns, strict=True):
+        off = pin.Quaternion(*a[[3, 0, 1, 2]]).angularDistance(
+            pin.Quaternion(*b[[3, 0, 1, 2]])
+        )
+        assert off <= ANGLE_BOUND * (1.0 + 1e-6)
+    assert len(keys) < 900
+    # The two quaternions of one orientation are one orientation.
+    flipped = turns * np.where(np.arange(1001) % 2, -1.0, 1.0)[:, None]
+    assert angle(1.0)(flipped, turns).max() < 1e-12
+
+
+# -- meshes ---------------------------------------------------------------------------
+
+
+def test_joined_triangles_keep_their_place() -> None:
+    box = trimesh.creation.box([1.0, 2.0, 3.0])
+    soup = np.asarray(box.triangles).reshape(-1, 3)
+    vertices, triangles = weld(soup, np.arange(36).reshape(-1, 3), 1e-6)
+    assert len(vertices) == 8
+    np.testing.assert_allclose(vertices[triangles], box.triangles)
+    sliver = np.array([[0, 1, 1], [0, 1, 2]])
+    assert len(weld(soup[:3], sliver, 1e-6)[1]) == 1
+
+
+def test_edges_stay_sharp_and_round_things_smooth() -> None:
+    box = trimesh.creation.box([1.0, 1.0, 1.0])
+    vertices, triangles = split_creases(np.array(box.vertices), np.array(box.faces))
+    assert len(vertices) == 24  # a corner has three normals
+    np.testing.assert_allclose(vertices[triangles], box.triangles)
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    vertices, triangles = split_creases(np.array(ball.vertices), np.array(ball.faces))
+    assert len(vertices) == len(ball.vertices)
+
+
+def test_the_order_changes_and_nothing_else() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    vertices, triangles = in_order(np.array(ball.vertices), np.array(ball.faces))
+    table = ArrayTable()
+    table.triangles(triangles)
+    np.testing.assert_array_equal(unpacked(table.entries[0]), triangles)
+
+    def rotations(corners: np.ndarray) -> set[bytes]:
+        first = np.lexsort(corners.transpose(2, 0, 1)[::-1], axis=1)[:, 0]
+        turn = (first[:, None] + np.arange(3)) % 3
+        turned = np.take_along_axis(corners, turn[:, :, None], axis=1)
+        return {row.tobytes() for row in np.ascontiguousarray(turned)}
+
+    assert rotations(vertices[triangles]) == rotations(np.array(ball.triangles))
+
+
+def mesh_of(robot: Robot, recorder_path: Path, **about: Any) -> dict[str, Any]:
+    suffix = recorder_path.suffix.lower()[1:]
+    text = recorder_path.read_text() if suffix == "dae" else recorder_path.read_bytes()
+    kind = "_meshfile_object" if suffix == "dae" else "_meshfile_geometry"
+    return {"type": kind, "format": suffix, "data": text, **about}
+
+
+@pytest.mark.parametrize("name", ["panda", "talos", "kinova", "ur5"])
+def test_meshes_are_read_as_pinocchio_reads_them(name: str) -> None:
+    robot = Robot.load(name)
+    geometry = pin.buildGeomFromUrdf(
+        robot.model,
+        str(robot.source.urdf),
+        pin.GeometryType.VISUAL,
+        package_dirs=[str(folder) for folder in robot.source.package_dirs],
+    )
+    read = 0
+    for item in list(geometry.geometryObjects)[::5]:
+        file = Path(item.meshPath)
+        if file.suffix.lower() not in {".dae", ".stl"}:
+            continue
+        read += 1
+        pieces = read_mesh(mesh_of(robot, file), item.name)
+        vertices = np.vstack([piece.vertices for piece in pieces]) * item.meshScale
+        before = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
+        triangles = [p.triangles + n for p, n in zip(pieces, before[:-1], strict=True)]
+        expected = item.geometry.vertices()
+        used = vertices[np.unique(np.concatenate(triangles))]
+        tolerance = 1e-5 * np.ptp(expected, axis=0).max()
+        for these, those in ((used, expected), (expected, used)):
+            assert cKDTree(these).query(those)[0].max() < tolerance
+    assert read > 1
+
+
+def collada(matrix: str, effect: str, extra: str = "", uv: str = "") -> str:
+    return f"""<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit meter="0.001"/><up_axis>Y_UP</up_axis></asset>
+{extra}
+<library_effects><effect id="e"><profile_COMMON>{effect}</profile_COMMON></effect>
+</library_effects>
+<library_materials><material id="m"><instance_effect url="#e"/></material>
+</library_materials>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="pa" count="9">0 0 0 1 0 0 0 1 0</float_array>
+<technique_common><accessor source="#pa" count="3" stride="3">
+<param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common>
+</source>{uv}
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="1" material="s"><input semantic="VERTEX" source="#v" offset="0"/>
+{'<input semantic="TEXCOORD" source="#u" offset="0" set="0"/>' if uv else ""}
+<p>0 1 2</p></triangles></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><matrix>{matrix}</matrix>
+<instance_geometry url="#g"><bind_material><technique_common>
+<instance_material symbol="s" target="#m"/></technique_common></bind_material>
+</instance_geometry></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+
+
+PLAIN = (
+    "<technique sid='t'><lambert><diffuse><color>1 0.5 0 1</color></diffuse></lambert>"
+    "</technique>"
+)
+
+
+def test_a_collada_file_keeps_its_place_colour_and_outside() -> None:
+    mirrored = "-2 0 0 0.5  0 2 0 0  0 0 2 0  0 0 0 1"
+    thing = {"type": "_meshfile_object", "format": "dae", "resources": {}}
+    (piece,) = read_mesh({**thing, "data": collada(mirrored, PLAIN)}, "it")
+    assert piece.color == pytest.approx((1.0, 0.5, 0.0, 1.0), abs=0.01)
+    corners = piece.vertices[piece.triangles[0]]
+    # Neither unit nor up axis counts; the node's own matrix does.
+    assert {tuple(corner) for corner in corners.tolist()} == {
+        (0.5, 0.0, 0.0), (-1.5, 0.0, 0.0), (0.5, 2.0, 0.0),
+    }  # fmt: skip
+    # Mirrored, but still seen from above.
+    assert np.cross(corners[1] - corners[0], corners[2] - corners[0])[2] > 0.0
+
+
+def test_a_texture_becomes_its_mean_colour() -> None:
+    picture = Image.new("RGB", (8, 8), (200, 40, 20))
+    buffer = io.BytesIO()
+    picture.save(buffer, "PNG")
+    address = f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}"
+    effect = (
+        "<newparam sid='f'><surface type='2D'><init_from>i</init_from></surface>"
+        "</newparam><newparam sid='a'><sampler2D><source>f</source></sampler2D>"
+        "</newparam><technique sid='t'><lambert><diffuse><texture texture='a' "
+        "texcoord='UV'/></diffuse></lambert></technique>"
+    )
+    images = (
+        "<library_images><image id='i'><init_from>skin.png</init_from></image>"
+        "</library_images>"
+    )
+    uv = (
+        '<source id="u"><float_array id="ua" count="6">0 0 1 0 0 1</float_array>'
+        '<technique_common><accessor source="#ua" count="3" stride="2"><param name="S" '
+        'type="float"/><param name="T" type="float"/></accessor></technique_common>'
+        "</source>"
+    )
+    text = collada("1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1", effect, images, uv)
+    thing = {"type": "_meshfile_object", "format": "dae", "data": text}
+    (piece,) = read_mesh({**thing, "resources": {"skin.png": address}}, "it")
+    assert piece.color is not None
+    expected = [200 / 255, 40 / 255, 20 / 255]
+    np.testing.assert_allclose(piece.color[:3], expected, atol=0.02)
+
+
+def test_a_mesh_that_cannot_be_read_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    thing = {"type": "_meshfile_object", "format": "dae", "data": "<COLLADA/>"}
+    with pytest.raises(ExportError, match=r"/robot/hand: its mesh cannot be read"):
+        read_mesh(thing, "/robot/hand")
+    for module in ("trimesh", "collada"):
+        with monkeypatch.context() as patch:
+            patch.setitem(sys.modules, module, None)
+            message = rf"/robot/hand is drawn from .* needs {module}: pip install"
+            with pytest.raises(ExportError, match=message):
+                read_mesh(thing, "/robot/hand")
+
+
+# -- the page -------------------------------------------------------------------------
+
+
+def content_of(page: Path) -> dict[str, Any]:
+    """What a page holds, with its arrays in their places."""
+    text = page.read_text(encoding="utf-8")
+    block = re.search(r'id="content">([^<]*)<', text)
+    assert block is not None
+    content = umsgpack.unpackb(gzip.decompress(base64.b64decode(block[1])))
+    arrays = [unpacked(entry) for entry in content["arrays"]]
+
+    def revived(value: Any) -> Any:
+        if isinstance(value, dict):
+            if "$array" in value:
+                return arrays[value["$array"]]
+            return {key: revived(item) for key, item in value.items()}
+        if isinstance(value, list):
+            return [revived(item) for item in value]
+        return value
+
+    return {key: revived(content[key]) for key in content if key != "arrays"}
+
+
+def tracks_of(content: dict[str, Any]) -> dict[tuple[str, str], tuple[Any, Any]]:
+    (clip,) = (c for c in content["commands"] if c["type"] == "clip")
+    return {
+        (track["path"], track["property"]): (
+            clip["clocks"][track["clock"]].ravel(),
+            track["values"],
+        )
+        for track in clip["tracks"]
+    }
+
+
+def test_every_joint_is_where_the_log_has_it(panda: Rollout, tmp_path: Path) -> None:
+    page = export_html(panda, tmp_path / "panda.html")
+    assert page.stat().st_size < 2.0 * MEGABYTE
+    content = content_of(page)
+    tracks = tracks_of(content)
+    robot = Robot.load("panda")
+    data = robot.model.createData()
+    at = {}
+    keyframes = 0
+    for joint in robot.model.names[1:]:
+        times, positions = tracks[f"/robot/{joint}", "position"]
+        clock, turns = tracks[f"/robot/{joint}", "quaternion"]
+        keyframes += len(times)
+        at[joint] = (
+            sampled(times, positions, panda.t, on_line),
+            sampled(clock, turns, panda.t, on_sphere),
+        )
+    assert keyframes < 0.5 * len(panda) * (robot.model.njoints - 1)
+    for row, q in enumerate(panda.q):
+        pin.forwardKinematics(robot.model, data, q)
+        for joint, (positions, turns) in at.items():
+            placement = data.oMi[robot.model.getJointId(joint)]
+            off = np.linalg.norm(positions[row] - placement.translation)
+            assert off <= POSITION_BOUND * 1.001
+            shown = pin.Quaternion(*turns[row][[3, 0, 1, 2]])
+            turned = shown.normalized().angularDistance(
+                pin.Quaternion(placement.rotation)
+            )
+            assert turned <= ANGLE_BOUND * 1.001
+
+
+def sampled(times: np.ndarray, values: np.ndarray, t: np.ndarray, how: Any) -> Any:
+    left = np.clip(np.searchsorted(times, t, side="right") - 1, 0, None)
+    right = np.minimum(left + 1, len(times) - 1)
+    span = times[right] - times[left]
+    fraction = ((t - times[left]) / np.where(span > 0, span, 1.0)).clip(0.0, 1.0)
+    return how(values[left], values[right], fraction[:, None])
+
+
+def test_talos_fits_and_its_mirrored_side_is_mirrored(tmp_path: Path) -> None:
+    experiment = load_experiment(TALOS)
+    rollout = experiment.run()
+    page = export_html(rollout, tmp_path / "talos.html")
+    assert page.stat().st_size < 4.0 * MEGABYTE
+    robot = experiment.robot
+    geometry = pin.buildGeomFromUrdf(
+        robot.model,
+        str(robot.source.urdf),
+        pin.GeometryType.VISUAL,
+        package_dirs=[str(folder) for folder in robot.source.package_dirs],
+    )
+    mirrored = 0
+    objects = {
+        command["path"]: command["object"]
+        for command in content_of(page)["commands"]
+        if command["type"] == "set_object" and command["path"].startswith("/robot/")
+    }
+    for item in geometry.geometryObjects:
+        if Path(item.meshPath).suffix.lower() not in {".dae", ".stl"}:
+            continue
+        link, _, number = item.name.rpartition("_")
+        joint = robot.model.names[item.parentJoint]
+        thing = objects[f"/robot/{joint}/{link}"]
+        node = thing["object"]["children"][int(number)]
+        vertices = world_vertices(thing, node)
+        expected = item.placement.act(pin.SE3.Identity())  # where its origin is
+        points = np.array([expected.act(v) for v in item.geometry.vertices()])
+        for these, those in ((vertices, points), (points, vertices)):
+            assert cKDTree(these).query(those)[0].max() < 4.0 * VERTEX_STEP
+        mirrored += int(np.prod(item.meshScale) < 0.0)
+    assert mirrored > 10
+
+
+def world_vertices(thing: dict[str, Any], node: dict[str, Any]) -> np.ndarray:
+    matrix = np.reshape(node.get("matrix", np.eye(4)), (4, 4)).T
+    if "children" in node:
+        points = np.vstack([world_vertices(thing, c) for c in node["children"]])
+    else:
+        (geometry,) = (g for g in thing["geometries"] if g["uuid"] == node["geometry"])
+        points = geometry["data"]["attributes"]["position"]["array"]
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def test_the_page_needs_nothing_from_anywhere(planar: Rollout, tmp_path: Path) -> None:
+    page = export_html(planar, tmp_path / "new" / "page.html")
+    text = page.read_text(encoding="utf-8")
+    shown = re.sub(r'(id="(?:scripts|content)">)[^<]*', r"\1", text)
+    addresses = re.findall(r'(?:src|href|url)\s*[=(]\s*["\']?([^"\')\s>]+)', shown)
+    assert set(addresses) <= {"data:,", "#${this.name}"}
+    assert "default-src 'none'" in text
+    assert "connect-src" not in text
+    assert str(tmp_path) not in text
+    assert not list(page.parent.glob(".*"))
+    again = export_html(planar, tmp_path / "again.html")
+    assert abs(again.stat().st_size - page.stat().st_size) < 2000  # names are numbered
+    assert page.stat().st_size < 0.5 * MEGABYTE
+
+
+def test_the_plots_are_the_logs(panda: Rollout) -> None:
+    table = ArrayTable()
+    packed = pack_panels(panda, table)
+    arrays = [unpacked(entry) for entry in table.entries]
+    assert (packed["start"], packed["end"]) == (0.0, 10.0)
+    panels = {panel["title"]: panel for panel in packed["panels"]}
+    assert list(panels) == [
+        "Task error ‖e‖",
+        "Null-space error ‖e_N‖",
+        "Least distance",
+        "Joint positions",
+        "Manipulability",
+        "Value of the field",
+        "Efforts τ",
+    ]
+
+    def curve(panel: dict[str, Any], place: int) -> np.ndarray:
+        series = panel["series"][place]
+        times, values = (arrays[series[key]["$array"]] for key in ("times", "values"))
+        return np.interp(panda.t, times.ravel(), values.ravel())
+
+    for place in range(7):
+        panel = panels["Joint positions"]
+        error = np.abs(curve(panel, place) - panda["joint_positions"][:, place])
+        assert error.max() <= CURVE_BOUND * (panel["high"] - panel["low"]) * 1.01
+    panel = panels["Null-space error ‖e_N‖"]
+    assert [s["name"] for s in panel["series"]] == ["promised: exp(−10 t)", "‖e_N‖"]
+    height = panel["high"] - panel["low"]
+    shown = np.log10(panda["null_space_norm"]).clip(panel["low"] - height)
+    assert np.abs(curve(panel, 1) - shown).max() <= CURVE_BOUND * height * 1.01
+    points = sum(len(a) for a in arrays)
+    assert points < 0.3 * 2 * len(panda) * 21
+
+
+def test_where_the_law_is_bounded_the_plots_say_so(planar: Rollout) -> None:
+    damped = np.zeros(len(planar))
+    damped[[10, 11, 12, 50]] = 1.0
+    damped[-3:] = 1.0
+    changed = Rollout({**planar.columns, "damped": damped}, planar.meta)
+    t = planar.t
+    expected = [[t[10], t[12]], [t[50], t[50]], [t[-3], t[-1]]]
+    assert pack_panels(changed, ArrayTable())["bounded"] == expected
+
+
+@pytest.mark.parametrize("values", [[np.nan] * 4, [0.0] * 4, [1.0, np.inf, 0.5, -1.0]])
+def test_what_cannot_be_drawn_does_not_break_the_page(
+    values: list[float], planar: Rollout
+) -> None:
+    columns = {name: column[:4].copy() for name, column in planar.columns.items()}
+    for name in ("manipulability", "null_space_norm", "task.tip.error"):
+        columns[name] = np.reshape(values, (4, 1)) * np.ones_like(
+            np.reshape(columns[name], (4, -1))
+        )
+        columns[name] = columns[name].reshape(planar[name][:4].shape)
+    table = ArrayTable()
+    for panel in pack_panels(Rollout(columns, planar.meta), table)["panels"]:
+        assert np.isfinite([panel["low"], panel["high"]]).all()
+        assert panel["low"] < panel["high"]
+    assert all(np.isfinite(unpacked(entry)).all() for entry in table.entries)
+
+
+def test_a_run_of_one_row_is_exported(planar: Rollout, tmp_path: Path) -> None:
+    columns = {name: column[:1] for name, column in planar.columns.items()}
+    page = export_html(Rollout(columns, planar.meta), tmp_path / "one.html")
+    assert content_of(page)["plots"]["panels"]
+    assert frame_times((0.0, 0.0), 30.0, 1.0).tolist() == [0.0]
+
+
+def test_what_cannot_be_exported_is_said(planar: Rollout, tmp_path: Path) -> None:
+    anonymous = Rollout(
+        planar.columns, {k: v for k, v in planar.meta.items() if k != "config"}
+    )
+    with pytest.raises(ViewerError, match="made from Python"):
+        export_html(anonymous, tmp_path / "page.html")
+    named = export_html(anonymous, tmp_path / "page.html", robot=Robot.load("planar3r"))
+    assert named.is_file()
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    with pytest.raises(ExportError, match=r"file/page\.html: cannot write the page"):
+        export_html(planar, blocked / "page.html")
+
+
+# -- films ----------------------------------------------------------------------------
+
+
+def test_a_films_moments_are_evenly_spread() -> None:
+    times = frame_times((0.0, 3.0), 30.0, 2.0)
+    assert len(times) == 46
+    np.testing.assert_allclose(np.diff(times), 2.0 / 30.0)
+    assert times[-1] == pytest.approx(3.0)
+    with pytest.raises(ExportError, match="900001 pictures"):
+        frame_times((0.0, 3.0), 30.0, 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "style", "message"),
+    [
+        ("film.mpg", FilmStyle(), r"ends with one of \.mp4.* did you mean '\.mp4'"),
+        ("film.mp4", FilmStyle(size=(10, 400)), "10x400 pixels: each must be between"),
+        ("film.gif", FilmStyle(frame_rate=0.5), "0.5 pictures in a second"),
+        ("film.gif", FilmStyle(speed=0.0), "speed 0 must be positive"),
+        (
+            "film.gif",
+            FilmStyle(start=2, end=1),
+            "from 2 to 1 s: the run goes from 0 to",
+        ),
+        ("film.gif", FilmStyle(end=3.5), "from 0 to 3.5 s: the run goes from 0 to 3 s"),
+    ],
+)
+def test_a_film_that_cannot_be_is_refused(
+    planar: Rollout, tmp_path: Path, name: str, style: FilmStyle, message: str
+) -> None:
+    with pytest.raises(ExportError, match=message):
+        export_film(planar, tmp_path / name, style=style)
+
+
+def test_what_is_missing_for_a_film_is_said_and_the_rest_goes_on(
+    planar: Rollout,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    log = planar.save(tmp_path / "run.npz")
+    wanted = [f"--{kind}={tmp_path / f'film.{kind}'}" for kind in ("mp4", "gif")]
+    page = tmp_path / "page.html"
+    command = ["export", str(log), f"--html={page}", *wanted]
+
+    monkeypatch.setenv("HSP_BROWSER", "no-such-browser")
+    assert main(command) == 2
+    said = capsys.readouterr()
+    assert "page.html" in said.out
+    assert page.is_file()
+    assert said.err.count("hsp: ") == 1  # once, not once a film
+    assert re.search(r"no-such-browser is no program; .*apt-get install chr", said.err)
+
+    monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
+    assert main(command) == 2
+    assert "pip install 'hsp_control[film]'" in capsys.readouterr().err
+
+    monkeypatch.setattr(encoding.shutil, "which", lambda name: None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    assert main(command) == 2
+    assert "apt-get install ffmpeg" in capsys.readouterr().err
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["page.html", "run.npz"]
+
+
+def test_ffmpegs_own_words_are_passed_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    film = tmp_path / "film.mp4"
+    failed = pytest.raises(ExportError, match=r"film\.mp4: ffmpeg failed: ")
+    with failed, encoding.encoder(film, 10.0) as take:
+        take(b"no picture")
+    monkeypatch.setattr(encoding, "find_ffmpeg", lambda: "/no/ffmpeg")
+    failed = pytest.raises(ExportError, match="cannot write the film: No such file")
+    with failed, encoding.encoder(film, 10.0):
+        pass
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_says_what_it_wants(
+    planar: Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = str(planar.save(tmp_path / "run.npz"))
+    assert main(["export", log]) == 2
+    assert "name a file with --html" in capsys.readouterr().err
+    assert main(["export", log, "--gif=film.mp4"]) == 2
+    assert "--gif film.mp4: its name must end with .gif" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["export", log, "--gif=a.gif", "--size=800"])
+    assert "'800' is not WIDTHxHEIGHT" in capsys.readouterr().err
+
+
+def test_capsules_need_no_mesh_reader(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in ("trimesh", "collada"):
+        monkeypatch.setitem(sys.modules, module, None)
+    rollout = load_experiment(PLANAR, "simulation.duration=0.2").run()
+    assert export_html(rollout, tmp_path / "page.html").is_file()
+    found = Robot.load("panda")
+    bare = Robot(found.model, replace(found.source, package_dirs=()))
+    config = load_experiment("panda_limits", "simulation.duration=0.1", *COARSE)
+    assert export_html(config.run(), tmp_path / "bare.html", robot=bare).is_file()

@@ -1,0 +1,583 @@
+"""What the view draws beside the robot is what the run did, recomputed another way."""
+
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from clips import Clip
+
+from hsp_control import Experiment, Robot, Rollout, load_experiment
+from hsp_control.geometry.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    HeightField,
+    PointCloud,
+    Shape,
+    Sphere,
+)
+from hsp_control.null_space.metrics import MetricSample
+from hsp_control.visualization.viewer import Act, LiveView, Recorder, Viewer, live
+from hsp_control.visualization.viewer.commands import CAPTION, CLIP, unpack
+from hsp_control.visualization.viewer.ellipsoid import SECONDS, principal_axes
+from hsp_control.visualization.viewer.explained import null_space_projector
+from hsp_control.visualization.viewer.influence import zone
+from hsp_control.visualization.viewer.motion import drawn_times
+from hsp_control.visualization.viewer.run_drawing import LAYERS
+
+PLANAR, SPATIAL = "paper/4_moving_obstacle", "panda_obstacle"
+
+
+@pytest.fixture(scope="module")
+def planar() -> tuple[Experiment, Rollout]:
+    experiment = load_experiment(PLANAR, "simulation.duration=1.5")
+    return experiment, experiment.run()
+
+
+@pytest.fixture(scope="module")
+def spatial() -> tuple[Experiment, Rollout]:
+    experiment = load_experiment(SPATIAL, "simulation.duration=0.5")
+    return experiment, experiment.run()
+
+
+@pytest.fixture
+def recorder() -> Recorder:
+    return Recorder()
+
+
+def drawn(experiment: Experiment, rollout: Rollout, recorder: Recorder) -> Clip:
+    viewer = Viewer(experiment.robot, transport=recorder)
+    viewer.play(rollout, controller=experiment.controller)
+    return Clip(recorder)
+
+
+def names(recorder: Recorder) -> list[str]:
+    caption = recorder.command(CAPTION, "caption")
+    assert caption is not None
+    return [entry["name"] for entry in caption["legend"]]
+
+
+def tip(clip: Clip, path: str, time: float) -> np.ndarray:
+    """Return where an arrow or a bar ends."""
+    length = clip.value(path, "scale", time)[2]
+    return (clip.pose(path, time) @ [0.0, 0.0, length, 1.0])[:3]
+
+
+# -- self-motion ----------------------------------------------------------------------
+
+
+def test_self_motion_moves_the_joints_and_not_the_hand(
+    planar: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    experiment, rollout = planar
+    clip = drawn(experiment, rollout, recorder)
+    arrows = clip.paths("/self_motion")
+    assert arrows == {
+        f"/self_motion/{kind}/joint{k}"
+        for kind in ("velocity", "field")
+        for k in (2, 3)
+    }
+    (seconds,) = [float(n.split()[2]) for n in names(recorder) if "self-motion" in n]
+    robot, step = experiment.robot, 1e-6
+    for row in (10, 60, 149):
+        t, q, v = rollout.t[row], rollout.q[row], rollout.v[row]
+        state = robot.state(t, q, v)
+        g = experiment.controller.compute(state).field.g
+        J = state.frame("tip").jacobian[:2]
+        metric = experiment.controller.metric
+        W = metric.evaluate(state, MetricSample.allocate(3)).W
+        raised = np.linalg.solve(W, J.T)  # W⁻¹Jᵀ
+        P = np.eye(3) - raised @ np.linalg.solve(J @ raised, J)
+        for kind, motion in (("velocity", P @ v), ("field", P @ g)):
+            moved = robot.integrate(q, step * motion)
+            there = robot.state(t, moved, v)
+            hand = there.position("tip") - state.position("tip")
+            assert np.linalg.norm(hand) < 1e-9
+            for joint in (2, 3):
+                path = f"/self_motion/{kind}/joint{joint}"
+                here = state.data.oMi[joint].translation
+                rate = (there.data.oMi[joint].translation - here) / step
+                np.testing.assert_allclose(
+                    clip.value(path, "position", t), here, atol=1e-6
+                )
+                arrow = tip(clip, path, t) - here
+                assert np.linalg.norm(arrow) <= 0.6 * 6.0
+                np.testing.assert_allclose(arrow, seconds * rate, atol=1e-4)
+
+
+def test_the_velocity_slips_into_its_field(
+    planar: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    experiment, rollout = planar
+    clip = drawn(experiment, rollout, recorder)
+    (seconds,) = [float(n.split()[2]) for n in names(recorder) if "self-motion" in n]
+    gaps = []
+    for row in (0, 50, 100, 150):
+        t = float(rollout.t[row])
+        arrows = [
+            tip(clip, f"/self_motion/{k}/joint3", t) for k in ("velocity", "field")
+        ]
+        gaps.append(np.linalg.norm(arrows[1] - arrows[0]))
+        e_N = rollout["null_space_error"][row]
+        state = experiment.robot.state(t, rollout.q[row], rollout.v[row])
+        moved = experiment.robot.integrate(rollout.q[row], 1e-6 * e_N)
+        there = experiment.robot.state(t, moved, rollout.v[row])
+        rate = there.data.oMi[3].translation - state.data.oMi[3].translation
+        assert gaps[-1] == pytest.approx(
+            seconds * np.linalg.norm(rate) / 1e-6, abs=1e-4
+        )
+    assert gaps[-1] < 0.05 * gaps[0]
+
+
+def test_an_uncontrolled_null_space_has_no_field_to_show(recorder: Recorder) -> None:
+    experiment = load_experiment("paper/1_uncontrolled", "simulation.duration=0.5")
+    clip = drawn(experiment, experiment.run(), recorder)
+    assert clip.paths("/self_motion/velocity")
+    assert not clip.paths("/self_motion/field")
+
+
+@pytest.mark.parametrize("name", ["panda_manipulability", "tiago_reach"])
+def test_the_projector_is_the_laws_own(name: str) -> None:
+    """In any metric P(g - v) is the e_N that the law computed."""
+    experiment = load_experiment(name)
+    robot, controller = experiment.robot, experiment.controller
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        q = robot.integrate(experiment.q0, 0.1 * rng.standard_normal(robot.nv))
+        state = robot.state(0.3, q, rng.standard_normal(robot.nv))
+        output = controller.compute(state)
+        P = null_space_projector(controller, state)
+        np.testing.assert_allclose(
+            P @ (output.field.g - state.v), output.null_space_error, atol=1e-9
+        )
+
+
+# -- distances ------------------------------------------------------------------------
+
+
+def test_bars_are_as_long_as_the_distances_in_the_log(
+    spatial: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    experiment, rollout = spatial
+    clip = drawn(experiment, rollout, recorder)
+    (path,) = clip.paths("/distances")
+    logged = rollout["distance.obstacle_clearance"]
+    for row in (0, 20, 50):
+        t = float(rollout.t[row])
+        assert clip.value(path, "scale", t)[2] == pytest.approx(logged[row], abs=1e-6)
+        seen = clip.value(path, "visible", t)
+        assert bool(seen) == (logged[row] < 0.4)
+        # It ends on the ball.
+        end = tip(clip, path, t) - rollout["obstacle.ball"][row]
+        assert np.linalg.norm(end) == pytest.approx(0.1, abs=1e-5)
+
+
+def test_the_papers_cost_is_shown_from_the_nearest_joint_to_the_centre(
+    planar: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    experiment, rollout = planar
+    clip = drawn(experiment, rollout, recorder)
+    (path,) = clip.paths("/distances")
+    for row in (0, 75, 150):
+        t = float(rollout.t[row])
+        length = clip.value(path, "scale", t)[2]
+        assert length == pytest.approx(
+            rollout["distance.point_distance"][row], abs=1e-6
+        )
+        center = rollout["obstacle.disk"][row]
+        np.testing.assert_allclose(tip(clip, path, t), center, atol=1e-5)
+
+
+# -- influence ------------------------------------------------------------------------
+
+
+def surface_points(thing: dict[str, Any]) -> np.ndarray:
+    """Return points of a drawn solid in its obstacle's frame."""
+    (geometry,) = thing["geometries"]
+    pose = np.reshape(thing["object"]["children"][0]["matrix"], (4, 4)).T
+    kind = geometry["type"]
+    if kind == "SphereGeometry":
+        directions = np.random.default_rng(0).standard_normal((100, 3))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        points = geometry["radius"] * directions
+    elif kind == "LatheGeometry":
+        profile = np.array([[p["x"], p["y"]] for p in geometry["points"]])
+        angles = np.linspace(0.0, 2.0 * np.pi, 12)[:, None]
+        points = np.stack(
+            [
+                profile[:, 0] * np.cos(angles),
+                np.broadcast_to(profile[:, 1], (12, len(profile))),
+                -profile[:, 0] * np.sin(angles),
+            ],
+            axis=-1,
+        ).reshape(-1, 3)
+    elif kind == "PlaneGeometry":
+        points = (
+            0.5 * geometry["width"] * np.array([[1, 1, 0], [-1, 1, 0], [1, -1, 0.0]])
+        )
+    else:
+        data = geometry["data"]["attributes"]["position"]["array"].data
+        points = np.frombuffer(data, "<f4").reshape(-1, 3).astype(float)
+    return points @ pose[:3, :3].T + pose[:3, 3]
+
+
+ZONES: list[tuple[Shape, float]] = [
+    (Sphere(0.1), 1e-9),
+    (Capsule(0.1, 0.3), 1e-9),
+    (Cylinder(0.1, 0.3), 1e-9),
+    (HalfSpace(), 1e-9),
+    (Box((0.1, 0.2, 0.3)), 3e-3),
+    (PointCloud([[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]], 0.01), 0.02),
+    (HeightField((1.0, 1.0), [[0.0, 0.1], [0.1, 0.2]]), 0.05),
+]
+
+
+@pytest.mark.parametrize(
+    ("shape", "slack"), ZONES, ids=lambda x: type(x).__name__ if x else ""
+)
+def test_a_zone_lies_at_the_influence_from_its_obstacle(
+    shape: Shape, slack: float
+) -> None:
+    influence = 0.2
+    points = surface_points(zone(shape, influence, 2.0))
+    point, geometry = coal.Sphere(1e-6), shape.geometry()
+    request = coal.DistanceRequest()
+    for place in points[:: max(1, len(points) // 60)]:
+        distance = coal.distance(
+            geometry,
+            coal.Transform3s(),
+            point,
+            coal.Transform3s(np.eye(3), place),
+            request,
+            coal.DistanceResult(),
+        )
+        assert distance == pytest.approx(influence, abs=slack + 2e-6)
+
+
+def test_zones_follow_their_obstacles(
+    spatial: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    experiment, rollout = spatial
+    clip = drawn(experiment, rollout, recorder)
+    assert recorder.paths("/influence") == ["/influence/ball"]
+    for row in (0, 50):
+        center = clip.value("/influence/ball", "position", float(rollout.t[row]))
+        np.testing.assert_allclose(center, rollout["obstacle.ball"][row], atol=1e-6)
+
+
+# -- the ellipsoid --------------------------------------------------------------------
+
+
+def test_the_ellipsoid_is_the_image_of_the_ball_of_joint_speeds(
+    spatial: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    experiment, rollout = spatial
+    clip = drawn(experiment, rollout, recorder)
+    (path,) = clip.paths("/ellipsoid")
+    frame = path.rpartition("/")[2]
+    for row in (0, 25, 50):
+        t = float(rollout.t[row])
+        state = experiment.robot.state(t, rollout.q[row], rollout.v[row])
+        J = state.frame(frame).jacobian[:3]
+        R, scale = clip.pose(path, t)[:3, :3], clip.value(path, "scale", t)
+        shape = R @ np.diag(scale**2) @ R.T / SECONDS**2
+        np.testing.assert_allclose(shape, J @ J.T, atol=1e-5)
+
+
+def test_its_axes_turn_no_more_than_they_must() -> None:
+    """Also where two of them become equal, change places in length, or change signs."""
+    rng = np.random.default_rng(1)
+    frame = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    right = np.linalg.qr(rng.standard_normal((7, 7)))[0][:3]
+    last, _ = principal_axes(frame @ np.diag([1.0, 0.7, 0.5]) @ right, np.eye(3))
+    for s in np.linspace(0.7, 1.3, 200):
+        turned = pin.exp3(np.array([0.0, 0.5 * s, 0.0])) @ frame
+        J = turned @ np.diag([1.0, s, 0.5]) @ right
+        axes, lengths = principal_axes(J, last)
+        assert np.linalg.det(axes) == pytest.approx(1.0)
+        np.testing.assert_allclose(
+            axes @ np.diag(lengths**2) @ axes.T, J @ J.T, atol=1e-9
+        )
+        if s > 0.7:
+            assert np.linalg.norm(pin.log3(last.T @ axes)) < 0.01
+        last = axes
+
+
+def test_a_planar_arms_is_a_disk(
+    planar: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    clip = drawn(*planar, recorder)
+    scale = clip.value("/ellipsoid/tip", "scale", 1.0)
+    assert scale.min() == pytest.approx(0.02 * scale.max(), rel=1e-5)
+
+
+# -- contacts -------------------------------------------------------------------------
+
+
+def test_contact_forces_are_arrows_at_their_points(recorder: Recorder) -> None:
+    robot = Robot.load("panda")
+    mass = sum(inertia.mass for inertia in robot.model.inertias)
+    weight = np.array([0.0, 0.0, 9.81 * mass])
+    columns = {
+        "t": np.array([0.0, 0.02]),
+        "q": np.tile(robot.home(), (2, 1)),
+        "v": np.zeros((2, robot.nv)),
+        # Where a contact that is off is, the log does not say.
+        "contact.left/foot.position": np.array([[0.1, 0.2, 0.3], [np.nan] * 3]),
+        "contact.left/foot.force": np.array([weight, np.zeros(3)]),
+        "contact.halved.force": np.zeros((2, 3)),  # without its place: left out
+    }
+    viewer = Viewer(robot, transport=recorder)
+    viewer.play(Rollout(columns, {"status": "completed"}))
+    clip = Clip(recorder)
+    assert clip.paths("/contacts") == {
+        "/contacts/left_foot/force", "/contacts/left_foot/point",
+    }  # fmt: skip
+    path = "/contacts/left_foot/force"
+    np.testing.assert_allclose(clip.value(path, "position", 0.0), [0.1, 0.2, 0.3])
+    arrow = tip(clip, path, 0.0) - [0.1, 0.2, 0.3]
+    assert arrow[2] > 0.2
+    assert np.abs(arrow[:2]).max() < 1e-6
+    assert clip.value(path, "scale", 0.02)[2] == 0.0
+    assert clip.value("/contacts/left_foot/point", "visible", 0.0) == 1.0
+    assert clip.value("/contacts/left_foot/point", "visible", 0.02) == 0.0
+    assert "contact force" in names(recorder)
+
+
+# -- switches -------------------------------------------------------------------------
+
+
+def test_each_layer_can_be_switched(
+    spatial: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    experiment, rollout = spatial
+    off = dict.fromkeys([*LAYERS, "grid"], False)
+    viewer = Viewer(experiment.robot, transport=recorder, show=off)
+    viewer.play(rollout, controller=experiment.controller)
+    for layer in (*LAYERS, "floor/grid"):
+        command = recorder.command(f"/{layer}", "visible")
+        assert command is not None
+        assert command["value"] is False
+    assert names(recorder) == []
+    assert Clip(recorder).paths("/self_motion")  # there, to be switched on
+
+
+def test_dark_backgrounds_have_light_words(recorder: Recorder) -> None:
+    robot = Robot.load("planar3r")
+    for color, dark in (("#101820", True), ("#FFFFFF", False), ("#0072B2", True)):
+        Viewer(robot, transport=recorder, background=color, light=0.5)
+        caption = recorder.command(CAPTION, "caption")
+        assert caption is not None
+        assert caption["dark"] is dark
+        sky = recorder.command("/Background", "top_color")
+        assert sky is not None
+        assert round(255 * sky["value"][0]) == int(color[1:3], 16)
+
+
+# -- several runs ---------------------------------------------------------------------
+
+
+def comparison(
+    planar: tuple[Experiment, Rollout], recorder: Recorder, **how: Any
+) -> tuple[Clip, Rollout]:
+    experiment, rollout = planar
+    other = load_experiment("paper/2_rest", "simulation.duration=0.5")
+    rest = other.run()
+    viewer = Viewer(experiment.robot, transport=recorder)
+    acts = [
+        Act("with", experiment.robot, rollout, experiment.controller),
+        Act("without", other.robot, rest, other.controller),
+    ]
+    viewer.compare(acts, **how)
+    return Clip(recorder), rest
+
+
+def test_runs_of_one_robot_lie_over_each_other_as_ghosts(
+    planar: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    clip, rest = comparison(planar, recorder)
+    assert (clip.start, clip.end) == (0.0, 1.5)
+    assert recorder.command("/without/robot", "ghost") is not None
+    assert recorder.paths("/without/paths/") == ["/without/paths/tip/actual"]
+    np.testing.assert_array_equal(recorder.transform("/without"), np.eye(4))
+    robot = planar[0].robot
+    for row in (0, 30, 50):
+        expected = robot.state(0.0, rest.q[row], rest.v[row]).data.oMi[2].homogeneous
+        shown = clip.pose("/without/robot/joint2", float(rest.t[row]))
+        np.testing.assert_allclose(shown, expected, atol=1e-6)
+    last = clip.pose("/without/robot/joint2", 1.5)  # it waits for the longer run
+    np.testing.assert_array_equal(last, clip.pose("/without/robot/joint2", 0.5))
+    assert names(recorder)[:2] == ["with", "without"]
+
+
+def test_side_by_side_they_keep_clear_of_each_other(
+    planar: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    clip, rest = comparison(planar, recorder, beside=True)
+    assert recorder.command("/without/robot", "ghost") is None
+    offset = recorder.transform("/without")[:3, 3]
+    right = planar[1]["skeleton"][..., 0].max()
+    assert offset[0] + min(0.0, rest["skeleton"][..., 0].min()) > right
+    assert np.abs(offset[1:]).max() < 1e-9
+    assert clip.paths("/without/targets")
+    # What comes after takes it all away.
+    viewer = Viewer(planar[0].robot, transport=recorder)
+    viewer._others = ["/without"]
+    viewer.draw_scene(planar[1])
+    assert not recorder.paths("/without")
+
+
+def test_runs_of_different_robots_stand_side_by_side(
+    planar: tuple[Experiment, Rollout],
+    spatial: tuple[Experiment, Rollout],
+    recorder: Recorder,
+) -> None:
+    viewer = Viewer(planar[0].robot, transport=recorder)
+    acts = [
+        Act(name, experiment.robot, rollout, experiment.controller)
+        for name, (experiment, rollout) in (("a", planar), ("b", spatial))
+    ]
+    viewer.compare(acts)
+    assert recorder.transform("/b")[0, 3] > 2.0
+    assert recorder.paths("/b/robot/panda_joint7")
+    (seconds,) = {n for n in names(recorder) if n.startswith("self-motion")}
+    assert seconds  # one scale for both
+    viewer.play(planar[1])
+    assert not recorder.paths("/b")
+
+
+# -- live -----------------------------------------------------------------------------
+
+
+class Watched(Recorder):
+    """Keeps what was sent, too."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sent: list[dict[str, Any]] = []
+
+    def send(self, commands: Any) -> None:
+        commands = list(commands)
+        super().send(commands)
+        self.sent += [unpack(command.packed) for command in commands]
+
+
+def test_a_run_is_shown_while_it_is_computed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(live, "PERIOD", 0.0)
+    monkeypatch.setattr(live, "LONGEST", 0.0)
+    experiment = load_experiment(PLANAR, "simulation.duration=0.5")
+    transport = Watched()
+    viewer = Viewer(experiment.robot, transport=transport)
+    view = LiveView(viewer, experiment)
+    # The whole desired path is there before the first step.
+    desired = transport.command("/paths/tip/desired", "object")
+    assert desired is not None
+    del transport.sent[:]
+    rollout = experiment.run(on_row=view.on_row)
+
+    clips = [command for command in transport.sent if command["type"] == "clip"]
+    assert [clip["begins"] for clip in clips] == [True] + [False] * (len(clips) - 1)
+    assert all(clip["open"] and clip["horizon"] == 0.5 for clip in clips[:-1])
+    said = [c["text"] for c in transport.sent if c["type"] == "status"]
+    assert any("× real time" in text for text in said)
+    times = np.concatenate([clip["clocks"][0] for clip in clips])
+    assert (np.diff(times) > 0.0).all()
+    assert (times[0], times[-1]) == (0.0, 0.5)
+    joint = np.concatenate(
+        [
+            np.reshape(track["values"], (-1, 4))
+            for clip in clips
+            for track in clip["tracks"]
+            if (track["path"], track["property"]) == ("/robot/joint1", "quaternion")
+        ]
+    )
+    rows = np.searchsorted(rollout.t, times - 1e-9)
+    for row, quaternion in zip(rows, joint, strict=True):
+        state = experiment.robot.state(0.0, rollout.q[row], rollout.v[row])
+        expected = pin.SE3ToXYZQUAT(state.data.oMi[1])[3:]
+        assert abs(quaternion @ expected) == pytest.approx(1.0, abs=1e-6)
+    trail = [c["points"] for c in transport.sent if c["type"] == "trail_more"]
+    assert sum(map(len, trail)) == 3 * len(times)
+
+    view.finish(rollout)
+    begin = transport.command(CLIP, "begin")
+    assert begin is not None
+    assert begin["keep"]
+    assert not begin["open"]
+    assert transport.command(CLIP, "more 1") is None  # one clip is kept, the whole
+    assert Clip(transport).value("/paths/tip/actual", "length", 0.5) == 50
+
+
+def test_what_is_hidden_costs_the_run_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live, "PERIOD", 0.0)
+    experiment = load_experiment(PLANAR, "simulation.duration=0.1")
+    transport = Watched()
+    off = dict.fromkeys(LAYERS, False)
+    viewer = Viewer(experiment.robot, transport=transport, show=off)
+    view = LiveView(viewer, experiment)
+    del transport.sent[:]
+    rollout = experiment.run(on_row=view.on_row)
+    moving = {track["path"] for c in transport.sent for track in c.get("tracks", ())}
+    assert moving == {f"/robot/joint{k}" for k in (1, 2, 3)}
+    assert not [c for c in transport.sent if c["type"] == "trail_more"]
+    view.finish(rollout)  # and then it is there, to be switched on
+    assert "/paths/tip/actual" in transport.paths("/paths")
+
+
+def test_drawing_leaves_rows_out_so_that_it_stays_cheap(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    experiment = load_experiment(PLANAR, "simulation.duration=0.5")
+    transport = Watched()
+    view = LiveView(Viewer(experiment.robot, transport=transport), experiment)
+    clock = {"now": 100.0}
+    monkeypatch.setattr(live.time, "perf_counter", lambda: clock["now"])
+    monkeypatch.setattr(live.time, "thread_time", lambda: clock["now"])
+    monkeypatch.setattr(live.time, "sleep", None)
+    send = transport.send
+
+    def slow(commands: Any) -> None:
+        clock["now"] += 0.05  # drawing takes this long
+        send(commands)
+
+    monkeypatch.setattr(transport, "send", slow)
+
+    def on_row(recorder: Any) -> None:
+        clock["now"] += 0.01
+        view.on_row(recorder)
+
+    experiment.run(on_row=on_row)
+    pieces = [c for c in transport.sent if c["type"] == "clip"]
+    assert len(pieces) <= 2  # of 51 rows, each of which took 0.01 s
+
+
+def test_a_view_that_ends_does_not_end_the_run(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    experiment = load_experiment(PLANAR, "simulation.duration=0.5")
+    with Viewer(experiment.robot) as viewer:
+        view = LiveView(viewer, experiment)
+        viewer.close()
+        rollout = experiment.run(on_row=view.on_row)
+    assert rollout.status == "completed"
+    assert "the run goes on unseen" in caplog.text
+
+
+# -- its parts ------------------------------------------------------------------------
+
+
+def test_drawn_times_are_neither_too_near_nor_too_far() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        times = np.cumsum(rng.exponential(0.02, 50))
+        drawn = drawn_times(times, 0.01, 0.033)
+        assert (drawn[0], drawn[-1]) == (times[0], times[-1])
+        gaps = np.diff(drawn)
+        assert gaps.max() <= 0.033 + 1e-9
+        assert (gaps[:-2] >= 0.01 - 1e-9).mean() > 0.95
+    assert drawn_times(np.array([3.0]), 0.01, 0.03).tolist() == [3.0]
