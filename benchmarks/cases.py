@@ -1,7 +1,7 @@
 """The common case: one robot, trajectory, start, field, obstacle and set of gains.
 
-Every controller gets the same numbers, and the same field g in the form that it can
-take: see `Case.posture_acceleration`.
+Every controller gets the same numbers, and the same field g in the form that its
+interface allows: see `Case.posture_acceleration`.
 """
 
 import copy
@@ -25,11 +25,11 @@ CENTER = np.array([0.1, 0.0, 0.0])  # of the circle, from the start [m]
 
 @dataclass
 class Case:
-    """A Panda's hand draws a circle while a ball comes and goes beside its elbow.
+    """A Panda's hand draws a circle while a ball moves near its elbow.
 
     Attributes:
-        rows: 6 holds the hand's orientation too; 3 leaves it free.
-        obstacle: Whether the field keeps clear of the ball; the ball moves anyway.
+        rows: Rows of the hand task: 6 for a pose, 3 for a position.
+        obstacle: Whether the field avoids the ball; the ball moves in both cases.
         period: How long an effort is held [s].
         duration: Length of a run [s].
         settled: When the transient is over and measuring begins [s].
@@ -37,6 +37,8 @@ class Case:
         null_space_gain: K_N [1/s].
         posture_rate: α of the field's posture part, g = -α (q - q_home) [1/s].
         clearance_weight: Weight of the field's obstacle part.
+        frame: Name of the hand's frame.
+        robot: The robot.
     """
 
     rows: int = 6
@@ -52,7 +54,7 @@ class Case:
     robot: hsp.Robot = field(init=False)
 
     def __post_init__(self) -> None:
-        """Build what all controllers share."""
+        """Build the robot, trajectory, ball, gains and field of all controllers."""
         self.robot = robot = hsp.Robot.load("panda")
         self.q0 = robot.home()
         start = robot.state(0.0, self.q0, np.zeros(robot.nv)).frame(FRAME)
@@ -81,7 +83,7 @@ class Case:
         self._pose = PoseSample.allocate()
         self._follow = self.trajectory.follow(self._pose)
 
-    # -- what the peers track ---------------------------------------------------------
+    # -- references of the peers ------------------------------------------------------
 
     @property
     def kp(self) -> float:
@@ -104,23 +106,23 @@ class Case:
         return self.null_space_gain + self.posture_rate
 
     def desired(self, t: float) -> PoseSample:
-        """Return the hand's pose at a time, with both rates; overwritten each call."""
+        """Return the hand's pose at time t [s] and its derivatives; one buffer."""
         self._follow(t)
         return self._pose
 
     def repulsion(self, t: float, q: Array) -> Array:
-        """Return the obstacle's part of g, shape (nv,), zeros without one [rad/s]."""
+        """Return the obstacle's part of g, shape (nv,), or zeros [rad/s]."""
         if not self.obstacle:
             return np.zeros(self.robot.nv)
         state = self._state.update(t, q, np.zeros(self.robot.nv))
         return -self.clearance_weight * self.clearance.gradient(state)
 
     def posture_acceleration(self, t: float, q: Array, v: Array) -> Array:
-        """Return the null-space acceleration of controllers that know no g'.
+        """Return the null-space acceleration of controllers without g'.
 
         K_N (g - v) + g', with g' = -α v of the posture part and without the obstacle's:
-        Kp (q_home - q) - Kv v + K_N g_ball, a posture task beside the gradient of an
-        artificial potential, which is the usual way.
+        Kp (q_home - q) - Kv v + K_N g_ball, a posture task plus the gradient of an
+        artificial potential, which is common practice.
         """
         posture = self.posture_kp * (self.q0 - q) - self.posture_kv * v
         return posture + self.null_space_gain * self.repulsion(t, q)
@@ -131,7 +133,7 @@ class Case:
         return self.null_space_gain * (sample.g - v) + sample.g_dot
 
     def save(self, path: Path, states: list[tuple[float, Array, Array]]) -> None:
-        """Write the case for an environment that this package does not run in."""
+        """Write the case for an environment without this package."""
         times = np.arange(round(self.duration / self.period) + 1) * self.period
         poses = [copy.deepcopy(self.desired(t)) for t in times]
         np.savez(
@@ -151,13 +153,13 @@ class Case:
             v=[v for _, _, v in states],
         )
 
-    # -- what is measured -------------------------------------------------------------
+    # -- measurements -----------------------------------------------------------------
 
     def measure(self, t: float, q: Array, v: Array) -> dict[str, float]:
-        """Return the numbers of one instant, the same way for every controller."""
+        """Measure one instant, in the same way for every controller."""
         state = self._state.update(t, q, v)
-        frame, wanted = state.frame(FRAME), self.desired(t)
-        turned = pin.log3(wanted.orientation.rotation.T @ frame.rotation)
+        frame, desired = state.frame(FRAME), self.desired(t)
+        rotation_error = pin.log3(desired.orientation.rotation.T @ frame.rotation)
         J = frame.jacobian[: self.rows]
         g = self._evaluate(state).g
         P = np.eye(self.robot.nv) - np.linalg.pinv(J) @ J
@@ -167,16 +169,18 @@ class Case:
         error_M, flow_M = P_M @ (g - v), P_M @ g
         return {
             "position": float(
-                np.linalg.norm(wanted.position.position - frame.position)
+                np.linalg.norm(desired.position.position - frame.position)
             ),
-            "orientation": float(np.linalg.norm(turned)) if self.rows == 6 else 0.0,
+            "orientation": (
+                float(np.linalg.norm(rotation_error)) if self.rows == 6 else 0.0
+            ),
             "null_space_error": float(np.linalg.norm(P @ (g - v))),
             "null_space_flow": float(np.linalg.norm(P @ g)),
             "null_space_error_M": float(np.sqrt(error_M @ M @ error_M)),
             "null_space_flow_M": float(np.sqrt(flow_M @ M @ flow_M)),
             "manipulability": float(np.linalg.det(J @ J.T)),
             "posture": float(np.linalg.norm(q - self.q0)),
-            "distance": self.clearance.least_distance(state),
+            "distance": self.clearance.minimum_distance(state),
         }
 
     def _evaluate(self, state: hsp.RobotState) -> FieldSample:

@@ -1,6 +1,6 @@
-"""The bundled iiwa with another public source's bodies: what may move, unknown.
+"""The bundled iiwa with the inertias of another public source.
 
-The figures are column D of robots/iiwa14/README.md, R. Krug's lbr_iiwa (also in
+The numbers are column D of robots/iiwa14/README.md, R. Krug's lbr_iiwa (also in
 iiwa_stack and bullet3): masses, centres of mass and moments of inertia in the axes of
 the base at q = 0. Gravity torques and mass matrix differ by a third from the bundled
 ones, which are Drake's.
@@ -27,7 +27,7 @@ LBR_IIWA = {
 
 
 def write_urdf(folder: Path) -> Path:
-    """Write the bundled URDF with those bodies into a folder; return the file."""
+    """Write the bundled URDF with these inertias into a folder; return the file."""
     robot = Robot.load("iiwa14")
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, robot.neutral())

@@ -1,8 +1,9 @@
-"""What each imperfection of a plant costs: one motion, two arms, two engines.
+"""Measure the effect of each imperfection of a plant: two arms, two engines.
 
     .venv/bin/python benchmarks/imperfect_plants.py
 
-The law alone, with the nominal model, at 1 kHz. The page is written to docs/plants.md.
+The controller without compensation, with the nominal model, at 1 kHz. Writes
+docs/plants.md.
 """
 
 from pathlib import Path
@@ -14,22 +15,22 @@ from rich.progress import track
 from hsp_control import Rollout, load_experiment
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "plants.md"
-SETTLED = 1.5  # the start is forgotten [s]
+SETTLED = 1.5  # the transient of the start is over [s]
 
 INTRODUCTION = """\
 # Plants
 
 Written by `.venv/bin/python benchmarks/imperfect_plants.py`; do not edit.
 
-A controller computes efforts for its model; a *plant* is what they move. By default it
-is the model itself. The key `plant` chooses another engine, and says how the world
-differs from the model. The controller keeps its nominal model whatever the plant is.
+A controller computes efforts for its model; a *plant* is the simulated system that they
+move. By default it is the model itself. The key `plant` selects another engine, and the
+imperfections of the plant. The controller keeps its nominal model for every plant.
 
-| `type` | what it is |
+| `type` | meaning |
 |---|---|
-| `rigid_body` | Pinocchio's articulated-body algorithm, under the simulation's integrator. With `friction`, joints stick and slip: each step solves for the velocity at its end |
-| `rigid_contacts` | the same, held by contacts that neither slip nor break, switched by the clock; their forces are in the log. For proofs on floating bases |
-| `mujoco` | MuJoCo with its own integrator, friction, joint limits and contacts, made of the Pinocchio model; `pip install 'hsp_control[mujoco]'`. `plant: mujoco` is enough |
+| `rigid_body` | Pinocchio's articulated-body algorithm, under the simulation's integrator. With `friction`, joints stick and slip (stiction): each step solves for the velocity at its end |
+| `rigid_contacts` | the same, with contacts that neither slip nor break and are switched by time; their forces are in the log. For verification on floating bases |
+| `mujoco` | MuJoCo with its own integrator, friction, joint limits and contacts, built from the Pinocchio model; `pip install 'hsp_control[mujoco]'`. `plant: mujoco` is enough |
 
 ```yaml
 robot: {name: panda}
@@ -40,7 +41,7 @@ tasks:
                  angular_rate: 2, normal: [0, 0, 1]}
 plant:
   type: mujoco
-  seed: 1                               # of all that is random below
+  seed: 1                               # of all random numbers below
   inertias: {random_mass: 0.2, random_inertia: 0.2, random_com: 0.01}
   payload: {frame: panda_tcp, mass: 1}
   motor_inertia: 0.05
@@ -51,15 +52,15 @@ plant:
 simulation: {duration: 5, control_period: 0.001}
 ```
 
-Sensors and drives act in the order in which `hsp schema` lists them. The log holds the
-true state in `q` and `v`, what was measured in `measured.q` and `measured.v`, the
-effort commanded in `tau` and the one that acted in `applied.tau`; errors are those of
-the true state. What the plant's bodies were is in the log's `meta`, key `plant`.
+Sensors and drives act in the order in which `hsp schema` lists them. The log contains
+the true state in `q` and `v`, the measured one in `measured.q` and `measured.v`, the
+commanded effort in `tau` and the applied one in `applied.tau`; errors are those of the
+true state. The inertias of the plant's bodies are in the log's `meta`, key `plant`.
 
-Feet touch MuJoCo's ground where `contacts` names them, on a stated shape or on the
-link's own collision geometry, and report `contact.<frame>.force` and `.moment`. A mesh
-with a flat sole becomes its box, another its capsule; `plant.clearance(q)` says by how
-much to lower a robot so that it starts on its feet:
+Frames named in `contacts` touch MuJoCo's ground, with a given shape or with the link's
+own collision geometry; `plant.contact.<frame>.force` and `.moment` are logged. A mesh
+with a flat sole becomes its box, another one its capsule; `plant.clearance(q)` returns
+by how much to lower a robot so that it starts on its feet:
 
 ```yaml
 robot: {name: panda}
@@ -75,12 +76,12 @@ plant:
 simulation: {duration: 1, control_period: 0.001}
 ```
 
-## What each imperfection costs the law
+## Effect of each imperfection
 
-The hand goes round a circle of 10 cm at 2 rad/s, with ω₀ = 20 1/s and K_N = 10 1/s, at
+The hand follows a circle of 10 cm radius at 2 rad/s, with ω₀ = 20 1/s and K_N = 10 1/s, at
 1 kHz, from 1.5 s to 4 s. Root mean squares of the hand's error, of ‖e_N‖ and of the
-commanded effort's rate. The two engines agree on what an imperfection costs; on the
-exact model each shows its own integrator.
+commanded effort's rate. The two engines agree on the effect of an imperfection; on the
+exact model the difference is that of their integrators.
 """  # noqa: E501
 
 CASES: dict[str, dict[str, Any]] = {
@@ -111,7 +112,7 @@ CASES: dict[str, dict[str, Any]] = {
 
 
 def configuration(robot: str, hand: str, plant: dict[str, Any]) -> dict[str, Any]:
-    """Return the motion on a plant."""
+    """Return the configuration of the motion on a plant."""
     if "payload" in plant:
         plant = {**plant, "payload": {**plant["payload"], "frame": hand}}
     circle = {
@@ -147,13 +148,13 @@ def configuration(robot: str, hand: str, plant: dict[str, Any]) -> dict[str, Any
 
 
 def measured(run: Rollout) -> str:
-    """Return the columns of a run."""
-    late = run.t > SETTLED
-    error = np.linalg.norm(run["task.hand.error"][late], axis=1)
-    rate = np.diff(run.tau[late], axis=0) / 0.001
+    """Return the table cells of a run."""
+    settled = run.t > SETTLED
+    error = np.linalg.norm(run["task.hand.error"][settled], axis=1)
+    rate = np.diff(run.tau[settled], axis=0) / 0.001
     rms = [
         float(np.sqrt(np.mean(x**2)))
-        for x in (1e3 * error, run["null_space_norm"][late], rate)
+        for x in (1e3 * error, run["null_space_norm"][settled], rate)
     ]
     return f"{rms[0]:.2g} | {rms[1]:.2g} | {rms[2]:.2g}"
 

@@ -1,11 +1,11 @@
 """Install this checkout and the peers into the environment that runs this script.
 
-`make bench` calls it with .venv-peers/bin/python. What it could not install it writes,
-with the reason, into .venv-peers/peers.json, and the table has a row that says so.
+`make bench` calls it with .venv-peers/bin/python. Peers that cannot be installed are
+written to .venv-peers/peers.json with the reason, which then stands in the table.
 
-TSID's wheel on PyPI is built for another Pinocchio and aborts next to pin 4.1: it is
-built here from its source package, with a C++ compiler and about 2 GB of memory a
-job. That takes 15 to 30 minutes, once; the wheels are kept in .venv-peers/wheels.
+TSID's wheel on PyPI is built for another Pinocchio and aborts with pin 4.1. Therefore
+it is built here from its source package, with a C++ compiler and about 2 GB of memory
+a job. That takes 15 to 30 minutes, once; the wheels are kept in .venv-peers/wheels.
 """
 
 import json
@@ -23,12 +23,12 @@ PLACO_HOME, PLACO = ROOT / ".venv-placo", "placo==0.10.2"
 
 PIN = ["pin==4.1.0", "libpinocchio==4.1.0", "cmeel-eigen==3.4.1"]
 PINK = ["pin-pink==4.4.0", "daqp==0.11.0", "proxsuite==0.8.0", "quadprog==0.1.14"]
-# What building needs and the wheels do not bring: CMake files, headers, `wheel pack`.
+# Needed for the build and not in the wheels: CMake files, headers, `wheel pack`.
 BUILD = ["libpinocchio[build]==4.1.0", "eiquadprog==1.3.2", "jrl-cmakemodules==2.1.0"]
 BUILD += ["cmake<4", "cmeel", "wheel"]
 CHECKS = {
     "pink": "import pink, qpsolvers; print(pink.__version__)",
-    # It is not enough that TSID imports: the wheel on PyPI aborts on the first robot.
+    # An import of TSID is not enough: the wheel on PyPI aborts on the first robot.
     "placo": "import placo, importlib.metadata as m; print(m.version('placo'))",
     "tsid": (
         "import pinocchio as pin, tsid; m = pin.buildSampleModelManipulator(); "
@@ -38,18 +38,18 @@ CHECKS = {
 
 
 def run(*command: str, **environment: str) -> str:
-    """Run a command, return what it printed.
+    """Run a command, and return its output.
 
     Raises:
-        RuntimeError: If it failed; with the last line that says something.
+        RuntimeError: If it fails; the message has its first line with an error.
     """
     done = subprocess.run(
         command, env=os.environ | environment, capture_output=True, text=True
     )
     if done.returncode:
         lines = [line for line in (done.stdout + done.stderr).splitlines() if line]
-        telling = [line for line in lines if "rror" in line] or lines or [""]
-        raise RuntimeError(f"exit {done.returncode}: {telling[0].strip()[:200]}")
+        errors = [line for line in lines if "rror" in line] or lines or [""]
+        raise RuntimeError(f"exit {done.returncode}: {errors[0].strip()[:200]}")
     return done.stdout.strip()
 
 
@@ -59,12 +59,12 @@ def pip(*arguments: str, **environment: str) -> None:
 
 
 def install_pink() -> None:
-    """Install pink and its solvers beside our Pinocchio."""
+    """Install pink and its solvers with this package's version of Pinocchio."""
     pip("install", "--quiet", *PINK, *PIN)
 
 
 def install_tsid() -> None:
-    """Build TSID against this environment's Pinocchio, unless that was done before."""
+    """Build TSID with this environment's Pinocchio, unless the wheels exist."""
     pip("install", "--quiet", *BUILD, *PIN)
     for name in ("libtsid", "tsid"):
         if not list(WHEELS.glob(f"{name}-1.10.0-*.whl")):
@@ -83,7 +83,7 @@ def install_tsid() -> None:
 def install_placo() -> None:
     """Install placo into an environment of its own: it needs pin 3.8."""
     if not PLACO_HOME.joinpath("bin", "python").exists():
-        # Debian's Python has no ensurepip: this environment's pip fills that one.
+        # Debian's Python has no ensurepip: use the pip of this environment.
         run(sys.executable, "-m", "venv", "--without-pip", str(PLACO_HOME))
     pip(
         "--python", str(PLACO_HOME / "bin" / "python"), "install", "--quiet", PLACO,
@@ -92,7 +92,7 @@ def install_placo() -> None:
 
 
 def main() -> None:
-    """Install everything that installs; keep a record of what did not."""
+    """Install all peers; write the reasons of those that cannot be installed."""
     print("Installing this checkout into", HOME, flush=True)
     pip("install", "--quiet", "--editable", f"{ROOT}[robots,mujoco]", *PIN)
     installers: dict[str, Callable[[], None]] = {
@@ -109,7 +109,7 @@ def main() -> None:
             version = run(str(home / "bin" / "python"), "-c", CHECKS[name])
             report[name] = {"version": version.splitlines()[-1]}
         except RuntimeError as error:
-            print(f"  {name} does not install: {error}", flush=True)
+            print(f"  {name} cannot be installed: {error}", flush=True)
             report[name] = {"failed": str(error)}
     (HOME / "peers.json").write_text(json.dumps(report, indent=2) + "\n")
 

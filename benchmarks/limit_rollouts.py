@@ -1,8 +1,8 @@
-"""Count violations of limits: a thousand rollouts of an arm, and pushes on legs.
+"""Count limit violations in 1000 rollouts of an arm and in pushes on legged robots.
 
     .venv/bin/python benchmarks/limit_rollouts.py [--rollouts N] [--pushes N]
 
-Each number is found in the log alone: positions, velocities and efforts of every step
+All numbers are computed from the log: positions, velocities and efforts of every step
 of 1 ms, and the differences of efforts. The tables are written into docs/limits.md.
 """
 
@@ -14,16 +14,16 @@ from time import process_time
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from marked import DOCS, replace_part
+from marked_sections import DOCS, replace_section
 from rich.progress import track
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.control.actuation import LIMITED, RELAXED
+from hsp_control.control.actuation import Status
 
 T = TypeVar("T")
 PERIOD = 1e-3  # [s]
-ROUNDING = 1e-9  # beside a limit, of what is no violation
+ROUNDING = 1e-9  # excess over a limit that is not counted as a violation
 EXCESS = ("effort [N·m]", "effort rate [N·m/s]", "velocity [rad/s]", "position [rad]")
 
 
@@ -31,17 +31,17 @@ EXCESS = ("effort [N·m]", "effort rate [N·m/s]", "velocity [rad/s]", "position
 
 
 class Arm(NamedTuple):
-    """What a rollout of the arm showed.
+    """Measurements of a rollout of the arm.
 
     Attributes:
-        completed: Whether it went on to its end.
-        rows: Steps.
-        violated: Steps beyond each limit, shape (4,).
-        excess: The largest, by how much, shape (4,).
-        used: The largest part of each limit that was used, shape (4,).
-        limited: Steps as near to the law as limits permit.
-        relaxed: Steps at which limits contradicted each other.
-        relaxation: By how much the worst barrier was then missed [rad/s²].
+        completed: Whether it ran to its end.
+        rows: Number of steps.
+        violated: Number of steps beyond each limit, shape (4,).
+        excess: Largest excess over each limit, shape (4,).
+        used: Largest ratio of a value to each limit, shape (4,).
+        limited: Number of steps at which limits changed the law's acceleration.
+        relaxed: Number of steps at which limits contradicted each other.
+        relaxation: Largest relaxation of a barrier [rad/s²].
         exact_step: Median processor time of a step of the law [s].
         limited_step: Median processor time of a limited step [s].
     """
@@ -60,17 +60,17 @@ class Arm(NamedTuple):
 
 @cache
 def panda() -> hsp.Robot:
-    """Return the arm, once a process."""
+    """Return the arm, cached in each process."""
     return hsp.Robot.load("panda")
 
 
 def draw(seed: int) -> tuple[hsp.Controller, hsp.Limits, Array]:
-    """Return a controller that its limits will meet, these, and a start.
+    """Return a random controller whose limits become active, its limits and a start.
 
-    70 to 100 % of the arm's efforts, 20 to 50 % of its speeds, 1000 N·m/s, its joint
-    ranges; the hand is asked to go round a circle of 20 cm at 1 to 6 rad/s, up to a
-    metre from where it is: mostly more than that allows, often out of reach. With odd
-    seeds the null space gives way within 2 rad/s, and every posture can be held.
+    Limits: 70 to 100 % of the arm's efforts, 20 to 50 % of its speeds, 1000 N·m/s, its
+    joint ranges. Task: a circle of 20 cm radius at 1 to 6 rad/s, up to a metre from the
+    start of the hand: mostly beyond the limits, often out of reach. With odd seeds the
+    limits `null_space_speed` (2 rad/s) and `static_effort` are on, too.
     """
     robot, rng = panda(), np.random.default_rng(seed)
     lower, upper = robot.position_limits()
@@ -95,7 +95,7 @@ def draw(seed: int) -> tuple[hsp.Controller, hsp.Limits, Array]:
 
 
 def roll_out(seed: int) -> Arm:
-    """Return what one random rollout of 0.8 s shows."""
+    """Run one random rollout of 0.8 s, and measure it."""
     controller, limits, q0 = draw(seed)
     rollout = hsp.simulate(
         controller,
@@ -107,19 +107,18 @@ def roll_out(seed: int) -> Arm:
     )
     excess = beyond(rollout, limits)
     status = rollout["status"]
-    of_each = [np.flatnonzero(status == kind) for kind in (0, LIMITED)]
-    exact_step, limited_step = (step_time(controller, rollout, k) for k in of_each)
+    exact, limited = (np.flatnonzero(status == s) for s in (0, Status.LIMITED))
     return Arm(
         completed=rollout.meta["status"] == "completed",
         rows=len(rollout),
         violated=np.array([(each > ROUNDING).any(axis=1).sum() for each in excess]),
         excess=np.array([each.max() for each in excess]),
-        used=np.array([part.max() for part in parts(rollout, limits)]),
-        limited=int((status == LIMITED).sum()),
-        relaxed=int((status == RELAXED).sum()),
+        used=np.array([ratio.max() for ratio in limit_ratios(rollout, limits)]),
+        limited=int((status == Status.LIMITED).sum()),
+        relaxed=int((status == Status.RELAXED).sum()),
         relaxation=float(rollout["relaxation"].max()),
-        exact_step=exact_step,
-        limited_step=limited_step,
+        exact_step=step_time(controller, rollout, exact),
+        limited_step=step_time(controller, rollout, limited),
     )
 
 
@@ -134,8 +133,8 @@ def beyond(rollout: hsp.Rollout, limits: hsp.Limits) -> tuple[Array, ...]:
     )
 
 
-def parts(rollout: hsp.Rollout, limits: hsp.Limits) -> tuple[Array, ...]:
-    """Return which part of each limit is used; of positions, from the middle."""
+def limit_ratios(rollout: hsp.Rollout, limits: hsp.Limits) -> tuple[Array, ...]:
+    """Return the ratio of each value to its limit; positions count from mid-range."""
     q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
     middle, half = 0.5 * (limits.upper + limits.lower), limits.upper - limits.lower
     return (
@@ -147,7 +146,7 @@ def parts(rollout: hsp.Rollout, limits: hsp.Limits) -> tuple[Array, ...]:
 
 
 def step_time(controller: hsp.Controller, rollout: hsp.Rollout, rows: Indices) -> float:
-    """Return the median time of some of the steps, taken again; NaN of none [s]."""
+    """Compute up to 40 of the steps again; return the median time [s], NaN if none."""
     rows, times = rows[rows > 0][:40], []
     for k in rows:
         controller.applied(rollout["tau"][k - 1], PERIOD)
@@ -159,30 +158,30 @@ def step_time(controller: hsp.Controller, rollout: hsp.Rollout, rows: Indices) -
 
 
 def arm_table(runs: list[Arm]) -> str:
-    """Return what all rollouts of the arm showed."""
+    """Return the table of all rollouts of the arm."""
     rows = sum(run.rows for run in runs)
     violated = np.sum([run.violated for run in runs], axis=0)
     excess = np.max([run.excess for run in runs], axis=0)
     used = np.array([run.used for run in runs])
-    lines = "| limit | steps beyond it | nearest to it, or worst beyond | 99 % of it "
-    lines += "used in |\n|---|--:|--:|--:|\n"
+    lines = "| limit | violations (steps) | largest excess (negative: margin) | "
+    lines += "99 % of it used in |\n|---|--:|--:|--:|\n"
     for k, name in enumerate(EXCESS):
         share = 100.0 * (used[:, k] > 0.99).mean()
-        nearest = f"{excess[k] + 0.0:.2g}" if abs(excess[k]) > ROUNDING else "0"
-        lines += f"| {name} | {violated[k]} | {nearest} | {share:.0f} % of runs |\n"
+        largest = f"{excess[k] + 0.0:.2g}" if abs(excess[k]) > ROUNDING else "0"
+        lines += f"| {name} | {violated[k]} | {largest} | {share:.0f} % of runs |\n"
     limited = sum(run.limited for run in runs) / rows
     relaxed = sum(run.relaxed for run in runs)
     with_relaxed = sum(run.relaxed > 0 for run in runs)
-    met = sum(run.limited + run.relaxed > 0 for run in runs)
+    active = sum(run.limited + run.relaxed > 0 for run in runs)
     ratio = np.nanmedian([run.limited_step / run.exact_step for run in runs])
     return lines + (
         f"\n{len(runs)} rollouts of 0.8 s, {rows} steps, "
-        f"{sum(run.completed for run in runs)} completed. Limits were met in "
-        f"{met} of them: {100 * limited:.1f} % of all steps are limited (status 2), "
+        f"{sum(run.completed for run in runs)} completed. Limits were active in "
+        f"{active} of them: {100 * limited:.1f} % of all steps are limited (status 2), "
         f"{relaxed} steps in {with_relaxed} rollouts relaxed (status 3: barriers that "
-        "the efforts cannot keep; the worst was missed by "
+        "the efforts cannot keep; the largest relaxation was "
         f"{max(run.relaxation for run in runs):.3g} rad/s²). A limited step takes "
-        f"{ratio:.1f} times as long as one of the law, median over the rollouts.\n"
+        f"{ratio:.1f} times as long as an exact one, median over the rollouts.\n"
     )
 
 
@@ -190,22 +189,22 @@ def arm_table(runs: list[Arm]) -> str:
 
 
 class Legs(NamedTuple):
-    """A robot on legs and how it is pushed.
+    """A legged robot and how it is pushed.
 
     Attributes:
         name: The bundled configuration.
-        overrides: What is changed in it.
-        frame: What is pushed.
-        body: The task that tells how far the trunk is turned, its last rows.
-        impulse: Force over weight.
-        ground: Friction of the plant's ground.
+        overrides: Changes of the configuration.
+        frame: The frame that is pushed.
+        body: The task whose last three rows are the orientation of the trunk.
+        force_ratio: Force over weight.
+        ground: Friction coefficient of the plant's ground.
     """
 
     name: str
     overrides: tuple[str, ...]
     frame: str
     body: str
-    impulse: float
+    force_ratio: float
     ground: float
 
 
@@ -218,18 +217,18 @@ START, PUSHED, DURATION = 1.0, 0.1, 4.0  # [s]
 
 
 class Pushed(NamedTuple):
-    """What a push did.
+    """Measurements of a pushed run.
 
     Attributes:
         fell: Whether the trunk sank by 10 cm, tilted by 30°, or the run ended early.
-        sunk: How far the root sank beside the run's own motion [m].
-        tilted: The largest error of the trunk's orientation [rad].
-        moved: The largest error of the first task [m].
-        asked: The largest part of a friction cone that a force asked for uses.
-        answered: The same of the engine's forces.
-        pulls: Steps at which a force that was asked for pulls.
-        relaxed: Steps at which limits contradicted each other.
-        rows: Steps.
+        sunk: How far the root sank below its start [m].
+        tilted: Largest error of the trunk's orientation [rad].
+        moved: Largest error of the first task [m].
+        planned: Largest used fraction of a friction cone, of the controller's forces.
+        simulated: The same, of the engine's forces.
+        pulls: Number of steps at which a force of the controller pulls.
+        relaxed: Number of steps at which limits contradicted each other.
+        rows: Number of steps.
         after: Error of the first task in the last 0.2 s [m].
     """
 
@@ -237,8 +236,8 @@ class Pushed(NamedTuple):
     sunk: float
     tilted: float
     moved: float
-    asked: float
-    answered: float
+    planned: float
+    simulated: float
     pulls: int
     relaxed: int
     rows: int
@@ -253,10 +252,10 @@ def weight(name: str) -> float:
 
 
 def push(legs: Legs, seed: int) -> Pushed:
-    """Return what a push in a random horizontal direction does."""
+    """Run with a push in a random horizontal direction, and measure it."""
     heading = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi)
-    force = legs.impulse * weight(legs.name)
-    blow: dict[str, Any] = {
+    force = legs.force_ratio * weight(legs.name)
+    setting: dict[str, Any] = {
         "frame": legs.frame,
         "force": [force * float(np.cos(heading)), force * float(np.sin(heading)), 0.0],
         "start": START,
@@ -265,13 +264,15 @@ def push(legs: Legs, seed: int) -> Pushed:
     rollout = hsp.load_experiment(
         f"whole_body/{legs.name}",
         *legs.overrides,
-        f"plant.pushes=[{blow}]",
+        f"plant.pushes=[{setting}]",
         f"simulation.duration={DURATION}",
         f"simulation.log_period={PERIOD}",
     ).run()
     columns = rollout.columns
     names = [c.split(".")[1] for c in columns if c.endswith("friction_used")]
-    ends = [c for c in columns if c.startswith("plant.contact.") and c[-6:] == ".force"]
+    forces = [
+        c for c in columns if c.startswith("plant.contact.") and c[-6:] == ".force"
+    ]
     first = next(iter(rollout.meta["tasks"]))
     moved = np.linalg.norm(rollout[f"task.{first}.error"][:, :3], axis=1)
     tilted = np.linalg.norm(rollout[f"task.{legs.body}.error"][:, -3:], axis=1).max()
@@ -283,35 +284,35 @@ def push(legs: Legs, seed: int) -> Pushed:
         sunk=sunk,
         tilted=float(tilted),
         moved=float(moved.max()),
-        asked=max(
+        planned=max(
             float(np.nanmax(rollout[f"contact.{n}.friction_used"])) for n in names
         ),
-        answered=max(cone_used(rollout[end], legs.ground) for end in ends),
+        simulated=max(cone_used(rollout[c], legs.ground) for c in forces),
         pulls=sum(
             int((rollout[f"contact.{n}.force"][:, 2] < 0.0).sum()) for n in names
         ),
-        relaxed=int((rollout["status"] == RELAXED).sum()),
+        relaxed=int((rollout["status"] == Status.RELAXED).sum()),
         rows=len(rollout),
         after=float(moved[-200:].max()),
     )
 
 
 def cone_used(force: Array, friction: float) -> float:
-    """Return the largest part of a cone that forces use, where something bears [-]."""
-    bears = force[:, 2] > 1.0
-    slope = np.linalg.norm(force[bears, :2], axis=1) / force[bears, 2]
+    """Return the largest used fraction of a cone while in contact (> 1 N) [-]."""
+    contact = force[:, 2] > 1.0
+    slope = np.linalg.norm(force[contact, :2], axis=1) / force[contact, 2]
     return float(slope.max(initial=0.0)) / friction
 
 
 def leg_table(runs: dict[Legs, list[Pushed]]) -> str:
-    """Return what all pushes did."""
+    """Return the table of all pushes."""
     lines = (
         "| robot | push | falls | worst error of the first task [mm], and at the end | "
-        "worst tilt [°] | friction used: asked, answered | pulling forces | relaxed "
+        "worst tilt [°] | friction used: controller, engine | pulling forces | relaxed "
         "steps |\n|---|---|--:|--:|--:|--:|--:|--:|\n"
     )
     for legs, pushed in runs.items():
-        force = legs.impulse * weight(legs.name)
+        force = legs.force_ratio * weight(legs.name)
         rows = sum(each.rows for each in pushed)
         lines += (
             f"| `{legs.name}` | {force:.0f} N for {PUSHED:g} s | "
@@ -319,8 +320,8 @@ def leg_table(runs: dict[Legs, list[Pushed]]) -> str:
             f"{1e3 * max(each.moved for each in pushed):.2g}, "
             f"{1e3 * max(each.after for each in pushed):.2g} | "
             f"{np.rad2deg(max(each.tilted for each in pushed)):.2g} | "
-            f"{100 * max(each.asked for each in pushed):.1f} %, "
-            f"{100 * max(each.answered for each in pushed):.1f} % | "
+            f"{100 * max(each.planned for each in pushed):.1f} %, "
+            f"{100 * max(each.simulated for each in pushed):.1f} % | "
             f"{sum(each.pulls for each in pushed)} | "
             f"{sum(each.relaxed for each in pushed)} of {rows} |\n"
         )
@@ -330,8 +331,8 @@ def leg_table(runs: dict[Legs, list[Pushed]]) -> str:
 # --------------------------------------------------------------------------- main
 
 
-def spread(work: Callable[[Any], T], items: Iterable[Any], what: str) -> list[T]:
-    """Return the work on every item, two at a time."""
+def run_parallel(work: Callable[[Any], T], items: Iterable[Any], what: str) -> list[T]:
+    """Return ``work(item)`` for every item, computed by two processes."""
     items = list(items)
     with ProcessPoolExecutor(2) as pool:
         done = pool.map(work, items, chunksize=max(1, min(10, len(items) // 4)))
@@ -339,7 +340,7 @@ def spread(work: Callable[[Any], T], items: Iterable[Any], what: str) -> list[T]
 
 
 def push_of(item: tuple[Legs, int]) -> Pushed:
-    """Return what a push does: `push` for a pool, which maps one argument."""
+    """Call `push` with one argument, as a process pool does."""
     return push(*item)
 
 
@@ -352,21 +353,23 @@ def main() -> None:
     options = parser.parse_args()
     tables = {}
     if options.rollouts:
-        runs = spread(roll_out, range(options.rollouts), "arm")
+        runs = run_parallel(roll_out, range(options.rollouts), "arm")
         tables["limit_rollouts"] = arm_table(runs)
         for seed, run in enumerate(runs):
             if run.violated.any() or run.relaxed:
                 print(f"seed {seed}: {run}")
     if options.pushes:
         pushed = {
-            legs: spread(push_of, ((legs, k) for k in range(options.pushes)), legs.name)
+            legs: run_parallel(
+                push_of, ((legs, k) for k in range(options.pushes)), legs.name
+            )
             for legs in LEGS
         }
         tables["pushes"] = leg_table(pushed)
     for name, table in tables.items():
         print(table)
         if not options.dry:
-            replace_part(DOCS / "limits.md", name, "\n" + table + "\n")
+            replace_section(DOCS / "limits.md", name, "\n" + table + "\n")
 
 
 if __name__ == "__main__":

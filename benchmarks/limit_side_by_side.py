@@ -1,23 +1,23 @@
-"""An arm that meets its limits: this law with and without them, and TSID.
+"""An arm that reaches its limits: this law with and without limits, and TSID.
 
     .venv-peers/bin/python benchmarks/limit_side_by_side.py
 
-The configurations of configs/limits on rigid bodies at 1 kHz; without TSID its rows are
-left out. Writes a table into docs/limits.md and draws docs/figures/limits.png.
+The configurations of configs/limits on rigid bodies at 1 kHz. Without TSID its rows are
+omitted. Writes a table into docs/limits.md and draws docs/figures/limits.png.
 """
 
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from marked import DOCS, replace_part
+from marked_sections import DOCS, replace_section
 from matplotlib.figure import Figure
 from timing import ratios, spread, step_times
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.config import Experiment
-from hsp_control.control.actuation import EXACT
+from hsp_control.control.actuation import Status
 from hsp_control.visualization.palette import INK, SERIES
 from hsp_control.visualization.plots import new_figure, styled
 
@@ -28,16 +28,16 @@ Compute = Callable[[float, Array, Array], Array]
 
 
 class Run(NamedTuple):
-    """A closed loop: one row a step, however far it went.
+    """A closed loop: one row for each of its N steps.
 
     Attributes:
-        t: Time [s].
-        q: Configuration.
-        v: Velocity.
-        tau: Effort.
-        error: Distance of the hand from its path [m].
-        null_space: ‖(I - J⁺J)(g - v)‖ [rad/s].
-        end: Why it ended early, if it did.
+        t: Time, shape (N,) [s].
+        q: Configuration, shape (N, nq).
+        v: Velocity, shape (N, nv).
+        tau: Effort, shape (N, nv).
+        error: Distance of the hand from its path, shape (N,) [m].
+        null_space: ‖(I - J⁺J)(g - v)‖, shape (N,) [rad/s].
+        end: Why it ended early; empty if it did not.
     """
 
     t: Array
@@ -50,7 +50,7 @@ class Run(NamedTuple):
 
 
 def this_law(experiment: Experiment) -> Compute:
-    """Return the configuration's controller, told what went out."""
+    """Return the configuration's controller, with the applied effort fed back."""
     controller, state = experiment.controller, hsp.RobotState(experiment.robot)
 
     def compute(t: float, q: Array, v: Array) -> Array:
@@ -61,17 +61,17 @@ def this_law(experiment: Experiment) -> Compute:
     return compute
 
 
-def clipped(experiment: Experiment, greatest: Array) -> Compute:
-    """Return the configuration's controller behind motors that give no more."""
+def clipped(experiment: Experiment, limits: Array) -> Compute:
+    """Return the configuration's controller with its efforts clipped, shape (nv,)."""
     law = this_law(experiment)
-    return lambda t, q, v: np.clip(law(t, q, v), -greatest, greatest)
+    return lambda t, q, v: np.clip(law(t, q, v), -limits, limits)
 
 
 def tsid_of(experiment: Experiment, limits: hsp.Limits, weight: float) -> Compute:
-    """Return TSID: hand, posture, bounds of efforts, positions and speeds.
+    """Return TSID: hand and posture tasks; bounds of efforts, positions and speeds.
 
-    The posture task has Kp = K_N α and Kv = K_N + α joint by joint, for the field
-    g = -α (q - q_0) that the configurations have.
+    The posture task has Kp = K_N α and Kv = K_N + α for each joint, for the field
+    g = -α (q - q_0) of the configurations.
     """
     import tsid
 
@@ -90,7 +90,7 @@ def tsid_of(experiment: Experiment, limits: hsp.Limits, weight: float) -> Comput
     hand.setMask(np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     problem.addMotionTask(hand, 1.0, 1, 0.0)
 
-    # g is linear in q: its slope and its zero, from two of its values.
+    # g is linear in q: compute its slope and its zero from two values.
     still = hsp.RobotState(robot)
 
     def flow(q: Array) -> Array:
@@ -127,9 +127,9 @@ def tsid_of(experiment: Experiment, limits: hsp.Limits, weight: float) -> Comput
     place[3:] = np.eye(3).ravel()
 
     def compute(t: float, q: Array, v: Array) -> Array:
-        wanted = task.trajectory.sample(t)
-        place[:3], rate[:3] = wanted.position, wanted.velocity
-        rate_dot[:3] = wanted.acceleration
+        desired = task.trajectory.sample(t)
+        place[:3], rate[:3] = desired.position, desired.velocity
+        rate_dot[:3] = desired.acceleration
         hand_sample.value(place)
         hand_sample.derivative(rate)
         hand_sample.second_derivative(rate_dot)
@@ -148,7 +148,7 @@ def close_loop(experiment: Experiment, compute: Compute) -> Run:
     """Run a controller on rigid bodies, its effort held for a period."""
     robot, (task,) = experiment.robot, experiment.controller.tasks
     assert isinstance(task, hsp.FramePosition)
-    reference = experiment.controller  # of this experiment: for g alone
+    reference = experiment.controller  # computes g for the measurement
     plant, integrator = hsp.RigidBodyPlant(robot), hsp.Rk4(PERIOD)
     q, v, tau = experiment.q0.copy(), experiment.v0.copy(), np.zeros(robot.nv)
     state, rows, end = hsp.RobotState(robot), [], ""
@@ -160,16 +160,16 @@ def close_loop(experiment: Experiment, compute: Compute) -> Run:
         t = k * PERIOD
         try:
             tau[:] = compute(t, q, v)
-        except (RuntimeError, hsp.exceptions.HspError) as error:
-            end = f"{error} at {t:.2f} s"
+        except (RuntimeError, hsp.HspControlError) as fault:
+            end = f"{fault} at {t:.2f} s"
             break
         frame = state.update(t, q, v).frame(task.frame)
         error = np.linalg.norm(task.trajectory.sample(t).position - frame.position)
         reference.compute(state)
         J = frame.jacobian[:3]
-        missed = reference.field_sample.g - v
-        missed = missed - np.linalg.pinv(J) @ (J @ missed)
-        rows.append((t, q, v, tau.copy(), error, np.linalg.norm(missed)))
+        e_N = reference.field_sample.g - v
+        e_N = e_N - np.linalg.pinv(J) @ (J @ e_N)
+        rows.append((t, q, v, tau.copy(), error, np.linalg.norm(e_N)))
         q, v = integrator.advance(robot, accelerate, t, t + PERIOD, q, v)
         if not np.abs(v).max() < 100.0:
             end = f"diverged at {t:.2f} s"
@@ -205,13 +205,13 @@ def runs_of(name: str) -> tuple[dict[str, Run], hsp.Limits]:
 def row(name: str, label: str, run: Run, limits: hsp.Limits) -> str:
     """Return a line of the table."""
     rate = np.abs(np.diff(run.tau, axis=0)).max() / PERIOD
-    least = np.minimum(run.q - limits.lower, limits.upper - run.q).min()
+    margin = np.minimum(run.q - limits.lower, limits.upper - run.q).min()
     error = 1e3 * run.error
     cells = (
         f"{100 * (np.abs(run.tau) / limits.effort).max():.0f} %",
         f"{rate:.0f}",
         f"{100 * (np.abs(run.v) / limits.velocity).max():.0f} %",
-        f"{1e3 * least:.2g}",
+        f"{1e3 * margin:.2g}",
         f"{np.sqrt((error**2).mean()):.2g} / {error.max():.2g}",
         f"{np.sqrt((run.null_space**2).mean()):.2g}",
         run.end,
@@ -220,15 +220,15 @@ def row(name: str, label: str, run: Run, limits: hsp.Limits) -> str:
 
 
 HEADER = (
-    "| configuration | controller | greatest effort, of its limit | greatest rate "
-    "[N·m/s] | greatest speed, of its limit | least distance from a joint's limit "
-    "[mrad] | hand, rms / max [mm] | ‖P(g − v)‖ rms [rad/s] | |\n"
+    "| configuration | controller | largest effort / limit | largest rate "
+    "[N·m/s] | largest speed / limit | minimum distance from a joint's limit "
+    "[mrad] | hand error, rms / max [mm] | ‖P(g − v)‖ rms [rad/s] | |\n"
     "|---|---|--:|--:|--:|--:|--:|--:|---|\n"
 )
 
 
 def cost(name: str, run: Run, limits: hsp.Limits) -> str:
-    """Return lines of what a step costs beside TSID's, limits binding or not."""
+    """Return rows of step times beside TSID's, without and with active limits."""
     experiment = hsp.load_experiment(f"limits/{name}")
     controller, state = experiment.controller, hsp.RobotState(experiment.robot)
 
@@ -236,11 +236,13 @@ def cost(name: str, run: Run, limits: hsp.Limits) -> str:
         return controller.compute(state.update(t, q, v)).tau
 
     steps = list(zip(run.t, run.q, run.v, strict=True))
-    bound = [controller.compute(state.update(*step)).status != EXACT for step in steps]
+    active = [
+        controller.compute(state.update(*step)).status != Status.EXACT for step in steps
+    ]
     peer = tsid_of(hsp.load_experiment(f"limits/{name}", "limits=null"), limits, 1e-3)
     lines = ""
     for label, wanted in (("none", False), ("some", True)):
-        chosen = [step for step, b in zip(steps, bound, strict=True) if b == wanted]
+        chosen = [step for step, a in zip(steps, active, strict=True) if a == wanted]
         times = step_times({"law": law, "TSID": peer}, chosen, rounds=25, block=40)
         ratio = spread(ratios(times, "law", "TSID"))
         taken = 1e6 * np.median(times["law"])
@@ -249,13 +251,13 @@ def cost(name: str, run: Run, limits: hsp.Limits) -> str:
 
 
 COST = (
-    "\n| configuration | limits that bind | steps | this law / TSID | µs |\n"
+    "\n| configuration | active limits | steps | this law / TSID | µs |\n"
     "|---|---|--:|--:|--:|\n"
 )
 
 
 def figure(found: dict[str, tuple[dict[str, Run], hsp.Limits]]) -> Figure:
-    """Return limits, what meets them, and what gives way."""
+    """Draw limited quantities, tracking error and null-space error."""
     drawn = new_figure(10.0, 7.2)
     axes = drawn.subplots(3, 2, sharex="col")
     half, towards = NAMES
@@ -277,9 +279,9 @@ def figure(found: dict[str, tuple[dict[str, Run], hsp.Limits]]) -> Figure:
         )
         for bound in bounds:
             top.axhline(bound, color=INK, lw=1.0, ls="--")
-        what = "effort of joint 2 [N·m]" if name == half else "joint 4 [°]"
-        top.set_ylabel(what)
-        middle.set_ylabel("hand off its path [mm]")
+        label = "effort of joint 2 [N·m]" if name == half else "joint 4 [°]"
+        top.set_ylabel(label)
+        middle.set_ylabel("hand error [mm]")
         bottom.set_ylabel("‖P(g − v)‖ [rad/s]")
         middle.set_ylim(1e-3, 3e2)
         bottom.set_ylim(1e-4, 1e2)
@@ -303,7 +305,7 @@ def main() -> None:
             for name, (runs, limits) in found.items()
         )
     print(table)
-    replace_part(DOCS / "limits.md", "limit_side_by_side", "\n" + table + "\n")
+    replace_section(DOCS / "limits.md", "limit_side_by_side", "\n" + table + "\n")
     with styled():
         figure(found).savefig(DOCS / "figures" / "limits.png", dpi=110)
 

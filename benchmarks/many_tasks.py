@@ -1,4 +1,4 @@
-"""Larger robots, several poses at once: this law and TSID on the same problem."""
+"""Larger robots with several pose tasks: this law and TSID on the same problem."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,13 +17,14 @@ ASIDE = np.array([0.05, 0.0, 0.0])  # from the start to the circle's centre [m]
 
 @dataclass
 class Poses:
-    """Frames of one robot follow small circles, its posture is held beside them.
+    """Frames of one robot follow small circles; a posture is held in the null space.
 
     Attributes:
-        name: What the table calls it.
+        name: Name in the table.
         robot: The robot.
-        q0: Where it starts, shape (nq,) = (nv,).
-        frames: Names of the frames; six rows each.
+        q0: Start configuration, shape (nq,) = (nv,).
+        frames: Names of the frames; six task rows each.
+        trajectories: One pose trajectory for each frame.
     """
 
     name: str
@@ -32,7 +33,7 @@ class Poses:
     frames: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        """Lay the circles through where the frames start."""
+        """Make circles through the start positions of the frames."""
         state = self.robot.state(0.0, self.q0, np.zeros(self.robot.nv))
         self.trajectories = []
         for frame in self.frames:
@@ -48,7 +49,7 @@ class Poses:
             )
 
     def law(self) -> Callable[[float, Array, Array], Array]:
-        """Return this law."""
+        """Return this law as a function (t, q, v) ↦ tau."""
         gains = hsp.Gains.from_frequency(FREQUENCY)
         tasks = [
             hsp.FramePose(self.robot, frame, trajectory, gains)
@@ -66,7 +67,7 @@ class Poses:
         return compute
 
     def tsid(self) -> Callable[[float, Array, Array], Array]:
-        """Return TSID as in `controllers/tsid_peer.py`, a pose task for each frame."""
+        """Return TSID as in `controllers/tsid_peer.py`, with one pose task a frame."""
         import tsid
 
         model, nv = self.robot.model, self.robot.nv
@@ -97,16 +98,16 @@ class Poses:
         still = tsid.TrajectorySample(nv)
         still.value(self.q0)
         still.derivative(np.zeros(nv))
-        wanted = [PoseSample.allocate() for _ in tasks]
+        desired = [PoseSample.allocate() for _ in tasks]
         followers = [
             trajectory.follow(out)
-            for trajectory, out in zip(self.trajectories, wanted, strict=True)
+            for trajectory, out in zip(self.trajectories, desired, strict=True)
         ]
         place, rate, rate_dot = np.zeros(12), np.zeros(6), np.zeros(6)
 
         def compute(t: float, q: Array, v: Array) -> Array:
             for task, sample, out, follow in zip(
-                tasks, samples, wanted, followers, strict=True
+                tasks, samples, desired, followers, strict=True
             ):
                 follow(t)
                 x, R = out
@@ -129,7 +130,7 @@ class Poses:
     def run(
         self, compute: Callable[[float, Array, Array], Array], duration: float
     ) -> tuple[float, list[tuple[float, Array, Array]]]:
-        """Close the loop; return the rms error [m] of its last half, and the states."""
+        """Run in closed loop; return the rms error [m] of the last half, and states."""
         plant, integrator = hsp.RigidBodyPlant(self.robot), hsp.Rk4(STEP)
         q, v, tau = self.q0.copy(), np.zeros(self.robot.nv), np.zeros(self.robot.nv)
         state, states, squares = hsp.RobotState(self.robot), [], []
@@ -167,7 +168,7 @@ def two_arms() -> Poses:
 
 
 def humanoid() -> Poses:
-    """Return Talos hung up by its pelvis: both hands and a foot, 18 rows."""
+    """Return Talos with a fixed pelvis: poses of both hands and a foot, 18 rows."""
     robot = hsp.Robot.load("talos", root="fixed")
     frames = ("gripper_left_base_link", "gripper_right_base_link", "left_sole_link")
     q = robot.home()
@@ -181,4 +182,4 @@ BENT = {
     "arm_left_1_joint": 0.25, "arm_left_2_joint": 0.2, "arm_left_4_joint": -1.2,
     "arm_right_1_joint": -0.25, "arm_right_2_joint": -0.2, "arm_right_4_joint": -1.2,
 }  # fmt: skip
-"""Elbows and a knee bent, so that nothing is singular [rad]."""
+"""Elbows and a knee are bent, so that no task is singular [rad]."""

@@ -1,10 +1,10 @@
-"""placo, in an environment of its own: it needs another Pinocchio than this package.
+"""Time placo in its own environment: it needs another version of Pinocchio.
 
     .venv-placo/bin/python benchmarks/placo_side.py CASE.npz
 
-It runs the case that `Case.save` wrote in closed loop, then times placo's dynamics
-solver beside the operational-space controller, which both environments run: the bridge
-from one environment's times to the other's. Prints one line of JSON.
+Runs the case written by `Case.save` in closed loop, then times placo's dynamics solver
+together with the operational-space controller. Both environments run that controller:
+it is the reference that relates their times. Prints one line of JSON.
 """
 
 import json
@@ -27,13 +27,13 @@ PLANT_STEP = 2.5e-4  # [s]
 
 @dataclass
 class Saved:
-    """The case, as the operational-space controller asks for it."""
+    """The case, with the attributes that the operational-space controller needs."""
 
     data: Any
     robot: SimpleNamespace
 
     def __post_init__(self) -> None:
-        """Read what stays."""
+        """Read the constants."""
         self.rows, self.frame = int(self.data["rows"]), str(self.data["frame"])
         self.q0, self.period = self.data["q0"], float(self.data["period"])
         self.kp, self.kv, self.posture_kp, self.posture_kv = self.data["gains"]
@@ -41,7 +41,7 @@ class Saved:
         self.turning = self.data["turning"]
 
     def desired(self, t: float) -> tuple[SimpleNamespace, SimpleNamespace]:
-        """Return position and orientation, with rates, at a control instant."""
+        """Return desired position and orientation with derivatives at time t [s]."""
         k = min(round(t / self.period), len(self.position) - 1)
         x, w = self.position[k], self.turning[k]
         return (
@@ -59,7 +59,7 @@ class Saved:
 
 
 def rigid_fingers(urdf: Path, folder: Path) -> Path:
-    """Write the URDF with its fingers fixed and without meshes."""
+    """Write the URDF with fixed fingers and without meshes; return the file."""
     text = urdf.read_text()
     text = re.sub(
         r'(name="panda_finger_joint[12]" type=)"prismatic"', r'\1"fixed"', text
@@ -125,7 +125,7 @@ def tracking(case: Saved, model: Any, compute: Compute) -> float:
 
 
 def main() -> None:
-    """Run, time, print."""
+    """Run, measure times, and print the result."""
     data = np.load(sys.argv[1])
     rounds, block = int(sys.argv[2]), int(sys.argv[3])
     with tempfile.TemporaryDirectory() as folder:
@@ -134,16 +134,16 @@ def main() -> None:
         case = Saved(data, SimpleNamespace(model=model))
         controllers = {
             "placo": make_placo(case, urdf),
-            "bridge": operational_space.make(case),
+            "reference": operational_space.make(case),
         }
-        rms = {n: tracking(case, model, c) for n, c in controllers.items()}
+        rms = {name: tracking(case, model, c) for name, c in controllers.items()}
         states = list(zip(data["times"].tolist(), data["q"], data["v"], strict=True))
         times = step_times(controllers, states, rounds, block)
     print(
         json.dumps(
             {
                 "rms": rms,
-                "ratio": (times["placo"] / times["bridge"]).tolist(),
+                "ratio": (times["placo"] / times["reference"]).tolist(),
                 "microseconds": 1e6 * float(np.median(times["placo"])),
                 "pin": pin.__version__,
             }

@@ -1,23 +1,23 @@
-"""The limits of the sampled loop, linear and real: a robot just below and just above.
+"""Check the stability limits of the sampled loop on the nonlinear robot.
 
     .venv/bin/python benchmarks/rate_limits.py
 
-For each case the check's own limit of one setting is found by bisection. Then the
-nonlinear robot is let go near its target with the setting 3 % below and 3 % above it.
-Writes the table of docs/robustness.md.
+For each case the limit of one setting according to `check_rate` is found by bisection.
+Then the nonlinear robot starts near its target with the setting 3 % below and 3 % above
+this limit: it must converge and diverge. Writes the table of docs/robustness.md.
 """
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from marked import DOCS, replace_part
+from marked_sections import DOCS, replace_section
 from rich.progress import track
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.common.exceptions import SimulationError, UnstableRateError
 
-BESIDE = 0.03
+OFFSET = 0.03  # relative distance of a run from the limit
 PERIODS = 600
 STARTS = {
     "panda": ("panda_tcp", [0.0, -0.5, 0.1, -2.0, 0.2, 1.6, 0.7]),
@@ -26,16 +26,16 @@ STARTS = {
 
 
 class Case(NamedTuple):
-    """A loop with one setting to be found.
+    """A loop with one setting whose limit is to be found.
 
     Attributes:
-        name: What it is.
-        robot: Whose.
-        frequency: Of the loop [Hz].
-        settings: (setting x, period h) ↦ what it changes in the configuration.
-        unit: (x, h) ↦ the number that theory states, and its name.
-        greatest: Where to look for it.
-        below: Whether it is stable below its limit; above it otherwise.
+        name: Name in the table.
+        robot: Name of the robot.
+        frequency: Control frequency [Hz].
+        settings: (setting x, period h) ↦ changes of the configuration.
+        unit: (x, h) ↦ name and value of the number that theory gives.
+        upper: Upper end of the search interval for x, over the frequency.
+        below: Whether the loop is stable below its limit; else above it.
     """
 
     name: str
@@ -43,31 +43,31 @@ class Case(NamedTuple):
     frequency: float
     settings: Callable[[float, float], dict[str, Any]]
     unit: Callable[[float, float], tuple[str, float]]
-    greatest: float
+    upper: float
     below: bool = True
 
 
 def gain(x: float, h: float) -> dict[str, Any]:
-    """Return a null-space gain."""
+    """Change the null-space gain."""
     return {"null_space.gain": x}
 
 
 def frequency(x: float, h: float) -> dict[str, Any]:
-    """Return a task's frequency."""
+    """Change the task's natural frequency."""
     return {"tasks.hand.gains.natural_frequency": x}
 
 
 def stiff(x: float, h: float) -> dict[str, Any]:
-    """Return a field as stiff as K_N."""
+    """Change gain and stiffness of the field, both to x."""
     return {"null_space.gain": x, "null_space.fields.0.weight": x}
 
 
-def also(
+def plus(
     settings: Callable[[float, float], dict[str, Any]], **more: Any
 ) -> Callable[[float, float], dict[str, Any]]:
-    """Return settings with others beside them, dots written as ``__``."""
-    beside = {key.replace("__", "."): value for key, value in more.items()}
-    return lambda x, h: {**settings(x, h), **beside}
+    """Add constant settings to variable ones; ``__`` in a name is a dot."""
+    others = {key.replace("__", "."): value for key, value in more.items()}
+    return lambda x, h: {**settings(x, h), **others}
 
 
 def K_N(x: float, h: float) -> tuple[str, float]:
@@ -90,32 +90,32 @@ CASES = [
     Case("null space", "panda", 1000, gain, K_N, 4.0),
     Case("null space", "panda", 100, gain, K_N, 4.0),
     Case("null space", "iiwa14", 500, gain, K_N, 4.0),
-    Case("null space, one period late", "panda", 1000, also(gain, **LATE), K_N, 4.0),
+    Case("null space, one period late", "panda", 1000, plus(gain, **LATE), K_N, 4.0),
     Case("null space, measured one period late", "panda", 500,
-         also(gain, plant__sensors__delay=1), K_N, 4.0),
+         plus(gain, plant__sensors__delay=1), K_N, 4.0),
     Case("null space, field as stiff as K_N", "panda", 1000, stiff, both, 2.0),
-    Case("the same, one period late", "panda", 1000, also(stiff, **LATE), both, 2.0),
+    Case("the same, one period late", "panda", 1000, plus(stiff, **LATE), both, 2.0),
     Case("task", "panda", 1000, frequency, omega, 2.0),
     Case("task", "panda", 100, frequency, omega, 2.0),
     Case("task", "iiwa14", 1000, frequency, omega, 2.0),
-    Case("task, one period late", "panda", 1000, also(frequency, **LATE), omega, 2.0),
-    Case("task, one period late", "panda", 100, also(frequency, **LATE), omega, 2.0),
+    Case("task, one period late", "panda", 1000, plus(frequency, **LATE), omega, 2.0),
+    Case("task, one period late", "panda", 100, plus(frequency, **LATE), omega, 2.0),
     Case("task, two periods late", "iiwa14", 500,
-         also(frequency, plant__drives__delay=2), omega, 2.0),
+         plus(frequency, plant__drives__delay=2), omega, 2.0),
     Case("task, one period late, predicted", "panda", 1000,
-         also(frequency, **LATE, compensation__predictor={"effort_delay": 1}),
+         plus(frequency, **LATE, compensation__predictor={"effort_delay": 1}),
          omega, 2.0),
     Case("task, one each, predicted", "panda", 500,
-         also(frequency, **LATE, plant__sensors__delay=1,
+         plus(frequency, **LATE, plant__sensors__delay=1,
               compensation__predictor={"effort_delay": 1, "sensor_delay": 1}),
          omega, 2.0),
     Case("task, velocity at 50 Hz", "panda", 1000,
-         also(frequency, compensation__velocity_filter={"cutoff": 50.0}), omega, 2.0),
+         plus(frequency, compensation__velocity_filter={"cutoff": 50.0}), omega, 2.0),
     Case("task, velocity at 50 Hz, second order", "panda", 1000,
-         also(frequency, compensation__velocity_filter={"cutoff": 50.0, "order": 2}),
+         plus(frequency, compensation__velocity_filter={"cutoff": 50.0, "order": 2}),
          omega, 2.0),
     Case("task, observer of 50 1/s, one period late", "panda", 1000,
-         also(frequency, **LATE, compensation__momentum_observer={"bandwidth": 50.0}),
+         plus(frequency, **LATE, compensation__momentum_observer={"bandwidth": 50.0}),
          omega, 2.0),
     Case("observer of x, ω0 h = 0.1, one period late", "panda", 1000,
          lambda x, h: {"compensation.momentum_observer": {"bandwidth": x},
@@ -130,7 +130,7 @@ CASES = [
 
 
 def configuration(case: Case, x: float, *, check: bool) -> dict[str, Any]:
-    """Return a robot a little off its target, at rest."""
+    """Return a configuration with the robot at rest, slightly off its target."""
     hand, q0 = STARTS[case.robot]
     h = 1.0 / case.frequency
     target = [value + 1e-3 * (-1) ** k for k, value in enumerate(q0)]
@@ -173,8 +173,8 @@ def configuration(case: Case, x: float, *, check: bool) -> dict[str, Any]:
 
 
 def limit(case: Case) -> float:
-    """Return the setting beyond which the check refuses the loop."""
-    low, high = 1e-3 * case.frequency, case.greatest * case.frequency
+    """Return the setting above which `check_rate` reports an unstable loop."""
+    low, high = 1e-3 * case.frequency, case.upper * case.frequency
     for _ in range(40):
         middle = 0.5 * (low + high)
         try:
@@ -189,9 +189,9 @@ def limit(case: Case) -> float:
 
 
 def growth(case: Case, x: float) -> float:
-    """Return how much larger what dies is at the end than at first, inf if all is lost.
+    """Return the ratio of the largest joint velocities, last to first third of the run.
 
-    Measured by the joints' velocity: all of it should be gone.
+    A stable loop converges, so that the ratio is below 1; inf if the run fails.
     """
     try:
         run = load_experiment(configuration(case, x, check=False)).run()
@@ -213,7 +213,7 @@ def main() -> None:
     for case in track(CASES, transient=True):
         x = limit(case)
         name, value = case.unit(x, 1.0 / case.frequency)
-        below, above = (growth(case, (1.0 + s * BESIDE) * x) for s in (-1.0, 1.0))
+        below, above = (growth(case, (1.0 + s * OFFSET) * x) for s in (-1.0, 1.0))
         if not below < 1.0 < above:
             print(f"WRONG: {case.name}: {below:.3g}, {above:.3g}")
         grown = "∞" if np.isinf(above) else f"{above:.2g}"
@@ -221,7 +221,7 @@ def main() -> None:
             f"| {case.name} | {case.robot} | {case.frequency:g} Hz | "
             f"{name} < {value:.3f} | {below:.2g} | {grown} |"
         )
-    replace_part(DOCS / "robustness.md", "rates", "\n".join(lines) + "\n")
+    replace_section(DOCS / "robustness.md", "rates", "\n".join(lines) + "\n")
     print("\n".join(lines))
 
 

@@ -1,11 +1,12 @@
-"""What each compensator is worth on each imperfect plant: two arms, two engines.
+"""Measure each compensator on each imperfect plant: two arms, two engines.
 
     .venv/bin/python benchmarks/robustness.py [--fresh] [--tables]
 
 Runs the motion of docs/plants.md with the nominal model, on Pinocchio's plant and on
-MuJoCo's; writes docs/robustness.csv, and of it the tables of docs/robustness.md. What
-the CSV has is not run again, so that it may be stopped and go on; ``--fresh`` forgets
-it, ``--tables`` only writes the page. Half an hour of two cores.
+MuJoCo's. Writes docs/robustness.csv, and from it the tables of docs/robustness.md. Runs
+that are in the CSV are not repeated, so that the script can be stopped and continued;
+``--fresh`` deletes the CSV, ``--tables`` only writes the page. Takes half an hour
+on two cores.
 """
 
 import csv
@@ -20,7 +21,7 @@ from typing import Any
 import numpy as np
 from iiwa_inertias import write_urdf
 from imperfect_plants import SETTLED, configuration
-from marked import DOCS, replace_part
+from marked_sections import DOCS, replace_section
 from rich.progress import track
 
 from hsp_control import ContinuousPlant, IntegratedPlant, SampledPlant, load_experiment
@@ -43,21 +44,21 @@ ENCODER = {
         "differenced_velocity": True,
     }
 }
-SHARE = 0.8  # of the friction that the feed-forward knows of
-FEED_FORWARD = {"coulomb": [SHARE * c for c in COULOMB], "viscous": SHARE * VISCOUS}
+KNOWN = 0.8  # fraction of the true friction that the feed-forward uses
+FEED_FORWARD = {"coulomb": [KNOWN * c for c in COULOMB], "viscous": KNOWN * VISCOUS}
 
 
 @dataclass(frozen=True)
 class Row:
-    """A plant.
+    """An imperfect plant, one row of a table.
 
     Attributes:
-        name: What is wrong with it.
-        plant: The same for the configuration.
-        frequency: Of the loop [Hz].
-        seeds: Of what is random; several are one root mean square.
-        imagined: Whether the feed-forward pays for friction that is not there.
-        robot: The only one that it is for, if it is.
+        name: Its imperfections.
+        plant: The same, for the configuration.
+        frequency: Control frequency [Hz].
+        seeds: Seeds of random imperfections; the table has the root mean square.
+        imagined: Whether the feed-forward compensates friction that does not exist.
+        robot: The only robot with this row; None: all.
     """
 
     name: str
@@ -69,17 +70,17 @@ class Row:
 
     @property
     def delay(self) -> int:
-        """Periods that its efforts are late."""
+        """Delay of its efforts [periods]."""
         return int(self.plant.get("drives", {}).get("delay", 0))
 
     @property
     def noisy(self) -> bool:
-        """Whether its sensors are."""
+        """Whether its sensors have noise."""
         return "sensors" in self.plant
 
     @property
     def friction(self) -> dict[str, Any] | None:
-        """What the feed-forward is told."""
+        """The friction parameters of the feed-forward, or None."""
         known = self.imagined or "friction" in self.plant
         return FEED_FORWARD if known else None
 
@@ -114,19 +115,19 @@ COLUMNS: dict[str, Callable[[Row], Compensation | None]] = {
     "law alone": lambda row: {},
     "integral": lambda row: {"integral_action": {"rate": 5.0}},
     "observer": lambda row: {"momentum_observer": {"bandwidth": 50.0}},
-    "feed-forward": lambda row: _if(row.friction, "friction_feed_forward"),
-    "feed-forward + observer": lambda row: _if(
+    "feed-forward": lambda row: _when(row.friction, "friction_feed_forward"),
+    "feed-forward + observer": lambda row: _when(
         row.friction,
         "friction_feed_forward",
         momentum_observer={"bandwidth": 50.0},
     ),
-    "filter": lambda row: _if(
+    "filter": lambda row: _when(
         {"cutoff": 50.0} if row.noisy or row == ROWS[0] else None, "velocity_filter"
     ),
-    "predictor": lambda row: _if(
+    "predictor": lambda row: _when(
         {"effort_delay": row.delay} if row.delay else None, "predictor"
     ),
-    "rate limit": lambda row: _if(
+    "rate limit": lambda row: _when(
         1000.0 if row.noisy or row == ROWS[0] else None, "effort_rate"
     ),
     "all": lambda row: {
@@ -135,15 +136,17 @@ COLUMNS: dict[str, Callable[[Row], Compensation | None]] = {
         "integral_action": {"rate": 5.0},
         "effort_rate": 1000.0,
         "start_up_ramp": {"duration": 1.0},
-        **(_if(row.friction, "friction_feed_forward") or {}),
-        **(_if({"effort_delay": row.delay} if row.delay else None, "predictor") or {}),
+        **(_when(row.friction, "friction_feed_forward") or {}),
+        **(
+            _when({"effort_delay": row.delay} if row.delay else None, "predictor") or {}
+        ),
     },
 }
-"""What is on in each column; None where the compensator has nothing to do."""
+"""Compensation of each column; None if the compensator does not apply to a row."""
 
 
-def _if(settings: Any, name: str, **beside: Any) -> Compensation | None:
-    return None if settings is None else {name: settings, **beside}
+def _when(settings: Any, name: str, **others: Any) -> Compensation | None:
+    return None if settings is None else {name: settings, **others}
 
 
 @dataclass(frozen=True)
@@ -158,7 +161,7 @@ class Job:
 
 
 def jobs(robots: list[str], engines: list[str]) -> list[Job]:
-    """Return all cells that have something to do."""
+    """Return all cells whose compensators apply."""
     return [
         Job(robot, engine, k, column, seed)
         for robot in robots
@@ -186,10 +189,10 @@ def experiment(job: Job, folder: Path) -> dict[str, Any]:
 
 
 def measured(config: dict[str, Any]) -> tuple[float, float, float]:
-    """Return the root mean squares of a run, inf if it diverges.
+    """Run a configuration; return three root mean squares, inf if it diverges.
 
-    Of the hand's error [mm], of ‖e_N‖ [rad/s] and of the efforts' rates [N·m/s], from
-    1.5 s to the end; without a log, which would cost most of the time.
+    They are the hand's error [mm], ‖e_N‖ [rad/s] and the efforts' rates [N·m/s], from
+    1.5 s to the end. There is no log: it would take most of the time.
     """
     made = load_experiment(config)
     settings, plant = made.scenario.simulation, made.plant
@@ -223,16 +226,16 @@ def measured(config: dict[str, Any]) -> tuple[float, float, float]:
 
 
 def run(job: Job) -> tuple[float, float, float]:
-    """Run a cell."""
+    """Run a cell; return the same as `measured`."""
     with tempfile.TemporaryDirectory() as folder:
         return measured(experiment(job, Path(folder)))
 
 
 def run_all() -> None:
-    """Run what the CSV does not have yet, and append it: what matters most first."""
+    """Run the cells that the CSV does not contain, and append them."""
     done = set(read()) if CSV.is_file() else set()
-    todo = [job for job in jobs([*HANDS], [*ENGINES]) if _place(job) not in done]
-    todo.sort(key=_lateness)
+    todo = [job for job in jobs([*HANDS], [*ENGINES]) if _key(job) not in done]
+    todo.sort(key=_sort_key)
     if not CSV.is_file():
         names = ["robot", "engine", "plant", "compensation", "seed", *MEASURES]
         CSV.write_text(",".join(names) + "\n", encoding="utf-8")
@@ -241,26 +244,26 @@ def run_all() -> None:
         for job, result in zip(todo, track(results, total=len(todo)), strict=True):
             with CSV.open("a", encoding="utf-8", newline="") as file:
                 numbers = (f"{x:.4g}" for x in result)
-                csv.writer(file, lineterminator="\n").writerow([*_place(job), *numbers])
+                csv.writer(file, lineterminator="\n").writerow([*_key(job), *numbers])
 
 
-def _place(job: Job) -> tuple[str, str, str, str, str]:
-    """Return what names a cell in the CSV."""
+def _key(job: Job) -> tuple[str, str, str, str, str]:
+    """Return the key of a cell in the CSV."""
     engine, plant = ENGINES[job.engine], ROWS[job.row].name
     return job.robot, engine, plant, job.column, str(job.seed)
 
 
-def _lateness(job: Job) -> tuple[int, int]:
-    """Return what a cell waits for: a first seed, and what frames a table, go first."""
-    ends = ("law alone", "feed-forward + observer", "all")
+def _sort_key(job: Job) -> tuple[int, int]:
+    """Return the sort key: first seeds and the most important columns come first."""
+    important = ("law alone", "feed-forward + observer", "all")
     return (
-        2 * (job.seed != ROWS[job.row].seeds[0]) + (job.column not in ends),
+        2 * (job.seed != ROWS[job.row].seeds[0]) + (job.column not in important),
         (job.robot != "panda") + (job.engine != "rigid_body"),
     )
 
 
 def read() -> dict[tuple[str, ...], dict[str, float]]:
-    """Return what was measured, by robot, engine, plant, compensation and seed."""
+    """Read the CSV; the keys are robot, engine, plant, compensation and seed."""
     names = ("robot", "engine", "plant", "compensation", "seed")
     with CSV.open(encoding="utf-8") as file:
         return {
@@ -274,30 +277,30 @@ def read() -> dict[tuple[str, ...], dict[str, float]]:
 def means() -> dict[tuple[str, ...], dict[str, float]]:
     """Return root mean squares over the seeds, by robot, engine, plant, compensation.
 
-    Of the seeds that all cells of an arm's row have: else columns would not compare.
+    Only seeds that all cells of an arm's row have, so that columns are comparable.
     """
     found = read()
     seeds: dict[tuple[str, ...], set[str]] = {}
-    for *place, seed in found:
-        seeds.setdefault(tuple(place), set()).add(seed)
+    for *cell, seed in found:
+        seeds.setdefault(tuple(cell), set()).add(seed)
     shared: dict[tuple[str, str], set[str]] = {}
     for (robot, _, plant, _), own in seeds.items():
         shared[robot, plant] = shared.get((robot, plant), own) & own
     cells: dict[tuple[str, ...], list[dict[str, float]]] = {}
-    for place, values in found.items():
-        if place[4] in shared[place[0], place[2]]:
-            cells.setdefault(place[:4], []).append(values)
+    for key, values in found.items():
+        if key[4] in shared[key[0], key[2]]:
+            cells.setdefault(key[:4], []).append(values)
     return {
-        place: {
+        key: {
             name: float(np.sqrt(np.mean([each[name] ** 2 for each in values])))
             for name in MEASURES
         }
-        for place, values in cells.items()
+        for key, values in cells.items()
     }
 
 
 def tables() -> str:
-    """Return the tables in Markdown: one for each arm and measure."""
+    """Return the tables in Markdown, one for each arm and measure."""
     cells, lines = means(), []
     for robot in HANDS:
         for measure, heading in MEASURES.items():
@@ -316,13 +319,13 @@ def tables() -> str:
                         cells.get((robot, engine, row.name, column), {}).get(measure)
                         for engine in ENGINES.values()
                     ]
-                    shown.append(_shown(pair))
+                    shown.append(_format(pair))
                 lines.append(f"| {row.name} | {' | '.join(shown)} |")
     return "\n".join(lines[1:]) + "\n"
 
 
-def _shown(pair: list[float | None]) -> str:
-    """Return both engines' numbers, as one where they agree to 5 %."""
+def _format(pair: list[float | None]) -> str:
+    """Return both engines' numbers, or one number if they agree to 5 %."""
     given = [each for each in pair if each is not None]
     if not given:
         return "–"
@@ -335,13 +338,13 @@ def _shown(pair: list[float | None]) -> str:
 
 
 def main() -> None:
-    """Run, and write the page's tables."""
+    """Run the cells, and write the tables of the page."""
     if "--fresh" in sys.argv:
         CSV.unlink(missing_ok=True)
     if "--tables" not in sys.argv:
         run_all()
-    replace_part(DOCS / "robustness.md", "tables", tables())
-    print("Draw it anew with benchmarks/robustness_figure.py")
+    replace_section(DOCS / "robustness.md", "tables", tables())
+    print("Run benchmarks/robustness_figure.py to draw the figure again")
     print(f"Wrote {CSV} and docs/robustness.md")
 
 

@@ -1,10 +1,10 @@
-"""The picture of docs/robustness.md: every plant beside every compensator.
+"""Draw the figure of docs/robustness.md: every plant with every compensator.
 
 .venv/bin/python benchmarks/robustness_figure.py
 """
 
 import numpy as np
-from marked import DOCS
+from marked_sections import DOCS
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.image import AxesImage
@@ -19,7 +19,7 @@ ROBOTS = {"panda": "Panda", "iiwa14": "iiwa 14"}
 
 
 def main() -> None:
-    """Draw it."""
+    """Draw and save the figure."""
     cells = means()
     with styled():
         figure = new_figure(15.0, 13.0)
@@ -41,7 +41,7 @@ def draw(
     robot: str,
     measure: str,
 ) -> AxesImage:
-    """Draw one arm's measure on Pinocchio's plant, on MuJoCo's where only that ran."""
+    """Draw one arm's measure on Pinocchio's plant, or else on MuJoCo's."""
     rows = [row.name for row in ROWS if row.robot in (None, robot)]
     values = np.full((len(rows), len(COLUMNS)), np.nan)
     for i, name in enumerate(rows):

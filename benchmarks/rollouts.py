@@ -1,12 +1,12 @@
-"""How many times faster than real time a rollout is, on one core.
+"""Measure the real-time factor of rollouts on one core.
 
     .venv/bin/python benchmarks/rollouts.py [--rounds N]
 
 First 10 s of a Panda at 1 kHz (6-D pose and joint centering) with a fixed-step plant
 and with RK4, logged every 10 ms and at every step, in turns; then every bundled
-configuration as it is. Logging is included, compiling is not. Processor time is
-counted, not the clock's: other processes on the machine then matter little. Memory is
-what the columns of the log take.
+configuration as it is. Times include logging, but not compilation. They are processor
+times, so that other processes on the machine matter little. Memory is the size of the
+log's columns.
 """
 
 import argparse
@@ -39,11 +39,11 @@ PANDA: dict[str, Any] = {
 
 
 def run(config: Any, *overrides: str) -> tuple[float, Rollout]:
-    """Return how many times faster than real time it ran, and the rollout."""
+    """Run a configuration; return the real-time factor and the rollout."""
     experiment = load_experiment(config, *overrides)
-    laps: list[float] = []
-    rollout = experiment.run(lambda done: laps.append(process_time()))
-    return float(rollout.t[-1] - rollout.t[0]) / (laps[-1] - laps[0]), rollout
+    times: list[float] = []
+    rollout = experiment.run(lambda done: times.append(process_time()))
+    return float(rollout.t[-1] - rollout.t[0]) / (times[-1] - times[0]), rollout
 
 
 def row(name: str, factors: list[float], rollout: Rollout) -> str:
@@ -63,7 +63,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=5)
     rounds = parser.parse_args().rounds
-    head = "| {} | x real time | from, to | rows | a row | largest error |"
+    head = "| {} | real-time factor | range | rows | row size | largest error |"
     cases = {
         f"{name}, a row {logged}": (f"simulation.integrator={{type: {kind}}}", period)
         for name, kind in (("fixed step", "semi_implicit_euler"), ("RK4", "rk4"))

@@ -1,10 +1,11 @@
-"""How a step's cost grows with joints, tasks, fields and obstacles, TSID's beside it.
+"""Measure how the cost of a step grows with joints, tasks, fields and obstacles.
 
     make bench          or          .venv-peers/bin/python benchmarks/scaling.py
 
-Each point is a median over interleaved rounds on one robot state after the other;
-t = a + b n^p is fitted to each series. Writes docs/speed.md and its figure. To add a
-series, write a function that yields (n, controllers) and name it in SERIES.
+Each point is a median over interleaved rounds over many robot states; TSID is timed
+where it is comparable. t = a + b n^p is fitted to each series. Writes docs/speed.md and
+its figure. To add a series, write a function that yields (n, robot, controllers) and
+add it to SERIES.
 """
 
 import argparse
@@ -44,12 +45,12 @@ Point = tuple[int, hsp.Robot, dict[str, Compute]]
 
 @dataclass
 class Law:
-    """This law, as a user would call it."""
+    """This law as a user calls it: (t, q, v) ↦ tau."""
 
     controller: hsp.Controller
 
     def __post_init__(self) -> None:
-        """Make the state that all steps share."""
+        """Allocate the state of all steps."""
         self.state = hsp.RobotState(self.controller.robot)
 
     def __call__(self, t: float, q: Array, v: Array) -> Array:
@@ -61,23 +62,23 @@ class Law:
 
 
 def joints() -> Iterator[Point]:
-    """A position of the tip of chains of ever more joints, posture beside it."""
+    """Chains of 3 to 40 joints: a position of the tip, and a posture."""
     for n in (3, 5, 7, 10, 14, 20, 28, 40):
         robot = chain(n)
         yield n, robot, beside_tsid(robot, [f"link{n}"])
 
 
 def tasks() -> Iterator[Point]:
-    """Ever more positions of a chain of 40 joints, three rows each."""
+    """A chain of 40 joints: 1 to 6 positions, three rows each."""
     robot = chain(40)
     for n in range(1, 7):
         yield n, robot, beside_tsid(robot, [f"link{40 - 6 * k}" for k in range(n)])
 
 
 def fields() -> Iterator[Point]:
-    """A Panda's pose, and ever more fields."""
+    """A Panda's pose with 0 to 6 fields."""
     robot = hsp.Robot.load("panda")
-    ready: list[hsp.NullSpaceField] = [
+    available: list[hsp.NullSpaceField] = [
         JointCentering(robot),
         LimitBarrier(robot),
         TargetPosture(robot, robot.home()),
@@ -85,15 +86,15 @@ def fields() -> Iterator[Point]:
         InverseCondition(robot, HAND),
         Transmission(robot, HAND, [0.0, 0.0, 1.0]),
     ]
-    for n in range(len(ready) + 1):
+    for n in range(len(available) + 1):
         field: hsp.NullSpaceField = Rest(robot)
         if n:
-            field = sum(ready[1:n], start=1.0 * ready[0])
+            field = sum(available[1:n], start=1.0 * available[0])
         yield n, robot, {"this law": Law(panda_pose(robot, field))}
 
 
 def obstacles() -> Iterator[Point]:
-    """A Panda's pose among ever more balls that move, one in five of them near."""
+    """A Panda's pose with 0 to 50 moving balls, one in five of them near."""
     robot, rng = hsp.Robot.load("panda"), np.random.default_rng(0)
     balls = []
     for k in range(50):
@@ -111,9 +112,10 @@ def obstacles() -> Iterator[Point]:
 
 
 def levels() -> Iterator[Point]:
-    """Ever more levels of a chain of 40 joints, a position each; and a rival below.
+    """A chain of 40 joints: 1 to 5 levels with a position each; and with a conflict.
 
-    The rival wants the first position elsewhere, which calls the recursion.
+    In conflict: a task of the lowest level wants another value of the first position,
+    so that the law needs its recursion over the levels.
     """
     robot = chain(40)
     frames = [f"link{40 - 6 * k}" for k in range(5)]
@@ -123,7 +125,7 @@ def levels() -> Iterator[Point]:
         for frame, path in zip(frames, paths, strict=True)
     ]
     away = hsp.Hold(paths[0].center + 0.3)
-    rival = hsp.FramePosition(robot, frames[0], away, GAINS, name="rival")
+    conflicting = hsp.FramePosition(robot, frames[0], away, GAINS, name="conflicting")
     posture = TargetPosture(robot, bent(robot))
 
     def law(stack: list[list[hsp.Task]]) -> Law:
@@ -131,8 +133,8 @@ def levels() -> Iterator[Point]:
 
     for n in range(1, 6):
         upper: list[list[hsp.Task]] = [[task] for task in positions[:n]]
-        contested = [*upper[:-1], [*upper[-1], rival]]
-        yield n, robot, {"this law": law(upper), "in conflict": law(contested)}
+        conflict = [*upper[:-1], [*upper[-1], conflicting]]
+        yield n, robot, {"this law": law(upper), "in conflict": law(conflict)}
 
 
 SERIES: dict[str, Callable[[], Iterator[Point]]] = {
@@ -148,7 +150,7 @@ SERIES: dict[str, Callable[[], Iterator[Point]]] = {
 
 
 def chain(n: int) -> hsp.Robot:
-    """Return an arm of n joints that turn about z, x and y by turns, 2 m long."""
+    """Return an arm of n joints with alternating axes z, x and y, 2 m long."""
     length = 2.0 / n
     text = '<robot name="chain"><link name="link0"/>'
     for k in range(1, n + 1):
@@ -173,7 +175,7 @@ def bent(robot: hsp.Robot) -> Array:
 
 
 def circles(robot: hsp.Robot, frames: list[str]) -> list[hsp.Circle]:
-    """Return a small circle through where each frame is."""
+    """Return a small circle through the position of each frame."""
     state = robot.state(0.0, bent(robot), np.zeros(robot.nv))
     return [
         hsp.Circle(state.position(frame), 0.05, 2.0, normal=[0.0, 0.0, 1.0])
@@ -182,7 +184,7 @@ def circles(robot: hsp.Robot, frames: list[str]) -> list[hsp.Circle]:
 
 
 def beside_tsid(robot: hsp.Robot, frames: list[str]) -> dict[str, Compute]:
-    """Return this law and, where it is installed, TSID on positions of frames."""
+    """Return this law and, if it is installed, TSID with positions of frames."""
     paths = circles(robot, frames)
     positions = [
         hsp.FramePosition(robot, frame, path, GAINS)
@@ -194,7 +196,7 @@ def beside_tsid(robot: hsp.Robot, frames: list[str]) -> dict[str, Compute]:
         positions,
         posture,
         null_space_gain=10.0,
-        singularity_threshold=1e-3,  # what is compared is the law away from them
+        singularity_threshold=1e-3,  # compare the law without damping
     )
     law = Law(controller)
     found: dict[str, Compute] = {"this law": law}
@@ -206,14 +208,14 @@ def beside_tsid(robot: hsp.Robot, frames: list[str]) -> dict[str, Compute]:
 def tsid_positions(
     robot: hsp.Robot, frames: list[str], paths: list[hsp.Circle]
 ) -> Compute:
-    """Return TSID: a masked pose task for each frame, posture, effort bounds."""
+    """Return TSID: a masked pose task for each frame, posture and effort bounds."""
     import tsid
 
     model, nv, zero = robot.model, robot.nv, np.zeros(robot.nv)
     wrapper = tsid.RobotWrapper(model, tsid.FIXED_BASE_SYSTEM, False)
     problem = tsid.InverseDynamicsFormulationAccForce("tsid", wrapper, False)
     problem.computeProblemData(0.0, bent(robot), zero)
-    positions, samples, wanted, followers = [], [], [], []
+    positions, samples, desired, followers = [], [], [], []
     for frame, path in zip(frames, paths, strict=True):
         task = tsid.TaskSE3Equality(frame, wrapper, frame)
         task.useLocalFrame(False)
@@ -223,8 +225,8 @@ def tsid_positions(
         problem.addMotionTask(task, 1.0, 1, 0.0)
         positions.append(task)
         samples.append(tsid.TrajectorySample(12, 6))
-        wanted.append(TrajectorySample.allocate(3))
-        followers.append(path.follow(wanted[-1]))
+        desired.append(TrajectorySample.allocate(3))
+        followers.append(path.follow(desired[-1]))
     posture = tsid.TaskJointPosture("posture", wrapper)
     posture.setKp(10.0 * np.ones(nv))
     posture.setKd(11.0 * np.ones(nv))
@@ -242,7 +244,7 @@ def tsid_positions(
 
     def compute(t: float, q: Array, v: Array) -> Array:
         for task, sample, out, follow in zip(
-            positions, samples, wanted, followers, strict=True
+            positions, samples, desired, followers, strict=True
         ):
             follow(t)
             place[:3], rate[:3], rate_dot[:3] = out
@@ -261,7 +263,7 @@ def tsid_positions(
 
 
 def panda_pose(robot: hsp.Robot, field: hsp.NullSpaceField) -> hsp.Controller:
-    """Return the law for a pose of the hand and a field."""
+    """Return this law for a pose of the hand and a field."""
     frame = robot.state(0.0, robot.home(), np.zeros(robot.nv)).frame(HAND)
     pose = hsp.ComposedPose(
         hsp.Circle(frame.position, 0.05, 2.0, normal=[0.0, 0.0, 1.0]),
@@ -275,7 +277,7 @@ def panda_pose(robot: hsp.Robot, field: hsp.NullSpaceField) -> hsp.Controller:
 
 
 def states(robot: hsp.Robot, count: int) -> list[State]:
-    """Return random states about the robot's home or bent posture."""
+    """Return random states near the robot's home or bent posture."""
     rng = np.random.default_rng(1)
     start = bent(robot) if robot.name.startswith("chain") else robot.home()
     return [
@@ -291,7 +293,7 @@ def states(robot: hsp.Robot, count: int) -> list[State]:
 def measure(
     series: Callable[[], Iterator[Point]], rounds: int, block: int
 ) -> dict[str, Array]:
-    """Return for each controller rows of n, median, lower and upper quartile [µs]."""
+    """Return rows (n, median, lower and upper quartile [µs]) for each controller."""
     found: dict[str, list[tuple[float, ...]]] = {}
     for n, robot, controllers in series():
         path = states(robot, 5 * block)
@@ -304,7 +306,7 @@ def measure(
 
 
 def growth(rows: Array) -> tuple[float, float, float]:
-    """Return a, b and p of the fitted t = a + b n^p, from the first thing on."""
+    """Return a, b and p of the fit t = a + b n^p to the rows with n ≥ 1."""
     n, t = rows[rows[:, 0] > 0, :2].T
     start = (t[0], max((t[-1] - t[0]) / n[-1], 1e-3), 1.0)
     bounds = ([0.0, 0.0, 0.3], [np.inf, np.inf, 3.0])
@@ -325,26 +327,26 @@ Written by `make bench` (`benchmarks/scaling.py`); do not edit.
 
 One `RobotState.update` and one `Controller.compute` [µs], medians over {rounds}
 interleaved rounds of {block} steps on one core, and the fitted t = a + b nᵖ, n ≥ 1.
-Near a singularity a stack of 18 rows takes some 100 µs more (Jacobi's method). Ratios
-carry over to another machine, microseconds do not.
+Near a singularity a stack of 18 rows takes about 100 µs more (Jacobi's method). Ratios
+are valid for other machines, microseconds are not.
 
 ![Time of a step against joints, tasks, fields, obstacles, levels](figures/scaling.png)
 
 """
 ABOUT = {
-    "joints": "A position task (3 rows) at the tip of a chain, posture beside it",
-    "tasks": "Positions of a chain of 40 joints, 3 rows each, posture beside them",
+    "joints": "A position task (3 rows) at the tip of a chain, and a posture",
+    "tasks": "Positions of a chain of 40 joints, 3 rows each, and a posture",
     "fields": "A Panda's pose; centering, limit barrier, posture, manipulability, "
     "inverse condition and transmission, in this order; the last three differentiate "
-    "Jacobians, and the exponent says no more than that",
-    "levels": "Positions of a chain of 40 joints, one a level; in conflict: with a "
-    "rival of the first one at the lowest level",
+    "Jacobians, which determines the exponent",
+    "levels": "Positions of a chain of 40 joints, one per level; in conflict: with a "
+    "conflicting task for the first one at the lowest level",
     "obstacles": "A Panda's pose, posture, and moving balls against its 12 capsules",
 }
 
 
 def table(what: str, found: dict[str, Array]) -> str:
-    """Return a series as a table with its fits."""
+    """Return the table of a series with its fits."""
     first = next(iter(found.values()))
     head = "".join(f" {n:.0f} |" for n in first[:, 0])
     text = f"## {what.capitalize()}\n\n{ABOUT.get(what, '')}.\n\n| |{head} fit |\n|---|"
@@ -360,7 +362,7 @@ def table(what: str, found: dict[str, Array]) -> str:
 
 
 def draw(everything: dict[str, dict[str, Array]]) -> None:
-    """Write the figure: one panel a series."""
+    """Draw the figure with one panel for each series."""
     with styled():
         figure = new_figure(2.6 * len(everything), 2.6)
         panels = figure.subplots(1, len(everything), squeeze=False)[0]
@@ -386,7 +388,7 @@ def draw(everything: dict[str, dict[str, Array]]) -> None:
 
 
 def main() -> None:
-    """Measure every series, print, write."""
+    """Measure every series, print the times, and write page and figure."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=21, help="rounds of timing")
     parser.add_argument("--block", type=int, default=100, help="steps in a round")

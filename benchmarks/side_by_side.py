@@ -1,10 +1,10 @@
-"""Run the same Panda task under this law and under what users would pick instead.
+"""Run the same Panda task with this law and with the usual alternatives.
 
     make bench          or          .venv-peers/bin/python benchmarks/side_by_side.py
 
-First every controller runs the case in closed loop, against the same simulator; only
-those that really track are timed, in one process, interleaved. Prints the tables and
-writes them to docs/side_by_side.md. A peer that is not installed is a row that says so.
+First every controller runs the case in closed loop with the same simulator. Those that
+track are then timed, in one process, interleaved. Prints the tables and writes them to
+docs/side_by_side.md. A peer that is not installed gets a row with the reason.
 """
 
 import argparse
@@ -36,7 +36,7 @@ Make = Callable[[Case], Compute]
 
 ROOT = Path(__file__).resolve().parent.parent
 KHATIB = "operational space (NumPy)"
-TRACKS = 0.02  # a controller whose rms error is larger is not timed [m]
+MAX_ERROR = 0.02  # a controller with a larger rms error is not timed [m]
 STEP = 2.5e-4  # the simulator's fourth-order step [s]
 EVERY = 4  # control periods between two measurements
 
@@ -45,9 +45,9 @@ EVERY = 4  # control periods between two measurements
 
 
 def peers() -> tuple[dict[str, Make], dict[str, tuple[str, Make]], dict[str, str]]:
-    """Return what to compare, what to time, and which peers are missing and why.
+    """Return controllers to compare, controllers to time, and why peers are missing.
 
-    What is timed comes with the name of the run that must have tracked before.
+    A controller to time comes with the name of the run that must track before.
     """
     law, khatib = "this law", "operational space + posture"
     compared: dict[str, Make] = {law: this_law.make, khatib: operational_space.make}
@@ -94,7 +94,7 @@ def _this_law(
 
 
 def _pinocchio_calls(case: Case) -> Compute:
-    """What no controller with J, J' and inverse dynamics can do without."""
+    """Return the calls that every controller with J, J' and inverse dynamics needs."""
     model, data = case.robot.model, case.robot.model.createData()
     frame, a = model.getFrameId(FRAME), np.zeros(case.robot.nv)
 
@@ -122,7 +122,7 @@ def _module(name: str, missing: dict[str, str]) -> Any:
 
 @dataclass
 class Run:
-    """What one controller did."""
+    """The closed-loop run of one controller."""
 
     columns: dict[str, Array] = field(default_factory=dict)
     failure: str = ""
@@ -134,12 +134,12 @@ class Run:
 
     @property
     def tracks(self) -> bool:
-        """Whether it may be timed."""
-        return not self.failure and self.rms("position") < TRACKS
+        """Whether the controller tracks, so that it may be timed."""
+        return not self.failure and self.rms("position") < MAX_ERROR
 
 
 def close_loop(case: Case, make: Make) -> Run:
-    """Run a controller against the rigid-body plant, its effort held each period."""
+    """Run a controller on the rigid-body plant, with its effort held each period."""
     run, rows = Run(), []
     plant, integrator = hsp.RigidBodyPlant(case.robot), hsp.Rk4(STEP)
     q, v = case.q0.copy(), np.zeros(case.robot.nv)
@@ -160,7 +160,7 @@ def close_loop(case: Case, make: Make) -> Run:
             q, v = integrator.advance(case.robot, accelerate, t, t + case.period, q, v)
             if not np.abs(v).max() < 50.0:
                 raise RuntimeError(f"diverged at t = {t:.2f} s")
-    except Exception as error:  # the peers have their own kinds: a row, not the end
+    except Exception as error:  # peers raise their own types: report it in a row
         reason = (str(error).splitlines() or [""])[0]
         run.failure = f"{type(error).__name__}: {reason}"
     if rows and not run.failure:
@@ -170,8 +170,8 @@ def close_loop(case: Case, make: Make) -> Run:
 
 HEADER = (
     "| controller | position rms / max [mm] | orientation rms [mrad] | "
-    "‖P(g − v)‖ rms [rad/s] | of ‖P g‖ | least distance [mm] | "
-    "least det(J Jᵀ) | ‖q − q_home‖ rms | effort rms [N·m] |\n"
+    "‖P(g − v)‖ rms [rad/s] | relative to ‖P g‖ | minimum distance [mm] | "
+    "smallest det(J Jᵀ) | ‖q − q_home‖ rms | effort rms [N·m] |\n"
     "|---|--:|--:|--:|--:|--:|--:|--:|--:|\n"
 )
 
@@ -182,7 +182,7 @@ def row(name: str, run: Run) -> str:
         return f"| {name} | {run.failure} |" + 7 * " |" + "\n"
     c, error = run.columns, run.rms("null_space_error")
     share = f"{100.0 * error / run.rms('null_space_flow'):.1f} %"
-    if name.startswith("operational space"):  # its projector is not the Euclidean one
+    if name.startswith("operational space"):  # its projector is in the metric M
         own = run.rms("null_space_error_M") / run.rms("null_space_flow_M")
         share += f" ({100.0 * own:.1f} % in its metric M)"
     cells = [
@@ -228,9 +228,10 @@ REFERENCES = ("TSID", "pink (quadprog) + RNEA")
 def placo_row(
     case: Case, times: dict[str, Array], path: list[State], rounds: int, block: int
 ) -> str:
-    """Return placo's line, timed where it can run beside the controller that both run.
+    """Return placo's row, timed in its own environment.
 
-    Its ratio to that controller there, times that controller's ratio here.
+    Both environments run the operational-space controller: placo's ratio to it there
+    times its ratio here is placo's ratio.
     """
     python = ROOT / ".venv-placo" / "bin" / "python"
     record = Path(sys.prefix) / "peers.json"
@@ -253,21 +254,21 @@ def placo_row(
         reason = (done.stderr.strip().splitlines() or [""])[-1]
         return f"| placo | failed: {reason} |{rest}"
     result = json.loads(done.stdout.splitlines()[-1])
-    if result["rms"]["placo"] > TRACKS:
+    if result["rms"]["placo"] > MAX_ERROR:
         error = 1e3 * result["rms"]["placo"]
         return f"| placo | does not track: {error:.0f} mm |{rest}"
     cells = []
     for reference in REFERENCES:
         if reference in times:
-            bridge = np.median(times[KHATIB] / times[reference])
-            there = np.quantile(result["ratio"], [0.25, 0.5, 0.75])
-            cells.append(spread(bridge * there))
+            ratio_here = np.median(times[KHATIB] / times[reference])
+            ratios_there = np.quantile(result["ratio"], [0.25, 0.5, 0.75])
+            cells.append(spread(ratio_here * ratios_there))
     cells.append(f"{result['microseconds']:.1f}")
     return f"| {name} (pin {result['pin']}) | " + " | ".join(cells) + " |\n"
 
 
 def larger_robots(rounds: int, block: int, say: Callable[[str], None]) -> list[str]:
-    """Time this law beside TSID on larger robots; return the README's lines."""
+    """Time this law and TSID on larger robots; return the rows of the README."""
     say("## Larger robots, several poses at once\n\n")
     say("| problem | this law, rms [mm] | TSID, rms [mm] | this law / TSID | µs |\n")
     say("|---|--:|--:|--:|--:|\n")
@@ -280,26 +281,26 @@ def larger_robots(rounds: int, block: int, say: Callable[[str], None]) -> list[s
         line = (
             f"| {problem.name} | {1e3 * errors['law']:.2g} | {1e3 * errors['TSID']:.2g}"
         )
-        if max(errors.values()) > TRACKS:
+        if max(errors.values()) > MAX_ERROR:
             say(f"{line} | not timed: does not track | |\n")
             continue
         times = step_times(compute, runs["law"][1], rounds, block)
         quartiles = ratios(times, "law", "TSID")
         say(f"{line} | {spread(quartiles)} | {1e6 * np.median(times['law']):.0f} |\n")
         summary.append(f"| {problem.name} | {spread(quartiles)} | |\n")
-    say("\nA pose for each frame, posture beside it; settings as for the Panda.\n\n")
+    say("\nA pose for each frame, and a posture; settings as for the Panda.\n\n")
     return summary
 
 
 def summarise(times: dict[int, dict[str, Array]], larger: list[str]) -> None:
-    """Write the README's table, between its two marks."""
+    """Write the README's table, between its two markers."""
     if "TSID" not in times[6]:
         return
     lines = (
         "| one control step, this law | TSID = 1 | pink + RNEA = 1 |\n|---|--:|--:|\n"
     )
     for rows, what in ((6, "Panda, pose"), (3, "Panda, position")):
-        for name, field_name in OWN.items():
+        for name, field_name in README_ROWS.items():
             cells = [
                 spread(ratios(times[rows], name, r)) if r in times[rows] else ""
                 for r in REFERENCES
@@ -307,15 +308,15 @@ def summarise(times: dict[int, dict[str, Array]], larger: list[str]) -> None:
             lines += f"| {what}, {field_name} | " + " | ".join(cells) + " |\n"
     readme = ROOT / "README.md"
     text = readme.read_text()
-    head, rest = text.split(MARKS[0] + "\n", 1)
-    _, tail = rest.split(MARKS[1], 1)
+    head, rest = text.split(MARKERS[0] + "\n", 1)
+    _, tail = rest.split(MARKERS[1], 1)
     readme.write_text(
-        head + MARKS[0] + "\n" + lines + "".join(larger) + MARKS[1] + tail
+        head + MARKERS[0] + "\n" + lines + "".join(larger) + MARKERS[1] + tail
     )
 
 
-MARKS = ("<!-- make bench: begin -->", "<!-- make bench: end -->")
-OWN = {
+MARKERS = ("<!-- make bench: begin -->", "<!-- make bench: end -->")
+README_ROWS = {
     "this law": "joint centering",
     "this law, manipulability": "manipulability",
     "this law, one obstacle (capsules)": "one moving obstacle",
@@ -330,28 +331,28 @@ TEXT = """\
 Written by `make bench` (`benchmarks/side_by_side.py`); do not edit.
 
 A Panda's hand draws a circle of 0.1 m at 2 rad/s, from rest, while a ball of 0.1 m
-comes and goes beside the elbow. Start, trajectory, ball, gains (ω0 = {w0:g} 1/s
+moves near the elbow. Start, trajectory, ball, gains (ω0 = {w0:g} 1/s
 critically damped, K_N = {K_N:g} 1/s, posture rate {alpha:g} 1/s) and simulator (rigid
-bodies, effort held for 1 ms, RK4 of 0.25 ms) are the same for all; figures are from
-{settled:g} s to {duration:g} s. The field g draws to the home posture and away from the
-ball; P is the Euclidean null-space projector. `benchmarks/README.md` says how each
-controller is set and what g becomes in it.
+bodies, effort held for 1 ms, RK4 of 0.25 ms) are the same for all; numbers are from
+{settled:g} s to {duration:g} s. The field g attracts to the home posture and repels
+from the ball; P is the Euclidean null-space projector. `benchmarks/README.md` has the
+settings of each controller, and the form of g in it.
 
 """
 
 
 def main() -> None:
-    """Compare, time, print and write."""
+    """Compare and time the controllers, print and write the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=35, help="rounds of timing")
     parser.add_argument("--block", type=int, default=200, help="steps in a round")
     parser.add_argument("--duration", type=float, default=8.0, help="of a run [s]")
-    parser.add_argument("--only", help="run controllers whose name holds this")
+    parser.add_argument("--only", help="run controllers whose name contains this")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "side_by_side.md")
     options = parser.parse_args()
 
     compared, timed, missing = peers()
-    wanted = options.only or ""
+    selected = options.only or ""
     base = Case()
     text = TEXT.format(
         w0=base.natural_frequency,
@@ -371,7 +372,7 @@ def main() -> None:
     for rows, title in ((6, "Pose (6 rows)"), (3, "Position (3 rows)")):
         say(f"## {title}, one moving obstacle\n\n" + HEADER)
         for name, make in compared.items():
-            if wanted in name and not (rows == 3 and name.startswith("pink + RNEA,")):
+            if selected in name and not (rows == 3 and name.startswith("pink + RNEA,")):
                 run = close_loop(Case(rows=rows, duration=options.duration), make)
                 say(row(name, run))
                 if run.tracks:
@@ -397,11 +398,11 @@ def main() -> None:
         say(
             f"\nMedians of {options.rounds} interleaved rounds of {options.block} "
             "steps, one process, quartiles in brackets; each step takes (t, q, v) and "
-            "returns an effort. Unless a row says otherwise: hand task, posture or "
-            "centering, no obstacle. The ball is within the field's influence for a "
-            "part of its row's rounds, hence the upper quartile. placo runs in an "
-            "environment of its own; its ratio is the product of its ratio to the "
-            "operational space there and of that one's ratio here.\n\n"
+            "returns an effort. Default of a row: hand task, posture or centering, no "
+            "obstacle. In the row with the ball, the ball is within the field's "
+            "influence in some rounds only, which explains the upper quartile. placo "
+            "runs in its own environment; its ratio is the product of its ratio to the "
+            "operational space there and of that controller's ratio here.\n\n"
         )
     larger: list[str] = []
     if "tsid" not in missing and not options.only:
@@ -410,8 +411,8 @@ def main() -> None:
         summarise(measured, larger)
     say(
         f"Python {platform.python_version()}, {os.cpu_count()} cores, hsp_control "
-        f"{hsp.__version__}, numpy {np.__version__}. Only ratios carry over to another "
-        "machine.\n"
+        f"{hsp.__version__}, numpy {np.__version__}. Only ratios are valid for other "
+        "machines.\n"
     )
     options.out.write_text(text)
 

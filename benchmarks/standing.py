@@ -1,7 +1,7 @@
 """The common case on two feet: circles of the centre of mass and of a hand.
 
-Robot, start, soles, trajectories, gains and posture are the same numbers for every
-controller; what is measured, is measured the same way for all.
+Robot, start, soles, trajectories, gains and posture have the same numbers for every
+controller, and all are measured in the same way.
 """
 
 from dataclasses import dataclass, field
@@ -20,26 +20,26 @@ from hsp_control.trajectories import Blend
 
 COM, HAND, TRUNK = "center_of_mass", "hand", "trunk"
 PERIOD = 1e-3  # how long an effort is held [s]
-FRICTION = 0.7  # of the ground, and what both controllers are told
-CONTACT_DAMPING = 40.0  # Kd of the contacts, without stiffness [1/s]
+FRICTION = 0.7  # coefficient of the ground, also in both controllers
+CONTACT_DAMPING = 40.0  # Kd of the contacts; their stiffness is 0 [1/s]
 FREQUENCY = 10.0  # ω0 of the critically damped tasks [rad/s]
 GAIN, POSTURE_RATE = 6.0, 2.0  # K_N, and α of g = -α (q - q_start) [1/s]
-BEVEL = 16  # edges of the cone that forces are judged by
-THICKNESS = 0.02  # of the boxes that are MuJoCo's soles [m]
+EDGES = 16  # edges of the pyramid that approximates a friction cone in the check
+THICKNESS = 0.02  # of the boxes that are the soles in MuJoCo [m]
 
 
 @dataclass(frozen=True)
 class Body:
-    """What differs between the robots.
+    """The data that differ between the robots.
 
     Attributes:
-        name: In the robots' catalogue.
+        name: Name in the catalogue of robots.
         soles: Frames of the feet.
         size: Length and width of a sole, along the frame's x and y [m].
-        center: Of the sole in its frame [m].
+        center: Centre of the sole in its frame [m].
         hand: Frame of the hand.
         trunk: Frame of the trunk.
-        locked: Joints that are none here, and where they stand [rad].
+        locked: Joints that are fixed here, and their positions [rad].
         bent: Joints that differ from the home posture [rad].
     """
 
@@ -83,19 +83,22 @@ G1 = Body(
 
 
 class Standing:
-    """A robot that stands on both soles, and what it shall do.
+    """A robot that stands on both soles, and its tasks.
 
     Attributes:
+        body: The data of the robot.
         robot: The robot.
-        q0: Where it starts, at rest, the soles on the ground.
+        q0: Start configuration, at rest, with the soles on the ground, shape (nq,).
+        weight: Weight of the robot [N].
+        soles_at: Positions of the sole frames at the start, shape (3,) each [m].
         com: Trajectory of the centre of mass.
         hand: Trajectory of the hand.
-        upright: The trunk's orientation.
-        gains: Of all tasks.
+        upright: Desired orientation of the trunk, shape (3, 3).
+        gains: Gains of all tasks.
     """
 
     def __init__(self, body: Body) -> None:
-        """Put it on its feet."""
+        """Put the robot on its feet, and make the trajectories."""
         self.body = body
         self.robot = robot = hsp.Robot.load(body.name, locked=body.locked)
         q = robot.home().copy()
@@ -117,7 +120,7 @@ class Standing:
         self.hand = Blend(start, circle, 1.5)
         self.upright = state.frame(body.trunk).rotation.copy()
         self.gains = hsp.Gains.from_frequency(FREQUENCY)
-        self._judge = self.controller(limited=False, threshold=1e-6)  # an exact P
+        self._reference = self.controller(limited=False, threshold=1e-6)  # an exact P
         self._state = hsp.RobotState(robot)
         self._edges = _cone_edges(self.corners)
 
@@ -131,7 +134,7 @@ class Standing:
     def controller(
         self, *, limited: bool = True, threshold: float = 0.03
     ) -> hsp.Controller:
-        """Return this law; its posture field leaves the root out, as TSID's task."""
+        """Return this law; its posture field excludes the root, as TSID's task does."""
         robot, body = self.robot, self.body
         weights = np.full(robot.nv, POSTURE_RATE)
         weights[list(robot.unactuated)] = 0.0
@@ -168,18 +171,18 @@ class Standing:
     # -- plants -----------------------------------------------------------------------
 
     def ideal(self) -> "Engine":
-        """Return soles that are held whatever that takes, and a Runge-Kutta step."""
+        """Return rigid contacts that hold any force, with a Runge-Kutta step."""
         soles = [RigidContact(name) for name in self.body.soles]
         plant, integrator = ContactPlant(self.robot, soles), hsp.Rk4(PERIOD)
 
         def advance(t: float, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
-            push = partial(_held, plant, tau)
-            return integrator.advance(self.robot, push, t, t + PERIOD, q, v)
+            acceleration = partial(_acceleration, plant, tau)
+            return integrator.advance(self.robot, acceleration, t, t + PERIOD, q, v)
 
         return Engine(plant, advance)
 
     def mujoco(self) -> "Engine":
-        """Return MuJoCo, with boxes for soles."""
+        """Return MuJoCo, with boxes as soles."""
         x, y, z = self.body.center
         shapes = [
             ContactShape(name, Box((*self.body.size, THICKNESS)), at)
@@ -199,15 +202,15 @@ class Standing:
 
         return Engine(plant, advance)
 
-    # -- what is measured -------------------------------------------------------------
+    # -- measurements -----------------------------------------------------------------
 
     def measure(self, t: float, q: Array, v: Array) -> dict[str, float]:
-        """Return the numbers of one instant, the same way for every controller."""
+        """Measure one instant, in the same way for every controller."""
         state = self._state.update(t, q, v)
-        output = self._judge.compute(state)
+        output = self._reference.compute(state)
         errors = {
             name: float(np.linalg.norm(output.task.error[rows]))
-            for name, rows in self._judge.task_rows.items()
+            for name, rows in self._reference.task_rows.items()
         }
         feet = zip(self.body.soles, self.soles_at, strict=True)
         return errors | {
@@ -219,11 +222,12 @@ class Standing:
         }
 
     def outside_cones(self, q: Array, wrenches: list[Array]) -> bool:
-        """Return whether a sole's wrench is none that pushes within friction give.
+        """Return whether a sole's wrench needs pulling forces or more than friction.
 
         Args:
-            q: Configuration.
-            wrenches: On each sole, about its frame's origin, in world axes, shape (6,).
+            q: Configuration, shape (nq,).
+            wrenches: Force and moment on each sole, about its frame's origin, in world
+                axes, shape (6,) each [N, N·m].
         """
         state = self._state.update(0.0, q, np.zeros(self.robot.nv))
         for name, wrench in zip(self.body.soles, wrenches, strict=True):
@@ -235,34 +239,39 @@ class Standing:
 
 
 class Engine:
-    """A plant and how it goes on by one period."""
+    """A plant, and the function that advances it by one period."""
 
     def __init__(self, plant: Any, advance: Any) -> None:
-        """Keep both."""
+        """Set both."""
         self.plant, self.advance = plant, advance
 
     def wrenches(self, t: float, q: Array, v: Array, tau: Array) -> list[Array]:
-        """Return what it does to each sole, about its frame's origin."""
-        read = self.plant.log_channels(t, q, v, tau)
-        forces = [name for name in read if name.endswith(".force")]
+        """Return the wrench on each sole, about its frame's origin, shape (6,) each."""
+        channels = self.plant.log_channels(t, q, v, tau)
+        forces = [name for name in channels if name.endswith(".force")]
         return [
             np.concatenate(
-                [read[name].value, read[name.replace(".force", ".moment")].value]
+                [
+                    channels[name].value,
+                    channels[name.replace(".force", ".moment")].value,
+                ]
             )
             for name in forces
         ]
 
 
-def _held(plant: ContactPlant, tau: Array, t: float, q: Array, v: Array) -> Array:
+def _acceleration(
+    plant: ContactPlant, tau: Array, t: float, q: Array, v: Array
+) -> Array:
     return plant.acceleration(t, q, v, tau)
 
 
 def _cone_edges(corners: Array) -> Array:
-    """Return wrenches of unit normal force along the cones' edges, (6, 4 BEVEL)."""
-    around = 2.0 * np.pi * np.arange(BEVEL) / BEVEL
-    side = FRICTION / np.cos(np.pi / BEVEL)  # the polygon about the circle
+    """Return wrenches of unit normal force along the edges, shape (6, 4 EDGES)."""
+    around = 2.0 * np.pi * np.arange(EDGES) / EDGES
+    side = FRICTION / np.cos(np.pi / EDGES)  # the pyramid contains the cone
     edge = np.column_stack(
-        [side * np.cos(around), side * np.sin(around), np.ones(BEVEL)]
+        [side * np.cos(around), side * np.sin(around), np.ones(EDGES)]
     )
     columns = [
         np.hstack([edge, np.cross(np.broadcast_to(corner, edge.shape), edge)])

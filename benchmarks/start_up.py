@@ -1,11 +1,11 @@
-"""What a start costs: with nothing compiled yet, and with compiled code kept.
+"""Measure the time of a start with an empty and with a filled kernel cache.
 
     .venv/bin/python benchmarks/start_up.py [CONFIG ...] [--rounds N]
 
-Each start is a fresh interpreter that imports the package, builds a configuration and
-computes its first effort. Cold, the cache of compiled code is an empty folder; cached,
-it is the one that the cold start left. Rounds alternate between the two. Processor time
-is counted, which on an idle machine is the clock's: it all happens in one thread.
+Each start is a new interpreter that imports the package, builds a configuration and
+computes its first effort. Cold: the cache of compiled code is an empty folder. Cached:
+it is the folder that the cold start has filled. The two alternate. Times are processor
+times, which equal wall time on an idle machine: everything runs in one thread.
 """
 
 import argparse
@@ -30,15 +30,15 @@ print(imported - begin, done - imported, done)
 
 
 def start(config: str, cache: str) -> tuple[float, float, float]:
-    """Return import, first effort, and all from the interpreter's start [s]."""
-    ran = subprocess.run(
+    """Return the times of import, first effort and the whole start [s]."""
+    done = subprocess.run(
         [sys.executable, "-c", START, config],
         env={**os.environ, "NUMBA_CACHE_DIR": cache},
         capture_output=True,
         text=True,
         check=True,
     )
-    imported, effort, whole = map(float, ran.stdout.split())
+    imported, effort, whole = map(float, done.stdout.split())
     return imported, effort, whole
 
 
@@ -49,7 +49,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     options = parser.parse_args()
     configs = options.configs or ["paper/4_moving_obstacle", "panda_obstacle"]
-    print("| configuration | start | import | first effort | in all |")
+    print("| configuration | start | import | first effort | total |")
     print("|---|---|--:|--:|--:|")
     for config in configs:
         times: dict[str, list[tuple[float, float, float]]] = {"cold": [], "cached": []}

@@ -1,13 +1,13 @@
-"""How much of the second core a sweep uses.
+"""Measure the parallel efficiency of a sweep on two cores.
 
     .venv/bin/python benchmarks/sweep_efficiency.py [--rounds N] [--samples N]
 
-The same sweep with one worker and with two, in turns, workers' start included. By the
-clock the efficiency is T1/(2 T2), which means nothing on a machine that others
-use: two processes do not get twice as much there as one. What does not depend on others
-is what the efficiency is made of: how much processor time the work takes, C1/C2, and
-which share of their time workers spend in runs rather than starting and waiting,
-B2/B1. Their product is the efficiency on a machine of one's own.
+Runs the same sweep with one worker and with two, in turns, start of the workers
+included. By wall time the efficiency is T1/(2 T2). On a machine with other load this is
+meaningless: two processes do not get twice the processor time of one. Two factors do
+not depend on other load: the ratio of processor times, C1/C2, and the ratio B2/B1 of
+the fractions of time that workers spend in runs (not starting or waiting). Their
+product is the efficiency on an otherwise idle machine.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from hsp_control import sweep
 
 
 class Cost(NamedTuple):
-    """What a sweep took: by the clock, of processors; the workers' share in runs."""
+    """Wall time [s] and processor time [s] of a sweep; fraction of time in runs."""
 
     clock: float
     processor: float
@@ -28,7 +28,7 @@ class Cost(NamedTuple):
 
 
 def cost(samples: int, workers: int) -> Cost:
-    """Return what a sweep takes."""
+    """Run a sweep, and return its cost."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     begin = perf_counter()
     found = sweep(
@@ -51,10 +51,8 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--samples", type=int, default=100)
     options = parser.parse_args()
-    cost(2, 1)  # compiles
-    print(
-        "| round | T1 | T2 | T1/(2 T2) | C1/C2 | B1 | B2 | on a machine of one's own |"
-    )
+    cost(2, 1)  # compiles the kernels
+    print("| round | T1 | T2 | T1/(2 T2) | C1/C2 | B1 | B2 | idle machine |")
     print("|--:|--:|--:|--:|--:|--:|--:|--:|")
     found = []
     for k in range(options.rounds):

@@ -1,4 +1,4 @@
-"""Interleaved timing: what else the machine does shall hit all controllers alike."""
+"""Interleaved timing, so that disturbances of the machine affect all controllers."""
 
 import gc
 from collections.abc import Callable, Sequence
@@ -18,10 +18,10 @@ def step_times(
     block: int,
     warm_up: int = 20,
 ) -> dict[str, Any]:
-    """Return the median time of a step [s] in each round, shape (rounds,).
+    """Return the median time of a step in each round, shape (rounds,) [s], by name.
 
-    Every round gives each controller the same block of consecutive states, in turn and
-    in an order that rotates.
+    In every round each controller gets the same block of consecutive states, one after
+    the other, in an order that rotates.
     """
     for compute in controllers.values():
         for t, q, v in states[:warm_up]:
@@ -34,22 +34,22 @@ def step_times(
         begin = warm_up + (k * block) % (len(states) - warm_up - block + 1)
         chosen = states[begin : begin + block]
         for name in names[k % len(names) :] + names[: k % len(names)]:
-            compute, taken = controllers[name], np.zeros(block)
+            compute, elapsed = controllers[name], np.zeros(block)
             for i, (t, q, v) in enumerate(chosen):
                 started = perf_counter_ns()
                 compute(t, q, v)
-                taken[i] = perf_counter_ns() - started
-            times[name][k] = 1e-9 * np.median(taken)
+                elapsed[i] = perf_counter_ns() - started
+            times[name][k] = 1e-9 * np.median(elapsed)
     gc.enable()
     return times
 
 
 def ratios(times: dict[str, Any], name: str, reference: str) -> Any:
-    """Return the quartiles of the rounds' ratios, shape (3,)."""
+    """Return the quartiles over the rounds of the time ratios, shape (3,)."""
     return np.quantile(times[name] / times[reference], [0.25, 0.5, 0.75])
 
 
 def spread(quartiles: Any) -> str:
-    """Return a median with its quartiles as a table shows them."""
+    """Format a median with its quartiles."""
     low, middle, high = quartiles
     return f"{middle:.2f} ({low:.2f} to {high:.2f})"

@@ -1,17 +1,17 @@
-"""Talos and G1 on two feet under this law and under TSID, on two plants.
+"""Compare this law with TSID: Talos and G1 on two feet, on two plants.
 
     make bench      or      .venv-peers/bin/python benchmarks/whole_body_side_by_side.py
 
-Runs every controller against the ideal contacts and against MuJoCo's, times the steps
-interleaved along the same states, says where this law's step spends its time, prints
-the tables and writes them to docs/whole_body_side_by_side.md.
+Runs every controller on ideal contacts and on MuJoCo, times the steps interleaved along
+the same states, and the parts of this law's step. Prints the tables and writes them to
+docs/whole_body_side_by_side.md.
 """
 
 # ruff: noqa: E402
 import os
 
 # TSID's wheel is built with OpenMP: with a second thread its solver takes a hundred
-# times as long where another process wants that core. Both sides have one thread.
+# times as long if another process uses that core. Both controllers get one thread.
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ[name] = "1"
 
@@ -37,11 +37,11 @@ LAW = "this law"
 WEIGHTS = (1e-2, 1e-3, 1e-4)  # of TSID's posture
 EVERY = 10  # control periods between two measurements
 FALLEN = 20.0  # joint speed at which a run is over [rad/s]
-Made = tuple[Compute, list[str]]
+Made = tuple[Compute, list[str]]  # a controller, and the statuses of its steps
 
 
 def controllers() -> dict[str, Callable[[Standing], Made]]:
-    """Return what is compared, by name; each with the list of its statuses."""
+    """Return functions that make the controllers, by name."""
     made: dict[str, Callable[[Standing], Made]] = {LAW: this_law}
     try:
         peer: Any = importlib.import_module("controllers.standing_tsid")
@@ -58,7 +58,7 @@ def _tsid(peer: Any, weight: float) -> Callable[[Standing], Made]:
 
 
 def this_law(case: Standing) -> Made:
-    """Return `hsp_control.Controller` as a user would call it."""
+    """Return `hsp_control.Controller` as a user calls it."""
     controller, state = case.controller(), hsp.RobotState(case.robot)
     statuses: list[str] = []
 
@@ -75,7 +75,7 @@ def this_law(case: Standing) -> Made:
 
 @dataclass
 class Run:
-    """What one controller did on one plant."""
+    """The closed-loop run of one controller on one plant."""
 
     columns: dict[str, Array] = field(default_factory=dict)
     statuses: Counter[str] = field(default_factory=Counter)
@@ -88,7 +88,7 @@ class Run:
 
 
 def close_loop(case: Standing, engine: Engine, made: Made, duration: float) -> Run:
-    """Run a controller against a plant, its effort held each period."""
+    """Run a controller on a plant, with its effort held each period."""
     run, rows = Run(), []
     compute, statuses = made
     q, v = case.q0.copy(), np.zeros(case.robot.nv)
@@ -143,7 +143,7 @@ def row(name: str, run: Run) -> str:
 
 
 def timing_table(times: dict[str, Array]) -> str:
-    """Return the ratios to each of TSID's, with the quartiles over the rounds."""
+    """Return the table of ratios to TSID, with the quartiles over the rounds."""
     reference = next((n for n in times if n.endswith("1e-03")), LAW)
     lines = f"| controller | {reference} = 1 | µs |\n|---|--:|--:|\n"
     for name, taken in times.items():
@@ -153,43 +153,43 @@ def timing_table(times: dict[str, Array]) -> str:
 
 
 def parts_table(case: Standing, states: list[State]) -> str:
-    """Return where a step of this law spends its time, as shares of the whole."""
+    """Return the table of the times of the parts of this law's step."""
     controller, state = case.controller(), hsp.RobotState(case.robot)
     controller.compute(state.update(*states[0]))
-    mode, actuation = controller.mode, controller._actuation
-    support = mode.support
-    taken: dict[str, list[str]] = {}
+    active, actuation = controller.active_stack, controller._actuation
+    support = active.support
+    times: dict[str, list[int]] = {}
 
     def timed(name: str, function: Callable[[], Any]) -> Any:
         started = perf_counter_ns()
         result = function()
-        taken.setdefault(name, []).append(perf_counter_ns() - started)
+        times.setdefault(name, []).append(perf_counter_ns() - started)
         return result
 
     def law() -> float:
-        return mode.resolve(state, controller.metric, controller.field)
+        return active.resolve(state, controller.metric, controller.field)
 
     for t, q, v in states:
         timed("kinematics, one pass of Pinocchio", lambda: state.update(t, q, v))  # noqa: B023
         timed("contacts, tasks, field, metric and law", law)
-        a = mode.resolution.acceleration
+        a = active.resolution.acceleration
         wanted = timed("inverse dynamics", lambda: state.inverse_dynamics(a).copy())  # noqa: B023
         timed("map of the corner forces", lambda: support.update(state))
         base = actuation.base
         forces = timed(
-            "least forces",
-            lambda: support.least_forces(base, wanted)[0],  # noqa: B023
+            "minimum-norm forces",
+            lambda: support.minimum_norm_forces(base, wanted)[0],  # noqa: B023
         )
-        timed("cones", lambda: support.bears(forces))  # noqa: B023
+        timed("cones", lambda: support.permits(forces))  # noqa: B023
         # Pinocchio's pass is kept until the state changes: the second call is cheap.
         delivered = timed(
-            "deliver, all of it",
-            lambda: actuation.deliver(state, a, mode.resolution, support),  # noqa: B023
+            "deliver, total",
+            lambda: actuation.deliver(state, a, active.resolution, support),  # noqa: B023
         )
         key = f"deliver, status {delivered[3]}"
-        taken.setdefault(key, []).append(taken["deliver, all of it"][-1])
+        times.setdefault(key, []).append(times["deliver, total"][-1])
     lines = "| part | median [µs] | steps |\n|---|--:|--:|\n"
-    for name, each in taken.items():
+    for name, each in times.items():
         lines += f"| {name} | {1e-3 * np.median(each):.0f} | {len(each)} |\n"
     return lines
 
@@ -200,7 +200,7 @@ def parts_table(case: Standing, states: list[State]) -> str:
 def compare(
     body: Body, options: argparse.Namespace, say: Callable[[str], None]
 ) -> None:
-    """Write a robot's tables."""
+    """Run the comparison for a robot, and write its tables."""
     case, chosen = Standing(body), controllers()
     path: list[State] = []
     for title, engine in (("ideal contacts", case.ideal), ("MuJoCo", case.mujoco)):
@@ -220,8 +220,8 @@ def compare(
     )
     parts = parts_table(case, path[::5])
     say(
-        "Where this law's step goes (*deliver* contains inverse dynamics, map, least "
-        f"forces and cones):\n\n{parts}\n"
+        "Times of the parts of this law's step (*deliver* contains inverse dynamics, "
+        f"map, minimum-norm forces and cones):\n\n{parts}\n"
     )
 
 
@@ -229,26 +229,26 @@ INTRODUCTION = """# Whole bodies, side by side with TSID
 
 Written by `make bench` (`benchmarks/whole_body_side_by_side.py`); do not edit.
 
-Two soles on the ground; the centre of mass goes round a circle of 3 cm, a hand round
-one of 8 cm, the trunk stays upright, the rest of the joints holds the posture of the
-start. {duration:g} s from rest at 1 kHz, the effort held. Both have the same model,
-soles, friction pyramids (within the cone of {friction:g}), effort limits, task gains
+Two soles are on the ground; the centre of mass follows a circle of 3 cm radius, a hand
+one of 8 cm, the trunk stays upright, and the posture field attracts to the start.
+{duration:g} s from rest at 1 kHz, the effort is held. Both have the same model, soles,
+friction pyramids (within the cone of {friction:g}), effort limits, task gains
 (ω₀ = 10 1/s) and contact damping; TSID's posture has Kp = 12 and Kd = 8, which is
 K_N = 6 and g = -2 (q - q_start). TSID 1.10 has contacts as constraints, forces at the
-soles' corners and eiquadprog-fast; tasks have weight 1. Joint ranges bind nobody here:
-neither controller knows them, and neither plant has them.
+soles' corners and eiquadprog-fast; tasks have weight 1. There are no joint limits,
+neither in the controllers nor in the plants.
 
 All run on one thread. TSID's solver, built with OpenMP, took 0.12 ms a step with one
-and 11 ms with two on a machine of two busy cores: that is no property of TSID's, and no
-ratio here is taken like that.
+and 11 ms with two on a machine with two busy cores. This is not a property of TSID, and
+no ratio here is measured like that.
 
-The *ideal contacts* hold whatever that takes, so a force that they had to give and the
-ground could not is counted: *outside the cones* is the share of instants. MuJoCo's slip
-instead: *soles shifted*. P is the projector into the null space of contacts and tasks,
-the same for all. Status of this law: 0 the law, 1 forces redistributed, 2 limited, 3
-limits relaxed, and *damped* where the tasks' Jacobian is so near a loss of rank that
-the law is bounded and not exact (`singularity_threshold`, at its default); of TSID:
-0 solved, anything else: its last effort went on.
+The *ideal contacts* provide any force, also one that a real ground could not:
+*outside the cones* is the fraction of instants with such a force. MuJoCo's contacts
+slip instead: *soles shifted*. P is the projector into the null space of contacts and
+tasks, the same for all. Status of this law: 0 exact, 1 forces redistributed, 2 limited,
+3 limits relaxed, and *damped* if the task Jacobian is so near to a loss of rank that
+the law is damped and not exact (`singularity_threshold`, at its default). Status of
+TSID: 0 solved; otherwise its last effort is held.
 
 """
 
@@ -276,7 +276,7 @@ def main() -> None:
             compare(body, options, say)
     say(
         f"Python {platform.python_version()}, hsp_control {hsp.__version__}, numpy "
-        f"{np.__version__}. Only ratios carry over to another machine.\n"
+        f"{np.__version__}. Only ratios are valid for other machines.\n"
     )
     options.out.write_text(text, encoding="utf-8")
 

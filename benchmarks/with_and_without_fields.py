@@ -1,11 +1,12 @@
-"""What a null-space field is worth: every bundled configuration with and without it.
+"""Run every bundled configuration with and without its null-space field.
 
     .venv/bin/python benchmarks/with_and_without_fields.py [NAME ...]
 
 Runs each configuration of `configs/` as it is, and once more without its first field
-(at rest where there is no other), measures both the same way, times the control step
-against the bare Pinocchio calls that nobody can do without, and prints the tables. All
-configurations together are written to docs/configurations.md.
+(with g = 0 if there is no other), measures both the same way, times the control step
+against the Pinocchio calls that every controller needs, and prints the tables. A run of
+all configurations also writes docs/configurations.md. The table of README.md is copied
+from there by hand.
 """
 
 import argparse
@@ -33,7 +34,7 @@ from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClea
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "configurations.md"
-ROUNDS, STEPS = 15, 200  # of the timing
+ROUNDS, STEPS = 15, 200  # of timing
 
 INTRODUCTION = """\
 # Configurations
@@ -42,15 +43,16 @@ Written by `.venv/bin/python benchmarks/with_and_without_fields.py`; do not edit
 
 Each of these is a file in `configs/` that runs by name: `hsp run panda_limits`, then
 `hsp plot out/panda_limits.npz`. The second row of each table is the same run without
-the field in question; what other fields there are stay. The task is tracked all the
-same, that is the law's point; what the field is worth is in the other columns.
+the field that the first row names; other fields stay. The law tracks the task in both
+runs; the other columns show the effect of the field.
 
-- **tracking**: root mean square of the task error over the whole run, the worst task's.
-- **manipulability**: least √det(J Jᵀ) of a controlled frame's position rows.
-- **distance**: least signed distance of the links, as capsules, to an obstacle, or to
-  each other where there are two arms; negative where they overlap.
-- **limit margin**: least distance of a joint from its limits; negative beyond them.
-- **effort**, **speed**: largest share of a joint's limit; 1 is at the limit.
+- **tracking**: root mean square of the task error over the whole run, of the worst
+  task.
+- **manipulability**: smallest √det(J Jᵀ) of a controlled frame's position rows.
+- **distance**: minimum signed distance of the links, as capsules, to an obstacle, or to
+  each other if there are two arms; negative if they overlap.
+- **limit margin**: minimum distance of a joint from its limits; negative beyond them.
+- **effort**, **speed**: largest ratio of a joint's value to its limit.
 - **step**: a control step from Python in units of the bare Pinocchio calls that it
   needs (`computeJointJacobiansTimeVariation`, `updateFramePlacements`, `rnea`), timed
   interleaved, median of 15 rounds.
@@ -58,8 +60,8 @@ same, that is the law's point; what the field is worth is in the other columns.
 
 
 @dataclass(frozen=True)
-class Figures:
-    """What one run shows."""
+class RunMetrics:
+    """One row of a table: the measurements of one run."""
 
     name: str
     tracking: str
@@ -96,33 +98,33 @@ def without_field(name: str) -> tuple[Experiment, str]:
     return load_experiment(name, f"null_space.fields={rest}"), first["type"]
 
 
-def figures(name: str, experiment: Experiment, rollout: Rollout) -> Figures:
-    """Return what a run shows."""
+def run_metrics(name: str, experiment: Experiment, rollout: Rollout) -> RunMetrics:
+    """Measure a run."""
     robot, tasks = experiment.robot, experiment.controller.tasks
     clearance, state = clearance_of(experiment), RobotState(robot)
     frames = {task.frame for task in tasks if hasattr(task, "frame")}
-    least_manipulability, least_distance = np.inf, np.inf
+    min_manipulability, min_distance = np.inf, np.inf
     for t, q, v in zip(rollout.t, rollout.q, rollout.v, strict=True):
         state.update(t, q, v)
         for frame in frames:
             J = state.frame(frame).jacobian[:3]
             square = max(0.0, float(np.linalg.det(J @ J.T)))
-            least_manipulability = min(least_manipulability, square**0.5)
+            min_manipulability = min(min_manipulability, square**0.5)
         if clearance is not None:
-            least_distance = min(least_distance, clearance.least_distance(state))
+            min_distance = min(min_distance, clearance.minimum_distance(state))
     lower, upper = robot.position_limits()
     q = rollout["joint_positions"]
     margins = np.minimum(q - lower, upper - q).min(axis=0)
     tightest = int(margins.argmin())
     model = robot.model
-    return Figures(
+    return RunMetrics(
         name,
         tracking=max((tracking(rollout, task.name) for task in tasks), key=_first),
-        manipulability=least_manipulability,
-        distance=None if clearance is None else least_distance,
+        manipulability=min_manipulability,
+        distance=None if clearance is None else min_distance,
         limit_margin=f"{margins[tightest]:.3f} {_unit(robot, tightest)}",
-        effort=share(rollout.tau, model.upperEffortLimit),
-        speed=share(rollout.v, model.upperVelocityLimit),
+        effort=limit_ratio(rollout.tau, model.upperEffortLimit),
+        speed=limit_ratio(rollout.v, model.upperVelocityLimit),
         step=step_ratio(experiment, rollout),
     )
 
@@ -140,14 +142,14 @@ def tracking(
     return text
 
 
-def share(values: Array, limits: Array) -> float:
-    """Return the largest share of a limit; a joint without a limit has none."""
+def limit_ratio(values: Array, limits: Array) -> float:
+    """Return the largest |value| / limit; joints without a limit do not count."""
     limited = (limits > 0.0) & (limits < 1e300)
     return float((np.abs(values[:, limited]) / limits[limited]).max())
 
 
 def clearance_of(experiment: Experiment) -> Clearance | None:
-    """Return what measures the run's distances, whatever its field."""
+    """Return a field that measures the run's distances, for any field of the run."""
     if experiment.scene:
         return ObstacleClearance(experiment.robot, list(experiment.scene.values()))
     if len(experiment.robot.parts) > 1:
@@ -163,17 +165,19 @@ def step_ratio(experiment: Experiment, rollout: Rollout) -> float:
     states = [(float(rollout.t[k]), rollout.q[k], rollout.v[k]) for k in rows]
     a = np.zeros(robot.nv)
 
-    def ours() -> None:
+    def this_law() -> None:
         for t, q, v in states:
             controller.compute(state.update(t, q, v))
 
-    def bare() -> None:
+    def pinocchio() -> None:
         for _, q, v in states:
             pin.computeJointJacobiansTimeVariation(model, data, q, v)
             pin.updateFramePlacements(model, data)
             pin.rnea(model, data, q, v, a)
 
-    return statistics.median(_timed(ours) / _timed(bare) for _ in range(ROUNDS))
+    return statistics.median(
+        _timed(this_law) / _timed(pinocchio) for _ in range(ROUNDS)
+    )
 
 
 def _timed(function: Callable[[], None]) -> float:
@@ -186,52 +190,55 @@ def _first(text: str) -> float:
     return float(text.split()[0])
 
 
-def _unit(robot: Any, freedom: int) -> str:
-    joint = next(j for j in robot.joints.values() if j.idx_v == freedom)
+def _unit(robot: Any, dof: int) -> str:
+    joint = next(j for j in robot.joints.values() if j.idx_v == dof)
     return "m" if joint.shortname().startswith("JointModelP") else "rad"
 
 
-# ------------------------------------------------------------------- what else to say
+# --------------------------------------------------------------------------- remarks
 
 
-def remark(name: str, experiment: Experiment, ours: Rollout, other: Rollout) -> str:
-    """Return what the columns do not show of a configuration; empty if they show all.
+def remark(
+    name: str, experiment: Experiment, rollout: Rollout, without: Rollout
+) -> str:
+    """Return a remark on a configuration that its table does not show; may be empty.
 
     Args:
         name: The configuration.
-        experiment: It.
-        ours: Its run.
-        other: The run without the field.
+        experiment: The configuration, built.
+        rollout: Its run.
+        without: Its run without the field.
     """
     if name == "iiwa_singular":
-        bounded = ours.t[ours["damped"] > 0]
-        before = tracking(ours, "hand", until=float(bounded[0]) - 0.1)
-        after = tracking(ours, "hand", since=9.5)
-        peaks = [float(np.abs(run["acceleration"]).max()) for run in (ours, other)]
+        damped = rollout.t[rollout["damped"] > 0]
+        before = tracking(rollout, "hand", until=float(damped[0]) - 0.1)
+        after = tracking(rollout, "hand", since=9.5)
+        runs = (rollout, without)
+        peaks = [float(np.abs(run["acceleration"]).max()) for run in runs]
         return (
-            f"The law is bounded instead of exact from {bounded[0]:.1f} s to "
-            f"{bounded[-1]:.1f} s, where the target is out of reach or nearly so. The "
+            f"The law is damped instead of exact from {damped[0]:.1f} s to "
+            f"{damped[-1]:.1f} s, while the target is out of reach or nearly so. The "
             f"rms error is {before} before and {after} in the last half second; the "
             f"largest joint acceleration {peaks[0]:.1f} rad/s², {peaks[1]:.1f} without."
         )
     if name == "iiwa_null_space":
-        path = _path(experiment, ours, "iiwa_link_4")
+        path = _path(experiment, rollout, "iiwa_link_4")
         swung = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
         moved = 1e3 * float(
-            np.linalg.norm(ours["task.hand.error"][:, :3], axis=1).max()
+            np.linalg.norm(rollout["task.hand.error"][:, :3], axis=1).max()
         )
-        error = np.linalg.norm(ours["null_space_error"], axis=1)[ours.t > 2.0]
-        speed = np.linalg.norm(ours.v, axis=1)[ours.t > 2.0]
+        error = np.linalg.norm(rollout["null_space_error"], axis=1)[rollout.t > 2.0]
+        speed = np.linalg.norm(rollout.v, axis=1)[rollout.t > 2.0]
         part = float(np.sqrt((error**2).mean() / (speed**2).mean()))
         return (
             f"The elbow travels {swung:.1f} m while the hand is never farther than "
             f"{moved:.2f} mm from where it was. From 2 s on the null-space error is "
-            f"{100 * part:.1g} % of the null-space velocity (rms): what is left of it "
-            "is the effort held for 1 ms."
+            f"{100 * part:.1g} % of the null-space velocity (rms); the cause of this "
+            "rest is that the effort is held for 1 ms."
         )
     if name == "panda_limits":
         drifts = []
-        for run in (ours, other):
+        for run in (rollout, without):
             q = run["joint_positions"][run.t >= 5.0 - 1e-9]  # a turn takes 5 s
             drifts.append(float(np.abs(q[-1] - q[0]).max()))
         return (
@@ -239,10 +246,10 @@ def remark(name: str, experiment: Experiment, ours: Rollout, other: Rollout) -> 
             f"without the field they drift by {drifts[1]:.2g} rad."
         )
     if name == "tiago_reach":
-        base = float(np.linalg.norm(ours.q[-1, :2] - ours.q[0, :2]))
-        torso = float(np.ptp(ours["joint_positions"][:, 3]))
+        base = float(np.linalg.norm(rollout.q[-1, :2] - rollout.q[0, :2]))
+        torso = float(np.ptp(rollout["joint_positions"][:, 3]))
         return (
-            f"The base ends {base:.1f} m from where it began; the torso uses "
+            f"The base ends {base:.1f} m from its start; the torso uses "
             f"{torso:.2f} m of its 0.35 m."
         )
     return ""
@@ -254,14 +261,14 @@ def _path(experiment: Experiment, rollout: Rollout, frame: str) -> Array:
     return np.array([state.update(*row).position(frame).copy() for row in rows])
 
 
-# ----------------------------------------------------------------------- running it
+# ------------------------------------------------------------------------------ main
 
 
 def sections(names: list[str], progress: Progress) -> Iterator[str]:
     """Run the configurations and return each one's section of the page."""
     bar = progress.add_task("", total=2.0 * len(names))
     for name in names:
-        found, runs, seconds = [], [], []
+        metrics, runs, seconds = [], [], []
         experiment = load_experiment(name)
         other, field = without_field(name)
         for label, run in ((f"with `{field}`", experiment), ("without", other)):
@@ -275,12 +282,12 @@ def sections(names: list[str], progress: Progress) -> Iterator[str]:
             rollout = run.run(on_progress)
             seconds.append(perf_counter() - start)
             runs.append(rollout)
-            found.append(figures(label, run, rollout))
+            metrics.append(run_metrics(label, run, rollout))
         duration = experiment.scenario.simulation.duration
         speeds = " and ".join(f"{duration / s:.1f}" for s in seconds)
         progress.console.print(f"{name}: real-time factors {speeds}", highlight=False)
         scenario = experiment.scenario
-        said = remark(name, experiment, runs[0], runs[1])
+        text = remark(name, experiment, runs[0], runs[1])
         yield "\n".join(
             [
                 f"## `{name}`",
@@ -288,20 +295,20 @@ def sections(names: list[str], progress: Progress) -> Iterator[str]:
                 f"**{scenario.title}.** {scenario.description.strip()}",
                 "",
                 HEADER,
-                *(one.row() for one in found),
-                *(("", said) if said else ()),
+                *(each.row() for each in metrics),
+                *(("", text) if text else ()),
             ]
         )
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run what was asked for and print it; write the page if that was everything."""
+    """Run the given configurations and print the tables; write the page if all."""
     known = [name for name in bundled_configs() if "/" not in name]
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(known))
     names = parser.parse_args(arguments).names or known
     if unknown := set(names) - set(known):
-        parser.error(f"no configuration {sorted(unknown)}; choose among {known}")
+        parser.error(f"unknown configuration {sorted(unknown)}; choose from {known}")
     console = Console(stderr=True)
     with Progress(console=console) as progress:
         found = list(sections(names, progress))

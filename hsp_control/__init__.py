@@ -228,7 +228,7 @@ _ROOMS = {
         "Controller",
         "Diagnostics",
     ),
-    "control.log_channel": ("Reading",),
+    "control.log_channel": ("LogChannel",),
     "control.compensation": (
         "Command",
         "EffortRateClip",

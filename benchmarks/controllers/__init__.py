@@ -1,1 +1,1 @@
-"""Controllers side by side: each module's ``make(case)`` gives (t, q, v) ↦ tau."""
+"""The compared controllers: each ``make(case)`` returns a function (t, q, v) ↦ tau."""

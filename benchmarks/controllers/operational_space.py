@@ -2,8 +2,8 @@
 
     tau = JᵀΛ(a_x - J'v) + (I - Jᵀ J̄ᵀ) M a_0 + N,   Λ = (J M⁻¹ Jᵀ)⁻¹,   J̄ = M⁻¹JᵀΛ
 
-Dynamically consistent: the posture's effort moves the hand by nothing. It has the drift
-J'v, which many implementations leave out. Plain NumPy.
+Dynamically consistent: the posture's effort does not accelerate the hand. It contains
+the drift J'v, which many implementations omit. Plain NumPy.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-if TYPE_CHECKING:  # it also runs where this package does not: see placo_side.py
+if TYPE_CHECKING:  # also runs without this package: see placo_side.py
     from cases import Case
 
     from hsp_control.common.arrays import Array

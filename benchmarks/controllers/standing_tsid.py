@@ -1,7 +1,7 @@
-"""TSID on two feet, by its own API, as in its exercise ``ex_2`` on Talos' legs.
+"""TSID on two feet, with its own API, as in its exercise ``ex_2`` (Talos' legs).
 
-Contacts are constraints (level 0) with a force at each corner; centre of mass, hand and
-trunk have weight 1 and the posture a smaller one, in one cost.
+Contacts are constraints (level 0) with a force at each corner. Centre of mass, hand and
+trunk with weight 1 and the posture with a smaller weight are one cost.
 """
 
 from collections.abc import Callable
@@ -12,13 +12,13 @@ from standing import CONTACT_DAMPING, FREQUENCY, FRICTION, GAIN, POSTURE_RATE, S
 
 from hsp_control.common.arrays import Array
 
-FORCE_WEIGHT = 1e-5  # of the forces' regularisation, as in TSID's exercises
+FORCE_WEIGHT = 1e-5  # regularisation of the forces, as in TSID's exercises
 
 
 def make(
     case: Standing, *, posture_weight: float
 ) -> tuple[Callable[[float, Array, Array], Array], list[str]]:
-    """Return the controller, and the list that it writes the solver's status into."""
+    """Return the controller, and the list to which it appends the solver's status."""
     model, nv = case.robot.model, case.robot.nv
     robot = tsid.RobotWrapper(model, tsid.FLOATING_BASE_SYSTEM, False)
     problem = tsid.InverseDynamicsFormulationAccForce("tsid", robot, False)
@@ -26,7 +26,7 @@ def make(
     kp, kv = FREQUENCY**2, 2.0 * FREQUENCY
     kept = [robot]  # TSID does not own its tasks
 
-    # Its pyramid stands about the cone of its coefficient; this one is within ours.
+    # TSID's pyramid contains the cone of its coefficient; this one is inside our cone.
     friction = FRICTION / np.sqrt(2.0)
     for name in case.body.soles:
         contact = tsid.Contact6d(
@@ -65,7 +65,7 @@ def make(
     kept += [com, hand, trunk, posture, bounds]
 
     trunk_sample = tsid.TrajectorySample(12, 6)
-    place = np.concatenate([np.zeros(3), case.upright.T.ravel()])  # column by column
+    place = np.concatenate([np.zeros(3), case.upright.T.ravel()])  # column-major
     trunk_sample.value(place)
     trunk_sample.derivative(np.zeros(6))
     trunk_sample.second_derivative(np.zeros(6))
@@ -81,14 +81,14 @@ def make(
     tau = np.zeros(nv)
 
     def compute(t: float, q: Array, v: Array) -> Array:
-        wanted = case.com.sample(t)
-        com_sample.value(wanted.position)
-        com_sample.derivative(wanted.velocity)
-        com_sample.second_derivative(wanted.acceleration)
+        desired = case.com.sample(t)
+        com_sample.value(desired.position)
+        com_sample.derivative(desired.velocity)
+        com_sample.second_derivative(desired.acceleration)
         com.setReference(com_sample)
-        wanted = case.hand.sample(t)
-        hand_place[:3], hand_rate[:3] = wanted.position, wanted.velocity
-        hand_rate_dot[:3] = wanted.acceleration
+        desired = case.hand.sample(t)
+        hand_place[:3], hand_rate[:3] = desired.position, desired.velocity
+        hand_rate_dot[:3] = desired.acceleration
         hand_sample.value(hand_place)
         hand_sample.derivative(hand_rate)
         hand_sample.second_derivative(hand_rate_dot)
@@ -96,7 +96,7 @@ def make(
         data = problem.computeProblemData(t, q, v)
         solution = solver.solve(data)
         statuses.append(str(int(solution.status)))
-        if solution.status == 0:  # else the last effort goes on
+        if solution.status == 0:  # else hold the last effort
             tau[6:] = problem.getActuatorForces(solution)
         return tau
 

@@ -1,4 +1,4 @@
-"""This package: `hsp_control.Controller`, as a user would call it."""
+"""This package: `hsp_control.Controller`, as a user calls it."""
 
 from collections.abc import Callable
 
@@ -15,9 +15,9 @@ def make(
     *,
     diagnoses: bool = False,
 ) -> Callable[[float, Array, Array], Array]:
-    """Return the controller; another field or metric for timing and comparison.
+    """Return the controller, with another field or metric if given.
 
-    Like its peers it keeps effort limits, and those of motion besides.
+    Like its peers it has effort limits; it has limits of position and speed, too.
     """
     robot = case.robot
     task: hsp.Task

@@ -1,8 +1,8 @@
-"""TSID: a pose (or masked pose) task, a posture task and effort bounds, by its own API.
+"""TSID with its own API: a pose (or masked pose) task, a posture task, effort bounds.
 
 As in its exercise ``ex_1`` (UR5): one weighted level with eiquadprog-fast. With
-``strict``, the pose is an equality constraint, level 0, and the posture alone is left
-in the cost: TSID's own form of a null space.
+``strict``, the pose is an equality constraint, level 0, and only the posture is in the
+cost: TSID's form of a null space.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ def make(
     strict: bool = False,
     exact_rate: bool = False,
 ) -> Callable[[float, Array, Array], Array]:
-    """Return the controller; with ``exact_rate`` it is given this package's g'."""
+    """Return the controller; with ``exact_rate`` it uses this package's g'."""
     model, nv = case.robot.model, case.robot.nv
     robot = tsid.RobotWrapper(model, tsid.FIXED_BASE_SYSTEM, False)
     problem = tsid.InverseDynamicsFormulationAccForce("tsid", robot, False)
@@ -56,7 +56,7 @@ def make(
 
     def compute(t: float, q: Array, v: Array) -> Array:
         x, R = case.desired(t)
-        place[:3], place[3:] = x.position, R.rotation.T.ravel()  # column by column
+        place[:3], place[3:] = x.position, R.rotation.T.ravel()  # column-major
         rate[:3], rate[3:] = x.velocity, R.angular_velocity
         rate_dot[:3], rate_dot[3:] = x.acceleration, R.angular_acceleration
         hand_sample.value(place)

@@ -1,4 +1,4 @@
-"""``hsp bench --latency``: a loop against the clock, beside an empty one."""
+"""``hsp bench --latency``: a real-time loop, compared with an empty loop."""
 
 import argparse
 import sys
@@ -21,10 +21,10 @@ from hsp_control.live.latency import (
 
 
 def bench(options: argparse.Namespace) -> int:
-    """Run the loop, and print how late it was."""
+    """Run the loop, and print its latencies."""
     if not 0.0 < options.rate <= 1e5:
         raise SimulationError(
-            f"--rate {options.rate:g}; must be positive, 100000 Hz at most"
+            f"--rate {options.rate:g}; must be positive and at most 100000 Hz"
         )
     experiment = load_experiment(
         options.config,
@@ -41,8 +41,8 @@ def bench(options: argparse.Namespace) -> int:
     )
     found = _measure(loop, options)
     out.print(
-        f"{options.config} at {options.rate:g} Hz: {len(found.step)} periods, in turns "
-        "with as many of an empty loop; times in microseconds"
+        f"{options.config} at {options.rate:g} Hz: {len(found.step)} periods, "
+        "alternating with as many of an empty loop; times in microseconds"
     )
     out.print(_table(found))
     out.print(
@@ -50,7 +50,7 @@ def bench(options: argparse.Namespace) -> int:
         f"{found.empty_missed} of {len(found.empty)}"
     )
     if found.compilations:
-        out.print(f"{found.compilations} kernels were compiled on the clock")
+        out.print(f"{found.compilations} kernels were compiled during the measurement")
     if options.plot is not None:
         _draw(found, options.plot, f"{experiment.name}: a loop at {options.rate:g} Hz")
     if len(found.step) < round(options.seconds * options.rate):
@@ -66,7 +66,7 @@ def _measure(loop: ControlLoop, options: argparse.Namespace) -> Latency:
         TimeRemainingColumn(),
         console=errors,
         transient=True,
-        auto_refresh=False,  # its thread would wake between the loop's steps
+        auto_refresh=False,  # its thread would run between the loop's steps
         disable=not errors.is_terminal,
     ) as progress:
         bar = progress.add_task(escape(options.config), total=1.0)
@@ -89,10 +89,10 @@ def _table(found: Latency) -> Table:
         table.add_row(name, *(f"{1e6 * x:.0f}" for x in Quantiles.of(times)))
 
     row("step: state and law", found.step)
-    row("the same back to back, off the clock", found.back_to_back)
+    row("the same back to back, without waiting", found.back_to_back)
     row("wake-up", found.wake)
     row("wake-up of the empty loop", found.empty)
-    row("from the period's beginning to the effort", found.response)
+    row("from the start of the period to the effort", found.response)
     return table
 
 

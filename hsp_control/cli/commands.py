@@ -1,4 +1,4 @@
-"""What each command of ``hsp`` does."""
+"""The commands of ``hsp``."""
 
 import argparse
 import json
@@ -16,9 +16,9 @@ from rich.table import Table
 
 from hsp_control.cli import robot_table
 from hsp_control.cli.consoles import errors as _errors
+from hsp_control.cli.consoles import message_of, renamed_keys_printed
 from hsp_control.cli.consoles import out as _out
-from hsp_control.cli.consoles import told
-from hsp_control.cli.interrupts import FirstInterruptWaits
+from hsp_control.cli.interrupts import DeferredInterrupt
 from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema, load_experiment
@@ -32,15 +32,16 @@ if TYPE_CHECKING:
 
 
 def load(options: argparse.Namespace) -> Experiment:
-    """Return the experiment that a command is about."""
+    """Return the experiment of a command's configuration."""
     strict = options.strict or bool(options.allow)
     return load_experiment(
         options.config, *options.overrides, strict=strict, allow=options.allow
     )
 
 
+@renamed_keys_printed()
 def run(options: argparse.Namespace) -> int:
-    """Simulate, save the log, say what it shows; keep what was computed."""
+    """Simulate, save the log and print a summary; rows computed so far are kept."""
     experiment = load(options)
     _warn_of_rates(experiment)
     log = options.out / f"{experiment.name}.npz"
@@ -59,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
 def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") -> int:
     status = 0
     stopwatch = Stopwatch()
-    with FirstInterruptWaits() as interrupts:
+    with DeferredInterrupt() as interrupts:
         try:
             rollout = _run_with_progress(
                 experiment, stopwatch, interrupts, screen.on_row if screen else None
@@ -68,8 +69,8 @@ def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") ->
             if not isinstance(error.rollout, Rollout) or not len(error.rollout):
                 raise
             rollout, status = error.rollout, 2
-            print(f"hsp: {told(error)}", file=sys.stderr)
-        interrupts.settle()
+            print(f"hsp: {message_of(error)}", file=sys.stderr)
+        interrupts.ignore_first()
         if rollout.status == "interrupted":
             at = f" at t = {rollout.t[-1]:g} s" if len(rollout) else ""
             print(f"hsp: stopped by the user{at}", file=sys.stderr)
@@ -81,7 +82,7 @@ def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") ->
         except LogError as error:
             log, status = _saved_elsewhere(rollout, log, error), 2
     summary = _summary(rollout)
-    for line in stopwatch.told(rollout):
+    for line in stopwatch.table_rows(rollout):
         summary.add_row(*line)
     _out.print(summary)
     _out.print(f"Log: {log}")
@@ -91,28 +92,28 @@ def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") ->
 
 
 def _saved_elsewhere(rollout: Rollout, log: Path, error: LogError) -> Path:
-    """Save a log among temporary files: what took hours to compute is not dropped.
+    """Save a log in a temporary folder, so that hours of computation are not lost.
 
     Raises:
-        LogError: The first error, if that fails, too.
+        LogError: The first error, if this fails, too.
     """
     try:
         elsewhere = rollout.save(Path(tempfile.mkdtemp(prefix="hsp-")) / log.name)
     except (LogError, OSError):
         raise error from None
-    print(f"hsp: {told(error)}; it is in another place", file=sys.stderr)
+    print(f"hsp: {message_of(error)}; the log is saved elsewhere", file=sys.stderr)
     return elsewhere
 
 
 def salvage(options: argparse.Namespace) -> int:
-    """Read what is whole of a cut log, write it as a log, and say what is lost."""
+    """Recover the complete rows of a truncated log, and print what is lost."""
     rollout = Rollout.salvage(options.log)
     stem = options.log.name.removesuffix(".npz").removesuffix(".cut")
     out = options.out or options.log.with_name(f"{stem}-salvaged.npz")
     log = rollout.save(out)
     lost = rollout.meta.get("lost", [])
     _out.print(
-        f"{len(rollout)} rows of {len(rollout.columns)} columns are whole, "
+        f"{len(rollout)} rows of {len(rollout.columns)} columns are complete, "
         + (f"lost: {', '.join(lost)}" if lost else "nothing is lost"),
         markup=False,
     )
@@ -120,8 +121,9 @@ def salvage(options: argparse.Namespace) -> int:
     return 0
 
 
+@renamed_keys_printed()
 def view(options: argparse.Namespace) -> int:
-    """Play logs in the browser."""
+    """Show logs in the browser."""
     from hsp_control.cli.screen import attend
     from hsp_control.visualization.viewer import view_logs
 
@@ -139,8 +141,9 @@ def view(options: argparse.Namespace) -> int:
     return 0
 
 
+@renamed_keys_printed()
 def check(options: argparse.Namespace) -> int:
-    """Build everything, evaluate the law once, and say what was found."""
+    """Build all objects, evaluate the law once, and print a summary."""
     experiment = load(options)
     robot, controller = experiment.robot, experiment.controller
     state = robot.state(0.0, experiment.q0, experiment.v0)
@@ -150,15 +153,16 @@ def check(options: argparse.Namespace) -> int:
     rows = sum(task.rows for task in controller.tasks)
     table.add_row("robot", f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}")
     for task in controller.tasks:
-        rows_on = controller.task_rows.get(task.name)  # none before its schedule
-        error = "not yet on"
+        rows_on = controller.task_rows.get(task.name)  # not before its schedule begins
+        error = "not yet active"
         if rows_on is not None:
             error = f"|e| = {np.linalg.norm(output.task.error[rows_on]):.3g}"
         table.add_row(
             f"task {task.name}",
             f"{type(task).__name__}, {task.rows} rows, {error} at the start",
         )
-    table.add_row("null space", f"{robot.nv - rows} freedoms, {controller.field.name}")
+    dofs = f"{robot.nv - rows} degrees of freedom"
+    table.add_row("null space", f"{dofs}, {controller.field.name}")
     table.add_row("plant", experiment.plant.describe()["type"])
     table.add_row("compensation", ", ".join(experiment.compensation.names) or "none")
     values = ", ".join(f"{value:.3g}" for value in diagnostics.singular_values)
@@ -168,9 +172,9 @@ def check(options: argparse.Namespace) -> int:
     _warn_of_rates(experiment)
     if output.damped:
         _out.print(
-            "The tasks are singular at the start: the law is bounded there, not exact."
+            "The tasks are singular at the start: the law is damped there, not exact."
         )
-    _out.print(f"{options.config}: fine")
+    _out.print(f"{options.config}: OK")
     return 0
 
 
@@ -180,8 +184,9 @@ def _warn_of_rates(experiment: Experiment) -> None:
         print(f"hsp: {place}: {finding.message}", file=sys.stderr)
 
 
+@renamed_keys_printed()
 def plot(options: argparse.Namespace) -> int:
-    """Draw the figures of a log, or of a sweep."""
+    """Draw the figures of a log or of a sweep."""
     if options.log.suffix == ".parquet":
         from hsp_control.cli import sweep as sweeps
 
@@ -201,13 +206,15 @@ def plot(options: argparse.Namespace) -> int:
     return 0
 
 
+@renamed_keys_printed()
 def export(options: argparse.Namespace) -> int:
-    """Write a log as a page, or as films."""
+    """Write a log as a page or as films."""
     from hsp_control.cli import export as exports
 
     return exports.export(options)
 
 
+@renamed_keys_printed()
 def sweep(options: argparse.Namespace) -> int:
     """Run a configuration many times."""
     from hsp_control.cli import sweep as sweeps
@@ -215,15 +222,17 @@ def sweep(options: argparse.Namespace) -> int:
     return sweeps.sweep(options)
 
 
+@renamed_keys_printed()
 def bench(options: argparse.Namespace) -> int:
-    """Measure how late a loop against the clock is."""
+    """Measure the latency of a real-time loop."""
     from hsp_control.cli import bench as benches
 
     return benches.bench(options)
 
 
+@renamed_keys_printed()
 def live(options: argparse.Namespace) -> int:
-    """Control a simulated robot in another process, against the clock."""
+    """Control a simulated robot in another process in real time."""
     from hsp_control.cli import live as lives
 
     return lives.live(options)
@@ -269,7 +278,7 @@ def schema(options: argparse.Namespace) -> int:
 def _run_with_progress(
     experiment: Experiment,
     stopwatch: Stopwatch,
-    interrupts: FirstInterruptWaits,
+    interrupts: DeferredInterrupt,
     on_row: Callable[[Recorder], None] | None = None,
 ) -> Rollout:
     with Progress(
@@ -301,17 +310,17 @@ def _summary(rollout: Rollout) -> Table:
         rms = float(np.sqrt(np.mean(error**2)))
         table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {error[-1]:.3g}")
     norm = rollout["null_space_norm"]
-    table.add_row("null space", f"|e_N| {norm[0]:.3g} at first, {norm[-1]:.3g} at last")
+    table.add_row(
+        "null space", f"|e_N| {norm[0]:.3g} at the start, {norm[-1]:.3g} at the end"
+    )
     table.add_row(
         "det(J W⁻¹ Jᵀ)",
-        f"least {rollout['manipulability'].min():.4g}, "
-        f"least singular value {rollout['singular_values'].min():.3g}",
+        f"minimum {rollout['manipulability'].min():.4g}, "
+        f"smallest singular value {rollout['singular_values'].min():.3g}",
     )
     table.add_row("effort", f"largest {np.abs(rollout.tau).max():.3g}")
     if damped := int(rollout["damped"].sum()):
-        table.add_row(
-            "singular", f"{damped} rows: the law was bounded there, not exact"
-        )
+        table.add_row("singular", f"{damped} rows: the law was damped there, not exact")
     return table
 
 
@@ -320,7 +329,7 @@ def _describe(robot: Robot) -> None:
     lower, upper = robot.position_limits()
     effort, speed = robot.model.upperEffortLimit, robot.model.upperVelocityLimit
     table = Table(box=None, pad_edge=False)
-    table.add_column("freedom")
+    table.add_column("dof")
     for heading in ("lower", "upper", "speed limit", "effort limit"):
         table.add_column(heading, justify="right")
     for i, name in enumerate(robot.dof_names):

@@ -1,20 +1,51 @@
-"""Where commands print: answers to standard output, progress to standard error."""
+"""Where commands print: results to standard output, progress to standard error."""
 
 import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TextIO
 
 from rich.console import Console
+
+from hsp_control.config.renamed import RenamedKeyWarning
 
 _LONGEST = 1500
 
 
-def told(error: Exception) -> str:
-    """Return an error's message, cut where it shows very long data."""
+def message_of(error: Exception) -> str:
+    """Return an error's message, cut if it contains very long data."""
     text = str(error)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
-# A pipe or a file has no width of its own: tables then need not be squeezed.
+# A pipe or a file has no width: tables are then printed in full width.
 out = Console(
     highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160
 )
 errors = Console(stderr=True, highlight=False)
+
+
+@contextmanager
+def renamed_keys_printed() -> Iterator[None]:
+    """Print warnings about renamed keys as lines on standard error, each one once."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", RenamedKeyWarning)
+        show_other, printed = warnings.showwarning, set[str]()
+
+        def show(
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: TextIO | None = None,
+            line: str | None = None,
+        ) -> None:
+            if not issubclass(category, RenamedKeyWarning):
+                show_other(message, category, filename, lineno, file, line)
+            elif str(message) not in printed:
+                printed.add(str(message))
+                print(f"hsp: {message}", file=sys.stderr)
+
+        warnings.showwarning = show
+        yield

@@ -1,4 +1,4 @@
-"""``hsp export``: a log as a page that plays offline, or as films."""
+"""``hsp export``: write a log as a page for offline use, or as films."""
 
 import argparse
 import sys
@@ -15,18 +15,18 @@ from hsp_control.simulation import Rollout
 
 
 def export(options: argparse.Namespace) -> int:
-    """Write every file that is asked for; one that fails does not stop the others."""
+    """Write every requested file; a file that fails does not stop the others."""
     from hsp_control.visualization.viewer.export import (
         FilmStyle,
         export_film,
         export_html,
     )
-    from hsp_control.visualization.viewer.replay import access_for, act_of
+    from hsp_control.visualization.viewer.replay import access_for, rebuild_run
 
     films = [path for path in (options.mp4, options.gif, options.webp) if path]
     if not options.html and not films:
         raise ExportError(
-            "nothing to write: name a file with --html, --mp4, --gif or --webp"
+            "nothing to write: give a file with --html, --mp4, --gif or --webp"
         )
     for kind in ("mp4", "gif", "webp"):
         _check_ending(getattr(options, kind), f".{kind}")
@@ -34,7 +34,7 @@ def export(options: argparse.Namespace) -> int:
     access = access_for(
         [options.log], options.strict or bool(options.allow), options.allow
     )
-    act = act_of(rollout, options.log.name, access)
+    run = rebuild_run(rollout, options.log.name, access)
     style = FilmStyle(
         size=options.size,
         frame_rate=options.fps,
@@ -46,7 +46,7 @@ def export(options: argparse.Namespace) -> int:
     )
 
     def page(path: Path) -> Path:
-        return export_html(rollout, path, robot=act.robot, controller=act.controller)
+        return export_html(rollout, path, robot=run.robot, controller=run.controller)
 
     def film(path: Path) -> Path:
         with _Bar(path.name) as bar:
@@ -54,8 +54,8 @@ def export(options: argparse.Namespace) -> int:
                 rollout,
                 path,
                 style=style,
-                robot=act.robot,
-                controller=act.controller,
+                robot=run.robot,
+                controller=run.controller,
                 progress=bar.update,
             )
 
@@ -64,22 +64,22 @@ def export(options: argparse.Namespace) -> int:
 
 
 def _write(wanted: list[tuple[Path, Callable[[Path], Path]]]) -> int:
-    """Write files; what is missing for several of them is said once."""
-    said: list[str] = []
+    """Write the files; an error that occurs for several of them is printed once."""
+    printed: list[str] = []
     for path, write in wanted:
         try:
             size = write(path).stat().st_size
         except ExportError as error:
-            if str(error) not in said:
+            if str(error) not in printed:
                 print(f"hsp: {error}", file=sys.stderr)
-            said.append(str(error))
+            printed.append(str(error))
         else:
             out.print(f"{size / 1e6:.2f} MB: {path}")
-    return 2 if said else 0
+    return 2 if printed else 0
 
 
 class _Bar:
-    """A bar on standard error while a film is taken; none where that is a file."""
+    """A progress bar of a film on standard error, if that is a terminal."""
 
     def __init__(self, name: str) -> None:
         self._progress = Progress(
@@ -106,4 +106,4 @@ class _Bar:
 
 def _check_ending(path: Path | None, ending: str) -> None:
     if path is not None and path.suffix.lower() != ending:
-        raise ExportError(f"--{ending[1:]} {path}: its name must end with {ending}")
+        raise ExportError(f"--{ending[1:]} {path}: the name must end with {ending}")

@@ -1,9 +1,9 @@
-"""Ctrl-C during a run: the first one asks it to end, the second one insists.
+"""Ctrl-C during a run: the first one ends the run at its next row, the second at once.
 
-A `KeyboardInterrupt` may be raised anywhere, also between the last row and the log's
-file, and everything computed would be gone. So the first Ctrl-C only leaves word, which
-the run finds at its next row; nothing is lost, wherever it comes. Where no row comes,
-as an integrator may fall to steps of a nanosecond, it interrupts what is computed then.
+A `KeyboardInterrupt` may be raised anywhere, also between the last row and writing the
+log; all computed rows would then be lost. So the first Ctrl-C only sets a flag, which
+the run checks at its next row. If no row comes (an integrator may reduce its steps to a
+nanosecond), the computation is interrupted after a short time.
 """
 
 import _thread
@@ -13,55 +13,57 @@ from types import FrameType
 from typing import Any, Self
 
 PATIENCE = 1.0
-"""How long the first Ctrl-C waits for a row [s]."""
+"""Time for which the first Ctrl-C waits for a row [s]."""
 
 
-class FirstInterruptWaits:
-    """Within this block the first Ctrl-C is kept for `check`; a second one interrupts.
+class DeferredInterrupt:
+    """A context in which `check` raises the first Ctrl-C; a second one acts at once.
 
-    So does the first itself, if nothing has checked in a second, until `settle`.
+    If `check` is not called within `PATIENCE`, the first Ctrl-C acts then, except after
+    `ignore_first`. The context does nothing outside the main thread, which
+    alone receives signals, and in a process that ignores Ctrl-C.
 
-    Outside the main thread, which alone gets signals, it does nothing, nor where
-    whoever started the process has it ignore them.
+    Attributes:
+        requested: Whether a Ctrl-C has come that `check` has not raised.
     """
 
     def __init__(self) -> None:
-        """Nothing has come."""
-        self.asked = False
+        """Create the context; entering it installs the signal handler."""
+        self.requested = False
         self._before: Any = None
-        self._settled = False
+        self._first_ignored = False
         self._patience = threading.Timer(PATIENCE, _thread.interrupt_main)
         self._patience.daemon = True
 
     def check(self) -> None:
-        """Raise the interrupt that has come, if one has.
+        """Raise `KeyboardInterrupt` if Ctrl-C has come.
 
         Raises:
-            KeyboardInterrupt: The first time that it is asked after a Ctrl-C.
+            KeyboardInterrupt: In the first call after a Ctrl-C.
         """
-        if self.asked:
-            self.asked = False
+        if self.requested:
+            self.requested = False
             self._patience.cancel()
             raise KeyboardInterrupt
 
-    def settle(self) -> None:
-        """From here on only a second Ctrl-C interrupts: what there is is to be kept."""
-        self._settled = True
+    def ignore_first(self) -> None:
+        """From now on only a second Ctrl-C interrupts, so that the log can be saved."""
+        self._first_ignored = True
         self._patience.cancel()
 
     def __enter__(self) -> Self:
         ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
         if not ignored and threading.current_thread() is threading.main_thread():
-            self._before = signal.signal(signal.SIGINT, self._keep)
+            self._before = signal.signal(signal.SIGINT, self._defer)
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.settle()
+        self.ignore_first()
         if self._before is not None:
             signal.signal(signal.SIGINT, self._before)
 
-    def _keep(self, _: int, __: FrameType | None) -> None:
-        self.asked = True
+    def _defer(self, _: int, __: FrameType | None) -> None:
+        self.requested = True
         signal.signal(signal.SIGINT, signal.default_int_handler)
-        if not self._settled:
+        if not self._first_ignored:
             self._patience.start()

@@ -1,4 +1,4 @@
-"""``hsp live``: the controller here, a simulated robot in another process, 1 kHz."""
+"""``hsp live``: control a simulated robot in another process in real time."""
 
 import argparse
 import os
@@ -18,82 +18,82 @@ from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.build_live import (
     interface_of,
+    simulated_robot,
     stop_of,
     tolerance_of,
-    watched_robot,
 )
 from hsp_control.control.compensation import Command
 from hsp_control.live import (
     Faults,
     InProcessRobot,
     LoopReport,
-    Operator,
+    OperatorRequests,
     run_loop,
 )
 from hsp_control.live.latency import Quantiles
 from hsp_control.live.settings import check_fixed
 from hsp_control.simulation import Rollout
 
-_REHEARSED = 0.5
-"""How much of the run is rehearsed off the clock [s]: kernels are compiled there."""
+_DRY_RUN = 0.5
+"""Duration of the dry run before the real-time run [s]: it compiles the kernels."""
 
 
 def live(options: argparse.Namespace) -> int:
-    """Run a loop against the clock, and say how it was and why it ended."""
-    faults, kill = Faults.parse(options.faults), _kill_of(options.kill)
+    """Run a loop in real time, print its response times and why it ended."""
+    faults, kill = Faults.parse(options.faults), _parse_kill(options.kill)
     experiment = load_experiment(options.config, *options.overrides)
     check_fixed(experiment.robot)
     simulation = experiment.scenario.simulation
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:
         raise LiveError(f"--duration {duration:g}; must be positive")
-    own = options.out / f"{experiment.name}-live.journal"
-    robots = options.out / f"{experiment.name}-robot.journal"
-    operator = Operator()
+    loop_log = options.out / f"{experiment.name}-live.journal"
+    robot_log = options.out / f"{experiment.name}-robot.journal"
+    requests = OperatorRequests()
     settings: dict[str, Any] = {
         "interface": interface_of(experiment),
         "tolerance": tolerance_of(experiment),
         "stop": stop_of(experiment),
-        "operator": operator,
+        "requests": requests,
         "scene": experiment.scene,
         "log_period": simulation.log_period,
     }
     command = Command(experiment.controller, experiment.compensation)
-    with _signals(operator):
-        rehearsal = InProcessRobot(watched_robot(experiment))
+    with _stop_signals(requests):
+        dry_run_robot = InProcessRobot(simulated_robot(experiment))
         run_loop(
             command,
-            rehearsal,
-            duration=min(duration, _REHEARSED),
+            dry_run_robot,
+            duration=min(duration, _DRY_RUN),
             **settings,
         )
         with RobotProcess(
-            experiment, faults=faults, log=robots, log_period=simulation.log_period
+            experiment, faults=faults, log=robot_log, log_period=simulation.log_period
         ) as robot:
             report = run_loop(
                 command,
                 robot.hardware,
                 duration=None if duration == inf else duration,
-                log=own,
+                log=loop_log,
                 meta=_meta(experiment),
                 priority=options.priority,
-                on_period=_killer(kill, robot),
+                on_period=_kill_action(kill, robot),
                 **settings,
             )
-            told = robot.wait()
+            robot_report = robot.wait()
     link = robot.hardware.link
     counts = {**link.counts, "lost": link.lost}
     out.print(_times(report, experiment))
-    out.print(_packets(counts, link.injected, told))
-    _say_ends(report, told)
-    _keep(own, link=counts, injected=link.injected)
-    _keep(robots)
-    asked = report.ended == "completed" or (
+    out.print(_packets(counts, link.injected, robot_report))
+    _print_ends(report, robot_report)
+    _convert(loop_log, link=counts, injected=link.injected)
+    _convert(robot_log)
+    regular = report.ended == "completed" or (
         report.ended == "operator" and duration == inf
     )
-    if not asked:
+    if not regular:
         print(f"hsp: {report.reason}", file=sys.stderr)
-    return 0 if asked and told is not None else 2
+    return 0 if regular and robot_report is not None else 2
 
 
 def _meta(experiment: Experiment) -> dict[str, Any]:
@@ -105,16 +105,16 @@ def _meta(experiment: Experiment) -> dict[str, Any]:
 
 
 @contextmanager
-def _signals(operator: Operator) -> Iterator[None]:
-    """Make Ctrl-C, and being told to end, the operator's stop; a second one is final.
+def _stop_signals(requests: OperatorRequests) -> Iterator[None]:
+    """Make Ctrl-C and termination signals request the operator's stop.
 
-    The second is Python's own: it ends the loop where it is, and the robot's watchdog
-    does the rest.
+    A second signal raises `KeyboardInterrupt`: the loop ends at once, and the robot's
+    watchdog stops the robot.
     """
     kinds = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
     def stop(number: int, frame: object) -> None:
-        operator.stop(f"stopped by the operator ({signal.Signals(number).name})")
+        requests.stop(f"stopped by the operator ({signal.Signals(number).name})")
         for kind in kinds:
             signal.signal(kind, signal.default_int_handler)
 
@@ -126,32 +126,32 @@ def _signals(operator: Operator) -> Iterator[None]:
             signal.signal(kind, handler)
 
 
-def _kill_of(text: str | None) -> tuple[str, float] | None:
-    """Return who is killed, and when [s], from ``robot=1.5`` or ``controller=2``."""
+def _parse_kill(text: str | None) -> tuple[str, float] | None:
+    """Return which process to kill, and when [s], from ``robot=1.5``."""
     if text is None:
         return None
-    who, _, when = text.partition("=")
+    process, _, when = text.partition("=")
     try:
         time = float(when)
     except ValueError:
         time = nan
-    if who not in {"robot", "controller"} or not time >= 0.0:
+    if process not in {"robot", "controller"} or not time >= 0.0:
         raise LiveError(f"--kill {text!r}; needs robot=SECONDS or controller=SECONDS")
-    return who, time
+    return process, time
 
 
-def _killer(
-    wanted: tuple[str, float] | None, robot: RobotProcess
+def _kill_action(
+    setting: tuple[str, float] | None, robot: RobotProcess
 ) -> Callable[[float], None] | None:
-    if wanted is None:
+    if setting is None:
         return None
-    who, time = wanted
-    left = [True]
+    process, time = setting
+    pending = [True]
 
     def kill(t: float) -> None:
-        if t >= time and left:
-            left.clear()
-            if who == "robot":
+        if t >= time and pending:
+            pending.clear()
+            if process == "robot":
                 robot.kill()
             else:
                 os.kill(os.getpid(), signal.SIGKILL)
@@ -170,55 +170,64 @@ def _times(report: LoopReport, experiment: Experiment) -> Table:
         if times is not None:
             table.add_row(name, *(f"{1e6 * x:.0f}" for x in times))
 
-    row("from a state to its effort", deadlines.response)
-    row("from state to state", deadlines.gap)
+    row("response: from a state to its effort", deadlines.response)
+    row("interval: from state to state", deadlines.interval)
     return table
 
 
 def _packets(
-    counts: dict[str, int], injected: dict[str, int], told: dict[str, Any] | None
+    counts: dict[str, int],
+    injected: dict[str, int],
+    robot_report: dict[str, Any] | None,
 ) -> Table:
     table = Table(box=None, pad_edge=False)
     table.add_column("packets")
     kinds = ("accepted", "lost", "stale", "duplicated", "corrupted", "foreign")
     for heading in ("sent", *kinds):
         table.add_column(heading, justify="right")
-    theirs = None if told is None else told["link"]
-    sent = "-" if theirs is None else str(theirs["sent"])
+    robot = None if robot_report is None else robot_report["link"]
+    sent = "-" if robot is None else str(robot["sent"])
     table.add_row("states to the loop", sent, *(str(counts[kind]) for kind in kinds))
-    got = ["-"] * len(kinds) if theirs is None else [str(theirs[k]) for k in kinds]
-    table.add_row("efforts to the robot", str(counts["sent"]), *got)
-    if told is not None and any([*injected.values(), *told["injected"].values()]):
-        for what, done in (("states", told["injected"]), ("efforts", injected)):
-            named = {"late": "stale"}
-            shown = {named.get(kind, kind): str(n) for kind, n in done.items()}
+    received = ["-"] * len(kinds) if robot is None else [str(robot[k]) for k in kinds]
+    table.add_row("efforts to the robot", str(counts["sent"]), *received)
+    if robot_report is None:
+        return table
+    if any([*injected.values(), *robot_report["injected"].values()]):
+        for packets, faults in (
+            ("states", robot_report["injected"]),
+            ("efforts", injected),
+        ):
+            column = {"late": "stale"}
+            shown = {column.get(kind, kind): str(n) for kind, n in faults.items()}
             cells = (shown.get(kind, "") for kind in kinds)
-            table.add_row(f"  injected, {what}", "", *cells)
+            table.add_row(f"  injected, {packets}", "", *cells)
     return table
 
 
-def _say_ends(report: LoopReport, told: dict[str, Any] | None) -> None:
+def _print_ends(report: LoopReport, robot_report: dict[str, Any] | None) -> None:
     deadlines = report.deadlines
     out.print(
-        f"Periods: {deadlines.periods} answered, {deadlines.missed} of them late; "
-        f"{deadlines.silent} without a new state, {deadlines.unseen} states not seen"
+        f"Periods: {deadlines.periods} answered, {deadlines.missed} deadline misses; "
+        f"{deadlines.without_state} without a new state, {deadlines.skipped_states} "
+        "states skipped"
     )
-    where = "fell silent" if report.silent else "held the robot"
+    end = "fell silent" if report.silent else "held the robot"
     out.print(
-        f"The loop: {report.reason}, at t = {report.t:.3f} s; {where}, the fastest "
+        f"The loop: {report.reason}, at t = {report.t:.3f} s; {end}, the fastest "
         f"joint at {report.speed:.2g}"
     )
-    if told is None:
+    if robot_report is None:
         out.print("The robot: its process was killed")
     else:
         out.print(
-            f"The robot: {told['reason']}; {told['phase']} at t = {told['t']:.3f} s, "
-            f"the fastest joint at {told['speed']:.2g}"
+            f"The robot: {robot_report['reason']}; {robot_report['phase']} at "
+            f"t = {robot_report['t']:.3f} s, the fastest joint at "
+            f"{robot_report['speed']:.2g}"
         )
 
 
-def _keep(journal: Path, **meta: Any) -> None:
-    """Turn a journal into a log like all others; what cannot be stays a journal."""
+def _convert(journal: Path, **meta: Any) -> None:
+    """Convert a journal to an ``.npz`` log; if it cannot be read, keep the journal."""
     try:
         rollout = Rollout.load(journal)
         rollout.meta.update(meta)

@@ -4,11 +4,12 @@ import argparse
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from hsp_control.cli.startup import end_quietly
 from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.resources import bundled_configs, bundled_robots
 from hsp_control.common.version import __version__
 
 _OWN_INTERRUPTS = {"bench", "export", "sweep", "view"}
@@ -20,6 +21,10 @@ FAILURE = 2
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``hsp`` and return its exit status: 0, or 2 after one clear message."""
     parser = _parser()
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks what may come next
+        import argcomplete
+
+        argcomplete.autocomplete(parser)
     options = parser.parse_args(arguments)
     if options.command is None:
         parser.print_help()
@@ -36,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         return int(getattr(commands, options.command)(options))
     except HspControlError as error:
-        print(f"hsp: {consoles.told(error)}", file=sys.stderr)
+        print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
     except BrokenPipeError:  # `hsp schema | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
@@ -54,6 +59,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="hsp",
         description="Torque control of redundant robots with a null space that "
         "provably converges.",
+        epilog='completion in bash and zsh: eval "$(register-python-argcomplete hsp)"',
     )
     parser.add_argument("--version", action="version", version=f"hsp {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
@@ -140,7 +146,10 @@ def _parser() -> argparse.ArgumentParser:
 
     robots = _command(commands, "robots", "list what can be loaded, or describe one")
     which = robots.add_mutually_exclusive_group()
-    which.add_argument("name", nargs="?", metavar="ROBOT", help="a name or a URDF")
+    name = which.add_argument(
+        "name", nargs="?", metavar="ROBOT", help="a name or a URDF"
+    )
+    _complete(name, bundled_robots)
     which.add_argument("--markdown", action="store_true", help="print docs/robots.md")
 
     _command(commands, "schema", "print the JSON Schema of a configuration")
@@ -333,13 +342,26 @@ def _add_live(live: argparse.ArgumentParser) -> None:
 
 
 def _add_configuration(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
+    config = parser.add_argument(
         "config",
         metavar="CONFIG",
         help="a bundled name such as paper/4_moving_obstacle, a YAML file, or a log",
     )
+    _complete(config, bundled_configs)
     _add_overrides(parser)
     _add_strict(parser)
+
+
+def _complete(action: argparse.Action, names: Callable[[], Iterable[str]]) -> None:
+    """Have shells complete an argument by names and by files."""
+
+    def completer(prefix: str, **_: object) -> list[str]:
+        from argcomplete.completers import FilesCompleter
+
+        files = FilesCompleter(("yaml", "npz", "urdf"))(prefix)
+        return [*(name for name in names() if name.startswith(prefix)), *files]
+
+    vars(action)["completer"] = completer
 
 
 def _add_strict(parser: argparse.ArgumentParser) -> None:

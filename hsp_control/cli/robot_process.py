@@ -1,4 +1,4 @@
-"""Starts a simulated robot in a process of its own, and never leaves it behind."""
+"""Run a simulated robot in a process of its own, which always ends."""
 
 import json
 import os
@@ -21,16 +21,17 @@ from hsp_control.live.udp_hardware import UdpHardware
 
 
 class RobotProcess:
-    """A simulated robot in its own process, and the hardware that speaks with it.
+    """A simulated robot in its own process, and the `Hardware` that connects to it.
 
-    Use it as a context: at its end the process is gone. It is its own session, so that
-    Ctrl-C in a terminal reaches the loop alone; if this process dies, the robot notices
-    by the end of its standard input, stops itself, writes its log, and ends.
+    Use it as a context manager: at its end the process has ended. The process has its
+    own session, so that Ctrl-C in a terminal reaches the loop only. If this process
+    dies, the robot's standard input is closed; then the robot stops itself, writes its
+    log and ends.
 
     Attributes:
         hardware: The robot, for `run_loop`.
-        process: The process.
-        told: What the robot counted, once it has ended by itself; else None.
+        process: The process; None if it does not run.
+        report: The robot's report (a dictionary), once it has ended by itself.
     """
 
     def __init__(
@@ -41,14 +42,14 @@ class RobotProcess:
         log: str | Path | None = None,
         log_period: float = 0.01,
     ) -> None:
-        """Prepare it; entering the context starts it.
+        """Prepare the process; entering the context starts it.
 
         Args:
-            experiment: Whose plant the robot is, where it starts, and whose section
-                ``live`` says how it wants its efforts and how patient it is.
-            faults: What happens to packets, in both directions.
-            log: The journal of its true states.
-            log_period: Time between two rows of it [s].
+            experiment: Defines the plant, its start, and in its section ``live`` the
+                effort interface, the watchdog and the safe stop.
+            faults: Faults to inject into packets, in both directions.
+            log: The journal of the robot's true states.
+            log_period: Time between two rows of the log [s].
 
         Raises:
             LiveError: If the robot has a floating base.
@@ -70,7 +71,7 @@ class RobotProcess:
             "session": self.hardware.session,
         }
         self.process: subprocess.Popen[bytes] | None = None
-        self.told: dict[str, Any] | None = None
+        self.report: dict[str, Any] | None = None
 
     def __enter__(self) -> Self:
         self.start()
@@ -85,13 +86,13 @@ class RobotProcess:
         self.close()
 
     def start(self, timeout: float = 180.0) -> None:
-        """Start the process, and wait until the robot sends its states.
+        """Start the process, and wait until it is ready.
 
         Args:
-            timeout: How long that may take [s]; kernels may have to be compiled.
+            timeout: Longest time to wait [s]; kernels may have to be compiled.
 
         Raises:
-            HardwareError: If it ends before, or takes longer.
+            HardwareError: If the process ends before, or takes longer.
         """
         command = [sys.executable, "-m", "hsp_control.cli.simulated_robot"]
         self.process = subprocess.Popen(
@@ -108,29 +109,30 @@ class RobotProcess:
             self.process.stdin.write(line)
             self.process.stdin.flush()
             ready, _, _ = select([self.process.stdout], [], [], timeout)
-            said = self.process.stdout.readline() if ready else b""
+            answer = self.process.stdout.readline() if ready else b""
         except OSError:
-            said = b""
-        if said.strip() != b"ready":
+            answer = b""
+        if answer.strip() != b"ready":
             self.close()
-            why = "did not start" if ready else f"did not start in {timeout:g} s"
-            raise HardwareError(f"the simulated robot {why}")
+            fault = "did not start" if ready else f"did not start in {timeout:g} s"
+            raise HardwareError(f"the simulated robot {fault}")
 
     def wait(self, timeout: float = 15.0) -> dict[str, Any] | None:
-        """Wait until the robot has stopped and its process ended.
+        """Wait until the robot has stopped and its process has ended.
 
         Args:
-            timeout: How long [s]; a safe stop takes 3 s at most.
+            timeout: Longest time to wait [s], then the process is killed; a safe stop
+                takes 3 s at most.
 
         Returns:
-            What it counted: ``phase``, ``reason``, ``speed``, ``link``, ...; None if it
-            was killed.
+            The robot's report: ``phase``, ``reason``, ``speed``, ``link``, ...; None if
+            the process was killed.
         """
         if self.process is None:
             return None
         end = monotonic() + timeout
         assert self.process.stdout is not None
-        said = b""
+        output = b""
         while (left := end - monotonic()) > 0.0:
             ready, _, _ = select([self.process.stdout], [], [], left)
             if not ready:
@@ -138,29 +140,29 @@ class RobotProcess:
             data = os.read(self.process.stdout.fileno(), 65536)
             if not data:
                 break
-            said += data
-        if said:
-            self.told = json.loads(said)
+            output += data
+        if output:
+            self.report = json.loads(output)
         try:
             self.process.wait(max(end - monotonic(), 0.1))
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
-        return self.told
+        return self.report
 
     def kill(self) -> None:
-        """Kill the process, as the machine might; nothing is waited for."""
+        """Kill the process at once, without a safe stop; do not wait."""
         if self.process is not None:
             os.kill(self.process.pid, signal.SIGKILL)
 
     def close(self) -> None:
-        """Have the robot stop, and its process end; again is no error."""
+        """Stop the robot and end its process; a second call does nothing."""
         self.hardware.close()
         process, self.process = self.process, None
         if process is not None:
             for pipe in (process.stdin, process.stdout):
                 if pipe is not None:
-                    with suppress(OSError):  # it is gone, with what was not written
+                    with suppress(OSError):  # the process has ended before reading all
                         pipe.close()
             try:
                 process.wait(10.0)

@@ -1,4 +1,4 @@
-"""Every robot that is known, and what it can serve: the table of ``hsp robots``."""
+"""The table of ``hsp robots``: every known robot, and the tasks that it can do."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ _ROMEO = {
         *("Finger31", "Finger32", "Finger33", "Thumb1", "Thumb2", "Thumb3"),
     )
 }
-COMPENSATION: dict[str, dict[str, Any]] = {
+LOAD_OPTIONS: dict[str, dict[str, Any]] = {
     "alex_psyonic_hands": {"mimic": False},
     "bluevolta_bravo7_gripper": {"locked": _BRAVO},
     "bravo7_gripper": {"locked": _BRAVO},
@@ -36,48 +36,48 @@ COMPENSATION: dict[str, dict[str, Any]] = {
     "talos_full": {"mimic": False},
     "talos_full_box": {"mimic": False},
 }
-"""Options of `Robot.load` for robots that do not load, or cannot move, without."""
+"""Options of `Robot.load` for robots that do not load, or cannot move, without them."""
 
 REMARKS = {
     "icub": "no mass moves with neck_yaw at its home",
     "talos_legs": "the URDF is the whole robot's",
     "ur3": "the URDF is a UR5's",
 }
-"""What one would not expect."""
+"""Notes on unexpected properties."""
 
 FLOATING = "floating base: needs contacts"
 NO_URDF = "has no URDF (only SDF, which is not read)"
 _PREFACE = """\
 # Robots
 
-What `Robot.load` finds by name, as `hsp robots` prints it and `hsp robots --markdown`
-writes it. Any other robot loads by the path of its URDF.
+The robots that `Robot.load` finds by name, as printed by `hsp robots` and `hsp robots
+--markdown`. Any other robot is loaded by the path of its URDF.
 
-The end effector is the frame that the robot's source names, or else the likeliest by
-its tree of joints (`Robot.end_effector`). *Position* and *pose* give the rank of these
-tasks there, and how many of the joints that move the end effector remain for
-self-motion: 3 + 4 for an arm of seven. Every robot with a number there is driven in
-`tests/integration/test_every_robot.py`. Those with a floating base, which needs
-contacts, are driven there with `root: fixed`.
+The end effector is the frame that the robot's source names; if it names none, it is the
+most likely frame in the tree of joints (`Robot.end_effector`). *Position* and *pose*
+give the rank of these tasks at the end effector, and how many of its joints remain
+for self-motion: 3 + 4 for an arm with seven joints. Every robot with a number there is
+simulated in `tests/integration/test_every_robot.py`. Robots with a floating base, which
+need contacts, are simulated there with `root: fixed`.
 """
 
 
 @dataclass(frozen=True)
 class Row:
-    """A robot as the table shows it.
+    """A robot in the table.
 
     Attributes:
         name: Its name.
         origin: ``bundled`` or ``example-robot-data``.
-        root: How it stands in the world.
-        nq: Numbers in a configuration; None where it does not load.
-        nv: Freedoms.
-        frames: Frames.
-        end_effector: The frame of its hand.
-        joints: How many freedoms move the hand's frame.
-        position: How many of the three rows of a position task are independent.
-        pose: How many of the six rows of a pose task are.
-        note: What one must know, or why it cannot serve.
+        root: Connection of its root to the world.
+        nq: Numbers in a configuration; None if it does not load.
+        nv: Degrees of freedom.
+        frames: Number of frames.
+        end_effector: Name of its end effector's frame.
+        joints: Number of degrees of freedom that move the end effector.
+        position: Rank of a position task (3 rows).
+        pose: Rank of a pose task (6 rows).
+        note: A remark, or why the controller cannot be used.
     """
 
     name: str
@@ -93,13 +93,13 @@ class Row:
     note: str = ""
 
     @property
-    def serves(self) -> bool:
+    def usable(self) -> bool:
         """Whether the controller can drive it as it is loaded."""
         return self.nv is not None and self.root != "free_flyer"
 
 
 def rows() -> Iterator[Row]:
-    """Describe every robot: the bundled ones, those that serve, those that do not."""
+    """Yield every robot: bundled ones, usable ones, then the others."""
     sources = {name: find_robot(name) for name in bundled_robots()}
     sources |= {k: v for k, v in example_robots().items() if k not in sources}
     for floating in (False, True):
@@ -135,9 +135,9 @@ def markdown() -> str:
 
 
 def task(row: Row, rank: int, full: int) -> str:
-    """Return rank and redundancy of a task, such as ``3 + 4``; ``-`` where it cannot.
+    """Return rank and redundancy of a task, such as ``3 + 4``; ``-`` if impossible.
 
-    A position task may leave axes out, so any rank serves; a pose task may not.
+    A position task may omit axes, so any rank is enough; a pose task needs rank 6.
     """
     if rank == 0 or (full == 6 and rank < full):
         return "-"
@@ -152,13 +152,13 @@ def _row(name: str, source: RobotSource) -> Row:
         robot = Robot.load(name)
     except ModelError as error:
         reason = str(error).removeprefix(f"{source.urdf}: ")
-        reason = reason.removeprefix("not a robot that can be built: ")
+        reason = reason.removeprefix("Pinocchio cannot build a model: ")
         notes.append(reason.split("; ")[0].split(", so that")[0])
-        if name not in COMPENSATION:
+        if name not in LOAD_OPTIONS:
             return Row(name, source.origin, source.root, note="; ".join(notes))
-    if name in COMPENSATION:
+    if name in LOAD_OPTIONS:
         notes.append(f"load it with {_options(name)}")
-        robot = Robot.load(name, **COMPENSATION[name])
+        robot = Robot.load(name, **LOAD_OPTIONS[name])
     found: dict[str, Any] = {"end_effector": robot.end_effector}
     if source.root != "free_flyer":
         found |= abilities(robot)
@@ -171,9 +171,9 @@ def _row(name: str, source: RobotSource) -> Row:
 
 
 def _options(name: str) -> str:
-    """Return the compensator as a configuration has it."""
+    """Return the load options as written in a configuration."""
     options = []
-    for key, value in COMPENSATION[name].items():
+    for key, value in LOAD_OPTIONS[name].items():
         if key == "locked":
             locks = [f"{joint}: {position:g}" for joint, position in value.items()]
             options.append(f"`locked: {{{listing(locks, limit=3)}}}`")
@@ -183,8 +183,8 @@ def _options(name: str) -> str:
 
 
 def abilities(robot: Robot) -> dict[str, int]:
-    """Return how many joints move the end effector and the ranks of its Jacobian."""
-    # Anywhere, for limits may be missing: chance does not make it singular.
+    """Return the number of joints that move the end effector, and the task ranks."""
+    # A random configuration (limits may be missing) is almost surely not singular.
     spread = np.random.default_rng(0).uniform(-1.0, 1.0, robot.nv)
     q = robot.integrate(robot.home(), spread)
     J = robot.state(0.0, q, np.zeros(robot.nv)).frame(robot.end_effector).jacobian

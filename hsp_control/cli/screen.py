@@ -1,4 +1,4 @@
-"""The browser view beside the command line: opened, attended, closed."""
+"""The browser view of a command: open it, keep it open, close it."""
 
 import argparse
 import sys
@@ -13,14 +13,14 @@ from hsp_control.simulation.recorder import Recorder
 from hsp_control.visualization.viewer import LiveView, Viewer
 
 PAGE_TIMEOUT = 15.0
-"""How long a browser that was started may take to show the page [s]."""
+"""Time in which a started browser must show the page [s]."""
 
 
 class Screen:
-    """A run that is shown while it is computed, and after."""
+    """Shows a run while it is computed, and after."""
 
     def __init__(self, viewer: Viewer, experiment: Experiment, *, opened: bool) -> None:
-        """Show the stage."""
+        """Show the robot and the scene before the run."""
         self._viewer = viewer
         self._opened = opened
         self._live = LiveView(viewer, experiment)
@@ -32,7 +32,7 @@ class Screen:
         options: argparse.Namespace,
         announce: Callable[[str], None],
     ) -> Self | None:
-        """Open it, or say why it cannot be and return None: the run goes on without."""
+        """Open the view; if that fails, print why and return None."""
         view = experiment.scenario.view.model_dump()
         with ExitStack() as stack:
             try:
@@ -42,17 +42,18 @@ class Screen:
                 opened = options.browser and viewer.open_browser()
                 screen = cls(viewer, experiment, opened=opened)
             except ViewerError as error:
-                print(f"hsp: {error}; the run goes on unseen", file=sys.stderr)
+                message = f"hsp: {error}; the run continues without a view"
+                print(message, file=sys.stderr)
                 return None
-            stack.pop_all()  # it stays open
+            stack.pop_all()  # the viewer stays open
         return screen
 
     def on_row(self, recorder: Recorder) -> None:
-        """Show what has been computed."""
+        """Show the rows computed so far."""
         self._live.on_row(recorder)
 
     def finish(self, rollout: Rollout) -> None:
-        """Show the whole run until a person has seen it.
+        """Show the whole run until the user closes the view.
 
         Raises:
             ViewerError: If the server has ended.
@@ -61,15 +62,15 @@ class Screen:
         attend(self._viewer, opened=self._opened)
 
     def close(self) -> None:
-        """End the view; again is no error."""
+        """Close the view; a second call does nothing."""
         self._viewer.close()
 
 
 def attend(viewer: Viewer, *, opened: bool) -> None:
-    """Keep a view open for as long as a person wants it; a script is not kept.
+    """Keep a view open until the user closes it.
 
-    In a terminal until Enter or Ctrl-C; elsewhere, if a browser was opened, until its
-    page is closed.
+    In a terminal: until Enter or Ctrl-C. Without a terminal: until the page is closed,
+    if a browser was opened; otherwise return at once.
 
     Args:
         viewer: The view.

@@ -1,9 +1,9 @@
 """The process of a simulated robot: ``python -m hsp_control.cli.simulated_robot``.
 
-Its settings come as one line of JSON through its standard input, which then stays open:
-when it ends, for whatever reason its parent died, the robot stops itself, writes its
-log to the end and is gone. Two lines go to its standard output: ``ready``, and at the
-end what it counted, as JSON.
+It reads its settings from its standard input, one line of JSON. The input then stays
+open; when the parent process dies it is closed, and the robot stops itself, completes
+its log and ends. It writes two lines to its standard output: ``ready``, and at the end
+its report, as JSON.
 """
 
 import json
@@ -20,15 +20,15 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import Experiment, load_experiment
-from hsp_control.config.build_live import watched_robot
+from hsp_control.config.build_live import simulated_robot
 from hsp_control.control.controller import ControlOutput
 from hsp_control.live.faults import Faults
 from hsp_control.live.link import Link
 from hsp_control.live.live_log import LiveLog, Row, live_channels
 from hsp_control.live.packets import Kind
 from hsp_control.live.settings import StopSettings
-from hsp_control.live.udp_robot import BYE, serve
-from hsp_control.live.watched_robot import WatchedRobot
+from hsp_control.live.simulated_robot import SimulatedRobot
+from hsp_control.live.udp_robot import CLOSED_BY_LOOP, serve
 from hsp_control.robot import RobotState
 from hsp_control.simulation.plants import differing_bodies
 
@@ -36,75 +36,74 @@ READY = "ready"
 
 
 def main() -> int:
-    """Live a robot's life; return 0, or 2 after one message."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the operator's, for the loop alone
-    ending = threading.Event()
-    signal.signal(signal.SIGTERM, lambda *_: ending.set())
+    """Run the robot until it has stopped; return 0, or 2 after one error message."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C stops the loop only
+    terminated = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: terminated.set())
     settings = json.loads(sys.stdin.buffer.readline())
-    lifeline = threading.Event()
+    parent_died = threading.Event()
     watch = threading.Thread(
-        target=_wait_for_end, args=(sys.stdin.buffer, lifeline), daemon=True
+        target=_wait_for_end, args=(sys.stdin.buffer, parent_died), daemon=True
     )
     watch.start()
 
-    def orphaned() -> str | None:
-        if lifeline.is_set():
-            return "the process that started the robot is gone"
-        return "the robot's process was told to end" if ending.is_set() else None
+    def stop_reason() -> str | None:
+        if parent_died.is_set():
+            return "the process that started the robot has ended"
+        return "the robot's process was terminated" if terminated.is_set() else None
 
     try:
-        told = _live(settings, orphaned)
+        report = _run(settings, stop_reason)
     except HspControlError as error:
         print(f"hsp: the simulated robot: {error}", file=sys.stderr)
         return 2
-    _say(json.dumps(told))
+    _print(json.dumps(report))
     return 0
 
 
-def _live(settings: dict[str, Any], orphaned: Any) -> dict[str, Any]:
+def _run(settings: dict[str, Any], stop_reason: Any) -> dict[str, Any]:
     experiment = load_experiment(settings["config"])
-    robot = watched_robot(experiment)
-    _rehearse(robot, experiment)
+    robot = simulated_robot(experiment)
+    _warm_up(robot, experiment)
     link = Link(
         settings["session"],
         peer=tuple(settings["peer"]),
         faults=Faults(**settings["faults"]),
         stream=2,
     )
-    journal = _Truth(experiment, robot, settings) if settings["log"] else None
-    _say(READY)
+    log = _RobotLog(experiment, robot, settings) if settings["log"] else None
+    _print(READY)
     served = serve(
-        robot, link, orphaned=orphaned, on_row=journal.row if journal else None
+        robot, link, stop_reason=stop_reason, on_row=log.row if log else None
     )
-    link.send(Kind.BYE)  # by its number the loop knows what it never had
-    reason = robot.reason or "no effort ever came"
-    told: dict[str, Any] = {
+    link.send(Kind.BYE)  # its sequence number tells the loop how many packets it lost
+    reason = robot.reason or "no effort arrived"
+    report: dict[str, Any] = {
         "phase": robot.phase.name.lower(),
         "reason": reason,
         "t": robot.t,
         "speed": float(np.abs(robot.v).max()),
         "outdated": served.outdated,
-        "slipped": served.slipped,
+        "slipped": served.overrun,
         "link": {**link.counts, "lost": link.lost},
         "injected": link.injected,
     }
-    if journal is not None:
-        asked = reason == BYE
-        status = "completed" if asked else "stopped"
-        journal.log.end(status, reason, robot_process=told)
+    if log is not None:
+        status = "completed" if reason == CLOSED_BY_LOOP else "stopped"
+        log.log.end(status, reason, robot_process=report)
     link.close()
-    return told
+    return report
 
 
-class _Truth:
-    """The robot's own log: its true states, and the safe stop to its end.
+class _RobotLog:
+    """The robot's own log: its true states, to the end of its safe stop.
 
-    What the law would make of them is what the configuration's would: the robot knows
-    nothing of changes that the loop makes while it runs.
+    The controller's columns are computed with the configuration's controller: the robot
+    does not know the changes that the loop makes while it runs.
     """
 
     def __init__(
-        self, experiment: Experiment, robot: WatchedRobot, settings: dict[str, Any]
+        self, experiment: Experiment, robot: SimulatedRobot, settings: dict[str, Any]
     ) -> None:
         self._controller, self._robot = experiment.controller, robot
         self._every = settings["log_period"]
@@ -120,10 +119,10 @@ class _Truth:
         }
         path = Path(settings["log"])
         self.log = LiveLog(path, experiment.controller, experiment.scene, meta)
-        self.log.rehearse(self._row(0.0, robot.q, robot.v))
+        self.log.warm_up(self._row(0.0, robot.q, robot.v))
 
     def row(self, t: float, q: Array, v: Array, last: bool) -> None:
-        """Write the row of a period, if it is time for one."""
+        """Write the row of a period, if one is due."""
         robot = self._robot
         if t < self._next and robot.phase == self._phase and not last:
             return
@@ -134,7 +133,7 @@ class _Truth:
     def _row(self, t: float, q: Array, v: Array) -> Row:
         robot, state = self._robot, self._state.update(t, q, v)
         output: ControlOutput | None = None
-        with suppress(HspControlError):  # where the law has no answer, the robot has
+        with suppress(HspControlError):  # then its columns are empty
             output = self._controller.compute(state)
         log_channels = {
             **live_channels(phase=float(robot.phase)),
@@ -143,12 +142,12 @@ class _Truth:
         return Row(state, output, robot.tau, log_channels)
 
 
-def _rehearse(robot: WatchedRobot, experiment: Experiment) -> None:
-    """Do once what will be done on the clock: nothing is then compiled there."""
+def _warm_up(robot: SimulatedRobot, experiment: Experiment) -> None:
+    """Execute each real-time operation once, so that none is compiled later."""
     experiment.controller.compute(
         experiment.robot.state(0.0, experiment.q0, experiment.v0)
     )
-    trial = WatchedRobot(
+    trial = SimulatedRobot(
         robot.plant, robot.q, robot.v, robot.period, watchdog=1, stop=StopSettings()
     )
     trial.advance([robot.tau])
@@ -159,16 +158,16 @@ def _rehearse(robot: WatchedRobot, experiment: Experiment) -> None:
 
 
 def _wait_for_end(stream: BinaryIO, ended: threading.Event) -> None:
-    # Not stream.read: a thread that holds its lock at exit would end the interpreter.
+    # Not stream.read: a thread that holds its lock at exit aborts the interpreter.
     while os.read(stream.fileno(), 4096):
         pass
     ended.set()
 
 
-def _say(line: str) -> None:
+def _print(line: str) -> None:
     try:
         print(line, flush=True)
-    except BrokenPipeError:  # nobody is left to be told
+    except BrokenPipeError:  # the parent has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

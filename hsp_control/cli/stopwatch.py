@@ -1,4 +1,4 @@
-"""How fast a run was, and what a row of its log weighs."""
+"""Measure the speed of a run and the size of its log."""
 
 from time import perf_counter
 
@@ -6,30 +6,30 @@ from hsp_control.simulation import Rollout
 
 
 class Stopwatch:
-    """Measures a run from its first row on: kernels are compiled before that."""
+    """Measures the wall time from the first row on: kernels are compiled before."""
 
     def __init__(self) -> None:
-        """Wait for the first row."""
+        """Create it; the first `lap` starts it."""
         self._first: float | None = None
         self._last = 0.0
 
     def lap(self) -> None:
-        """Take the time of a row."""
+        """Record the time of a row."""
         self._last = perf_counter()
         if self._first is None:
             self._first = self._last
 
-    def told(self, rollout: Rollout) -> list[tuple[str, str]]:
-        """Return what there is to say, as rows of a table."""
+    def table_rows(self, rollout: Rollout) -> list[tuple[str, str]]:
+        """Return speed and size as rows of a table: name and text."""
         rows = len(rollout)
         size = sum(column.nbytes for column in rollout.columns.values())
-        told = [
-            ("log", f"{size / rows:.0f} bytes a row, {size / 1e6:.2g} MB in memory")
+        found = [
+            ("log", f"{size / rows:.0f} bytes per row, {size / 1e6:.2g} MB in memory")
         ]
         took = 0.0 if self._first is None else self._last - self._first
         if rows > 1 and took > 0.0:
             simulated = float(rollout.t[-1] - rollout.t[0])
-            told.insert(
+            found.insert(
                 0,
                 (
                     "speed",
@@ -37,4 +37,4 @@ class Stopwatch:
                     f"{took:.2g} s, logging included)",
                 ),
             )
-        return told
+        return found

@@ -1,4 +1,4 @@
-"""``hsp sweep``, and ``hsp plot`` of what it wrote."""
+"""``hsp sweep``, and ``hsp plot`` of its file."""
 
 import argparse
 import re
@@ -24,13 +24,15 @@ from hsp_control.config import load_experiment
 from hsp_control.sweeps import Sensitivity, Sweep, sensitivity
 from hsp_control.sweeps import sweep as run_sweep
 
-_REASONS = 3  # of runs that did not complete
+_REASONS = 3  # printed for runs that did not complete
 _NUMBER = re.compile(r"-?[0-9][0-9.]*(e[-+]?[0-9]+)?")
 
 
 def sweep(options: argparse.Namespace) -> int:
-    """Run a configuration many times, save and tell what came of it."""
-    if options.strict or options.allow:  # the runs name no other files than this one
+    """Run a configuration many times, save the results and print a summary."""
+    if (
+        options.strict or options.allow
+    ):  # the runs use the same files as this experiment
         load_experiment(
             options.config, *options.overrides, strict=True, allow=options.allow
         )
@@ -65,13 +67,13 @@ def sweep(options: argparse.Namespace) -> int:
             fresh=options.fresh,
             on_progress=show,
         )
-    _tell(swept, perf_counter() - start)
+    _print_summary(swept, perf_counter() - start)
     out.print(f"Sweep: {file}")
     if not swept.complete:
         left = swept.meta["runs"] - len(swept)
         print(
-            f"hsp: stopped by the user, {left} runs are left; the same command does "
-            "them",
+            f"hsp: stopped by the user, {left} runs are left; the same command "
+            "continues",
             file=sys.stderr,
         )
         return 2
@@ -81,9 +83,9 @@ def sweep(options: argparse.Namespace) -> int:
 
 
 def plot(options: argparse.Namespace) -> int:
-    """Tell and draw what a sweep's file holds."""
+    """Print and draw the contents of a sweep's file."""
     swept = Sweep.load(options.log)
-    _tell(swept, None)
+    _print_summary(swept, None)
     folder = options.out or options.log.parent
     _draw(swept, folder, options.log.stem, options.formats or ["png"])
     return 0
@@ -96,13 +98,13 @@ def _draw(swept: Sweep, folder: Path, stem: str, formats: list[str]) -> None:
         out.print(f"Figure: {file}")
 
 
-def _tell(swept: Sweep, took: float | None) -> None:
+def _print_summary(swept: Sweep, took: float | None) -> None:
     counts = Counter(map(str, swept["status"]))
     states = ", ".join(f"{count} {status}" for status, count in counts.most_common())
     work = float(swept["wall_time"].sum())
     pace = "" if took is None else f"; {work:.1f} s of runs, {took:.1f} s now"
     out.print(f"{len(swept)} of {swept.meta['runs']} runs: {states or 'none'}{pace}")
-    _tell_failures(swept)
+    _print_failures(swept)
     try:
         found = sensitivity(swept)
     except SweepError as error:
@@ -113,12 +115,13 @@ def _tell(swept: Sweep, took: float | None) -> None:
         out.print(_influences(found))
         out.print(
             "Rank correlation, and the share of the variance of ranks that the "
-            f"parameter explains alone; below {found.noise:.2f} it may be chance (.)."
+            f"parameter explains alone; a correlation below {found.noise:.2f} may be "
+            "chance (.)."
         )
 
 
-def _tell_failures(swept: Sweep) -> None:
-    """Tell why runs did not complete, once where reasons differ in numbers alone."""
+def _print_failures(swept: Sweep) -> None:
+    """Print why runs did not complete; reasons that differ only in numbers once."""
     reasons: dict[str, list[str]] = {}
     failed = ~swept.completed
     for status, message in zip(
@@ -136,16 +139,16 @@ def _tell_failures(swept: Sweep) -> None:
 def _spread(swept: Sweep, found: Sensitivity) -> Table:
     table = Table(box=None, pad_edge=False)
     table.add_column("")
-    for heading in ("least", "median", "most", "worst run"):
+    for heading in ("min", "median", "max", "worst run"):
         table.add_column(heading, justify="right")
     done = swept.completed
     for name in found.outcomes:
-        told = swept.meta["metrics"][name]
+        unit = swept.meta["metrics"][name]["unit"]
         values = np.where(done, swept[name], np.nan)
-        # Manipulability and distances are bad where they are small.
+        # Of manipulability and distances, the smallest value is the worst.
         worst = np.nanargmin(values) if name.endswith(".min") else np.nanargmax(values)
         figures = (np.nanmin(values), np.nanmedian(values), np.nanmax(values))
-        unit = "" if told["unit"] == "–" else f" [{told['unit']}]"
+        unit = "" if unit == "–" else f" [{unit}]"
         table.add_row(
             escape(f"{name}{unit}"),
             *(f"{value:.3g}" for value in figures),
@@ -158,7 +161,7 @@ def _influences(found: Sensitivity) -> Table:
     table = Table(box=None, pad_edge=False)
     table.add_column("", no_wrap=True)
     for name in found.outcomes:
-        # Broken after dots: six whole names beside each other fit no terminal.
+        # Line breaks after dots: six complete names are too wide for a terminal.
         table.add_column(escape(name.replace(".", ".\n")), justify="right")
     for i, parameter in enumerate(found.parameters):
         table.add_row(

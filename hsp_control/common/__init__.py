@@ -1,1 +1,1 @@
-"""What every room stands on: arrays, errors, linear algebra, compiled kernels."""
+"""What all rooms use: array types, errors, linear algebra and compiled kernels."""

@@ -1,4 +1,4 @@
-"""Names for arrays; shapes stand in the docstrings."""
+"""Array types; docstrings give the shapes."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,8 @@
-"""Every error that the package raises on purpose, under one base class.
+"""All errors that the package raises on purpose.
 
-Each also is the builtin that a caller would expect to catch, and each message names
-what was given, what was wanted and, where names are concerned, the nearest one.
+They have one base class, `HspControlError`. Each also derives from the built-in
+exception that fits, so ``except ValueError`` works as well. A message says what was
+given and what is needed; if a name does not exist, it suggests the nearest one.
 """
 
 
@@ -9,130 +10,139 @@ class HspControlError(Exception):
     """Base class of all errors of this package.
 
     Attributes:
-        location: Where in a configuration the cause stands (``panda.yaml:12``), if it
-            came from one; the message then begins with it.
+        location: File and line of the configuration that caused the error
+            (``panda.yaml:12``), or None. If it is set, the message begins with it.
     """
 
     location: str | None = None
 
 
 class ShapeError(HspControlError, ValueError):
-    """An array does not have the shape that the robot or the task asks for."""
+    """An array has a shape that does not fit the robot, the task or the argument."""
 
 
 class NonFiniteError(HspControlError, ValueError):
-    """A NaN or an infinity at a border where only numbers may pass."""
+    """An argument contains NaN or inf where finite numbers are needed."""
 
 
 class GainError(HspControlError, ValueError):
-    """A gain that is negative, not positive definite or of the wrong shape."""
+    """Gains are negative, not positive definite, incomplete or of the wrong shape."""
 
 
 class RobotNotFoundError(HspControlError, FileNotFoundError):
-    """Neither a bundled robot, nor one of example-robot-data, nor a URDF file."""
+    """No robot has this name, or its URDF file does not exist or cannot be read."""
 
 
 class AccessError(HspControlError, PermissionError):
-    """A file outside the folders that may be read: see `robot.description.access`."""
+    """A file may not be read: strict reading does not allow its folder or its format.
+
+    See `hsp_control.robot.description.access`.
+    """
 
 
 class ModelError(HspControlError, ValueError):
-    """A URDF that does not parse, or a model that no dynamics can be computed for."""
+    """A robot cannot be built: its URDF, SRDF or a collision mesh is invalid.
+
+    Also raised for a valid URDF whose dynamics cannot be computed, for example because
+    the mass matrix is singular.
+    """
 
 
 class FrameNotFoundError(HspControlError, LookupError):
-    """The robot has no frame of that name."""
+    """The robot has no frame with this name."""
 
 
 class JointNotFoundError(HspControlError, LookupError):
-    """The robot has no joint of that name."""
+    """The robot has no moving joint with this name."""
 
 
 class ConfigurationError(HspControlError, ValueError):
-    """A configuration vector that is not a point of the robot's configuration space."""
+    """A vector q is no configuration: a quaternion or (cos, sin) pair has norm ≠ 1."""
 
 
 class TrajectoryError(HspControlError, ValueError):
-    """A trajectory whose parameters do not describe a motion."""
+    """The parameters of a trajectory are invalid or contradict each other."""
 
 
 class TaskError(HspControlError, ValueError):
-    """A task that this robot cannot have."""
+    """The parameters of a task are invalid, or this robot cannot perform the task."""
 
 
 class FieldError(HspControlError, ValueError):
-    """A field or a cost that is ill-defined, or that returned something unusable."""
+    """A null-space field or cost is invalid, or returned a wrong shape, NaN or inf."""
 
 
 class MetricError(HspControlError, ValueError):
-    """A joint-space metric that is not symmetric positive definite."""
+    """A joint-space metric is not a symmetric positive definite matrix."""
 
 
 class SceneError(HspControlError, ValueError):
-    """An obstacle that is ill-defined, or that does not exist."""
+    """An obstacle is invalid, does not exist, or touches the robot at the start."""
 
 
 class ScheduleError(HspControlError, ValueError):
-    """Intervals of time that overlap, or leave no room for their ramps."""
+    """The time intervals of a schedule overlap, or are empty or shorter than ramps."""
 
 
 class LimitError(HspControlError, ValueError):
-    """Limits that contradict each other, or a start outside them."""
+    """Limits are invalid or contradict each other, or the start is outside them."""
 
 
 class ContactError(HspControlError, ValueError):
-    """A contact that this robot cannot have, or a floating base without support."""
+    """A contact is invalid for this robot, or a floating base has no contact."""
 
 
 class ControllerError(HspControlError, ValueError):
-    """Tasks, field and metric that do not fit together."""
+    """The parts of a controller do not fit together, or a request to it is invalid."""
 
 
 class CompensationError(HspControlError, ValueError):
-    """A compensator that this robot cannot have, or whose settings make no sense."""
+    """The parameters of a compensator are invalid, or it does not fit the robot."""
 
 
 class UnstableRateError(HspControlError, ValueError):
-    """Gains, delays and a control period for which the sampled loop is unstable."""
+    """The sampled control loop is unstable with these gains, delays and period."""
 
 
 class SimulationError(HspControlError, RuntimeError):
-    """A simulation that cannot start, or that diverged.
+    """A simulation cannot start, or it diverged.
+
+    Also raised for invalid settings of a plant or an integrator.
 
     Attributes:
-        rollout: What had been computed until then, or None.
+        rollout: The `Rollout` up to the time of the error, or None.
     """
 
     rollout: object | None = None
 
 
 class LogError(HspControlError, ValueError):
-    """A file that is not a whole log of this package."""
+    """A log file is missing, incomplete or invalid, or cannot be written."""
 
 
 class ConfigError(HspControlError, ValueError):
-    """A configuration file that does not follow the schema."""
+    """A configuration does not exist, or does not follow the schema."""
 
 
 class SweepError(HspControlError, ValueError):
-    """A sweep that is ill-defined, or whose file cannot be read or written."""
+    """A sweep is invalid, or its file cannot be read or written."""
 
 
 class ViewerError(HspControlError, RuntimeError):
-    """A 3-D view that cannot be opened, or that is gone."""
+    """A 3-D view cannot be opened or used, or its browser page was closed."""
 
 
 class ExportError(HspControlError, RuntimeError):
-    """A page or a film that cannot be written, or what is missing to write it."""
+    """A web page or a film cannot be written."""
 
 
 class PlotError(HspControlError, ValueError):
-    """A log that cannot be drawn, or a picture that cannot be written."""
+    """A figure cannot be drawn from a log or a sweep, or cannot be written."""
 
 
 class LiveError(HspControlError, ValueError):
-    """Settings of a live loop that contradict each other, or a robot it is not for."""
+    """Settings of a live loop are invalid, or it does not support this robot."""
 
 
 class HardwareError(HspControlError, RuntimeError):
-    """A robot that cannot be reached, or that is gone."""
+    """The robot cannot be reached, is not ready, or stopped sending its state."""

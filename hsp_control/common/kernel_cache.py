@@ -123,6 +123,7 @@ def _value(value: Any, seen: set[int]) -> Iterator[bytes]:
             yield from _value(each, seen)
     elif isinstance(value, type | BuiltinFunctionType | np.ufunc):
         yield f"{value.__module__}.{value.__name__}".encode()
+        yield repr(getattr(value, "_fields", ())).encode()  # of a record
     elif value is None or isinstance(
         value, bool | int | float | complex | str | np.generic | types.Type
     ):

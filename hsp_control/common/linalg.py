@@ -1,4 +1,7 @@
-"""Small dense linear algebra as kernels: no allocation, no LAPACK call."""
+"""Dense linear algebra for small matrices, as kernels: no allocation, no LAPACK.
+
+Shapes: A and J are (m, n) unless a docstring says otherwise, L is lower triangular.
+"""
 
 import numpy as np
 
@@ -8,7 +11,7 @@ from hsp_control.common.kernels import kernel
 
 @kernel
 def multiply(A: Array, x: Array, out: Array) -> None:
-    """Write A x."""
+    """Write A x; shapes (m, n), (n,) and (m,)."""
     for i in range(A.shape[0]):
         total = 0.0
         for j in range(A.shape[1]):
@@ -18,7 +21,7 @@ def multiply(A: Array, x: Array, out: Array) -> None:
 
 @kernel
 def multiply_transposed(A: Array, x: Array, out: Array) -> None:
-    """Write Aᵀ x."""
+    """Write Aᵀ x; shapes (m, n), (m,) and (n,)."""
     for j in range(A.shape[1]):
         out[j] = 0.0
     for i in range(A.shape[0]):
@@ -28,7 +31,7 @@ def multiply_transposed(A: Array, x: Array, out: Array) -> None:
 
 @kernel
 def norm(W: Array, x: Array) -> float:
-    """Return ‖x‖_W = √(xᵀ W x)."""
+    """Return ‖x‖_W = √(xᵀ W x); shapes (n, n) and (n,)."""
     square = 0.0
     for i in range(x.shape[0]):
         for j in range(x.shape[0]):
@@ -38,7 +41,10 @@ def norm(W: Array, x: Array) -> float:
 
 @kernel
 def cholesky(A: Array, L: Array) -> bool:
-    """Write the lower triangle L of A = L Lᵀ; return whether A is positive definite."""
+    """Write the Cholesky factor L of A = L Lᵀ; return whether A is positive definite.
+
+    Shapes (n, n). If A is not positive definite, L is incomplete.
+    """
     n = A.shape[0]
     for j in range(n):
         pivot = A[j, j]
@@ -58,7 +64,7 @@ def cholesky(A: Array, L: Array) -> bool:
 
 @kernel
 def solve_lower(L: Array, x: Array) -> None:
-    """Overwrite x by L⁻¹ x."""
+    """Overwrite x with L⁻¹ x; shapes (n, n) and (n,)."""
     for i in range(L.shape[0]):
         total = x[i]
         for k in range(i):
@@ -68,7 +74,7 @@ def solve_lower(L: Array, x: Array) -> None:
 
 @kernel
 def solve_lower_transposed(L: Array, x: Array) -> None:
-    """Overwrite x by L⁻ᵀ x."""
+    """Overwrite x with L⁻ᵀ x; shapes (n, n) and (n,)."""
     n = L.shape[0]
     for j in range(n):
         i = n - 1 - j
@@ -80,21 +86,24 @@ def solve_lower_transposed(L: Array, x: Array) -> None:
 
 @kernel
 def solve_rows(L: Array, X: Array) -> None:
-    """Overwrite each row x of X by L⁻¹ x: X by X L⁻ᵀ."""
+    """Overwrite X with X L⁻ᵀ: each row x with L⁻¹ x; shapes (n, n) and (m, n)."""
     for i in range(X.shape[0]):
         solve_lower(L, X[i])
 
 
 @kernel
 def solve_rows_transposed(L: Array, X: Array) -> None:
-    """Overwrite each row x of X by L⁻ᵀ x: X by X L⁻¹."""
+    """Overwrite X with X L⁻¹: each row x with L⁻ᵀ x; shapes (n, n) and (m, n)."""
     for i in range(X.shape[0]):
         solve_lower_transposed(L, X[i])
 
 
 @kernel
 def solve_columns(L: Array, X: Array) -> None:
-    """Overwrite X by (L Lᵀ)⁻¹ X, row by row, in the order that they lie in memory."""
+    """Overwrite X with (L Lᵀ)⁻¹ X; shapes (m, m) and (m, n).
+
+    The loops follow the rows of X, in the order of memory.
+    """
     m, n = X.shape
     for i in range(m):
         for k in range(i):
@@ -113,7 +122,7 @@ def solve_columns(L: Array, X: Array) -> None:
 
 @kernel
 def gram(A: Array, B: Array, symmetric: bool, out: Array) -> None:
-    """Write A Bᵀ, or A Bᵀ + B Aᵀ."""
+    """Write A Bᵀ, or A Bᵀ + B Aᵀ if ``symmetric``; A and B (m, n), ``out`` (m, m)."""
     m, n = A.shape
     for i in range(m):
         for k in range(m):
@@ -131,16 +140,22 @@ def gram(A: Array, B: Array, symmetric: bool, out: Array) -> None:
 
 @kernel
 def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
-    """Write a lower triangular X and Q = X J with orthonormal rows, for m ≤ n.
+    """Write a lower triangular X, and Q = X J with orthonormal rows, for m ≤ n.
 
-    Gram-Schmidt, each row handing on what it shares with those after it; X goes through
-    the same steps. Where they cancel nine tenths of a row or more, all rows are cleaned
-    once more ("twice is enough", Giraud et al. 2005), so that Q is orthonormal to
-    rounding. A row that vanishes leaves zeros in Q and X.
+    Modified Gram-Schmidt: each row is normalised, then its component is subtracted from
+    the rows after it. X goes through the same steps. If a row loses nine tenths of its
+    length or more, all rows are orthogonalised a second time ("twice is enough", Giraud
+    et al. 2005), so that Q is orthonormal to rounding. A row that becomes zero leaves
+    zeros in Q and X.
+
+    Args:
+        J: Shape (m, n).
+        Q: Shape (m, n).
+        X: Shape (m, m).
 
     Returns:
-        A lower bound of J's least singular value, within √m of it: 1/‖X‖_F, or 0 where
-        a row vanished.
+        1/‖X‖_F, a lower bound of J's smallest singular value, too small by a factor of
+        √m at most; 0 if a row became zero.
     """
     m, n = J.shape
     for j in range(m):
@@ -150,10 +165,10 @@ def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
             X[j, i] = 1.0 if i == j else 0.0
     cancelled = False
     for j in range(m):
-        cancelled = _share_row(Q, X, j) < 0.01 * _square(J[j]) or cancelled
+        cancelled = _project_out_row(Q, X, j) < 0.01 * _square(J[j]) or cancelled
     if cancelled:
         for j in range(m):
-            _share_row(Q, X, j)
+            _project_out_row(Q, X, j)
     total = 0.0
     for j in range(m):
         if X[j, j] == 0.0:
@@ -163,8 +178,8 @@ def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
 
 
 @kernel
-def _share_row(Q: Array, X: Array, j: int) -> float:
-    """Scale row j to length one, take it out of those after it; return its square."""
+def _project_out_row(Q: Array, X: Array, j: int) -> float:
+    """Normalise row j, subtract its component from later rows; return its square."""
     m, n = Q.shape
     square = _square(Q[j])
     scale = 1.0 / np.sqrt(square) if square > 0.0 else 0.0
@@ -173,13 +188,13 @@ def _share_row(Q: Array, X: Array, j: int) -> float:
     for i in range(j + 1):
         X[j, i] *= scale
     for k in range(j + 1, m):
-        share = 0.0
+        component = 0.0
         for i in range(n):
-            share += Q[j, i] * Q[k, i]
+            component += Q[j, i] * Q[k, i]
         for i in range(n):
-            Q[k, i] -= share * Q[j, i]
+            Q[k, i] -= component * Q[j, i]
         for i in range(j + 1):
-            X[k, i] -= share * X[j, i]
+            X[k, i] -= component * X[j, i]
     return square
 
 
@@ -193,10 +208,11 @@ def _square(x: Array) -> float:
 
 
 @kernel
-def least_singular_value_bound(X: Array) -> float:
-    """Return 1/√‖X Xᵀ‖_F for the X of `orthonormalise_rows`: a tighter bound.
+def smallest_singular_value_bound(X: Array) -> float:
+    """Return 1/√‖X Xᵀ‖_F for the X of `orthonormalise_rows`, shape (m, m).
 
-    It is within the fourth root of m of the least singular value.
+    It is a lower bound of the smallest singular value, too small by a factor of the
+    fourth root of m at most: tighter than what `orthonormalise_rows` returns.
     """
     m = X.shape[0]
     square = 0.0
@@ -211,12 +227,14 @@ def least_singular_value_bound(X: Array) -> float:
 
 @kernel
 def orthogonalise_rows(Y: Array, U: Array) -> None:
-    """Overwrite Y by U Y with orthogonal rows, U orthogonal (one-sided Jacobi).
+    """Overwrite Y with U Y, whose rows are orthogonal; U is orthogonal.
 
-    Only as many columns of U are written as it has: none, for singular values alone.
+    One-sided Jacobi. The norms of the new rows are the singular values of Y; small ones
+    have high relative accuracy (Demmel and Veselić 1992). Y may be rank-deficient.
 
-    The rows' norms are then Y's singular values, small ones to high relative accuracy
-    (Demmel and Veselić 1992). Rank loss is welcome.
+    Args:
+        Y: Shape (m, n).
+        U: Shape (m, m); shape (m, 0) if only the singular values are needed.
     """
     m, n = Y.shape
     for i in range(m):

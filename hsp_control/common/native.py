@@ -8,6 +8,7 @@ that puts them together again: it has the same signature whatever the kernel's, 
 """
 
 import hashlib
+import warnings
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from types import FunctionType
@@ -17,6 +18,7 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core.datamodel.registry import default_manager
 from numba.extending import intrinsic
 
 from hsp_control.common.arrays import Array, Indices
@@ -24,6 +26,10 @@ from hsp_control.common.kernels import callback, is_compiled, kernel
 
 FOREVER = -np.inf, np.inf
 """From when until when a call is made [s], unless something else is said."""
+
+
+_ARRAY = ("meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides")
+"""The words of an array in Numba's compiled code, in order."""
 
 
 class NativeCall(partial[float]):
@@ -85,7 +91,7 @@ def bind(
         arguments: Its arguments. Arrays are followed, numbers stay as they are.
         timed: Whether the last argument, the time, is left to the call.
     """
-    if not is_compiled(function):
+    if not (AVAILABLE and is_compiled(function)):
         return partial(function, *arguments)
     return NativeCall.of(function, arguments, timed)
 
@@ -98,6 +104,19 @@ def sequence(calls: Sequence[Timed]) -> Callable[[float], float]:
     return call
 
 
+def unknown_layout() -> str:
+    """Return what of Numba's memory layout is not as `_packed` has it, or nothing."""
+    lookup: Callable[[Any], Any] = default_manager.lookup
+    array = lookup(types.float64[:, ::1])
+    pair = lookup(cast("Any", types).Tuple((types.int64,) * 2))
+    found = getattr(array, "_fields", ())
+    if found != _ARRAY:
+        return f"an array is {', '.join(found)}; known is {', '.join(_ARRAY)}"
+    if not isinstance(pair.get_value_type(), ir.ArrayType):
+        return f"a tuple of two integers is {pair.get_value_type()}; known is [2 x i64]"
+    return ""
+
+
 def _packed(argument: Any) -> tuple[types.Type, Array]:
     """Return an argument's type, and what stands for it in memory."""
     if isinstance(argument, np.ndarray):
@@ -106,6 +125,9 @@ def _packed(argument: Any) -> tuple[types.Type, Array]:
         shape = *argument.shape, *argument.strides
         # Two owners come first in Numba's arrays, of which kernels know nothing.
         return kind, np.array([0, 0, size, item, at, *shape], dtype=np.int64)
+    if isinstance(argument, tuple):  # a record: its values, one after the other
+        kind = cast("Callable[[Any], types.Type]", numba.typeof)(argument)
+        return kind, np.concatenate([_packed(value)[1] for value in argument])
     if isinstance(argument, bool | int | np.integer | np.bool_):
         return types.int64, np.array([argument], dtype=np.int64)
     return types.float64, np.array([argument], dtype=float).view(np.int64)
@@ -203,3 +225,20 @@ def _entry() -> Callable[..., float]:
     compiled_run = cast("Any", run)
     compiled_run.compile(kinds)
     return cast("Callable[..., float]", compiled_run.overloads[kinds].entry_point)
+
+
+def _available() -> bool:
+    if complaint := unknown_layout():
+        warnings.warn(
+            f"kernels are called one by one from Python, which doubles the time of a "
+            f"step: in Numba {numba.__version__} {complaint}. Install a version that "
+            "hsp_control declares",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return False
+    return True
+
+
+AVAILABLE = _available()
+"""Whether calls are packed; otherwise they are ordinary ones, with the same results."""

@@ -1,4 +1,4 @@
-"""Where the bundled robots and configurations lie: in a checkout or in the wheel."""
+"""Find the bundled robots and configurations, in a checkout or in a wheel."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,20 +9,20 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 def bundled(folder: str) -> Path:
     """Return the bundled folder ``robots`` or ``configs``.
 
-    In an installed wheel it lies inside the package (``hsp_control/data``), in a
-    checkout or an editable install beside it.
+    In an installed wheel it is inside the package (``hsp_control/data``); in a
+    checkout or an editable install it is next to the package.
     """
     installed = _PACKAGE / "data" / folder
     return installed if installed.is_dir() else _PACKAGE.parent / folder
 
 
 def bundled_robots() -> dict[str, Path]:
-    """Return the bundled robots, name to folder, sorted by name."""
+    """Return the folder of each bundled robot, by name, in alphabetical order."""
     return {path.parent.name: path.parent for path in _urdf_files()}
 
 
 def bundled_configs() -> dict[str, Path]:
-    """Return the bundled configurations, name (``paper/1_...``) to file, sorted."""
+    """Return the file of each bundled configuration, by name (``paper/1_...``)."""
     root = bundled("configs")
     files = sorted(root.rglob("*.yaml"))
     return {file.relative_to(root).with_suffix("").as_posix(): file for file in files}

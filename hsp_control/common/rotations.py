@@ -1,15 +1,16 @@
-"""Rotations in coordinates: exp, log and their Jacobians on SO(3), as kernels.
+"""Rotations: exp, log and their Jacobians on SO(3), as kernels.
 
-A rotation vector y turns by the angle √(y·y) about y. With s = y·y and the
-Stumpff functions C_k(s) = Σ_j (-s)^j / (k + 2j)!, each matrix below is one combination
-of I, [y]× and y yᵀ, regular at 0 and up to the true singularity (of Jlog, at 2π):
+A rotation vector y is a rotation by the angle √(y·y) about y. With s = y·y and the
+Stumpff functions C_k(s) = Σ_j (-s)^j / (k + 2j)!, each matrix below is a linear
+combination of I, [y]× and y yᵀ. It is regular at 0; only Jlog is singular, at 2π:
 
     exp(y)   =  C0 I        + C1 [y]×  + C2 y yᵀ
     Jexp(y)  =  C1 I        - C2 [y]×  + C3 y yᵀ      ω = Jexp(y) y'
     Jlog(y)  =  C1/(2C2) I  + ½ [y]×   + d  y yᵀ      y' = Jlog(y) ω,  Jlog = Jexp⁻¹
 
 where d = (C3 - 2 C4) / (2 C2) and ω is the angular velocity in the body frame. Results
-go into ``out``, which must not share memory with a matrix argument.
+are written to ``out``, which must not share memory with a matrix argument unless the
+docstring allows it.
 """
 
 from math import atan2, factorial, sin, sqrt
@@ -17,10 +18,11 @@ from math import atan2, factorial, sin, sqrt
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 
-_SERIES_BELOW = 10.0  # s; just above π², so that the logarithm's range has no switch
+# Threshold of s. It is above π², so that the range of log uses the series only.
+_SERIES_BELOW = 10.0
 _C4_TERMS = tuple(1.0 / factorial(4 + 2 * j) for j in reversed(range(14)))
 _C5_TERMS = tuple(1.0 / factorial(5 + 2 * j) for j in reversed(range(14)))
-# Errors of tracking are small: below s = 0.2 the terms after six are below rounding.
+# Tracking errors are usually small. Below s = 0.2, six terms reach rounding accuracy.
 _SHORT_BELOW, _SHORT, _ALL = 0.2, 6, len(_C4_TERMS)
 _C4_SHORT, _C5_SHORT = _C4_TERMS[-_SHORT:], _C5_TERMS[-_SHORT:]
 
@@ -31,8 +33,9 @@ def stumpff(s: float) -> tuple[float, float, float, float, float, float]:
 
     They are cos t, sin t / t, (1 - cos t) / t², (t - sin t) / t³, ... with t = √s, and
     C_k = 1/k! - s C_{k+2}. Their derivative is dC_k/ds = (k C_{k+2} - C_{k+1}) / 2.
-    Absolute errors stay at rounding: downwards from a series where s < 10, upwards from
-    the sine beyond.
+    Absolute errors are at rounding. For s < 10, C4 and C5 come from a series and the
+    others from the recurrence downwards; for larger s, C1 comes from the sine and the
+    others from the recurrence upwards.
     """
     if s < _SERIES_BELOW:
         c4 = c5 = 0.0
@@ -92,7 +95,7 @@ def compose(A: Array, B: Array, out: Array) -> None:
 
 @kernel
 def compose_back(A: Array, B: Array, out: Array) -> None:
-    """Write Aᵀ B, the rotation from A to B seen from A; shapes (3, 3)."""
+    """Write Aᵀ B, the rotation from A to B in the axes of A; shapes (3, 3)."""
     for i in range(3):
         for j in range(3):
             out[i, j] = A[0, i] * B[0, j] + A[1, i] * B[1, j] + A[2, i] * B[2, j]
@@ -114,12 +117,12 @@ def _combine(identity: float, skew: float, outer: float, y: Array, out: Array) -
 
 @kernel
 def turn(R: Array, a: Array, scale: float, out: Array) -> None:
-    """Write exp(scale · a) R: R, turned about the world's axis a.
+    """Write exp(scale · a) R: R rotated about a, a vector in world axes.
 
     Args:
         R: Rotation matrix, shape (3, 3).
         a: Rotation vector, shape (3,) [rad].
-        scale: Part of ``a`` to turn by.
+        scale: Factor of ``a``: the angle is scale · |a|.
         out: Rotation matrix, shape (3, 3); may be ``R``.
     """
     s = scale * scale * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
@@ -148,7 +151,7 @@ def exp3(y: Array, out: Array) -> None:
 
 @kernel
 def jexp3(y: Array, out: Array) -> None:
-    """Write the right Jacobian of exp: ω = Jexp(y) y' for R = exp(y), ω in the body.
+    """Write the right Jacobian of exp: ω = Jexp(y) y', ω in the body frame of exp(y).
 
     Args:
         y: Rotation vector, shape (3,) [rad].
@@ -185,7 +188,7 @@ def jexp3_dot(y: Array, y_dot: Array, out: Array) -> None:
 
 @kernel
 def jlog3(y: Array, out: Array) -> None:
-    """Write the inverse of `jexp3`: y' = Jlog(y) ω for y = log(R), ω in the body.
+    """Write the inverse of `jexp3`: y' = Jlog(y) ω for y = log(R), ω in the body frame.
 
     Args:
         y: Rotation vector, shape (3,), |y| < 2π [rad].
@@ -197,10 +200,10 @@ def jlog3(y: Array, out: Array) -> None:
 
 @kernel
 def log3(R: Array, out: Array) -> None:
-    """Write the rotation vector of R, |y| <= π, to rounding from 0 to π.
+    """Write the rotation vector of R, |y| <= π, accurate to rounding from 0 to π.
 
-    It goes through the quaternion, whose vector part keeps its digits near π (where the
-    trace and the skew part both lose them). At π itself either sign of y is right.
+    It is computed from the quaternion, whose vector part stays accurate near π, where
+    the trace and the skew part of R both lose digits. At π either sign of y is right.
 
     Args:
         R: Rotation matrix, shape (3, 3).
@@ -214,7 +217,7 @@ def log3(R: Array, out: Array) -> None:
 
 @kernel
 def rotation_from_quaternion(quaternion: Array, out: Array) -> None:
-    """Write the rotation matrix of a quaternion, of any length but zero.
+    """Write the rotation matrix of a quaternion of any non-zero norm.
 
     Args:
         quaternion: (x, y, z, w) as in Pinocchio, shape (4,).
@@ -239,9 +242,9 @@ def quaternion_from_rotation(R: Array, out: Array) -> None:
 
 @kernel
 def _quaternion(R: Array) -> tuple[float, float, float, float]:
-    """Return (x, y, z, w), w >= 0: the row of 4 q qᵀ with the largest diagonal entry.
+    """Return (x, y, z, w), w >= 0, from the row of 4 q qᵀ with the largest diagonal.
 
-    The four diagonal entries add up to 4, so that the largest is at least 1.
+    The four diagonal entries add up to 4, so the largest is at least 1.
     """
     a, b, c = R[0, 0], R[1, 1], R[2, 2]
     if a + b + c >= max(a, b, c):

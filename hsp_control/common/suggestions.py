@@ -1,14 +1,16 @@
-"""Help with names in error messages: the nearest one, and a list that stays short."""
+"""Text for error messages about names: the nearest name, and a short list."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 
 
 def nearest(word: str, options: Iterable[str]) -> str | None:
-    """Return the option that ``word`` was probably meant to be, or None.
+    """Return the option that the user probably meant by ``word``, or None.
 
-    Upper and lower case count as equal. If nothing is spelled alike, an option that
-    contains the word (or is contained in it) will do: ``hand`` finds ``panda_hand``.
+    Upper and lower case are treated as equal. An option with similar spelling is
+    preferred. If there is none, the shortest option that contains the word, or is
+    contained in it, is returned: ``hand`` finds ``panda_hand``. Words of one or two
+    letters are not searched for in this way.
     """
     folded = {option.casefold(): option for option in options}
     target = word.casefold()
@@ -23,13 +25,21 @@ def nearest(word: str, options: Iterable[str]) -> str | None:
 
 
 def did_you_mean(word: str, options: Iterable[str]) -> str:
-    """Return ``; did you mean 'x'?`` for the option nearest to ``word``, or nothing."""
+    """Return ``; did you mean 'x'?`` with the nearest option, or an empty string.
+
+    Append it to a message that says that ``word`` does not exist.
+    """
     near = nearest(word, options)
     return "" if near is None else f"; did you mean {near!r}?"
 
 
 def listing(options: Iterable[str], limit: int = 12) -> str:
-    """Return ``a, b, c``; beyond ``limit`` names ``a, b, c, ... (37 in all)``."""
+    """Return ``a, b, c``, or ``a, b, c, ... (37 in all)`` if the list is long.
+
+    Args:
+        options: The names, in the order in which they are listed.
+        limit: How many names are written out.
+    """
     names = list(options)
     if len(names) <= limit:
         return ", ".join(names)

@@ -1,4 +1,4 @@
-"""Configurations: from a YAML text to a ready experiment, with errors that help."""
+"""Configurations: from a YAML text to a ready experiment."""
 
 from .experiment import Experiment as Experiment
 from .experiment import load_experiment as load_experiment

@@ -1,4 +1,4 @@
-"""Compensation out of a configuration, and whether the loop is stable at its rate."""
+"""Build the compensation, and check that the loop is stable at its rate."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from hsp_control.robot.friction import JointFriction
 def build_compensation(
     document: Document, scenario: Scenario, controller: Controller
 ) -> Compensation:
-    """Return what is on, checked against the robot, its tasks and its limits."""
+    """Return the compensation, checked against the robot, its tasks and its limits."""
     model, robot = scenario.compensation, controller.robot
     compensation = Compensation(
         velocity_filter=_filter(model.velocity_filter),
@@ -42,10 +42,10 @@ def build_compensation(
     if compensation.names and scenario.simulation.control_period is None:
         raise document.error(
             ("compensation",),
-            "it acts once a period: set simulation.control_period [s], for "
-            "example to 0.001",
+            "compensation acts once per control period: set simulation.control_period "
+            "[s], for example to 0.001",
         )
-    for name in compensation.names:  # one by one, for the line that is to blame
+    for name in compensation.names:  # one by one, for the line of the error
         with document.at("compensation", name):
             only = Compensation(**{name: getattr(compensation, name)})
             only.check(robot, controller.tasks, controller.limits)
@@ -59,9 +59,12 @@ def check_rates(
     compensation: Compensation,
     q0: Array,
 ) -> tuple[RateFinding, ...]:
-    """Refuse a loop that is unstable at its rate; return what misses the rule.
+    """Check that the loop is stable at its rate; return gains that are high for it.
 
-    Delays are the plant's own, whether a predictor knows of them or not.
+    The delays are those of the plant, whether or not a predictor compensates them.
+
+    Raises:
+        UnstableRateError: If the loop is unstable.
     """
     settings, plant = scenario.simulation, scenario.plant
     if settings.control_period is None or not settings.check_rate:

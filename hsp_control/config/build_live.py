@@ -1,4 +1,4 @@
-"""What a configuration says of a live run, as the objects of this package."""
+"""Build the objects of a live run."""
 
 from hsp_control.common.exceptions import LiveError
 from hsp_control.config.experiment import Experiment
@@ -8,12 +8,12 @@ from hsp_control.live.settings import (
     Tolerance,
     check_fixed,
 )
-from hsp_control.live.watched_robot import WatchedRobot
+from hsp_control.live.simulated_robot import SimulatedRobot
 from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import ContinuousPlant, IntegratedPlant, SampledPlant
 
-LINGER = 0.5
-"""How long a simulated robot that has stopped is held, and seen, before it ends [s]."""
+FINAL_HOLD = 0.5
+"""Time for which a simulated robot is held after its stop, before it ends [s]."""
 
 
 def live_period(experiment: Experiment) -> float:
@@ -22,9 +22,9 @@ def live_period(experiment: Experiment) -> float:
 
 
 def interface_of(experiment: Experiment) -> EffortInterface:
-    """Return how the experiment's robot wants its efforts.
+    """Return the effort interface of the experiment's robot.
 
-    The greatest effort is that of the controller's limits, where it has some.
+    The maximum effort is that of the controller's limits, if it has limits.
     """
     live, limits = experiment.scenario.live, experiment.controller.limits
     return EffortInterface(
@@ -46,20 +46,20 @@ def tolerance_of(experiment: Experiment) -> Tolerance:
 
 
 def stop_of(experiment: Experiment) -> StopSettings:
-    """Return how the safe stop brakes and holds."""
+    """Return the settings of the safe stop."""
     return StopSettings(**experiment.scenario.live.stop.model_dump())
 
 
-def watched_robot(experiment: Experiment) -> WatchedRobot:
-    """Return the experiment's plant as a robot that looks after itself.
+def simulated_robot(experiment: Experiment) -> SimulatedRobot:
+    """Return the experiment's plant as a robot with a watchdog and a safe stop.
 
     Raises:
-        LiveError: If it has a floating base, or settings contradict each other.
+        LiveError: If it has a floating base, or a setting is invalid.
     """
     check_fixed(experiment.robot)
     period, live = live_period(experiment), experiment.scenario.live
-    stop = live.stop.model_dump() | {"hold": LINGER}
-    return WatchedRobot(
+    stop = live.stop.model_dump() | {"hold": FINAL_HOLD}
+    return SimulatedRobot(
         live_plant(experiment, period),
         experiment.q0,
         experiment.v0,
@@ -71,10 +71,10 @@ def watched_robot(experiment: Experiment) -> WatchedRobot:
 
 
 def live_plant(experiment: Experiment, period: float) -> SampledPlant:
-    """Return an experiment's plant as one that moves on period by period.
+    """Return an experiment's plant as one that advances period by period.
 
-    A continuous one is carried by the experiment's integrator, or where that is
-    adaptive, and might take any time, by one Runge-Kutta step a period.
+    A continuous plant is integrated by the experiment's integrator. An adaptive
+    integrator may take any time, so one Runge-Kutta step per period replaces it.
 
     Raises:
         LiveError: If it is neither continuous nor sampled.
@@ -84,5 +84,7 @@ def live_plant(experiment: Experiment, period: float) -> SampledPlant:
         adaptive = isinstance(integrator, Dop853)
         return IntegratedPlant(plant, Rk4(period) if adaptive else integrator)
     if not isinstance(plant, SampledPlant):
-        raise LiveError(f"{type(plant).__name__} is no plant that can move")
+        raise LiveError(
+            f"{type(plant).__name__} is neither a continuous nor a sampled plant"
+        )
     return plant

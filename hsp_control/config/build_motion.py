@@ -1,4 +1,4 @@
-"""Trajectories out of a configuration."""
+"""Build trajectories."""
 
 from collections.abc import Sequence
 
@@ -33,27 +33,29 @@ def position_trajectory(model: s.PointTrajectory, start: Array | None) -> Trajec
 
     Args:
         model: Its configuration.
-        start: Where the robot starts, shape (n,); None where that means nothing.
+        start: The robot's start position, shape (n,); None if there is none.
 
     Raises:
-        TrajectoryError: If it is given relative to a start that does not exist, or
-            does not describe a motion.
+        TrajectoryError: If its origin is a start that does not exist, a point has the
+            wrong length, or the trajectory is not valid.
     """
     if model.origin == "start" and start is None:
-        raise TrajectoryError("origin: start means nothing here; use origin: world")
+        raise TrajectoryError("origin: start is not available here; use origin: world")
     origin = start if model.origin == "start" and start is not None else 0.0
 
     def point(values: Sequence[float] | Sequence[Sequence[float]] | None) -> Array:
-        """Return given points in the world, or the start where none is given."""
+        """Return the given points in the world, or the start if there are none."""
         if values is None and start is None:
-            raise TrajectoryError("give the point: there is no start to take it from")
+            raise TrajectoryError(
+                "the point is missing, and there is no start to use instead"
+            )
         if values is None:
             return np.asarray(start)
         array = np.asarray(values, dtype=float)
         size = array.shape[-1]
         if start is not None and size != len(start):
             raise TrajectoryError(
-                f"a point of {size} numbers {array.tolist()}; needs {len(start)}"
+                f"a point has {size} numbers {array.tolist()}; needs {len(start)}"
             )
         return np.asarray(array + origin)
 
@@ -90,7 +92,12 @@ def position_trajectory(model: s.PointTrajectory, start: Array | None) -> Trajec
 def orientation_trajectory(
     model: s.OrientationModel, start: Array
 ) -> OrientationTrajectory:
-    """Return the trajectory of an orientation; ``start`` is the robot's, (3, 3)."""
+    """Return the trajectory of an orientation.
+
+    Args:
+        model: Its configuration.
+        start: The robot's start orientation, shape (3, 3).
+    """
     match model:
         case s.HoldOrientationModel():
             return HoldOrientation(_rotation(model.rpy, start))
@@ -103,7 +110,7 @@ def orientation_trajectory(
 
 
 def pose_trajectory(model: s.PoseModel, start: pin.SE3) -> PoseTrajectory:
-    """Return the trajectory of a pose; ``start`` is the robot's."""
+    """Return the trajectory of a pose; ``start`` is the robot's start pose."""
     match model:
         case s.ComposedPoseModel():
             return ComposedPose(
@@ -124,5 +131,7 @@ def _rotation(rpy: Sequence[float] | None, start: Array) -> Array:
 def _points(waypoints: Sequence[Sequence[float]], point) -> Array:  # type: ignore[no-untyped-def]
     sizes = {len(waypoint) for waypoint in waypoints}
     if len(sizes) > 1:
-        raise TrajectoryError(f"waypoints have {sorted(sizes)} numbers; need as many")
+        raise TrajectoryError(
+            f"waypoints have different lengths {sorted(sizes)}; need the same"
+        )
     return np.array([point(waypoint) for waypoint in waypoints])

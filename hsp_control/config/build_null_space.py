@@ -1,4 +1,4 @@
-"""Fields and metric out of a configuration, each error located."""
+"""Build fields and metric; errors have a location."""
 
 from typing import Any
 
@@ -55,7 +55,7 @@ def build_metric(document: Document, model: s.AnyMetric, robot: Robot) -> Metric
                     A = _matrix(model.matrix)
                 if A is None:
                     raise MetricError(
-                        f"{robot.name} has no joint coordinates of its own; give matrix"
+                        f"{robot.name} defines no joint coordinates; give matrix"
                     )
                 return ConstantMetric.from_coordinates(A)
 
@@ -63,16 +63,16 @@ def build_metric(document: Document, model: s.AnyMetric, robot: Robot) -> Metric
 def build_fields(
     document: Document, models: list[f.AnyField], start: RobotState, scene: Scene
 ) -> NullSpaceField:
-    """Return the sum of the fields, or rest when there is none."""
+    """Return the sum of the fields, or `Rest` if there are none."""
     terms: list[tuple[Weight | float, NullSpaceField]] = []
     for index, model in enumerate(models):
         with document.at("null_space", "fields", index):
             field = _field(document, index, model, start, scene)
             if not field.controls and len(models) > 1:
                 raise ConfigError(
-                    "an uncontrolled null space takes no other field beside it"
+                    "the field 'uncontrolled' cannot be combined with other fields"
                 )
-            _refuse_contact(field, start)
+            _check_no_contact(field, start)
         weight = getattr(model, "weight", 1.0)
         if isinstance(weight, f.RampModel):
             weight = Ramp(
@@ -152,14 +152,14 @@ def _field(
             return SelfClearance(robot, influence=model.influence, proxy=model.proxy)
 
 
-def _refuse_contact(field: NullSpaceField, start: RobotState) -> None:
-    """Refuse a start in contact: a barrier cannot push what is already inside."""
+def _check_no_contact(field: NullSpaceField, start: RobotState) -> None:
+    """Check that the start is free of contact: a barrier cannot resolve a contact."""
     if isinstance(field, Clearance):
         distance, pair = field.proximity.nearest(start)
         if distance <= 0.0:
             raise SceneError(
                 f"the robot starts in contact: {pair}, {-distance:.3g} m deep; "
-                "move the start, or the obstacle"
+                "change the start or move the obstacle"
             )
 
 
@@ -167,4 +167,4 @@ def _matrix(rows: Any) -> Array:
     try:
         return np.array(rows, dtype=float)
     except ValueError:
-        raise MetricError("the matrix's rows differ in length") from None
+        raise MetricError("the rows of the matrix have different lengths") from None

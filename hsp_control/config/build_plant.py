@@ -1,4 +1,4 @@
-"""The plant out of a configuration."""
+"""Build the plant."""
 
 from pathlib import Path
 
@@ -53,7 +53,7 @@ from hsp_control.simulation.plants.sensors import (
 )
 
 _STEP = 1e-3
-"""Largest step of joints that stick, where the integrator says none [s]."""
+"""Largest step of a plant with stiction, if the integrator has no step [s]."""
 
 AnyModel = s.RigidBodyPlantModel | s.ContactPlantModel | s.MujocoPlantModel
 
@@ -87,20 +87,20 @@ def build_plant(
         if isinstance(plant, SampledPlant) and (sensors or drives):
             plant = ImperfectPlant(plant, sensors, drives)
         check_plant(plant, robot)
-        _try(document, own, sensors, drives)
+        _check_imperfections(document, own, sensors, drives)
     if isinstance(plant, SampledPlant) and period is None:
         raise document.error(
             ("plant",),
-            "efforts are held on this plant: set simulation.control_period [s], for "
-            "example to 0.001",
+            "this plant needs efforts that are held for a period: set "
+            "simulation.control_period [s], for example to 0.001",
         )
     return plant, scenario
 
 
-def _try(
+def _check_imperfections(
     document: Document, robot: Robot, sensors: list[Sensor], drives: list[Drive]
 ) -> None:
-    """Refuse settings that do not fit the robot, here where they can be located."""
+    """Check that settings fit the robot, here where errors have a location."""
     with document.at("plant", "sensors"):
         for sensor in sensors:
             sensor.reset(robot, 0.0, robot.neutral(), np.zeros(robot.nv))
@@ -109,15 +109,15 @@ def _try(
             drive.reset(robot)
 
 
-def _with_defaults(model: LoadModel, controllers: LoadModel) -> LoadModel:
-    """Return how the plant's robot is loaded: as the controller's, unless said."""
-    said = {name: getattr(model, name) for name in model.model_fields_set}
-    like = {name: getattr(controllers, name) for name in LoadModel.model_fields}
-    return LoadModel(**{**like, **said})
+def _with_defaults(model: LoadModel, controller: LoadModel) -> LoadModel:
+    """Return the plant's robot, with the controller's settings where it has none."""
+    given = {name: getattr(model, name) for name in model.model_fields_set}
+    like = {name: getattr(controller, name) for name in LoadModel.model_fields}
+    return LoadModel(**{**like, **given})
 
 
 def _robot(document: Document, model: s.PlantModel, robot: Robot) -> Robot:
-    """Return the robot that moves; the controller's own object if it is the same."""
+    """Return the simulated robot; the controller's object if they are the same."""
     own = robot
     if model.robot is not None:
         gravity = robot.model.gravity.linear.tolist()
@@ -146,7 +146,7 @@ def _engine(
     pushes = _pushes(document, model, robot)
     match model:
         case s.ContactPlantModel():
-            return _held(document, model, robot, pushes)
+            return _rigid_contacts(document, model, robot, pushes)
         case s.MujocoPlantModel():
             friction = _friction(document, model, robot)
             return _mujoco(document, model, robot, friction, pushes)
@@ -178,7 +178,7 @@ def _pushes(document: Document, model: s.PlantModel, robot: Robot) -> list[Push]
     return pushes
 
 
-def _held(
+def _rigid_contacts(
     document: Document, model: s.ContactPlantModel, robot: Robot, pushes: list[Push]
 ) -> ContactPlant:
     contacts = []

@@ -1,4 +1,4 @@
-"""The robot and its start out of a configuration, each error located."""
+"""Build the robot and its start; errors have a location."""
 
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,14 +21,14 @@ Loaded = TypeVar("Loaded", bound=s.LoadModel)
 def build_robot(
     document: Document, scenario: Scenario, folder: Path
 ) -> tuple[Robot, Scenario]:
-    """Return the robot, and the scenario with its paths made absolute.
+    """Return the robot, and the scenario with absolute paths.
 
-    A relative path is looked up beside the configuration first, so that a folder with
-    both can be moved; the log then names the file that was found.
+    A relative path is first looked up in the configuration's folder, so that a folder
+    with both can be moved. The log then contains the path of the file that was found.
     """
     model = scenario.robot
     if (model.name is None) == (model.parts is None):
-        raise document.error(("robot",), "give either name or parts")
+        raise document.error(("robot",), "give one of name and parts")
     gravity = model.gravity
     if model.parts is None:
         found = located_model(model, folder)
@@ -51,7 +51,7 @@ def build_robot(
 
 
 def located_model(model: Loaded, folder: Path) -> Loaded:
-    """Return the model with the path of a URDF beside the configuration."""
+    """Return the model; a URDF in the configuration's folder gets its full path."""
     name = model.name or ""
     if name.endswith((".urdf", ".xml")) and _is_file(folder / name):
         return model.model_copy(update={"name": str(folder / name)})
@@ -61,14 +61,21 @@ def located_model(model: Loaded, folder: Path) -> Loaded:
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except (OSError, ValueError):  # longer than a path may be, a null character
+    except (OSError, ValueError):  # too long for a path, or with a null character
         return False
 
 
 def load_robot(
     document: Document, at: KeyPath, model: s.LoadModel, gravity: list[float] | None
 ) -> Robot:
-    """Return the robot that a part of the configuration at a key path names."""
+    """Return the robot of a part of the configuration.
+
+    Args:
+        document: The configuration.
+        at: The key path of the part.
+        model: The part.
+        gravity: Gravitational acceleration [m/s²]; None: the default.
+    """
     if model.name is None:
         raise document.error(at, "missing key 'name'")
     tools = {
@@ -96,7 +103,8 @@ def build_start(document: Document, model: s.StartModel, robot: Robot) -> Array:
     ]
     if len(given) > 1:
         raise document.error(
-            ("start", given[1]), f"the start is said twice: by {given[0]} already"
+            ("start", given[1]),
+            f"the start is given twice; give only one of {given[0]} and {given[1]}",
         )
     with document.at("start", *given):
         if model.configuration is not None:
@@ -105,7 +113,7 @@ def build_start(document: Document, model: s.StartModel, robot: Robot) -> Array:
             A = robot.joint_coordinates
             if A is None:
                 raise ConfigurationError(
-                    f"{robot.name} has no joint coordinates of its own; use joints"
+                    f"{robot.name} defines no joint coordinates; use joints"
                 )
             theta = robot.check_tangent(model.coordinates, "coordinates")
             joints = np.asarray(np.linalg.solve(A, theta))
@@ -118,7 +126,16 @@ def build_start(document: Document, model: s.StartModel, robot: Robot) -> Array:
 
 
 def joint_configuration(robot: Robot, joints: Any, what: str) -> Array:
-    """Return the configuration of given joint positions, shape (nv,)."""
+    """Return the configuration, shape (nq,), of joint positions, shape (nv,).
+
+    Args:
+        robot: The robot.
+        joints: The joint positions [rad or m].
+        what: Their name in messages.
+
+    Raises:
+        ShapeError: If there are not nv numbers.
+    """
     return robot.integrate(robot.neutral(), robot.check_tangent(joints, what))
 
 
@@ -129,8 +146,8 @@ def _moved_joints(document: Document, robot: Robot, joints: dict[str, float]) ->
             where = robot.velocity_index(joint)
             if where.stop - where.start != 1:
                 raise ConfigurationError(
-                    f"joint {joint!r} has {where.stop - where.start} freedoms; "
-                    "use start.configuration"
+                    f"joint {joint!r} has {where.stop - where.start} degrees of "
+                    "freedom; use start.configuration"
                 )
         positions[where] = value
     return robot.integrate(robot.neutral(), positions)
@@ -139,7 +156,7 @@ def _moved_joints(document: Document, robot: Robot, joints: dict[str, float]) ->
 def end_effector(
     document: Document, at: KeyPath, frame: str | None, robot: Robot
 ) -> str:
-    """Return the named frame, which exists, or the robot's end effector."""
+    """Return the named frame, checked to exist, or the robot's end effector."""
     if frame is None:
         return robot.end_effector
     with document.at(*at, "frame"):

@@ -1,4 +1,4 @@
-"""Obstacles out of a configuration."""
+"""Build the obstacles."""
 
 from pathlib import Path
 
@@ -20,11 +20,11 @@ from hsp_control.geometry.shapes import (
     Shape,
     Sphere,
 )
-from hsp_control.robot.description.mesh_files import check_inside
+from hsp_control.robot.description.mesh_files import check_references
 
 
 def located_scene(model: s.SceneModel, folder: Path) -> s.SceneModel:
-    """Return the scene with its meshes' paths made absolute, for a log to name them."""
+    """Return the scene with absolute paths of its meshes, for the log."""
 
     def located(obstacle: s.ObstacleModel) -> s.ObstacleModel:
         if not isinstance(obstacle.shape, s.MeshModel):
@@ -38,7 +38,7 @@ def located_scene(model: s.SceneModel, folder: Path) -> s.SceneModel:
 
 
 def build_scene(document: Document, model: s.SceneModel, folder: Path) -> Scene:
-    """Return the scene; files are looked up beside the configuration."""
+    """Return the scene; ``folder`` is where relative paths of files begin."""
     obstacles = []
     for name, obstacle in model.obstacles.items():
         where = ("scene", "obstacles", name)
@@ -49,7 +49,7 @@ def build_scene(document: Document, model: s.SceneModel, folder: Path) -> Scene:
                         document, (*where, "shape", "file"), obstacle.shape, folder
                     )
                 shape = build_shape(obstacle.shape, folder)
-                shape.geometry()  # fails here, where it can be located
+                shape.geometry()  # fails here, where the error has a location
             with document.at(*where, "center"):
                 center = position_trajectory(obstacle.center, None)
             orientation = None
@@ -65,14 +65,14 @@ def build_scene(document: Document, model: s.SceneModel, folder: Path) -> Scene:
 def _check_mesh(
     document: Document, at: KeyPath, model: s.MeshModel, folder: Path
 ) -> None:
-    """Refuse a mesh that the document may not name."""
+    """Check that the document may use a mesh file."""
     with document.at(*at):
         document.access.check(folder / model.file, "mesh")
-        check_inside(folder / model.file, "mesh", document.access)
+        check_references(folder / model.file, "mesh", document.access)
 
 
 def build_shape(model: s.AnyShape, folder: Path) -> Shape:
-    """Return a shape; files are looked up in a folder."""
+    """Return a shape; ``folder`` is where relative paths of files begin."""
     match model:
         case s.SphereModel():
             return Sphere(model.radius)

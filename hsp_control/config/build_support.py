@@ -1,4 +1,4 @@
-"""Contacts, limits and schedules out of a configuration, each error located."""
+"""Build contacts, limits and schedules; errors have a location."""
 
 from typing import Any
 
@@ -27,17 +27,24 @@ from hsp_control.trajectories.schedule import Schedule
 def build_contacts(
     document: Document, models: dict[str, c.AnyContact], robot: Robot
 ) -> list[Contact]:
-    """Return the contacts, by the names that the configuration gives them."""
+    """Return the contacts, with their names in the configuration."""
     return [_contact(document, name, model, robot) for name, model in models.items()]
 
 
 def put_on_ground(
     document: Document, height: float, contacts: list[Contact], robot: Robot, q: Array
 ) -> Array:
-    """Return q with the root moved up or down until the lowest contact is at a height.
+    """Return q with the root moved vertically: the lowest contact is then at a height.
+
+    Args:
+        document: The configuration.
+        height: The height [m].
+        contacts: The contacts.
+        robot: The robot.
+        q: Configuration, shape (nq,).
 
     Raises:
-        ContactError: If the robot cannot be moved like that, or has no contact.
+        ContactError: If the robot has no free-flyer root, or no contact.
     """
     with document.at("start", "ground"):
         if not (robot.unactuated and contacts):
@@ -52,7 +59,7 @@ def put_on_ground(
             float((frame.position + contact.arms(frame))[:, 2].min())
             for contact, frame in zip(contacts, frames, strict=True)
         )
-        # A root's linear displacement is in its own axes.
+        # The displacement of a root is expressed in its own axes.
         root = next(iter(robot.joints.values()))
         lift = np.zeros(robot.nv)
         up = state.data.oMi[1].rotation.T @ np.array([0.0, 0.0, height - lowest])
@@ -89,7 +96,7 @@ def _surface(
 ) -> Contact:
     sized = model.length is not None and model.width is not None
     if sized == (model.corners is not None):
-        raise ContactError("give length and width of the sole, or its corners")
+        raise ContactError("give either length and width of the sole, or its corners")
     if model.corners is not None:
         return SurfaceContact(robot, model.frame, corners=model.corners, **shared)
     return SurfaceContact.rectangle(
@@ -105,7 +112,7 @@ def _surface(
 def build_limits(
     document: Document, model: l.LimitsModel | None, robot: Robot, scene: Scene
 ) -> Limits | None:
-    """Return the limits, if there are any."""
+    """Return the limits; None if there are none."""
     if model is None:
         return None
     distances = []
@@ -119,9 +126,9 @@ def build_limits(
         own = Limits(robot, position=None)
         return Limits(
             robot,
-            effort=_greatest(document, "effort", model.effort, own.effort, robot),
+            effort=_maximum(document, "effort", model.effort, own.effort, robot),
             effort_rate=model.effort_rate,
-            velocity=_greatest(
+            velocity=_maximum(
                 document, "velocity", model.velocity, own.velocity, robot
             ),
             acceleration=model.acceleration,
@@ -147,10 +154,10 @@ def _distance(model: l.AnyDistance, robot: Robot, scene: Scene) -> MinimumDistan
     return MinimumDistance(field.proximity, model.least)
 
 
-def _greatest(
-    document: Document, key: str, model: l.Greatest, own: Array, robot: Robot
+def _maximum(
+    document: Document, key: str, model: l.Maximum, own: Array, robot: Robot
 ) -> Any:
-    """Return a greatest effort or speed in numbers, None for none."""
+    """Return a maximum effort or speed in numbers; None if it is unlimited."""
     if isinstance(model, l.ScaledModel):
         if not isinstance(model.scale, dict):
             return model.scale * own
@@ -159,7 +166,7 @@ def _greatest(
             with document.at("limits", key, "scale", joint):
                 where = robot.velocity_index(joint)
                 if not np.isfinite(own[where]).all():
-                    raise LimitError(f"{joint} has no {key} limit of its own to scale")
+                    raise LimitError(f"{joint} has no {key} limit that could be scaled")
                 scaled[where] *= scale
         return scaled
     if isinstance(model, str):
@@ -168,7 +175,7 @@ def _greatest(
 
 
 def build_schedule(model: ScheduleModel | None) -> Schedule | None:
-    """Return a schedule, if there is one."""
+    """Return a schedule; None if there is none."""
     if model is None:
         return None
     intervals = [
@@ -181,7 +188,7 @@ def build_schedule(model: ScheduleModel | None) -> Schedule | None:
 def build_schedules(
     document: Document, models: dict[str, AnyTask]
 ) -> dict[str, Schedule]:
-    """Return when tasks count, for those that do not always."""
+    """Return the schedules of tasks that are not always active, by name."""
     schedules = {}
     for name, model in models.items():
         with document.at("tasks", name, "schedule"):

@@ -1,4 +1,4 @@
-"""Tasks out of a configuration, each error located."""
+"""Build the tasks; errors have a location."""
 
 import numpy as np
 import pinocchio as pin
@@ -41,7 +41,7 @@ from hsp_control.trajectories import (
 def build_task(
     document: Document, name: str, model: s.AnyTask, start: RobotState
 ) -> Task:
-    """Return one task; ``start`` is the robot where it starts."""
+    """Return one task; ``start`` is the start state of the robot."""
     robot = start.robot
     with document.at("tasks", name, "gains"):
         gains = _gains(model.gains)
@@ -108,13 +108,13 @@ def _whole_body(
 def _gains(model: s.GainsModel) -> Gains:
     stiff = model.kp is not None or model.kv is not None
     if stiff and (model.natural_frequency is not None or model.damping_ratio):
-        raise GainError("give kp and kv, or natural_frequency and damping_ratio")
+        raise GainError("give either kp and kv, or natural_frequency and damping_ratio")
     if stiff:
         if model.kp is None or model.kv is None:
-            raise GainError("kp and kv belong together; one is missing")
+            raise GainError("give both kp and kv; one of them is missing")
         return Gains(model.kp, model.kv)
     if model.natural_frequency is None:
-        raise GainError("give kp and kv, or natural_frequency")
+        raise GainError("give either kp and kv, or natural_frequency")
     ratio = 1.0 if model.damping_ratio is None else model.damping_ratio
     return Gains.from_frequency(model.natural_frequency, ratio)
 
@@ -166,7 +166,7 @@ def _pose(
     if model.blend is None:
         return trajectory
     if not isinstance(trajectory, ComposedPose):
-        raise TaskError("blend: a screw starts where the robot does; leave blend out")
+        raise TaskError("blend: a screw begins at the robot's start; remove blend")
     return ComposedPose(
         Blend(start.translation, trajectory.position, model.blend),
         BlendOrientation(start.rotation, trajectory.orientation, model.blend),
@@ -178,7 +178,7 @@ def _facing(direction: list[float]) -> Array:
     z = np.asarray(direction)
     length = float(np.linalg.norm(z))
     if length == 0.0:
-        raise TaskError("direction: [0, 0, 0] is none")
+        raise TaskError("direction must be non-zero, got [0, 0, 0]")
     x, y = np.linalg.svd(z[None, :] / length)[2][1:]
     rotation = np.column_stack([x, y, z / length])
     rotation[:, 0] *= np.sign(np.linalg.det(rotation))

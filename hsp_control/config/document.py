@@ -1,4 +1,4 @@
-"""A configuration as plain data that remembers which line each key came from."""
+"""A configuration as plain data, with the line that each key came from."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,33 +13,45 @@ from hsp_control.config.keys import KeyPath, split_assignment
 from hsp_control.config.located import locate, located
 from hsp_control.config.overrides import assign
 from hsp_control.config.plain import shortened, shown
+from hsp_control.config.renamed import current_keys, rename_keys
 from hsp_control.config.syntax import YamlError
 from hsp_control.config.yaml_reader import MAX_SIZE, Mark, read_yaml
 from hsp_control.robot.description.access import ANYWHERE
 
-_TOO_LARGE = f"larger than {MAX_SIZE // 1_000_000} MB, too much for a configuration"
+_TOO_LARGE = f"larger than {MAX_SIZE // 1_000_000} MB, the limit for a configuration"
 _LONGEST_ORIGIN = 72
 
 
 class Document:
     """The plain data of a YAML text, with a location for every key path.
 
-    A key path is the tuple of what the user writes with dots: ``("tasks", 0, "frame")``
-    for ``tasks.0.frame``. All errors read ``file:line: key.path: what is wrong``.
+    A key path is a tuple: ``("tasks", 0, "frame")`` for what the user writes as
+    ``tasks.0.frame``. All errors have the form ``file:line: key.path: what is wrong``.
+    Keys that were renamed have their new names (see `hsp_control.config.renamed`).
 
     Attributes:
         name: The file's path as it was given, for messages.
-        access: Which files it may name.
+        access: Which files the configuration may name.
     """
 
     def __init__(
         self, data: dict[str, Any], marks: dict[KeyPath, Mark], name: str
     ) -> None:
-        """Take what `Document.parse` found."""
+        """Keep a copy of the data.
+
+        Args:
+            data: The plain data.
+            marks: The place of each key path in the text; empty if there is no text.
+            name: The file's path, for messages.
+
+        Raises:
+            ConfigError: If a renamed key is given with its old and its new name.
+        """
         self.name = name
         self.access = ANYWHERE
-        self._data = data
+        self._data = deepcopy(data)
         self._origins: dict[KeyPath, Mark | str] = dict(marks)
+        rename_keys(self._data, self._origins, self.location)
 
     @classmethod
     def read(cls, path: str | PathLike[str]) -> "Document":
@@ -66,7 +78,11 @@ class Document:
 
     @classmethod
     def parse(cls, text: str, name: str = "<string>") -> "Document":
-        """Parse a YAML text; in messages ``name`` stands for its file.
+        """Parse a YAML text.
+
+        Args:
+            text: The text.
+            name: The file's path, for messages.
 
         Raises:
             ConfigError: If it is not a mapping in plain YAML.
@@ -80,7 +96,7 @@ class Document:
             raise located(where, error.message, error.path) from None
         if not isinstance(data, dict):
             what = "is empty" if data is None else f"is {shown(data)}"
-            message = f"{what}; a configuration is a mapping (key: value)"
+            message = f"{what}; a configuration must be a mapping (key: value)"
             raise located(f"{name}:{marks[()].line}", message)
         return cls(data, marks, name)
 
@@ -89,13 +105,15 @@ class Document:
         return deepcopy(self._data)
 
     def override(self, assignment: str) -> None:
-        """Apply ``tasks.0.gains.kp=100``, as given to ``--set`` on the command line.
+        """Change one value by ``tasks.0.gains.kp=100``, the argument of ``--set``.
 
-        The value is YAML. Missing keys are created, for the schema to judge; entries of
-        lists are not. Keys with a dot inside go in quotes: ``frames.'a.b'.parent=x``.
+        The value is YAML. Missing keys are created, and the schema then checks them;
+        missing list entries are an error. Keys that contain a dot need quotes:
+        ``frames.'a.b'.parent=x``.
 
         Raises:
-            ConfigError: If it has another form, or there is no such place.
+            ConfigError: If the assignment has another form, or its key path leads
+                nowhere.
         """
         origin = shortened(f"--set {' '.join(assignment.split())}", _LONGEST_ORIGIN)
         try:
@@ -108,23 +126,24 @@ class Document:
         self.assign(keys, value, origin)
 
     def assign(self, keys: list[str], value: Any, origin: str) -> KeyPath:
-        """Put plain data where the keys lead, and return the key path of that place.
+        """Set the value at a key path, and return the key path.
 
         Args:
             keys: The parts of the key path, as text; see `override`.
-            value: The data.
-            origin: What stands for the file and line in messages about it.
+            value: The new value, plain data.
+            origin: What messages about the value say instead of file and line.
 
         Raises:
-            ConfigError: If there is no such place.
+            ConfigError: If the key path leads nowhere.
         """
         try:
-            path = assign(self._data, keys, value)
+            path = assign(self._data, current_keys(keys, origin), value)
         except ValueError as error:
             raise located(origin, str(error)) from None
         for inside in [key for key in self._origins if key[: len(path)] == path]:
             del self._origins[inside]
         self._origins[path] = origin
+        rename_keys(self._data, self._origins, self.location)  # keys inside the value
         return path
 
     def __contains__(self, path: KeyPath) -> bool:
@@ -139,9 +158,9 @@ class Document:
         return True
 
     def mark(self, path: KeyPath) -> Mark | None:
-        """Return where in the text the key path begins, None if it was overridden.
+        """Return the place of a key path in the text, None if it was overridden.
 
-        A path that does not exist has the mark of its nearest ancestor.
+        For a path that does not exist it is the place of its nearest ancestor.
         """
         origin = self._origin(path)
         return origin if isinstance(origin, Mark) else None
@@ -152,21 +171,21 @@ class Document:
         return f"{self.name}:{origin.line}" if isinstance(origin, Mark) else origin
 
     def error(self, path: KeyPath, message: str) -> ConfigError:
-        """Return an error, to be raised, about the value at the key path."""
+        """Return an error about the value at the key path, for the caller to raise."""
         return located(self.location(path), message, path)
 
     @contextmanager
     def at(self, *path: str | int) -> Iterator[None]:
-        """Give errors of the package that are raised inside the location of a key path.
+        """Add the location of a key path to errors that are raised inside the block.
 
-        An error keeps its class, and one that has a location keeps that, so of nested
-        blocks the innermost wins::
+        An error keeps its class. An error that has a location already keeps it, so of
+        nested blocks the innermost one counts::
 
             with document.at("tasks", 0, "frame"):
                 robot.frame_id("panda_hnad")  # FrameNotFoundError: panda.yaml:7: ...
 
         Raises:
-            HspControlError: What was raised inside.
+            HspControlError: The error that was raised inside, with the location.
         """
         try:
             yield
@@ -177,12 +196,12 @@ class Document:
     def _origin(self, path: KeyPath) -> Mark | str:
         while path and path not in self._origins:
             path = path[:-1]
-        return self._origins.get(path, self.name)  # data that came from no file
+        return self._origins.get(path, self.name)  # data without a file
 
 
 def _why_unreadable(name: str, error: OSError | ValueError) -> str:
     if isinstance(error, IsADirectoryError):
-        return "is a folder; name a file in it"
+        return "is a folder; give a file"
     if isinstance(error, FileNotFoundError):
         files = {file.stem: file.name for file in Path(name).parent.glob("*.yaml")}
         near = nearest(Path(name).stem, files)

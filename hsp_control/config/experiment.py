@@ -1,4 +1,4 @@
-"""An experiment: a configuration turned into objects, ready to run."""
+"""An experiment: the objects of a configuration, ready to run."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ from hsp_control.robot.integrators import Dop853, Integrator, Rk4, SemiImplicitE
 from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.plants import Plant
 from hsp_control.simulation.recorder import Recorder
-from hsp_control.simulation.simulate import check_steps, planned
+from hsp_control.simulation.simulate import check_steps, count_rows
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,9 @@ class Experiment:
         scene: Its obstacles.
         q0: Start configuration, shape (nq,).
         v0: Start velocity, shape (nv,).
-        integrator: How the simulation moves on.
-        plant: What the controller's efforts move.
-        compensation: What is done about what the plant has beside the model.
+        integrator: The integrator of the simulation.
+        plant: The simulated system that the efforts act on.
+        compensation: Compensators for differences between plant and model.
         rate_findings: Gains that are high for the control period.
     """
 
@@ -79,7 +79,7 @@ class Experiment:
         on_progress: Callable[[float], None] | None = None,
         on_row: Callable[[Recorder], None] | None = None,
     ) -> Rollout:
-        """Simulate it; see `simulate` for the arguments, what is raised and kept."""
+        """Simulate the experiment; see `simulate` for arguments and errors."""
         settings = self.scenario.simulation
         return simulate(
             self.controller,
@@ -112,17 +112,17 @@ def load_experiment(
 
     Args:
         source: The name of a bundled configuration, a path to a YAML file or to a log
-            (whose own configuration is then repeated), or the data itself.
+            (whose stored configuration is used), or the data itself.
         overrides: Values to change, each ``key.path=value``.
-        strict: For files of strangers: what they name must lie in the source's own
-            folder, among what is bundled, or in a folder that is allowed.
-        allow: Further folders for strict reading.
+        strict: For untrusted files: the files that they name must be in the source's
+            own folder, bundled, or in an allowed folder.
+        allow: Further allowed folders, for strict reading.
 
     Raises:
         ConfigError: If the configuration does not follow the schema.
         AccessError: If it is read strictly and names a file elsewhere.
-        HspControlError: If it names what does not exist or does not fit; the message
-            says where.
+        HspControlError: If a name does not exist or a value does not fit; the message
+            contains the location.
     """
     document = read_document(source, strict=strict, allow=allow)
     for assignment in overrides:
@@ -136,7 +136,7 @@ def read_document(
     strict: bool = False,
     allow: Sequence[str | PathLike[str]] = (),
 ) -> Document:
-    """Return the configuration's data with the place that each key came from.
+    """Return the configuration's data with the location of each key.
 
     See `load_experiment` for the arguments.
 
@@ -159,7 +159,7 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
         config = Rollout.load(path).config
         if config is None:
             raise ConfigError(
-                f"{path}: this log was made from Python and holds no configuration"
+                f"{path}: this log was made from Python and contains no configuration"
             )
         return Document(config, {}, str(path))
     known = bundled_configs()
@@ -169,19 +169,23 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
         return Document.read(known[str(source)])
     raise ConfigError(
         f"no configuration {str(source)!r}{did_you_mean(str(source), known)} "
-        f"(a path to a .yaml file, or one of: {listing(known)})"
+        f"(give the path of a .yaml file, or one of: {listing(known)})"
     )
 
 
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except (OSError, ValueError):  # no name that a file can have
+    except (OSError, ValueError):  # not a valid file name
         return False
 
 
 def build(document: Document) -> Experiment:
-    """Turn a configuration into objects: YAML and Python are two faces of them."""
+    """Build the experiment of a configuration.
+
+    Raises:
+        HspControlError: If the configuration is wrong; see `load_experiment`.
+    """
     scenario = validate(document, Scenario)
     folder = Path(document.name).resolve().parent
     robot, scenario = build_robot(document, scenario, folder)
@@ -247,7 +251,7 @@ def build(document: Document) -> Experiment:
 def _integrator(document: Document, scenario: Scenario) -> Integrator:
     settings = scenario.simulation
     with document.at("simulation"):
-        planned(settings.duration, settings.log_period, settings.control_period)
+        count_rows(settings.duration, settings.log_period, settings.control_period)
         if isinstance(plant := scenario.plant, MujocoPlantModel):
             check_steps(settings.duration, plant.timestep, "plant.timestep")
     model = settings.integrator

@@ -1,9 +1,9 @@
-"""From pydantic's list of errors to the mistakes that the user made.
+"""Find the mistakes that the user made in pydantic's list of errors.
 
 Pydantic reports a wrong value once for every alternative of a union, under a path that
-names the alternatives; and a misspelt key twice, as unknown and as missing. Walking
-errors and schema together, from the top, undoes both: one finding for one mistake,
-under the key path that the user wrote.
+contains the alternatives' names. It reports a misspelt key twice, as unknown and as
+missing. This module follows errors and schema together, from the top, and returns one
+finding for one mistake, under the key path that the user wrote.
 """
 
 from collections import defaultdict
@@ -18,19 +18,20 @@ from hsp_control.config.keys import KeyPath
 from hsp_control.config.schema import Shape, entry, keys, shape, tagged
 
 Pending: TypeAlias = tuple[KeyPath, ErrorDetails]
-"""An error, and the part of its path that is still ahead."""
+"""The remaining part of an error's path, and the error."""
 
 
 class Finding(NamedTuple):
     """One mistake.
 
     Attributes:
-        path: The key path that the user wrote; for a missing key, of what lacks it.
-        kind: ``mismatch`` for a wrong type, ``misspelt_tag`` for a wrong key in the
-            place of a discriminator, or else pydantic's name for the error.
-        value: The value or the key at fault; the list of missing keys.
-        expected: What is allowed there; for keys, what holds them.
-        error: Pydantic's own words and numbers.
+        path: The key path that the user wrote; for a missing key, that of the mapping
+            without it.
+        kind: ``mismatch`` for a wrong type, ``misspelt_tag`` for a misspelt
+            discriminator key, otherwise pydantic's name for the error.
+        value: The wrong value or key; for missing keys, their list.
+        expected: The allowed types there; for keys, those of their mapping.
+        error: Pydantic's own error.
     """
 
     path: KeyPath
@@ -46,10 +47,10 @@ def findings(
     """Return one finding for each mistake at ``path`` or below it.
 
     Args:
-        document: What was validated.
-        expected: What is allowed at ``path``.
+        document: The validated document.
+        expected: The allowed types at ``path``.
         errors: The errors there and below.
-        path: Where we stand.
+        path: The key path.
     """
     found = [_here(path, expected, error) for ahead, error in errors if not ahead]
     below: dict[str | int, list[Pending]] = defaultdict(list)
@@ -65,8 +66,8 @@ def findings(
         for tag, inner in below.items():
             found += findings(document, shape(choices.get(tag, Any)), inner, path)
         return found
-    # Below a union, pydantic names the alternatives by labels of its own; all failed,
-    # so all are there, in their order.
+    # Below a union, pydantic labels the alternatives with its own names. All of them
+    # failed, so all of them are in the list, in their order.
     known = len(below) == len(expected.options)
     options = expected.options if known else [Any] * len(below)
     tries = [
@@ -81,7 +82,7 @@ def _here(path: KeyPath, expected: Shape, error: ErrorDetails) -> Finding:
     kind, value = error["type"], error["input"]
     if kind.endswith(("_type", "_parsing", "_from_float")):
         kind = "mismatch"
-    if kind in ("extra_forbidden", "missing"):  # of a key that we lost sight of
+    if kind in ("extra_forbidden", "missing"):  # its key is not known
         kind = "other"
     tag = expected.discriminator
     if tag is not None and isinstance(value, dict):
@@ -100,7 +101,7 @@ def _at_key(
     path: KeyPath,
     key: str | int,
 ) -> list[Finding]:
-    """Return the findings at one key of the value at ``path``, which is no union."""
+    """Return the findings at one key of the value at ``path``, which is not a union."""
     found: list[Finding] = []
     deeper: list[Pending] = []
     for ahead, error in errors:
@@ -116,36 +117,37 @@ def _at_key(
         else:
             found.append(Finding(path, kind, [key], holder, error))
     within = entry(holder.options[0], key)
-    if within is None and (*path, key) not in document:  # a label of pydantic's own
+    if within is None and (*path, key) not in document:  # a label of pydantic
         return found + findings(document, shape(Any), deeper, path)
     return found + findings(document, within or shape(Any), deeper, (*path, key))
 
 
 def _gathered(found: list[Finding], path: KeyPath) -> list[Finding]:
-    """Gather the keys missing at ``path``, without those that are only misspelt."""
+    """Join the keys missing at ``path`` in one finding, without misspelt ones."""
     missing = [f for f in found if f.kind == "missing" and f.path == path]
     others = [f for f in found if f.kind != "missing" or f.path != path]
     unknown = [f for f in found if f.kind == "extra_forbidden" and f.path[:-1] == path]
-    meant = {nearest(f.value, keys(f.expected)) for f in unknown}
-    names = [name for f in missing for name in f.value if name not in meant]
+    misspelt = {nearest(f.value, keys(f.expected)) for f in unknown}
+    names = [name for f in missing for name in f.value if name not in misspelt]
     return [*others, missing[0]._replace(value=names)] if names else others
 
 
 def _most_likely(
     document: Document, tries: list[list[Finding]], path: KeyPath
 ) -> list[Finding]:
-    """Return what is wrong with the alternative that the user most likely meant.
+    """Return the findings of the alternative that the user most likely meant.
 
-    That is one whose outer form fits, with the fewest mistakes inside. Of several as
-    likely it is the one that got furthest in the text; and if all stumble over the same
-    value, that has none of the expected forms.
+    It is the alternative whose outer type is right, with the fewest mistakes inside. If
+    several are equally likely, it is the one whose first mistake is furthest down in
+    the text. If all of them fail at the same value, that value has none of the expected
+    types.
     """
 
     def unlikeliness(found: list[Finding]) -> tuple[bool, int]:
         return any(f.path == path and _misfit(f) for f in found), len(found)
 
-    least = min(map(unlikeliness, tries))
-    likely = [found for found in tries if unlikeliness(found) == least]
+    lowest = min(map(unlikeliness, tries))
+    likely = [found for found in tries if unlikeliness(found) == lowest]
     first = likely[0][0]
     if len(likely) == 1 or not all(
         len(found) == 1 and found[0].path == first.path and _misfit(found[0])

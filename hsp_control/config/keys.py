@@ -1,4 +1,4 @@
-"""Key paths: where in a configuration something stands, as the user writes it."""
+"""Key paths: the place of a value in a configuration, as the user writes it."""
 
 import re
 from typing import TypeAlias
@@ -16,8 +16,7 @@ _NEEDS_QUOTES = re.compile(r"[\s.=:'\"]")
 def written(path: KeyPath) -> str:
     """Return the path with dots between its parts: ``tasks.0.gains.kp``.
 
-    Parts that would be misread (with a dot or a blank inside, or empty) are quoted, and
-    cut if they are long.
+    Parts that are empty or contain a dot or a space are quoted. Long parts are cut.
     """
     return ".".join(_written_part(part) for part in path)
 

@@ -1,4 +1,4 @@
-"""Change one value of plain data, by a key path as it is typed on a command line."""
+"""Change one value of plain data, by a key path from the command line."""
 
 import re
 from typing import Any
@@ -9,13 +9,18 @@ from hsp_control.config.yaml_reader import MAX_DEPTH
 
 
 def assign(data: dict[str, Any], keys: list[str], value: Any) -> KeyPath:
-    """Put ``value`` where the keys lead, and return the key path of that place.
+    """Set the value at a key path, and return the key path.
 
-    Missing keys of mappings are created (a mapping that was left empty, too), so that
-    the schema judges them; entries of lists are named by number and must exist.
+    Missing keys of mappings are created (also in a mapping that was left empty); the
+    schema then checks them. List entries are given by number and must exist.
+
+    Args:
+        data: The data; changed in place.
+        keys: The parts of the key path, as text.
+        value: The new value.
 
     Raises:
-        ValueError: If there is no such place; the data is then unchanged.
+        ValueError: If the key path leads nowhere; the data is then unchanged.
     """
     if len(keys) > MAX_DEPTH:
         raise ValueError(f"nested deeper than {MAX_DEPTH} levels")
@@ -34,10 +39,10 @@ def assign(data: dict[str, Any], keys: list[str], value: Any) -> KeyPath:
 
 
 def _place(holder: Any, key: str, path: KeyPath) -> str | int:
-    """Return the key, or the number of the list's entry, that ``key`` names.
+    """Return ``key`` for a mapping, or the number of the entry for a list.
 
     Raises:
-        ValueError: If the holder, which stands at ``path``, has no such place.
+        ValueError: If the holder, the value at ``path``, has no such key or entry.
     """
     if isinstance(holder, dict):
         return key

@@ -1,4 +1,4 @@
-"""Plain data in the words of the user who wrote it: shown as YAML, short, and named."""
+"""Plain data in messages: written as YAML, cut to one line, and named by its kind."""
 
 import math
 from itertools import islice
@@ -9,7 +9,7 @@ _ENTRIES = 8
 
 
 def shown(value: Any) -> str:
-    """Return the value much as it stands in the YAML, in one short line."""
+    """Return the value as YAML, in one short line."""
     return shortened(_flow(value, levels=3))
 
 
@@ -19,7 +19,7 @@ def shortened(text: str, width: int = _WIDTH) -> str:
 
 
 def kind(value: Any) -> str:
-    """Return what kind of value this is, with its article."""
+    """Return the kind of a value with its article, such as ``a list``."""
     kinds = {
         type(None): "nothing",
         bool: "a boolean",

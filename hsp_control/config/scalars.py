@@ -1,7 +1,7 @@
-"""The scalars of YAML 1.2: how they are recognised, and what they become.
+"""The scalars of YAML 1.2: how they are recognised and converted.
 
-PyYAML speaks YAML 1.1, where ``1e-3`` is a text, ``on`` is true, ``010`` is eight and
-``1:30`` is ninety; here they are what they look like.
+PyYAML reads YAML 1.1, where ``1e-3`` is text, ``on`` is true, ``010`` is eight and
+``1:30`` is ninety. In YAML 1.2 they are a number, text, ten and text.
 """
 
 from collections.abc import Callable
@@ -14,10 +14,12 @@ class Scalar(NamedTuple):
     """One kind of scalar.
 
     Attributes:
-        name: What it is called in messages.
-        convert: From its text to its value; a ValueError if that is impossible.
-        pattern: What it looks like without quotes, if it can be told from a text.
-        first: The characters that it can begin with; an empty one: it can be empty.
+        name: Its name in messages.
+        convert: Converts its text to its value; raises ValueError if it cannot.
+        pattern: Regular expression of its text without quotes; None if only a tag
+            selects it.
+        first: The characters that it can begin with; an empty string if the scalar can
+            be empty.
     """
 
     name: str
@@ -48,7 +50,7 @@ def _number(text: str) -> float:
 
 
 def _text(text: str) -> str:
-    text.encode()  # refuses half a character, as in "\ud800"
+    text.encode()  # raises for half of a surrogate pair, as in "\ud800"
     return text
 
 
@@ -66,7 +68,7 @@ SCALARS = {
         first=tuple("tTfF"),
     ),
     TAG + "int": Scalar(
-        "an integer of 64 bits",
+        "a 64-bit integer",
         _integer,
         pattern=r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+",
         first=tuple("-+0123456789"),
@@ -80,4 +82,4 @@ SCALARS = {
     ),
     TAG + "str": Scalar("text", _text),
 }
-"""Every scalar that a file may hold, by tag."""
+"""Every scalar that is allowed in a file, by tag."""

@@ -1,7 +1,7 @@
-"""The schema: what a YAML configuration may say, as a tree of typed models.
+"""The schema of a YAML configuration, as a tree of typed models.
 
-Each ``type:`` is one class in one visible union; the builders map it to the object of
-the same name. Units are SI: metres, radians, seconds.
+Each ``type:`` selects one class of a union; the builders map it to the object of the
+same name. Units are SI: metres, radians, seconds.
 """
 
 from typing import Annotated, Any, Literal
@@ -26,42 +26,47 @@ class Scenario(Model):
     """A whole configuration."""
 
     title: str = ""
-    """One line on what it shows; plots are headed by it."""
+    """One line that says what the configuration shows; the title of its plots."""
     description: str = ""
-    """More on it, for people."""
+    """A longer description, for readers."""
     robot: RobotModel
-    """The robot."""
+    """The robot that is controlled."""
     start: StartModel = StartModel()
-    """Where it starts."""
+    """Configuration and velocity at t = 0."""
     scene: SceneModel = SceneModel()
-    """What else there is."""
+    """The obstacles."""
     tasks: Annotated[dict[Name, AnyTask], Field(min_length=1, max_length=100)]
-    """Tasks by name; those of one priority are stacked at one level."""
+    """The tasks, by name; tasks of the same priority form one level."""
     contacts: Annotated[dict[Name, AnyContact], Field(max_length=100)] = Field(
         default_factory=dict
     )
-    """Where a robot with a free-flyer root rests, by name."""
+    """The contacts that support a robot with a free-flyer root, by name."""
     base: Literal["flying", "driven"] | None = None
-    """What moves a free-flyer root where no contact does."""
+    """For a free-flyer root without contacts: ``flying`` if nothing holds it,
+    ``driven`` if something outside the controller moves it."""
     limits: LimitsModel | None = None
-    """What efforts and motion are kept within; no limits by default."""
+    """Limits on efforts and motion that the controller keeps; no limits by default."""
     null_space: NullSpaceModel = NullSpaceModel()
-    """Where self-motion goes."""
+    """The control of self-motion: fields, metric and gain."""
     plant: AnyPlant = "rigid_body"
-    """What its efforts move, and how that differs from the controller's model."""
+    """The simulated system that the efforts act on, and its differences from the
+    controller's model."""
     compensation: CompensationModel = CompensationModel()
-    """What is done about that difference."""
+    """Compensators for the differences between the plant and the model."""
     simulation: SimulationModel = SimulationModel()
-    """How it is simulated."""
+    """Settings of the simulation."""
     live: LiveModel = LiveModel()
-    """How it is run live."""
+    """Settings of `hsp live`."""
     view: ViewModel = ViewModel()
-    """How it is shown."""
+    """Settings of the 3-D view."""
 
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a configuration, for editors."""
     schema = Scenario.model_json_schema()
+    for model in schema["$defs"].values():
+        if "const" in (kind := model.get("properties", {}).get("type", {})):
+            kind["description"] = f"{kind['const']}: {model['description']}"
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "hsp_control configuration"
     return schema

@@ -1,4 +1,4 @@
-"""Ask a pydantic model what it accepts, through its annotations alone."""
+"""What a pydantic model accepts, read from its annotations."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from types import UnionType
@@ -9,11 +9,11 @@ from pydantic.fields import FieldInfo
 
 
 class Shape(NamedTuple):
-    """What a value may be.
+    """The types that a value may have.
 
     Attributes:
-        options: The types that it may have; ``Any`` for one that we cannot look into.
-        metadata: What pydantic was told beside the type: bounds, discriminators.
+        options: The types; ``Any`` for a type whose inside is not known.
+        metadata: Pydantic's constraints beside the type: bounds, discriminators.
     """
 
     options: tuple[Any, ...]
@@ -26,7 +26,7 @@ class Shape(NamedTuple):
         return next((name for name in names if isinstance(name, str)), None)
 
     def bounds(self) -> tuple[int, int | None]:
-        """Return how few and how many entries (or characters) a value may have."""
+        """Return the smallest and largest number of entries, or of characters."""
         for option in self.options:
             if get_origin(option) is tuple and Ellipsis not in get_args(option):
                 return len(get_args(option)), len(get_args(option))
@@ -36,21 +36,21 @@ class Shape(NamedTuple):
 
 
 def shape(annotation: Any, *metadata: Any) -> Shape:
-    """Return the shape of an annotation, without the wrapping around its types."""
-    told = tuple(_flat(metadata))
+    """Return the shape of an annotation: its types without ``Annotated`` or aliases."""
+    known = tuple(_flat(metadata))
     if get_origin(annotation) is Annotated:
         inner, *more = get_args(annotation)
-        return shape(inner, *more, *told)
+        return shape(inner, *more, *known)
     if hasattr(annotation, "__value__"):  # an alias: type Gain = float | list[float]
-        return shape(annotation.__value__, *told)
+        return shape(annotation.__value__, *known)
     if get_origin(annotation) in (Union, UnionType):
         options = [o for o in get_args(annotation) if o is not type(None)]
         if len(options) > 1:
-            return Shape(tuple(options), told)
-        return shape(options[0], *told)
+            return Shape(tuple(options), known)
+        return shape(options[0], *known)
     if is_model(annotation) and issubclass(annotation, RootModel):
         return field_shape(annotation.model_fields["root"])
-    return Shape((annotation,), told)
+    return Shape((annotation,), known)
 
 
 def field_shape(field: FieldInfo) -> Shape:
@@ -59,12 +59,12 @@ def field_shape(field: FieldInfo) -> Shape:
 
 
 def is_model(option: Any) -> bool:
-    """Say whether a type is a pydantic model."""
+    """Return whether a type is a pydantic model."""
     return isinstance(option, type) and issubclass(option, BaseModel)
 
 
 def fields(option: Any) -> dict[str, FieldInfo]:
-    """Return the fields of a type by the key that the user writes; none if no model."""
+    """Return the fields of a model by the user's keys; {} for other types."""
     if not is_model(option):
         return {}
     return {
@@ -94,7 +94,7 @@ def tagged(options: Iterable[Any], discriminator: str) -> dict[Any, Any]:
 
 
 def literals(options: Iterable[Any]) -> list[Any]:
-    """Return the values that are listed one by one among the options."""
+    """Return the values of all ``Literal`` and ``Enum`` types among the options."""
     values: list[Any] = []
     for option in options:
         if get_origin(option) is Literal:
@@ -105,9 +105,9 @@ def literals(options: Iterable[Any]) -> list[Any]:
 
 
 def entry(option: Any, key: str | int) -> Shape | None:
-    """Return the shape of what stands at ``key`` in a value of this type.
+    """Return the shape of the value at ``key`` in a value of this type.
 
-    None if the type has no such place, or none that we know of.
+    None if the type has no such key, or the key is not known.
     """
     if is_model(option):
         field = fields(option).get(str(key))
@@ -124,7 +124,7 @@ def entry(option: Any, key: str | int) -> Shape | None:
 
 
 def _flat(metadata: Iterable[Any]) -> Iterator[Any]:
-    """Yield each datum, and those that a ``Field(...)`` holds."""
+    """Yield each item, and the items inside a ``Field(...)``."""
     for data in metadata:
         yield data
         yield from getattr(data, "metadata", ())

@@ -1,30 +1,31 @@
-"""What is wrong with a YAML text, in plain words and with the line."""
+"""YAML syntax errors, with the line and a message in plain words."""
 
 import yaml
 
 from hsp_control.config.keys import KeyPath
 
 _HINTS = {
-    r"'\t'": "a tab; indent with spaces",
+    r"'\t'": "a tab in the indentation; use spaces",
     "mapping values are not allowed": (
-        "no key can stand here; check the indentation, and quote texts that hold ': '"
+        "a key is not allowed here; check the indentation, and put text that contains "
+        "': ' in quotes"
     ),
-    "expected <block end>": "the indentation does not fit the lines above",
+    "expected <block end>": "the indentation does not match the lines above",
 }
-"""Plain words for what PyYAML says in those of its grammar."""
+"""Part of a message of PyYAML, and the message that replaces it."""
 
 
 class YamlError(Exception):
-    """A text that is not the YAML that we accept.
+    """The text is not YAML, or uses a part of YAML that is not allowed.
 
     Attributes:
-        line: The line that the message speaks of.
+        line: The line of the error, counted from 1.
         message: What is wrong there.
-        path: The key path that it speaks of, if the text was understood that far.
+        path: The key path of the error; empty if it is not known.
     """
 
     def __init__(self, line: int, message: str, path: KeyPath = ()) -> None:
-        """Keep the three apart: the caller knows the name of the file."""
+        """Store the parts; the caller adds the name of the file."""
         super().__init__(line, message, path)
         self.line = line
         self.message = message
@@ -32,12 +33,12 @@ class YamlError(Exception):
 
 
 def syntax_error(error: yaml.MarkedYAMLError) -> YamlError:
-    """Return PyYAML's error as ours."""
+    """Return the `YamlError` for an error of PyYAML."""
     problem, context = error.problem or "", error.context or ""
     mark = error.problem_mark or error.context_mark
     line = mark.line + 1 if mark else 1
-    for sign, hint in _HINTS.items():
-        if sign in problem:
+    for part_of_problem, hint in _HINTS.items():
+        if part_of_problem in problem:
             return YamlError(line, f"not YAML: {hint}")
     if context and error.context_mark and error.context_mark.line + 1 != line:
         context += f" from line {error.context_mark.line + 1}"
@@ -46,6 +47,7 @@ def syntax_error(error: yaml.MarkedYAMLError) -> YamlError:
 
 
 def character_error(error: yaml.reader.ReaderError, text: str) -> YamlError:
-    """Return PyYAML's error about a character that no YAML may hold as ours."""
+    """Return the `YamlError` for a character that YAML does not allow."""
     line = text.count("\n", 0, error.position) + 1
-    return YamlError(line, f"not YAML: the character U+{ord(text[error.position]):04X}")
+    character = f"U+{ord(text[error.position]):04X}"
+    return YamlError(line, f"not YAML: the character {character} is not allowed")

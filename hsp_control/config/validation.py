@@ -21,8 +21,8 @@ def validate(document: Document, model: type[Model]) -> Model:
     """Return the document as an instance of the pydantic model.
 
     Raises:
-        ConfigError: If it does not follow the model. The message tells the first
-            mistake in the order of the file, then up to five others, a line each.
+        ConfigError: If it does not follow the model. The message describes the
+            first mistake in the order of the file, then up to five others, a line each.
     """
     try:
         return model.model_validate(document.to_dict())
@@ -35,7 +35,7 @@ def validate(document: Document, model: type[Model]) -> Model:
 
 
 def _first_entries(pending: list[Pending]) -> list[Pending]:
-    """Leave out what is wrong far down in long lists, if very much is wrong."""
+    """Of very many errors, drop those of later entries in long lists."""
     if len(pending) <= _MANY:
         return pending
     first = [
@@ -47,7 +47,7 @@ def _first_entries(pending: list[Pending]) -> list[Pending]:
 
 
 def _order(document: Document, finding: Finding) -> tuple[bool, tuple[int, ...]]:
-    """Return what sorts findings by their place in the file, overrides at the end."""
+    """Return the sort key of a finding: its place in the file, overrides last."""
     mark = document.mark(finding.path)
     return mark is None, tuple(mark or ())
 

@@ -1,4 +1,4 @@
-"""Say in one line what is wrong, what is allowed instead, and what was meant."""
+"""Messages: in one line what is wrong, what is allowed, and what was likely meant."""
 
 import re
 from collections.abc import Collection, Iterable, Mapping
@@ -28,7 +28,7 @@ _LONG_LIST = 40
 
 
 def explained(finding: Finding) -> str:
-    """Return the message for a finding, without its place."""
+    """Return the message for a finding, without its location."""
     value, expected = finding.value, finding.expected
     match finding.kind:
         case "mismatch" if words := joined(_words(expected)):
@@ -55,8 +55,8 @@ def explained(finding: Finding) -> str:
         case "value_error" | "assertion_error":
             return str(finding.error["ctx"]["error"])
         case "key":
-            return f"the key {_in_pydantics_words(finding)}"
-    return _in_pydantics_words(finding)
+            return f"the key {_message_of_pydantic(finding)}"
+    return _message_of_pydantic(finding)
 
 
 def _unknown(value: Any, options: Iterable[Any]) -> str:
@@ -97,7 +97,7 @@ def _wrong_length(finding: Finding) -> str:
     elif most is not None:
         needs = f"at most {most}"
     else:
-        return _in_pydantics_words(finding)
+        return _message_of_pydantic(finding)
     return f"{shown(value)} has {count} {units[count != 1]}, needs {needs}"
 
 
@@ -112,15 +112,15 @@ def _out_of_bounds(finding: Finding) -> str:
     return f"{shown(finding.value)} is {wrong}; must be {words} {limit}"
 
 
-def _in_pydantics_words(finding: Finding) -> str:
-    """Return pydantic's message with the value in the place of its "Input"."""
+def _message_of_pydantic(finding: Finding) -> str:
+    """Return pydantic's message, with the value instead of its word "Input"."""
     value, message = shown(finding.value), finding.error["msg"]
     sentence = re.sub(r"^\w+ (?=should )", f"{value} ".replace("\\", r"\\"), message)
     return sentence if sentence != message else f"{value}: {message}"
 
 
 def _words(expected: Shape, *, many: bool = False) -> list[str]:
-    """Return the types in plain words, or nothing if one of them has none."""
+    """Return the types in plain words; an empty list if a type has no plain word."""
     found: list[str] = []
     for option in expected.options:
         choices = [shown(choice) for choice in literals([option])]

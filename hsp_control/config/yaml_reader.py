@@ -1,7 +1,7 @@
-"""Read a YAML text as plain data, and remember where in the text each key stands.
+"""Read a YAML text as plain data, and record the place of each key in the text.
 
-Nothing in a text is ever executed. What PyYAML would pass over in silence (a key given
-twice, a key that is no text, a tag, an alias that grows without bound) is refused.
+Nothing in a text is ever executed. What PyYAML accepts silently (a key given twice, a
+key that is not text, a tag, aliases that grow without bound) is an error here.
 """
 
 import re
@@ -15,15 +15,15 @@ from hsp_control.config.scalars import SCALARS, TAG
 from hsp_control.config.syntax import YamlError, character_error, syntax_error
 
 MAX_SIZE = 1_000_000
-"""Characters in a text; parsing that many takes seconds."""
+"""Most characters in a text; parsing that many takes seconds."""
 MAX_VALUES = 100_000
-"""Values in a text, counted after its aliases are expanded."""
+"""Most values in a text, counted after its aliases are expanded."""
 MAX_DEPTH = 50
-"""Levels of nesting."""
+"""Most levels of nesting."""
 
 
 class Mark(NamedTuple):
-    """A place in a text, counted from 1."""
+    """A place in a text: line and column, counted from 1."""
 
     line: int
     column: int
@@ -33,7 +33,7 @@ def read_yaml(text: str) -> tuple[Any, dict[KeyPath, Mark]]:
     """Return the plain data of a text, and the mark of every key path in it.
 
     Raises:
-        YamlError: If the text is not YAML, or more than plain data.
+        YamlError: If the text is not YAML, or holds more than plain data.
     """
     root = _compose(text)
     if root is None:
@@ -44,7 +44,7 @@ def read_yaml(text: str) -> tuple[Any, dict[KeyPath, Mark]]:
 
 
 class _Composer(yaml.BaseLoader):
-    """PyYAML's composer, with the scalars of YAML 1.2 and with bounds."""
+    """PyYAML's composer, with the scalars of YAML 1.2 and limits on size."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -77,7 +77,7 @@ def _compose(text: str) -> yaml.Node | None:
     except yaml.MarkedYAMLError as error:
         raise syntax_error(error) from None
     except (ValueError, OverflowError):  # raised by the scanner's own int() and chr()
-        message = "not YAML: an escape or a version that is out of range"
+        message = "not YAML: an escape sequence or a version number is out of range"
         raise YamlError(composer.line + 1, message) from None
 
 
@@ -94,7 +94,7 @@ class _Builder:
         _check_bounds(len(path) + 1, self._count, _mark(node).line)
         if id(node) in self._open:
             raise YamlError(
-                _mark(node).line, "an alias of a value that contains it", path
+                _mark(node).line, "an alias inside the value that it refers to", path
             )
         self._open.add(id(node))
         value: Any

@@ -1,1 +1,1 @@
-"""What must hold: contacts with the world, and limits of motors, joints and space."""
+"""Constraints: contacts with the world, and limits of motors, joints and distances."""

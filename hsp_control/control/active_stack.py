@@ -1,16 +1,19 @@
-"""What is on at one time: the contacts that bear and the tasks that count, stacked."""
+"""The active stack: the contacts that bear and the tasks that count at one time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.step_plan import StepPlan, steps
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.unactuated import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
-from hsp_control.law import Resolution
+from hsp_control.law import Outcome, Resolution
+from hsp_control.law.outcome import OUTCOMES
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
@@ -18,7 +21,7 @@ from hsp_control.tasks import Task, TaskSample
 
 
 class ActiveStack:
-    """The law for one set of contacts and tasks: rows in order of priority.
+    """The law for one set of contacts and tasks, with rows in order of priority.
 
     The first level, where there is a floating base, holds the contacts still and asks
     for no effort where nothing can give one; those of the tasks follow, and the field.
@@ -31,7 +34,7 @@ class ActiveStack:
         task_rows: Where each task's rows stand in the stack, by name.
         contact_rows: Where each contact's rows stand, by name.
         first_task_row: Where the rows of contacts end and those of tasks begin.
-        stack: All rows: J, J', e, e', a_x.
+        rows: All rows stacked: J, J', e, e', a_x.
     """
 
     def __init__(
@@ -58,12 +61,12 @@ class ActiveStack:
             first + sizes, robot.nv, metric.form, gain, threshold
         )
         problem = self.resolution.problem
-        self.stack = problem.task
-        self._held, self._rest = self.stack.rows(0, held), None
+        self.rows = problem.task
+        self._held, self._rest = self.rows.rows(0, held), None
         if free:
             self._rest = UnactuatedRows(robot, base, free)
-            self._free = self.stack.rows(held, held + free)
-        self._bound: tuple[RobotState, Metric, NullSpaceField] | None = None
+            self._free = self.rows.rows(held, held + free)
+        self._steps = IdentityCache(self._compile)
         self.contact_rows = _places(self.contacts, 0)
         tasks = [task for level in self.levels for task in level]
         self.first_task_row = held + free
@@ -71,42 +74,34 @@ class ActiveStack:
         parts: list[Task | Contact] = [*self.contacts, *tasks]
         places = [*self.contact_rows.values(), *self.task_rows.values()]
         self._parts = tuple(
-            (part, self.stack.rows(where.start, where.stop))
+            (part, self.rows.rows(where.start, where.stop))
             for part, where in zip(parts, places, strict=True)
         )
 
     def resolve(
         self, state: RobotState, metric: Metric, field: NullSpaceField
-    ) -> float:
-        """Resolve contacts, tasks and field: see `resolution` for what comes out.
-
-        Returns:
-            `EXACT`, `DAMPED` or `NOT_FINITE`.
-        """
-        bound = self._bound
-        if bound is None or bound[0] is not state or bound[2] is not field:
-            self._compile(state, metric, field)
+    ) -> Outcome:
+        """Resolve contacts, tasks and field; `resolution` holds the results."""
         t, outcome = state.t, 0.0
-        for step in self._steps:
+        for step in self._steps(state, metric, field):
             outcome = step(t)
-        return outcome
+        return OUTCOMES[int(outcome)]
 
     def _compile(
         self, state: RobotState, metric: Metric, field: NullSpaceField
-    ) -> None:
-        """Collect what a step calls."""
+    ) -> list[Callable[[float], Any]]:
+        """Return what a step calls with the time, in order."""
         problem = self.resolution.problem
-        bounds = [part.compile(state, sample) for part, sample in self._parts]
+        plans = [part.compile(state, sample) for part, sample in self._parts]
         if self._rest is not None:
             rest = partial(self._rest.evaluate, state, self._held, self._free)
-            bounds.append(StepPlan(write=(rest,)))
-        bounds.append(metric.compile(state, problem.metric))
-        bounds.append(field.compile(state, problem.metric, metric.form, problem.field))
+            plans.append(StepPlan(write=(rest,)))
+        plans.append(metric.compile(state, problem.metric))
+        plans.append(field.compile(state, problem.metric, metric.form, problem.field))
         law = self.resolution.compile(state.v, controls=field.controls)
-        self._steps = steps(bounds, law)
-        self._bound = state, metric, field
+        return steps(plans, law)
 
-    def culprit(self) -> str | None:
+    def not_finite(self) -> str | None:
         """Return which task's or contact's numbers are not finite, if any are."""
         for part, sample in self._parts:
             if not all(np.isfinite(array).all() for array in sample):

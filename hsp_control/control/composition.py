@@ -1,4 +1,4 @@
-"""Whether the parts of a controller belong together."""
+"""Checks that the parts of a controller fit together."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
@@ -17,11 +17,11 @@ from hsp_control.tasks import Task
 from hsp_control.tasks.gains import as_gain, as_matrix
 
 Base = Literal["flying", "driven"]
-"""What moves a free-flyer root where no contact does."""
+"""What else than contacts acts on a free-flyer root: nothing, or an outside device."""
 
 
 def levels_of(tasks: Sequence[Task | Sequence[Task]]) -> tuple[tuple[Task, ...], ...]:
-    """Return the tasks level by level; a plain list of tasks is one level.
+    """Return the tasks of each level; a plain list of tasks is one level.
 
     Raises:
         ControllerError: If tasks and lists of tasks are mixed.
@@ -31,7 +31,7 @@ def levels_of(tasks: Sequence[Task | Sequence[Task]]) -> tuple[tuple[Task, ...],
     if single and nested:
         raise ControllerError(
             "tasks mixes tasks and lists of tasks; needs a list of tasks (one level) "
-            "or a list of lists (one a level)"
+            "or a list of lists (one per level)"
         )
     return tuple(nested) if nested else (tuple(single),)
 
@@ -39,10 +39,10 @@ def levels_of(tasks: Sequence[Task | Sequence[Task]]) -> tuple[tuple[Task, ...],
 def check_parts(
     robot: Robot, levels: Sequence[Sequence[Task]], field: NullSpaceField
 ) -> None:
-    """Refuse tasks and a field that are not one robot's, or too many.
+    """Check that tasks and field belong to the robot, and that no level is too large.
 
     Raises:
-        ControllerError: Names the culprit.
+        ControllerError: Names the task, the field or the level.
     """
     tasks = [task for level in levels for task in level]
     if not tasks or not all(levels):
@@ -50,7 +50,9 @@ def check_parts(
     names = [task.name for task in tasks]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise ControllerError(f"two tasks are called {twice[0]!r}; give them names")
+        raise ControllerError(
+            f"two tasks are called {twice[0]!r}; give them distinct names"
+        )
     parts: list[Task | NullSpaceField] = [*tasks, field]
     for part in parts:
         if part.robot is not robot:
@@ -66,15 +68,23 @@ def check_parts(
             where = f" of level {number}" if len(levels) > 1 else ""
             raise ControllerError(
                 f"the tasks{where} have {rows} rows ({each}); "
-                f"{robot.name} has only {robot.nv} freedoms"
+                f"{robot.name} has only {robot.nv} degrees of freedom"
             )
 
 
 def checked_gain(gain: Any, robot: Robot, metric: Metric) -> Array:
-    """Return K_N as a matrix for which V' = -e_NᵀW K_N e_N < 0.
+    """Return K_N as a matrix, checked for V' = -e_NᵀW K_N e_N < 0.
 
-    For the mass matrix W changes with q; there K_N alone is asked to be positive
-    definite, and only a multiple of the identity is proved for every q.
+    If W is the mass matrix it changes with q: then K_N alone must be positive definite,
+    and decay at every q is proved only for multiples of the identity.
+
+    Args:
+        gain: K_N: a scalar, shape (nv,) or (nv, nv) [1/s].
+        robot: The robot.
+        metric: The metric W.
+
+    Raises:
+        GainError: If K_N has another shape, or the null-space error would not decay.
     """
     K_N = as_matrix(as_gain(gain, "null_space_gain"), robot.nv, "null_space_gain")
     sample = MetricSample.allocate(robot.nv)
@@ -82,41 +92,45 @@ def checked_gain(gain: Any, robot: Robot, metric: Metric) -> Array:
         state = robot.state(0.0, robot.neutral(), np.zeros(robot.nv))
         metric.evaluate(state, sample)
     decay = sample.W @ K_N
-    least = float(np.linalg.eigvalsh(0.5 * (decay + decay.T))[0])
-    if least <= 0.0:
+    smallest = float(np.linalg.eigvalsh(0.5 * (decay + decay.T))[0])
+    if smallest <= 0.0:
         raise GainError(
-            "null_space_gain does not make the null-space error decay: the least "
-            f"eigenvalue of W K_N is {least:.3g}; must be greater than 0"
+            "null_space_gain does not make the null-space error decay: the smallest "
+            f"eigenvalue of W K_N is {smallest:.3g}; must be greater than 0"
         )
     return K_N
 
 
 def check_support(robot: Robot, contacts: Sequence[Contact], base: Base | None) -> None:
-    """Refuse a floating base without support, and support without a floating base.
+    """Check that contacts and ``base`` are given exactly where the robot needs them.
 
     Raises:
-        ContactError: If they do not fit.
+        ContactError: If a floating base has neither, a fixed base has one of them, or a
+            contact has another robot or a duplicate name.
     """
     if base not in {None, "flying", "driven"}:
         raise ContactError(f"base is {base!r}; needs 'flying', 'driven' or None")
     if not robot.unactuated:
         if contacts or base is not None:
             raise ContactError(
-                f"{robot.name} has no free-flyer root: contacts and base are for "
-                "robots that may fall"
+                f"{robot.name} has no free-flyer root: contacts and base are only for "
+                "robots with a floating base"
             )
         return
     if not contacts and base is None:
         raise ContactError(
             f"no motor moves the free-flyer root of {robot.name}: declare contacts, or "
-            "base='flying' (nothing holds it), or base='driven' (something else does)"
+            "base='flying' (nothing acts on it), or base='driven' (something else "
+            "moves it)"
         )
     if contacts and base == "driven":
-        raise ContactError("base='driven' needs no contacts, and there are some")
+        raise ContactError("base='driven' needs no contacts, but contacts are given")
     names = [contact.name for contact in contacts]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise ContactError(f"two contacts are called {twice[0]!r}; give them names")
+        raise ContactError(
+            f"two contacts are called {twice[0]!r}; give them distinct names"
+        )
     for contact in contacts:
         if contact.robot is not robot:
             raise ContactError(
@@ -126,14 +140,14 @@ def check_support(robot: Robot, contacts: Sequence[Contact], base: Base | None) 
 
 
 def check_schedules(schedules: Mapping[str, Any], tasks: Sequence[str]) -> None:
-    """Refuse schedules of tasks that do not exist.
+    """Check that every schedule belongs to an existing task.
 
     Raises:
-        ControllerError: Names the nearest task.
+        ControllerError: Names the unknown task, and the most similar one.
     """
     for name in schedules:
         if name not in tasks:
             raise ControllerError(
-                f"there is no task {name!r} to be scheduled"
+                f"there is no task {name!r} to schedule"
                 f"{did_you_mean(name, tasks)} (there are {listing(tasks)})"
             )

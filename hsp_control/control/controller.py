@@ -1,6 +1,7 @@
 """The controller: tasks, a null-space field and a metric make one effort."""
 
 from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ from hsp_control.common.exceptions import ControllerError, NonFiniteError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.actuation import Actuation
+from hsp_control.control.actuation import Actuation, Status
 from hsp_control.control.composition import (
     Base,
     check_parts,
@@ -20,7 +21,7 @@ from hsp_control.control.composition import (
     checked_gain,
     levels_of,
 )
-from hsp_control.law import DAMPED, NOT_FINITE, Resolution
+from hsp_control.law import Outcome, Resolution
 from hsp_control.null_space.fields import FieldSample, NullSpaceField, Rest
 from hsp_control.null_space.fields.crossfade import crossfade
 from hsp_control.null_space.metrics import IdentityMetric, Metric
@@ -31,7 +32,8 @@ from hsp_control.tasks.gain_ramp import GainRamp
 from hsp_control.trajectories.schedule import Schedule
 
 
-class ControlOutput(NamedTuple):
+@dataclass(slots=True)
+class ControlOutput:
     """The effort at one state, and everything that explains it.
 
     The arrays are the controller's own and are overwritten by its next `compute`: copy
@@ -46,8 +48,9 @@ class ControlOutput(NamedTuple):
         damped: Whether a task is so near a singularity that the law was bounded
             rather than exact.
         forces: At the points of the contacts that bear, in the axes of each (two
-            tangents, normal), shape (3 points,) [N]; see `Mode.support`.
-        status: What of the law could be delivered: `actuation.status`.
+            tangents, normal), shape (3 points,) [N]; see
+            `ActiveStack.support`.
+        status: How much of the law could be delivered.
         relaxation: By how much the worst limit is missed, where limits contradict each
             other [rad/s² or m/s²].
     """
@@ -59,12 +62,8 @@ class ControlOutput(NamedTuple):
     null_space_error: Array
     damped: bool
     forces: Array
-    status: int
+    status: Status
     relaxation: float
-
-
-_output = tuple.__new__
-"""Makes a `ControlOutput` in half the time that calling it takes."""
 
 
 class Diagnostics(NamedTuple):
@@ -180,8 +179,8 @@ class Controller:
         self._actuation = Actuation(
             robot, limits, () if base == "driven" else robot.unactuated
         )
-        self._modes: dict[tuple[Any, ...], ActiveStack] = {}
-        self._mode: ActiveStack | None = None
+        self._stacks: dict[tuple[Any, ...], ActiveStack] = {}
+        self._active: ActiveStack | None = None
         self._mixed, self._modified = np.zeros(robot.nv), np.zeros(robot.nv)
         self._ramps: list[GainRamp] = []
         self._next_field: tuple[float, NullSpaceField] | None = None
@@ -215,38 +214,33 @@ class Controller:
             self._ramps = [ramp for ramp in self._ramps if not ramp.apply(state.t)]
         if self._next_field is not None and state.t >= self._next_field[0]:
             self.field, self._next_field = self._next_field[1], None
-        mode = self._mode
-        if mode is None or not self._timeless:
-            a, how = self._scheduled(state)
-            mode = self.mode
+        active = self._active
+        if active is None or not self._timeless:
+            a, outcome = self._scheduled(state)
+            active = self.active_stack
         else:
-            how = mode.resolve(state, self.metric, self.field)
-            a = mode.resolution.acceleration
-        if how == NOT_FINITE:
+            outcome = active.resolve(state, self.metric, self.field)
+            a = active.resolution.acceleration
+        if outcome is Outcome.NOT_FINITE:
             self._explain_non_finite(state)
         offset = None
         if modifier is not None:
-            self._modified[:], offset = modifier(state, mode, a)
+            self._modified[:], offset = modifier(state, active, a)
             a = self._modified
-        resolution = mode.resolution
+        resolution = active.resolution
         tau, a, forces, status, relaxation = self._actuation.deliver(
-            state, a, resolution, mode.support, offset
+            state, a, resolution, active.support, offset
         )
-        problem, e_N = resolution.problem, resolution.null_space_error
-        return _output(
-            ControlOutput,
-            (
-                tau,
-                a,
-                mode.stack,
-                problem.field,
-                e_N,
-                how == DAMPED,
-                forces,
-                status,
-                relaxation,
-            ),
-        )
+        # By name, and without a call of nine arguments, which costs 1 µs.
+        output = object.__new__(ControlOutput)
+        output.tau, output.acceleration = tau, a
+        output.task = active.rows
+        output.field = resolution.problem.field
+        output.null_space_error = resolution.null_space_error
+        output.damped = outcome is Outcome.DAMPED
+        output.forces = forces
+        output.status, output.relaxation = status, relaxation
+        return output
 
     def applied(self, tau: Array, period: float) -> None:
         """Take note of an effort that goes out, and of when the next one will.
@@ -265,10 +259,10 @@ class Controller:
         for task in self.tasks:
             task.offset[:] = 0.0
 
-    def _scheduled(self, state: RobotState) -> tuple[Array, float]:
+    def _scheduled(self, state: RobotState) -> tuple[Array, Outcome]:
         """Return the law's acceleration with what the schedules have on.
 
-        And what became of the law, see `Mode.resolve`.
+        And whether the law is exact.
 
         A task that comes or goes has a weight between 0 and 1. With w1 ≥ w2 ≥ ... the
         weights of such tasks, the acceleration is
@@ -291,24 +285,25 @@ class Controller:
         shares = [1.0, *(weights[name] for name in coming), 0.0]
         mixed = self._mixed
         mixed[:] = 0.0
-        how = 0.0
+        outcome = Outcome.EXACT
         for k, (share, following) in enumerate(pairwise(shares)):
-            self._mode = self._mode_without(state, off - set(coming[:k]))
-            how = max(how, self._mode.resolve(state, self.metric, self.field))
-            a = self._mode.resolution.acceleration
+            active = self._stack_without(state, off - set(coming[:k]))
+            self._active = active
+            outcome = max(outcome, active.resolve(state, self.metric, self.field))
+            a = active.resolution.acceleration
             if not coming:
                 break
             mixed += (share - following) * a
             a = mixed
-        return a, how
+        return a, outcome
 
-    def _mode_without(self, state: RobotState, off: Set[str]) -> ActiveStack:
-        """Return the mode of the contacts that bear now, without some tasks."""
+    def _stack_without(self, state: RobotState, off: Set[str]) -> ActiveStack:
+        """Return the stack of the contacts that bear now, without some tasks."""
         bearing = tuple(c for c in self.contacts if c.schedule.active(state.t))
         key = (tuple(c.name for c in bearing), frozenset(off))
-        if key not in self._modes:
+        if key not in self._stacks:
             levels = [[t for t in level if t.name not in off] for level in self.levels]
-            self._modes[key] = ActiveStack(
+            self._stacks[key] = ActiveStack(
                 state,
                 bearing,
                 levels,
@@ -318,25 +313,25 @@ class Controller:
                 self.null_space_gain,
                 self._threshold,
             )
-        return self._modes[key]
+        return self._stacks[key]
 
     # -- what explains it -------------------------------------------------------------
 
     @property
-    def mode(self) -> ActiveStack:
-        """What was on at the last `compute`.
+    def active_stack(self) -> ActiveStack:
+        """The contacts and tasks that the last `compute` resolved.
 
         Raises:
             ControllerError: If there was none yet.
         """
-        if self._mode is None:
+        if self._active is None:
             raise ControllerError("nothing has been computed yet")
-        return self._mode
+        return self._active
 
     def stack(self, state: RobotState) -> TaskSample:
         """Return the rows of all contacts and tasks that count at a state."""
         self._scheduled(state)
-        return self.mode.stack
+        return self.active_stack.rows
 
     def level_of(self, task: str) -> int:
         """Return the level that a task is at, 0 the highest.
@@ -354,17 +349,18 @@ class Controller:
     @property
     def task_rows(self) -> dict[str, slice]:
         """Where each task's rows stand in the last output's stack, by name."""
-        return self.mode.task_rows
+        return self.active_stack.task_rows
 
     @property
     def field_sample(self) -> FieldSample:
         """The field, g and g', at the last `compute`."""
-        return self.mode.resolution.problem.field
+        return self.active_stack.resolution.problem.field
 
     def diagnose(self, state: RobotState) -> Diagnostics:
         """Return what one would plot, after `compute` at the same state."""
-        resolution = self.mode.resolution
-        singular_values, manipulability = resolution.spectrum(self.mode.first_task_row)
+        active = self.active_stack
+        resolution = active.resolution
+        singular_values, manipulability = resolution.spectrum(active.first_task_row)
         return Diagnostics(
             self.field.value(state),
             resolution.null_space_norm(),
@@ -380,20 +376,21 @@ class Controller:
         """
         state = self.robot.state(t, q, np.zeros(self.robot.nv))
         self.compute(state)
-        mode, problem = self.mode, self.mode.resolution.problem
+        active = self.active_stack
+        problem = active.resolution.problem
         # At rest, without drift and with unit gain the law's acceleration is the flow.
         flow = Resolution(
-            np.diff(mode.resolution.ends, prepend=0).tolist(),
+            np.diff(active.resolution.ends, prepend=0).tolist(),
             self.robot.nv,
             min(self.metric.form, CONSTANT),
             np.eye(self.robot.nv),
             self._threshold,
         )
-        flow.problem.task.jacobian[:] = mode.stack.jacobian
-        for level in mode.levels:
+        flow.problem.task.jacobian[:] = active.rows.jacobian
+        for level in active.levels:
             for task in level:
                 rate = task.reference_rate(state)
-                flow.problem.task.acceleration[mode.task_rows[task.name]] = rate
+                flow.problem.task.acceleration[active.task_rows[task.name]] = rate
         flow.problem.field.g[:] = problem.field.g
         flow.problem.metric.W[:], flow.problem.metric.L[:] = problem.metric[:2]
         return flow.resolve(state.v).acceleration
@@ -427,7 +424,7 @@ class Controller:
         self.levels = tuple(tuple(each) for each in levels)
         self.tasks = tuple(each for row in self.levels for each in row)
         self.schedules[task.name] = Schedule([(start, np.inf)], ramp=ramp)
-        self._modes.clear()
+        self._stacks.clear()
         self._timeless = False
 
     def remove_task(self, name: str, *, start: float, ramp: float) -> None:
@@ -486,17 +483,17 @@ class Controller:
         self._next_field = start + ramp, field
 
     def _explain_non_finite(self, state: RobotState) -> None:
-        culprit = self.mode.culprit()
-        if culprit is not None:
+        part = self.active_stack.not_finite()
+        if part is not None:
             raise NonFiniteError(
-                f"{culprit} is not finite at t = {state.t:.6g} s; "
+                f"{part} is not finite at t = {state.t:.6g} s; "
                 "does its trajectory return NaN or infinity there?"
             )
         if not all(np.isfinite(array).all() for array in self.field_sample):
             raise NonFiniteError(
                 f"field {self.field.name!r} is not finite at t = {state.t:.6g} s"
             )
-        problem = self.mode.resolution.problem
+        problem = self.active_stack.resolution.problem
         self.metric.evaluate(state, problem.metric)  # may say what is wrong with it
         raise NonFiniteError(
             f"the effort is not finite at t = {state.t:.6g} s, "

@@ -1,4 +1,4 @@
-"""What the parts of a loop tell of themselves, for the log."""
+"""Log channels: values that parts of the control loop report to the log."""
 
 from typing import NamedTuple
 
@@ -6,12 +6,12 @@ from hsp_control.common.arrays import Array
 
 
 class LogChannel(NamedTuple):
-    """Something that a plant can tell of itself; it becomes a column of the log.
+    """A value that a plant or a compensator reports; it becomes a column of the log.
 
     Attributes:
-        value: A number or an array whose shape never changes.
+        value: A number, or an array of constant shape.
         unit: Its SI unit.
-        meaning: What it is, in a few words.
+        meaning: A short description.
     """
 
     value: Array | float

@@ -1,4 +1,4 @@
-"""Geometry of links, and distances between shapes."""
+"""Shapes of links and obstacles, and the distances between them."""
 
 from .links import LinkShape as LinkShape
 from .links import Proxy as Proxy

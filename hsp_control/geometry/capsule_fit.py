@@ -1,63 +1,71 @@
-"""The smallest capsule that holds a set of points."""
+"""Fit a small capsule around a set of points."""
 
 from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from scipy.optimize import minimize
 
 from hsp_control.common.arrays import Array
 
 
 def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
-    """Return the ends and the radius of a small capsule that holds the points.
+    """Return the ends and the radius of a small capsule that contains all points.
 
-    Its axis is found by a local search over direction and offset from each of the
-    three principal axes; for a given axis the shortest segment is exact.
+    The direction and the offset of its axis minimise the volume, by a local search from
+    each of the three principal axes. For a given axis the segment is the shortest.
 
     Args:
         points: Shape (k, 3) [m].
 
     Returns:
-        (first end, second end, radius); the ends are equal for a ball.
+        (first end (3,), second end (3,), radius) [m]; for a sphere the ends are equal.
     """
+    from scipy.optimize import minimize  # here: SciPy takes long to import
+
     center = points.mean(axis=0)
     spread = points - center
-    axes = np.linalg.svd(spread.T @ spread)[2]  # three, however few the points
+    axes = np.linalg.svd(spread.T @ spread)[
+        2
+    ]  # always three, also for one or two points
     candidates = []
     for k in range(len(axes)):
-        frame = np.roll(axes, -k, axis=0)  # its first row is the axis tried
+        frame = np.roll(axes, -k, axis=0)  # the first row is the initial axis
         scale = float(np.ptp(points, axis=0).max()) or 1.0
-        search = partial(_axis, center, frame, scale)
+        axis = partial(_axis, center, frame, scale)
         found = minimize(
-            partial(_volume_along, points, search),
+            partial(_volume, points, axis),
             np.zeros(4),
             method="Nelder-Mead",
             options={"xatol": 1e-5, "fatol": 1e-12, "maxiter": 600},
         )
-        candidates.append((float(found.fun), k, search(found.x)))
+        candidates.append((float(found.fun), k, axis(found.x)))
     _, _, (anchor, direction) = min(candidates, key=lambda candidate: candidate[:2])
     low, high, radius = _segment(points, anchor, direction)
     return anchor + low * direction, anchor + high * direction, radius
 
 
 def _axis(center: Array, frame: Array, scale: float, x: Array) -> tuple[Array, Array]:
+    """Return a point and the direction of the axis with parameters x, shape (4,)."""
     direction = frame[0] + x[0] * frame[1] + x[1] * frame[2]
     anchor = center + scale * (x[2] * frame[1] + x[3] * frame[2])
     return anchor, direction / np.linalg.norm(direction)
 
 
-def _volume_along(
-    points: Array, search: Callable[[Array], tuple[Array, Array]], x: Array
+def _volume(
+    points: Array, axis: Callable[[Array], tuple[Array, Array]], x: Array
 ) -> float:
-    low, high, radius = _segment(points, *search(x))
+    low, high, radius = _segment(points, *axis(x))
     return float(np.pi * radius**2 * (high - low + 4.0 / 3.0 * radius))
 
 
 def _segment(
     points: Array, anchor: Array, direction: Array
 ) -> tuple[float, float, float]:
-    """Return the shortest segment on an axis whose capsule holds the points."""
+    """Return the shortest segment on an axis whose capsule contains the points.
+
+    Returns:
+        (low, high, radius): the ends of the segment along the axis, and the radius.
+    """
     along = (points - anchor) @ direction
     across = np.linalg.norm(points - anchor - np.outer(along, direction), axis=1)
     radius = float(across.max())

@@ -1,14 +1,16 @@
-"""Pairs whose distance is a formula, with its gradient's exact rate, by kernels.
+"""Distances in closed form, with the exact rate of their gradients, as kernels.
 
-A link is a ball or a capsule: a segment that its joint carries, grown by a radius. The
-other is such a link, an obstacle that is one, or, before a ball, a solid.
+A link is a sphere or a capsule: all points within a radius of a segment, its core. The
+other shape is such a link, an obstacle that is a sphere or a capsule, or, if the link
+is a sphere, a solid (box, cylinder or half-space).
 
 With x and y the nearest points of the two cores and n = (x - y)/|x - y|,
 
     ∇d = J_xᵀ n - J_yᵀ n,    d' = n · (x' - y'),
 
-x' and y' with the nearest points' own sliding. The column (l, w) of a joint at the
-world's origin gives l·n + w·(x × n), whose rate is a matter of the product rule.
+where x' and y' include the motion of the nearest points along their cores. A column
+(l, w) of a joint's Jacobian at the world's origin contributes l·n + w·(x × n) to the
+gradient; the product rule gives its rate.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,6 +20,7 @@ import coal
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.rotations import cross, rotate, rotate_back
@@ -39,30 +42,27 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import joint_support
 from hsp_control.trajectories.following import stay
 
-MOTION = 18
-"""Numbers that say how an obstacle is and moves: R, c, c', ω; see `Obstacle.follow`."""
+MOTION_SIZE = 18
+"""Size of an obstacle's motion, R, c, c' and ω: see `Obstacle.follow`."""
 
 
 def has_closed_form(first: LinkShape, second: LinkShape | Obstacle) -> bool:
-    """Return whether the distance of a link to another thing is a formula."""
+    """Return whether the distance of a link to a link or obstacle has a closed form."""
     if not isinstance(first.geometry, coal.Sphere | coal.Capsule):
         return False
     if isinstance(second, LinkShape):
         return isinstance(second.geometry, coal.Sphere | coal.Capsule)
     if isinstance(second.shape, Sphere | Capsule):
         return True
-    ball = isinstance(first.geometry, coal.Sphere)
-    return ball and isinstance(second.shape, Box | Cylinder | HalfSpace)
+    is_sphere = isinstance(first.geometry, coal.Sphere)
+    return is_sphere and isinstance(second.shape, Box | Cylinder | HalfSpace)
 
 
-_Derived = tuple[RobotState, Array, Array, Array, Array, Callable[[], Any]]
-
-
-class ClosedForm:
-    """Distances of such pairs at one state, and sums of their gradients.
+class ClosedFormDistances:
+    """Distances in closed form at one state, and weighted sums of their gradients.
 
     Attributes:
-        measurements: How often they were measured, at whatever state, shape (1,).
+        measurements: Number of calls of `measure`, at any state, shape (1,).
     """
 
     def __init__(
@@ -73,18 +73,18 @@ class ClosedForm:
         pairs: Indices,
         places: Indices,
     ) -> None:
-        """Prepare.
+        """Allocate the arrays.
 
         Args:
             robot: The robot.
             links: Shapes of its links.
-            obstacles: Obstacles.
+            obstacles: The obstacles.
             pairs: Indices into links followed by obstacles, shape (k, 2).
-            places: Where each pair stands among all of a `Proximity`, shape (k,).
+            places: Index of each pair among all pairs of the `Proximity`, shape (k,).
         """
         self._pairs, self._places = pairs, places
         used = np.unique(pairs)
-        self._motion = np.zeros((len(obstacles), MOTION))
+        self._motion = np.zeros((len(obstacles), MOTION_SIZE))
         followers = [
             obstacle.follow(self._motion[k])
             for k, obstacle in enumerate(obstacles)
@@ -112,22 +112,19 @@ class ClosedForm:
         self._cores = np.zeros((len(pairs), 3, 3))
         self._scratch = np.zeros((40, 3))
         self.measurements: Indices = np.zeros(1, dtype=np.int64)
-        self._measured: tuple[RobotState, Array, StepPlan] | None = None
-        self._derived: _Derived | None = None
+        self.compile = IdentityCache(self._compile)
+        self._derivatives = IdentityCache(self.derivatives)
 
     def measure(self, state: RobotState, distances: Array) -> None:
-        """Write the distances, each in its place."""
-        bound = self.compile(state, distances)
-        for follow in bound.follow:
+        """Write the distances [m] at the indices ``places`` of ``distances``."""
+        plan = self.compile(state, distances)
+        for follow in plan.follow:
             follow(state.t)
-        for write in bound.write:
+        for write in plan.write:
             write()
 
-    def compile(self, state: RobotState, distances: Array) -> StepPlan:
-        """Return what `measure` does with this state and this array."""
-        measured = self._measured
-        if measured and measured[0] is state and measured[1] is distances:
-            return measured[2]
+    def _compile(self, state: RobotState, distances: Array) -> StepPlan:
+        """Return the step plan of `measure` for this state and this array."""
         measure = bind(
             _measure,
             self.measurements,
@@ -143,12 +140,13 @@ class ClosedForm:
             self._scratch,
             distances,
         )
-        bound = StepPlan(self._moving, (measure,))
-        self._measured = state, distances, bound
-        return bound
+        return StepPlan(self._moving, (measure,))
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
-        """Return the points on both shapes, and the normal from first to second."""
+        """Return the witness points [m] and the unit normal from first to second.
+
+        For the k-th of these pairs, in world axes, shape (3,) each.
+        """
         x, y, n = self._cores[k]
         first, second = self._sizes[self._pairs[k], 6]
         return x - first * n, y + second * n, -n
@@ -157,7 +155,7 @@ class ClosedForm:
         self,
         state: RobotState,
         slopes: Array,
-        bends: Array,
+        curvatures: Array,
         gradient: Array,
         rate: Array,
     ) -> None:
@@ -165,33 +163,22 @@ class ClosedForm:
 
         Args:
             state: The robot's state.
-            slopes: b' of all pairs of the `Proximity`.
-            bends: b'' of them.
-            gradient: Where to write, shape (nv,).
-            rate: Where to write, shape (nv,).
+            slopes: b'(d_k) of all pairs of the `Proximity`.
+            curvatures: b''(d_k) of all pairs of the `Proximity`.
+            gradient: Is overwritten with the sum, shape (nv,).
+            rate: Is overwritten with the rate of the sum, shape (nv,).
         """
-        bound = self._derived
-        if (
-            bound is None
-            or bound[0] is not state
-            or bound[1] is not slopes
-            or bound[2] is not bends
-            or bound[3] is not gradient
-            or bound[4] is not rate
-        ):
-            arrays = slopes, bends, gradient, rate
-            self._derived = bound = state, *arrays, self.derivatives(state, *arrays)
-        bound[5]()
+        self._derivatives(state, slopes, curvatures, gradient, rate)()
 
     def derivatives(
         self,
         state: RobotState,
         slopes: Array,
-        bends: Array,
+        curvatures: Array,
         gradient: Array,
         rate: Array,
     ) -> Callable[[], Any]:
-        """Return what `differentiate` does with this state and these arrays."""
+        """Return the bound kernel of `differentiate` for these arguments."""
         world = state.world
         return bind(
             _differentiate,
@@ -208,14 +195,14 @@ class ClosedForm:
             self._segments,
             self._scratch,
             slopes,
-            bends,
+            curvatures,
             gradient,
             rate,
         )
 
 
 def _link(link: LinkShape) -> list[float]:
-    """Return a link's segment in its joint's frame (start, axis), and its radius."""
+    """Return a link's segment in its joint's frame (start, axis) and its radius."""
     half = getattr(link.geometry, "halfLength", 0.0)
     axis = half * link.placement.rotation[:, 2]
     center = link.placement.translation
@@ -224,7 +211,7 @@ def _link(link: LinkShape) -> list[float]:
 
 
 def _obstacle(shape: Shape) -> tuple[int, list[float]]:
-    """Return an obstacle's kind and, in its own frame, its segment or size."""
+    """Return the kind of an obstacle, and its segment or size in its own frame."""
     if isinstance(shape, Sphere):
         return SEGMENT, [0.0] * 6 + [shape.radius]
     if isinstance(shape, Capsule):
@@ -253,7 +240,7 @@ def _measure(
     scratch: Array,
     distances: Array,
 ) -> None:
-    """Bring all segments into the world, write distances and (x, y, n) of each pair."""
+    """Write the segments in the world, and the distance and (x, y, n) of each pair."""
     measurements[0] += 1
     for k in range(used.shape[0]):
         i = used[k]
@@ -270,21 +257,21 @@ def _measure(
             distances[places[k]] = direction(core) - sizes[i, 6] - sizes[j, 6]
         else:
             x, n, moving = segments[i, 0], core[2], motion[-1 - kinds[j, 1]]
-            apart = _to_solid(kinds[j, 0], sizes[j], moving, x, local, H, n)
+            distance = _to_solid(kinds[j, 0], sizes[j], moving, x, local, H, n)
             for a in range(3):
                 core[0, a] = x[a]
-                core[1, a] = x[a] - apart * n[a]
-            distances[places[k]] = apart - sizes[i, 6]
+                core[1, a] = x[a] - distance * n[a]
+            distances[places[k]] = distance - sizes[i, 6]
 
 
 @kernel
 def _place(
     placements: Array, motion: Array, sizes: Array, i: int, joint: int, segments: Array
 ) -> None:
-    """Write a segment's start and axis in the world; a ball has no axis."""
+    """Write a segment's start and axis in the world; the axis of a sphere is zero."""
     for a in range(3):
         start = axis = 0.0
-        if joint >= 0:  # Pinocchio's rotations lie column by column
+        if joint >= 0:  # Pinocchio stores rotations column by column
             for b in range(3):
                 start += placements[joint, 3 * b + a] * sizes[i, b]
                 axis += placements[joint, 3 * b + a] * sizes[i, 3 + b]
@@ -308,17 +295,17 @@ def _to_solid(
     H: Array,
     n: Array,
 ) -> float:
-    """Return the distance of a point in the world to a solid, write its world normal.
+    """Return the distance of a point in the world to a solid, and write the normal.
 
-    H is written in the solid's own axes.
+    The normal n is in world axes, the Hessian H in the solid's own axes.
     """
     R = motion[:9].reshape(3, 3)
     for a in range(3):
         local[a] = x[a] - motion[9 + a]
     rotate_back(R, local, local)
-    apart = distance_to_solid(kind, size, local, n, H)
+    distance = distance_to_solid(kind, size, local, n, H)
     rotate(R, n, n)
-    return apart
+    return distance
 
 
 @kernel
@@ -336,11 +323,14 @@ def _differentiate(
     segments: Array,
     scratch: Array,
     slopes: Array,
-    bends: Array,
+    curvatures: Array,
     gradient: Array,
     rate: Array,
 ) -> None:
-    """Write Σ b' ∇d and Σ (b'' d' ∇d + b' (∇d)'); far pairs cost nothing."""
+    """Write Σ b' ∇d and Σ (b'' d' ∇d + b' (∇d)'); pairs with b' = b'' = 0 are skipped.
+
+    ``slopes`` are b' and ``curvatures`` b'', of all pairs of the `Proximity`.
+    """
     for p in range(gradient.shape[0]):
         gradient[p] = rate[p] = 0.0
     core, core_dot = scratch[0:3], scratch[3:6]  # x, y and n
@@ -352,31 +342,32 @@ def _differentiate(
         scratch[4],
         scratch[5],
     )
-    ours, theirs = scratch[6:8], scratch[8:10]  # twists at the world's origin
+    # Twists of both bodies at the world's origin.
+    twist_i, twist_j = scratch[6:8], scratch[8:10]
     work = scratch[10:]
     for k in range(pairs.shape[0]):
-        slope, bend = slopes[places[k]], bends[places[k]]
-        if slope == 0.0 and bend == 0.0:
+        slope, curvature = slopes[places[k]], curvatures[places[k]]
+        if slope == 0.0 and curvature == 0.0:
             continue
         i, j = pairs[k, 0], pairs[k, 1]
-        _twist(J, v, motion, kinds, i, columns, dofs, ours)
-        _twist(J, v, motion, kinds, j, columns, dofs, theirs)
+        _twist(J, v, motion, kinds, i, columns, dofs, twist_i)
+        _twist(J, v, motion, kinds, j, columns, dofs, twist_j)
         if kinds[j, 0] == SEGMENT:
-            _between_segments(segments, i, j, ours, theirs, work, core, core_dot)
+            _between_segments(segments, i, j, twist_i, twist_j, work, core, core_dot)
         else:
             size, moving = sizes[j], motion[-1 - kinds[j, 1]]
             center, kind = segments[i, 0], kinds[j, 0]
             _to_moving_solid(
-                kind, size, moving, center, ours, theirs, work, core, core_dot
+                kind, size, moving, center, twist_i, twist_j, work, core, core_dot
             )
-        nearing = 0.0
+        d_dot = 0.0
         for a in range(3):
-            nearing += n[a] * (x_dot[a] - y_dot[a])
-        # The force b' n and its rate, on one and, the other way round, on the other.
+            d_dot += n[a] * (x_dot[a] - y_dot[a])
+        # The force b' n and its rate on the first body; the opposite on the second.
         for a in range(3):
-            n_dot[a] = slope * n_dot[a] + bend * nearing * n[a]
+            n_dot[a] = slope * n_dot[a] + curvature * d_dot * n[a]
             n[a] *= slope
-        _push(
+        _add_force(
             J,
             J_dot,
             kinds,
@@ -394,7 +385,7 @@ def _differentiate(
         if kinds[j, 1] >= 0:
             for a in range(3):
                 n[a], n_dot[a] = -n[a], -n_dot[a]
-            _push(
+            _add_force(
                 J,
                 J_dot,
                 kinds,
@@ -422,7 +413,7 @@ def _twist(
     dofs: Indices,
     twist: Array,
 ) -> None:
-    """Write the velocity of the point at the world's origin, and the angular one."""
+    """Write a body's twist at the world's origin: linear velocity, angular velocity."""
     for a in range(3):
         twist[0, a] = twist[1, a] = 0.0
     for p in range(kinds[i, 2], kinds[i, 3]):
@@ -440,7 +431,7 @@ def _twist(
 
 @kernel
 def _velocity(twist: Array, x: Array, out: Array) -> None:
-    """Write the velocity of the body's point that is at x."""
+    """Write the velocity of the point of a body that is at x."""
     cross(twist[1], x, out)
     for a in range(3):
         out[a] += twist[0, a]
@@ -451,19 +442,19 @@ def _between_segments(
     segments: Array,
     i: int,
     j: int,
-    ours: Array,
-    theirs: Array,
+    twist_i: Array,
+    twist_j: Array,
     work: Array,
     core: Array,
     core_dot: Array,
 ) -> None:
-    """Write the nearest points and the normal, with their rates."""
+    """Write the nearest points x and y and the normal n, with their rates."""
     a, e, b, f = segments[i, 0], segments[i, 1], segments[j, 0], segments[j, 1]
     a_dot, e_dot, b_dot, f_dot = work[0], work[1], work[2], work[3]
-    _velocity(ours, a, a_dot)
-    _velocity(theirs, b, b_dot)
-    cross(ours[1], e, e_dot)
-    cross(theirs[1], f, f_dot)
+    _velocity(twist_i, a, a_dot)
+    _velocity(twist_j, b, b_dot)
+    cross(twist_i[1], e, e_dot)
+    cross(twist_j[1], f, f_dot)
     s, t, s_free, t_free = nearest_on_segments(segments, i, j)
     s_dot, t_dot = nearest_rates(
         a, a_dot, e, e_dot, b, b_dot, f, f_dot, s, t, s_free, t_free
@@ -490,36 +481,36 @@ def _to_moving_solid(
     size: Array,
     motion: Array,
     center: Array,
-    ours: Array,
-    theirs: Array,
+    twist_i: Array,
+    twist_j: Array,
     work: Array,
     core: Array,
     core_dot: Array,
 ) -> None:
-    """Write the ball's centre, the solid's velocity there and the normal, with rates.
+    """Write the sphere's centre x, x', y', the normal n and n'.
 
-    In the solid's axes the normal is ∇D of the point, so that n' = ω × n + R H Rᵀ(x' -
-    y') with y' the velocity of the solid's own point at x.
+    In the solid's axes the normal is the gradient of the distance at the point, so that
+    n' = ω × n + R H Rᵀ(x' - y'), where y' is the velocity of the solid's point at x.
     """
-    local, bent, H = work[0], work[1], work[2:5]
+    local, n_change, H = work[0], work[1], work[2:5]
     n, x_dot, y_dot, n_dot = core[2], core_dot[0], core_dot[1], core_dot[2]
     _to_solid(kind, size, motion, center, local, H, n)
-    _velocity(ours, center, x_dot)
-    _velocity(theirs, center, y_dot)
+    _velocity(twist_i, center, x_dot)
+    _velocity(twist_j, center, y_dot)
     R = motion[:9].reshape(3, 3)
     for a in range(3):
         core[0, a] = center[a]
         local[a] = x_dot[a] - y_dot[a]
     rotate_back(R, local, local)
-    rotate(H, local, bent)
-    rotate(R, bent, bent)
-    cross(theirs[1], n, n_dot)
+    rotate(H, local, n_change)
+    rotate(R, n_change, n_change)
+    cross(twist_j[1], n, n_dot)
     for a in range(3):
-        n_dot[a] += bent[a]
+        n_dot[a] += n_change[a]
 
 
 @kernel
-def _push(
+def _add_force(
     J: Array,
     J_dot: Array,
     kinds: Indices,
@@ -534,7 +525,7 @@ def _push(
     gradient: Array,
     rate: Array,
 ) -> None:
-    """Add J(x)ᵀ force and its rate, J the linear Jacobian of a point of a link."""
+    """Add J(x)ᵀ force and its rate; J is the linear Jacobian of a point of a link."""
     moment, moment_dot, turned = work[0], work[1], work[2]
     cross(x, force, moment)
     cross(x_dot, force, moment_dot)

@@ -1,18 +1,19 @@
-"""Convex hulls: of meshes, by Coal, and the corners of points; some have none."""
+"""Convex hulls of meshes (by Coal) and of points; flat ones have no hull."""
 
 from typing import Any
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from hsp_control.common.arrays import Array
 
 
 def convex_hull(mesh: Any) -> Any:
-    """Return the convex hull of Coal's mesh; None of one that is flat.
+    """Return the convex hull of one of Coal's meshes, or None if the mesh is flat.
 
-    At those Coal ends the process.
+    For a flat mesh Coal would abort the process.
     """
+    from scipy.spatial import ConvexHull, QhullError  # here: SciPy takes long to import
+
     try:
         ConvexHull(np.array(mesh.vertices()), qhull_options="Qt")
     except QhullError:
@@ -22,10 +23,12 @@ def convex_hull(mesh: Any) -> Any:
 
 
 def hull_corners(points: Array) -> Array:
-    """Return the points, shape (k, 3), that are corners of their hull.
+    """Return those of the points, shape (k, 3), that are vertices of their hull.
 
-    All of them if they are too few to have one, or in one place.
+    All points are returned if they have no hull: too few points, or all at one place.
     """
+    from scipy.spatial import ConvexHull, QhullError  # here: SciPy takes long to import
+
     try:
         return points[ConvexHull(points, qhull_options="QJ").vertices]
     except QhullError:

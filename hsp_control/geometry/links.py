@@ -1,4 +1,4 @@
-"""What the robot's links look like to a distance: capsules, or its own shapes."""
+"""Shapes of the robot's links for distances: capsules or its collision geometry."""
 
 import logging
 from dataclasses import dataclass
@@ -22,10 +22,10 @@ from hsp_control.robot.description.urdf_checks import read_urdf
 Proxy = Literal["capsules", "spheres", "hulls", "meshes"]
 
 FALLBACK_RADIUS = 0.05
-"""Radius of the capsules between joints where a robot has no geometry [m]."""
+"""Radius of the capsules between the joints of a robot without geometry [m]."""
 
-_MOST_BEADS = 100
-"""Along one capsule; a link's own geometry needs ten."""
+_MAX_SPHERES = 100
+"""Maximum number of intervals between spheres on a capsule; a usual link has 10."""
 
 _log = logging.getLogger(__name__)
 _warned: "WeakSet[Robot]" = WeakSet()
@@ -36,8 +36,8 @@ class LinkShape:
     """A shape fixed to a joint.
 
     Attributes:
-        link: Name of the link, as SRDF files and messages call it.
-        joint: Index of the joint that carries it; 0 is the world.
+        link: Name of the link, for SRDF files and messages.
+        joint: Index of the joint that it is fixed to; 0 is the world.
         placement: Its placement in the joint's frame.
         geometry: Coal's geometry.
     """
@@ -51,28 +51,32 @@ class LinkShape:
 def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
     """Return the shapes of the robot's links.
 
-    ``capsules``, the default, are 200 times faster than meshes and have exact, smooth
-    gradients against balls; ``spheres`` are beads along those capsules,
-    smooth against everything convex; ``hulls`` and ``meshes`` are the robot's own
-    collision geometry. A robot without any gets capsules between its joints, and
-    one warning.
+    A robot without collision geometry gets capsules between its joints, and a warning.
+
+    Args:
+        robot: The robot.
+        proxy: ``capsules``: the smallest capsule around each shape; distances are 200
+            times faster than with meshes, and their gradients are exact, and smooth
+            for spheres. ``spheres``: spheres along these capsules; gradients are
+            smooth for all convex obstacles. ``hulls``, ``meshes``: the robot's own
+            collision geometry, as convex hulls or as it is.
 
     Raises:
         ModelError: If a collision mesh cannot be read, or the proxy is unknown.
     """
     if proxy not in get_args(Proxy):
-        raise ModelError(f"proxy {proxy!r}: choose among {', '.join(get_args(Proxy))}")
+        raise ModelError(f"proxy {proxy!r} is not one of {', '.join(get_args(Proxy))}")
     own = {part.prefix: _collision_shapes(robot, part) for part in robot.parts}
-    bare = [part for part in robot.parts if not own[part.prefix]]
-    if bare and robot not in _warned:
+    without = [part for part in robot.parts if not own[part.prefix]]
+    if without and robot not in _warned:
         _warned.add(robot)
         _log.warning(
             "%s has no collision geometry: using capsules of radius %g m between its "
-            "joints", " and ".join(part.prefix + part.source.name for part in bare),
+            "joints", " and ".join(part.prefix + part.source.name for part in without),
             FALLBACK_RADIUS,
         )  # fmt: skip
-    own |= {part.prefix: _between_joints(robot, part) for part in bare}
-    shapes = [shape for of_part in own.values() for shape in of_part]
+    own |= {part.prefix: _between_joints(robot, part) for part in without}
+    shapes = [shape for part_shapes in own.values() for shape in part_shapes]
     if proxy == "meshes":
         return shapes
     if proxy == "hulls":
@@ -80,24 +84,24 @@ def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
     capsules = [_capsule(shape) for shape in _merge_rounded_cylinders(shapes)]
     if proxy == "capsules":
         return capsules
-    return [bead for capsule in capsules for bead in _beads(capsule)]
+    return [sphere for capsule in capsules for sphere in _spheres_along(capsule)]
 
 
 def part_of(robot: Robot, name: str) -> Part:
-    """Return which of a combined robot's parts a joint or a link belongs to."""
+    """Return the part of a combined robot that a joint or link name belongs to."""
     parts = [part for part in robot.parts if name.startswith(part.prefix)]
     return max(parts, key=lambda part: len(part.prefix))
 
 
 def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
-    """Read the URDF's collision geometry and hang it on the robot's own joints.
+    """Return the URDF's collision geometry, fixed to the joints of the robot.
 
-    The robot may have locked joints that the URDF has not: a shape is found again by
-    the name of the frame that it is fixed to.
+    The robot may have fewer joints than the URDF, since joints can be locked. So the
+    joint of a shape is found by the name of the shape's frame.
     """
     source = part.source
     for name in _collision_meshes(source):
-        _refuse_bad_mesh(source, name)
+        _check_mesh(source, name)
     full = pin.buildModelFromUrdf(str(source.urdf), mimic=False)
     try:
         geometry = pin.buildGeomFromUrdf(
@@ -115,10 +119,9 @@ def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
         name = part.prefix + frame.name
         if not _finite(item.geometry):
             raise ModelError(
-                f"{source.urdf}: a collision mesh: {item.meshPath} has a corner "
-                "at a NaN or an infinity"
+                f"{source.urdf}: a collision mesh: {item.meshPath} contains NaN or inf"
             )
-        # What is fixed to a combined robot's root hangs on its universe's namesake.
+        # In a combined robot, the frame of a part's world is called <prefix>universe.
         own = robot.model.frames[robot.frame_id(name)]
         shapes.append(
             LinkShape(
@@ -137,22 +140,23 @@ def _collision_meshes(source: RobotSource) -> list[str]:
     return list(dict.fromkeys(mesh.get("filename", "") for mesh in meshes))
 
 
-def _refuse_bad_mesh(source: RobotSource, name: str) -> None:
-    """Look at a mesh before Assimp does; one that is missing is Pinocchio's to tell."""
+def _check_mesh(source: RobotSource, name: str) -> None:
+    """Check a mesh before Assimp reads it; Pinocchio reports a missing one."""
     found = (file for file in mesh_files.candidates(source, name) if file.is_file())
     file = next(found, None)
-    if file is not None and (reason := mesh_files.complaint(file)):
+    if file is not None and (reason := mesh_files.find_problem(file)):
         raise ModelError(f"{source.urdf}: a collision mesh: {file}: {reason}")
 
 
 def _finite(geometry: Any) -> bool:
-    """Return whether a mesh's corners are somewhere; other shapes have none."""
+    """Return whether all vertices of a mesh are finite; other shapes have none."""
     if not hasattr(geometry, "vertices"):
         return True
     return bool(np.isfinite(np.array(geometry.vertices())).all())
 
 
 def _between_joints(robot: Robot, part: Part) -> list[LinkShape]:
+    """Return capsules between the joints, and a sphere at each last joint."""
     model = robot.model
     joints = [
         i for i in range(1, model.njoints) if part_of(robot, model.names[i]) is part
@@ -160,10 +164,10 @@ def _between_joints(robot: Robot, part: Part) -> list[LinkShape]:
     shapes = []
     for child in joints:
         parent, end = model.parents[child], model.jointPlacements[child].translation
-        # The world is no joint of the part's own: it goes by a name of the part's.
+        # The parts share the world, so each uses a name of its own for it.
         name = model.names[parent] if parent else f"{part.prefix}universe"
         start = np.zeros(3) if parent else part.placement.translation
-        placement, length = _along(start, end)
+        placement, length = _placement_along(start, end)
         if length > 1e-6:
             geometry = coal.Capsule(FALLBACK_RADIUS, length)
             shapes.append(LinkShape(name, parent, placement, geometry))
@@ -176,13 +180,13 @@ def _between_joints(robot: Robot, part: Part) -> list[LinkShape]:
 
 
 def _merge_rounded_cylinders(shapes: list[LinkShape]) -> list[LinkShape]:
-    """Merge a cylinder and the two balls that close it, as URDFs write capsules."""
+    """Merge each cylinder with spheres at its two ends: URDFs describe capsules so."""
     merged: list[LinkShape] = []
     used: set[int] = set()
     for i, shape in enumerate(shapes):
         if i in used:
             continue
-        ends = _closing_balls(shapes, i)
+        ends = _end_spheres(shapes, i)
         if ends is None:
             merged.append(shape)
             continue
@@ -194,12 +198,13 @@ def _merge_rounded_cylinders(shapes: list[LinkShape]) -> list[LinkShape]:
     return merged
 
 
-def _closing_balls(shapes: list[LinkShape], index: int) -> list[int] | None:
+def _end_spheres(shapes: list[LinkShape], index: int) -> list[int] | None:
+    """Return the indices of the spheres at both ends of a cylinder, or None."""
     shape = shapes[index]
     cylinder = shape.geometry
     if not isinstance(cylinder, coal.Cylinder):
         return None
-    balls = []
+    spheres = []
     for side in (-1.0, 1.0):
         end = shape.placement.act(np.array([0.0, 0.0, side * cylinder.halfLength]))
         for k, other in enumerate(shapes):
@@ -209,13 +214,13 @@ def _closing_balls(shapes: list[LinkShape], index: int) -> list[int] | None:
                 and abs(other.geometry.radius - cylinder.radius) < 1e-6
                 and float(np.linalg.norm(other.placement.translation - end)) < 1e-3
             ):
-                balls.append(k)
+                spheres.append(k)
                 break
-    return balls if len(set(balls)) == 2 else None
+    return spheres if len(set(spheres)) == 2 else None
 
 
 def _capsule(shape: LinkShape) -> LinkShape:
-    """Return the smallest capsule that holds a shape."""
+    """Return the smallest capsule that contains a shape."""
     geometry = shape.geometry
     if isinstance(geometry, coal.Sphere | coal.Capsule):
         return shape
@@ -224,7 +229,7 @@ def _capsule(shape: LinkShape) -> LinkShape:
             shape, coal.Capsule(geometry.radius, 2.0 * geometry.halfLength)
         )
     first, second, radius = enclosing_capsule(_points(shape))
-    placement, length = _along(first, second)
+    placement, length = _placement_along(first, second)
     return LinkShape(
         shape.link,
         shape.joint,
@@ -233,27 +238,29 @@ def _capsule(shape: LinkShape) -> LinkShape:
     )
 
 
-def _beads(capsule: LinkShape) -> list[LinkShape]:
-    """Return balls along a capsule, no farther apart than its radius.
+def _spheres_along(capsule: LinkShape) -> list[LinkShape]:
+    """Return spheres along a capsule that contain it, at most one radius apart.
 
-    Along a needle they are fewer, and grow to cover it.
+    Along a very slender capsule they are farther apart, and larger.
     """
     if isinstance(capsule.geometry, coal.Sphere):
         return [capsule]
     radius, half = capsule.geometry.radius, capsule.geometry.halfLength
-    apart = max(radius, 2.0 * half / _MOST_BEADS)
+    apart = max(radius, 2.0 * half / _MAX_SPHERES)
     number = max(int(np.ceil(2.0 * half / apart)), 1) + 1
-    # Half-way between two balls the capsule's side stands out by this factor.
+    # The spheres must contain the side of the capsule half-way between two centres.
     gap = 2.0 * half / (number - 1)
-    grown = float(np.hypot(radius, 0.5 * gap))
-    beads = []
+    larger_radius = float(np.hypot(radius, 0.5 * gap))
+    spheres = []
     for z in np.linspace(-half, half, number):
         place = capsule.placement * pin.SE3(np.eye(3), np.array([0.0, 0.0, z]))
-        beads.append(LinkShape(capsule.link, capsule.joint, place, coal.Sphere(grown)))
-    return beads
+        sphere = coal.Sphere(larger_radius)
+        spheres.append(LinkShape(capsule.link, capsule.joint, place, sphere))
+    return spheres
 
 
 def _points(shape: LinkShape) -> Array:
+    """Return points whose convex hull is the shape's, shape (k, 3) [m]."""
     geometry = shape.geometry
     if isinstance(geometry, coal.Box):
         signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
@@ -263,24 +270,29 @@ def _points(shape: LinkShape) -> Array:
     if hasattr(geometry, "points"):
         return np.array(geometry.points())
     raise ModelError(
-        f"link {shape.link!r}: no capsule for a {type(geometry).__name__}; use meshes"
+        f"link {shape.link!r}: cannot fit a capsule to a {type(geometry).__name__}; "
+        "use proxy: meshes"
     )
 
 
 def _hull(geometry: Any) -> Any:
-    """Return a mesh's convex hull, or what has none as it is."""
+    """Return the convex hull of a mesh; other shapes and flat meshes as they are."""
     if hasattr(geometry, "buildConvexHull"):
         return convex_hull(geometry) or geometry
     return geometry
 
 
-def _along(first: Array, second: Array) -> tuple[pin.SE3, float]:
-    """Return the placement whose z axis leads from one point to another."""
-    between = second - first
-    length = float(np.linalg.norm(between))
+def _placement_along(first: Array, second: Array) -> tuple[pin.SE3, float]:
+    """Return the placement half-way between two points, its z axis along their line.
+
+    Returns:
+        The placement, and the distance of the points [m].
+    """
+    line = second - first
+    length = float(np.linalg.norm(line))
     if length == 0.0:
         return pin.SE3(np.eye(3), first), 0.0
-    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), between)
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), line)
     return pin.SE3(turn.matrix(), 0.5 * (first + second)), length
 
 

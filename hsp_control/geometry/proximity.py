@@ -1,4 +1,4 @@
-"""Distances between pairs of shapes, and their gradients, once per state."""
+"""Distances between pairs of shapes and their gradients, computed once per state."""
 
 from collections.abc import Sequence
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.geometry.by_coal import ByCoal
-from hsp_control.geometry.closed_form import ClosedForm, has_closed_form
+from hsp_control.geometry.closed_form import ClosedFormDistances, has_closed_form
+from hsp_control.geometry.coal_distances import CoalDistances
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.robot import Robot, RobotState
@@ -16,15 +16,19 @@ from hsp_control.robot import Robot, RobotState
 class Proximity:
     """Signed distances of pairs (link, obstacle) and (link, link).
 
-    The gradient of a distance is ∇d = (J_1 - J_2)ᵀ n at the witness points, n the unit
-    vector from the second to the first; an obstacle has J_2 = 0. Balls, capsules and,
-    before balls, boxes, cylinders and half-spaces have formulas, with the exact rate of
-    that gradient; the others' distances are Coal's.
+    The gradient of a distance is ∇d = (J_1 - J_2)ᵀ n at the witness points, where n is
+    the unit vector from the second point to the first; an obstacle has J_2 = 0. Pairs
+    of spheres and capsules have a closed form, and so have a sphere and a box, cylinder
+    or half-space; the rate of their gradient is exact. Coal computes all others.
 
     Attributes:
-        distances: At the last `measure`, shape (k,) [m]; negative where shapes overlap.
-        formulas: The pairs that have formulas, if any.
-        others: The pairs that have none, if any.
+        robot: The robot.
+        links: Shapes of its links.
+        obstacles: The obstacles.
+        pairs: Indices into links followed by obstacles.
+        distances: At the last `measure`, shape (k,) [m]; negative if shapes overlap.
+        closed_form: The pairs that have a closed form, or None.
+        coal: The other pairs, or None.
     """
 
     def __init__(
@@ -34,21 +38,21 @@ class Proximity:
         obstacles: Sequence[Obstacle],
         pairs: Sequence[tuple[int, int]],
     ) -> None:
-        """Prepare.
+        """Set up the pairs.
 
         Args:
             robot: The robot.
             links: Shapes of its links.
-            obstacles: Obstacles.
-            pairs: Indices into links followed by obstacles; the first is a link. A
-                pair that is named twice counts once.
+            obstacles: The obstacles.
+            pairs: Indices into links followed by obstacles; the first of a pair is a
+                link. Repeated pairs count once.
 
         Raises:
             FieldError: If there is no pair.
         """
         if not pairs:
-            raise FieldError("no pair of shapes is left to keep apart")
-        # In either order: so does Pinocchio.
+            raise FieldError("there are no pairs of shapes to keep apart")
+        # (i, j) and (j, i) are one pair, as in Pinocchio.
         pairs = list({frozenset(pair): pair for pair in pairs}.values())
         self.robot = robot
         self.links = tuple(links)
@@ -56,51 +60,54 @@ class Proximity:
         self.pairs = tuple(pairs)
         self.distances: Array = np.zeros(len(pairs))
         items: list[LinkShape | Obstacle] = [*links, *obstacles]
-        known = np.array([has_closed_form(links[i], items[j]) for i, j in pairs])
+        closed = np.array([has_closed_form(links[i], items[j]) for i, j in pairs])
         index = np.array(pairs, dtype=np.int64)
-        self.formulas: ClosedForm | None = None
-        self.others: ByCoal | None = None
-        if known.any():
-            places = np.flatnonzero(known)
-            self.formulas = ClosedForm(robot, links, obstacles, index[known], places)
-        if not known.all():
-            places = np.flatnonzero(~known)
-            self.others = ByCoal(robot, links, obstacles, index[~known], places)
-        self._whose = [
-            (self.formulas if has else self.others, int((known == has)[:k].sum()))
-            for k, has in enumerate(known)
+        self.closed_form: ClosedFormDistances | None = None
+        self.coal: CoalDistances | None = None
+        if closed.any():
+            places = np.flatnonzero(closed)
+            self.closed_form = ClosedFormDistances(
+                robot, links, obstacles, index[closed], places
+            )
+        if not closed.all():
+            places = np.flatnonzero(~closed)
+            self.coal = CoalDistances(robot, links, obstacles, index[~closed], places)
+        self._computed_by = [
+            (self.closed_form if has else self.coal, int((closed == has)[:k].sum()))
+            for k, has in enumerate(closed)
         ]
         self._measured: RobotState | None = None
         self._stamp = -1, -1
 
     def measure(self, state: RobotState) -> Array:
-        """Return all distances at a state, computing them once."""
+        """Return all distances at a state, shape (k,) [m]; computed once per state."""
         if self._measured is state and self._stamp == self._stamp_of(state):
-            return self.distances  # the state itself: an id would be used again
-        if self.formulas is not None:
-            self.formulas.measure(state, self.distances)
-        if self.others is not None:
-            self.others.measure(state, self.distances)
+            return self.distances  # compare the object: ids are reused
+        if self.closed_form is not None:
+            self.closed_form.measure(state, self.distances)
+        if self.coal is not None:
+            self.coal.measure(state, self.distances)
         self._measured, self._stamp = state, self._stamp_of(state)
         return self.distances
 
     def _stamp_of(self, state: RobotState) -> tuple[int, int]:
-        """Return what is another one once anything was measured at another state."""
-        count = 0 if self.formulas is None else int(self.formulas.measurements[0])
+        """Return a value that changes when anything is measured at another state."""
+        count = 0 if self.closed_form is None else int(self.closed_form.measurements[0])
         return state.stamp, count
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
-        """Return what realises the k-th distance, world axes, shape (3,) each.
+        """Return the nearest points of the k-th pair, after `measure`.
 
-        The points on the first and on the second shape [m], and the unit normal from
-        the first to the second.
+        Returns:
+            The points on the first and on the second shape [m], and the unit normal
+            from the first to the second; in world axes, shape (3,) each.
         """
-        whose, own = self._whose[k]
-        assert whose is not None
-        return whose.witness(own)
+        computed_by, own = self._computed_by[k]
+        assert computed_by is not None
+        return computed_by.witness(own)
 
     def gradient(self, state: RobotState, slopes: Array) -> Array:
-        """Return Σ slopes_k ∇d_k, shape (nv,); pairs of slope 0 cost nothing.
+        """Return Σ slopes_k ∇d_k, shape (nv,); pairs with slope 0 are skipped.
 
         Args:
             state: The robot's state.
@@ -108,15 +115,15 @@ class Proximity:
         """
         self.measure(state)
         result, rate = np.zeros(self.robot.nv), np.zeros(self.robot.nv)
-        if self.formulas is not None:
-            bends = np.zeros(len(slopes))
-            self.formulas.differentiate(state, slopes, bends, result, rate)
-        if self.others is not None:
-            self.others.add_gradient(state, slopes, result)
+        if self.closed_form is not None:
+            curvatures = np.zeros(len(slopes))
+            self.closed_form.differentiate(state, slopes, curvatures, result, rate)
+        if self.coal is not None:
+            self.coal.add_gradient(state, slopes, result)
         return result
 
     def nearest(self, state: RobotState) -> tuple[float, str]:
-        """Return the least distance [m] and which pair it is."""
+        """Return the minimum distance [m] and the names of its pair, ``a to b``."""
         distances = self.measure(state)
         k = int(np.argmin(distances))
         names = [link.link for link in self.links] + [o.name for o in self.obstacles]

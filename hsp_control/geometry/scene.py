@@ -1,4 +1,4 @@
-"""What stands or moves in the robot's world."""
+"""Obstacles in the robot's world, fixed or moving."""
 
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -20,13 +20,13 @@ from hsp_control.trajectories.following import Follower, follow_all
 
 
 class Obstacle:
-    """A shape that stands or moves along trajectories.
+    """A shape that is fixed, or moves along trajectories.
 
     Attributes:
-        name: What fields and the log call it.
-        shape: Its form, centred on its own frame.
-        center: Where its frame's origin is in the world [m], of dimension 3.
-        orientation: How its frame is turned in the world.
+        name: Its name in fields and in the log.
+        shape: Its shape, centred on its own frame.
+        center: Trajectory of its frame's origin in the world [m], of dimension 3.
+        orientation: Trajectory of its frame's orientation in the world.
     """
 
     def __init__(
@@ -36,10 +36,10 @@ class Obstacle:
         center: Trajectory,
         orientation: OrientationTrajectory | None = None,
     ) -> None:
-        """Set the obstacle; without an orientation it stands along the world's axes.
+        """Set the obstacle; the default orientation is that of the world's axes.
 
         Raises:
-            SceneError: If the centre is not a point in space.
+            SceneError: If the dimension of the centre is not 3.
         """
         if center.dimension != 3:
             raise SceneError(
@@ -57,12 +57,13 @@ class Obstacle:
         return pin.SE3(rotation, self.center.sample(t).position)
 
     def follow(self, motion: Array) -> Follower:
-        """Return a function of time [s] that keeps an array at the obstacle's motion.
+        """Return a function of time [s] that writes the obstacle's motion to an array.
 
         See `Trajectory.follow`.
 
         Args:
-            motion: R row by row, c, c' and ω, shape (18,).
+            motion: Is overwritten with R row by row, the centre c [m], c' [m/s] and the
+                angular velocity ω [rad/s] in the world, shape (18,).
         """
         center = TrajectorySample(motion[9:12], motion[12:15], np.zeros(3))
         turn = OrientationSample(motion[:9].reshape(3, 3), motion[15:18], np.zeros(3))
@@ -70,7 +71,7 @@ class Obstacle:
 
 
 class Scene(Mapping[str, Obstacle]):
-    """The obstacles by name."""
+    """The obstacles of a world, by name."""
 
     def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
         """Collect obstacles.
@@ -81,7 +82,7 @@ class Scene(Mapping[str, Obstacle]):
         self._obstacles: dict[str, Obstacle] = {}
         for obstacle in obstacles:
             if obstacle.name in self._obstacles:
-                raise SceneError(f"two obstacles are called {obstacle.name!r}")
+                raise SceneError(f"two obstacles have the name {obstacle.name!r}")
             self._obstacles[obstacle.name] = obstacle
 
     def __getitem__(self, name: str) -> Obstacle:

@@ -1,4 +1,4 @@
-"""Which pairs of a robot's own links are worth keeping apart."""
+"""Pairs of a robot's own links that are checked for self-collision."""
 
 from collections.abc import Sequence
 from xml.etree import ElementTree
@@ -10,10 +10,13 @@ from hsp_control.robot.description.xml_files import XmlError, read_xml
 
 
 def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]]:
-    """Return the pairs of shapes of different links that may come apart and together.
+    """Return the pairs of link shapes that can collide, as indices into ``links``.
 
-    Left out: shapes on one joint or on neighbouring ones, which always touch, and pairs
-    that the robot's SRDF disables.
+    Pairs on one joint or on neighbouring joints are left out, since they always touch,
+    and so are pairs that the robot's SRDF disables.
+
+    Raises:
+        ModelError: If the SRDF cannot be read.
     """
     disabled = _disabled(robot)
     parents = list(robot.model.parents)
@@ -33,9 +36,10 @@ def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]
 def _neighbours(
     robot: Robot, first: LinkShape, second: LinkShape, parents: Sequence[int]
 ) -> bool:
-    """Return whether one joint carries the other's link, on the same robot.
+    """Return whether the joint of one link is the parent of the other's.
 
-    The world is a neighbour of each robot's own first joint only.
+    In a combined robot, the world is a neighbour of a first joint only for links of the
+    same part.
     """
     a, b = first.joint, second.joint
     if parents[a] != b and parents[b] != a:
@@ -51,7 +55,9 @@ def _disabled(robot: Robot) -> set[frozenset[str]]:
         try:
             srdf = read_xml(part.source.srdf)
         except (XmlError, ElementTree.ParseError, OSError) as error:
-            raise ModelError(f"{part.source.srdf}: not read: {error}") from error
+            raise ModelError(
+                f"{part.source.srdf}: cannot read the SRDF: {error}"
+            ) from error
         for pair in srdf.iter("disable_collisions"):
             links = (pair.get("link1", ""), pair.get("link2", ""))
             disabled.add(frozenset(part.prefix + link for link in links))

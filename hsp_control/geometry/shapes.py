@@ -1,9 +1,9 @@
 """Shapes of obstacles and links, as Coal computes distances between them.
 
-A capsule's distance to a ball has a continuous gradient. Against a flat face it jumps
-wherever the capsule comes to lie along it, and against another capsule when the two are
-parallel; a ball's distance to any convex shape does not. `ObstacleClearance` chooses
-accordingly.
+The gradient of a capsule's distance to a sphere is continuous. To a flat face, it jumps
+where the capsule becomes parallel to the face; to another capsule, where both become
+parallel. The gradient of a sphere's distance to a convex shape is continuous.
+`ObstacleClearance` chooses the proxies of links accordingly.
 """
 
 from abc import ABC, abstractmethod
@@ -23,15 +23,16 @@ from hsp_control.robot.description import mesh_files
 
 
 class Shape(ABC):
-    """A body's form, centred on its own frame.
+    """The shape of a body, centred on its own frame.
 
     Attributes:
         rounded: Whether a capsule's distance to it has a continuous gradient.
+        witness_reversed: Whether Coal returns the witness points in reverse order, and
+            the normal with the opposite sign.
     """
 
     rounded: ClassVar[bool] = False
-    reversed: ClassVar[bool] = False
-    """Whether Coal gives its witness points, and the normal, the other way round."""
+    witness_reversed: ClassVar[bool] = False
 
     @abstractmethod
     def geometry(self) -> Any:
@@ -43,13 +44,13 @@ class Shape(ABC):
 
     @property
     @abstractmethod
-    def reach(self) -> float:
-        """The radius of a ball about its origin that holds it [m]; inf for a plane."""
+    def bounding_radius(self) -> float:
+        """Radius of a sphere about its origin that contains it [m]; inf for a plane."""
 
 
 @dataclass(frozen=True)
 class Sphere(Shape):
-    """A ball; in the plane, a disk.
+    """A sphere; in the plane, a disk.
 
     Attributes:
         radius: Its radius [m]; 0 is a point.
@@ -59,16 +60,16 @@ class Sphere(Shape):
     rounded: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse what is no length."""
-        _lengths(self, {"radius": self.radius}, zero=True)
+        """Check the lengths."""
+        _check_lengths(self, {"radius": self.radius}, zero=True)
 
     def geometry(self) -> Any:
         """Return Coal's sphere."""
         return coal.Sphere(self.radius)
 
     @property
-    def reach(self) -> float:
-        """Its radius."""
+    def bounding_radius(self) -> float:
+        """The radius."""
         return self.radius
 
 
@@ -78,38 +79,38 @@ class Capsule(Shape):
 
     Attributes:
         radius: Its radius [m].
-        length: Between the centres of its ends [m].
+        length: Distance of the centres of its round ends [m].
     """
 
     radius: float
     length: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no length."""
-        _lengths(self, {"radius": self.radius})
-        _lengths(self, {"length": self.length}, zero=True)
+        """Check the lengths."""
+        _check_lengths(self, {"radius": self.radius})
+        _check_lengths(self, {"length": self.length}, zero=True)
 
     def geometry(self) -> Any:
         """Return Coal's capsule."""
         return coal.Capsule(self.radius, self.length)
 
     @property
-    def reach(self) -> float:
-        """Half its overall length."""
+    def bounding_radius(self) -> float:
+        """Half the overall length."""
         return self.radius + 0.5 * self.length
 
 
 @dataclass(frozen=True)
 class HalfSpace(Shape):
-    """All below its own x-y plane: a floor, or a wall when it is turned."""
+    """All points below its own x-y plane: a floor, or a rotated one, a wall."""
 
     def geometry(self) -> Any:
         """Return Coal's half-space."""
         return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
 
     @property
-    def reach(self) -> float:
-        """Infinite."""
+    def bounding_radius(self) -> float:
+        """Infinity."""
         return float("inf")
 
 
@@ -118,24 +119,24 @@ class Box(Shape):
     """A box.
 
     Attributes:
-        size: Its edges along x, y and z [m].
+        size: Lengths of its edges along x, y and z [m].
     """
 
     size: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        """Refuse what is no length."""
+        """Check the lengths."""
         if len(self.size) != 3:
-            raise SceneError(f"box: size {list(self.size)} needs 3 edges")
-        _lengths(self, dict(zip("xyz", self.size, strict=True)))
+            raise SceneError(f"box: size is {list(self.size)}; needs 3 lengths")
+        _check_lengths(self, dict(zip("xyz", self.size, strict=True)))
 
     def geometry(self) -> Any:
         """Return Coal's box."""
         return coal.Box(*self.size)
 
     @property
-    def reach(self) -> float:
-        """Half its diagonal."""
+    def bounding_radius(self) -> float:
+        """Half the diagonal."""
         return 0.5 * float(np.linalg.norm(self.size))
 
 
@@ -152,16 +153,16 @@ class Cylinder(Shape):
     length: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no length."""
-        _lengths(self, {"radius": self.radius, "length": self.length})
+        """Check the lengths."""
+        _check_lengths(self, {"radius": self.radius, "length": self.length})
 
     def geometry(self) -> Any:
         """Return Coal's cylinder."""
         return coal.Cylinder(self.radius, self.length)
 
     @property
-    def reach(self) -> float:
-        """Half its diagonal."""
+    def bounding_radius(self) -> float:
+        """Half the diagonal."""
         return float(np.hypot(self.radius, 0.5 * self.length))
 
 
@@ -171,8 +172,8 @@ class Mesh(Shape):
 
     Attributes:
         file: An STL, OBJ or DAE file.
-        scale: What its numbers are worth [m].
-        convex: Whether its convex hull stands for it.
+        scale: The unit of length of the file [m].
+        convex: Whether to use its convex hull.
     """
 
     file: Path
@@ -180,22 +181,22 @@ class Mesh(Shape):
     convex: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what is no length."""
-        _lengths(self, {"scale": self.scale})
+        """Check the lengths."""
+        _check_lengths(self, {"scale": self.scale})
 
     def geometry(self) -> Any:
         """Return Coal's mesh."""
         return self._load()[0]
 
     @property
-    def reach(self) -> float:
-        """The distance of its farthest vertex."""
+    def bounding_radius(self) -> float:
+        """Distance of the farthest vertex from the origin."""
         return float(np.linalg.norm(self._load()[1], axis=1).max())
 
     def _load(self) -> tuple[Any, Array]:
         if "\0" in str(self.file) or not Path(self.file).is_file():
-            raise SceneError(f"mesh: no file {self.file}")
-        if reason := mesh_files.complaint(Path(self.file)):
+            raise SceneError(f"mesh: no such file {self.file}")
+        if reason := mesh_files.find_problem(Path(self.file)):
             raise SceneError(f"mesh: {self.file}: {reason}")
         try:
             mesh = coal.MeshLoader().load(str(self.file), np.full(3, self.scale))
@@ -204,49 +205,51 @@ class Mesh(Shape):
             raise SceneError(f"mesh: cannot read {self.file}: {reason}") from error
         vertices = np.array(mesh.vertices())
         if len(vertices) == 0:
-            raise SceneError(f"mesh: {self.file} holds no triangle")
+            raise SceneError(f"mesh: {self.file} contains no triangles")
         if not np.isfinite(vertices).all():
-            raise SceneError(f"mesh: {self.file} has a corner at a NaN or an infinity")
+            raise SceneError(f"mesh: {self.file} contains NaN or inf")
         if not self.convex:
             return mesh, vertices
         hull = convex_hull(mesh)
         if hull is None:
             raise SceneError(
-                f"mesh: {self.file} is flat and has no convex hull; needs convex: false"
+                f"mesh: {self.file} is flat and has no convex hull; use convex: false"
             )
         return hull, vertices
 
 
 @dataclass(frozen=True)
 class PointCloud(Shape):
-    """Measured points, each grown to a cube of the resolution (Coal's octree).
+    """Measured points; each becomes a cube of the resolution (Coal's octree).
 
     Attributes:
         points: The points, shape (k, 3) [m].
-        resolution: Edge of the cubes [m].
+        resolution: Edge length of the cubes [m].
     """
 
     points: Sequence[Sequence[float]]
     resolution: float = 0.02
-    reversed: ClassVar[bool] = True
+    witness_reversed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Refuse what is no cloud."""
-        _lengths(self, {"resolution": self.resolution})
+        """Check the resolution and the points."""
+        _check_lengths(self, {"resolution": self.resolution})
         try:
             array = np.asarray(self.points, dtype=float)
-        except ValueError:  # points differ in length
+        except ValueError:  # points of different sizes
             array = np.zeros(0)
         if array.shape != (max(len(array), 1), 3) or not np.isfinite(array).all():
-            raise SceneError("point cloud: needs one or more points of 3 numbers")
+            raise SceneError(
+                "point cloud: needs one or more points of 3 finite numbers"
+            )
 
     def geometry(self) -> Any:
         """Return Coal's octree."""
         return coal.makeOctree(np.asarray(self.points, dtype=float), self.resolution)
 
     @property
-    def reach(self) -> float:
-        """The distance of its farthest point, and a cube."""
+    def bounding_radius(self) -> float:
+        """Distance of the farthest point from the origin, and its cube."""
         far = float(np.linalg.norm(self.points, axis=1).max())
         return far + 2.0 * self.resolution
 
@@ -255,7 +258,7 @@ class PointCloud(Shape):
 class HeightField(Shape):
     """A terrain: heights on a regular grid about the origin, as a triangle mesh.
 
-    Coal measures no distance to its own height fields.
+    Coal has height fields, but computes no distances to them.
 
     Attributes:
         size: Extent along x and y [m].
@@ -266,16 +269,20 @@ class HeightField(Shape):
     heights: Sequence[Sequence[float]]
 
     def __post_init__(self) -> None:
-        """Refuse what is no grid."""
+        """Check the extents and the grid."""
         if len(self.size) != 2:
-            raise SceneError(f"height field: size {list(self.size)} needs 2 extents")
-        _lengths(self, dict(zip("xy", self.size, strict=True)))
+            raise SceneError(
+                f"height field: size is {list(self.size)}; needs 2 lengths"
+            )
+        _check_lengths(self, dict(zip("xy", self.size, strict=True)))
         grid = self._grid()
         if grid.ndim != 2 or min(grid.shape) < 2 or not np.isfinite(grid).all():
-            raise SceneError("height field: heights need 2 rows of 2 numbers or more")
+            raise SceneError(
+                "height field: heights must be at least 2 rows of 2 finite numbers"
+            )
 
     def geometry(self) -> Any:
-        """Return Coal's mesh of two triangles a cell."""
+        """Return Coal's mesh with two triangles per cell."""
         rows, columns = self._grid().shape
         vertices = self._vertices()
         mesh = coal.BVHModelOBBRSS()
@@ -290,15 +297,15 @@ class HeightField(Shape):
         return mesh
 
     @property
-    def reach(self) -> float:
-        """The distance of its farthest vertex."""
+    def bounding_radius(self) -> float:
+        """Distance of the farthest vertex from the origin."""
         return float(np.linalg.norm(self._vertices(), axis=1).max())
 
     def _grid(self) -> Array:
         try:
             return np.asarray(self.heights, dtype=float)
         except ValueError:
-            raise SceneError("height field: its rows differ in length") from None
+            raise SceneError("height field: its rows have different lengths") from None
 
     def _vertices(self) -> Array:
         grid = self._grid()
@@ -308,30 +315,37 @@ class HeightField(Shape):
         return np.column_stack([X.ravel(), Y.ravel(), grid.ravel()])
 
 
-def described_shape(kind: str, parameters: Mapping[str, Any]) -> Shape | None:
-    """Return the shape that a log describes; None of a kind that is not one of these.
+def shape_from_log(kind: str, parameters: Mapping[str, Any]) -> Shape | None:
+    """Return the shape that a log describes, or None if the kind is unknown.
+
+    Args:
+        kind: Name of the shape's class.
+        parameters: Its attributes.
 
     Raises:
-        SceneError: If a shape of this kind has other parameters.
+        SceneError: If the parameters are not those of this kind, or invalid.
     """
-    forms = {form.__name__: form for form in Shape.__subclasses__()}
-    form = forms.get(kind)
-    if form is None:
+    classes = {shape.__name__: shape for shape in Shape.__subclasses__()}
+    shape_class = classes.get(kind)
+    if shape_class is None:
         return None
     try:
         known = {k: Path(v) if k == "file" else v for k, v in parameters.items()}
-        shape: Shape = form(**known)
+        shape: Shape = shape_class(**known)
     except (TypeError, ValueError):
-        needed = ", ".join(signature(form).parameters) or "nothing"
+        needed = ", ".join(signature(shape_class).parameters) or "nothing"
         found = f"{dict(parameters)!r}"[:60]
-        raise SceneError(f"{kind.lower()}: needs {needed}; found {found}") from None
+        raise SceneError(f"{kind.lower()}: needs {needed}; got {found}") from None
     return shape
 
 
-def _lengths(shape: Shape, values: dict[str, float], *, zero: bool = False) -> None:
+def _check_lengths(
+    shape: Shape, values: dict[str, float], *, zero: bool = False
+) -> None:
+    """Check that lengths are finite and positive, or not negative if ``zero``."""
     for name, value in values.items():
         if not (value >= 0.0 if zero else value > 0.0) or not value < np.inf:
-            least = "at least 0" if zero else "greater than 0"
+            needed = "at least 0" if zero else "greater than 0"
             raise SceneError(
-                f"{type(shape).__name__.lower()}: {name} is {value}; must be {least}"
+                f"{type(shape).__name__.lower()}: {name} is {value}; must be {needed}"
             )

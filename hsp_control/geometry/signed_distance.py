@@ -1,7 +1,7 @@
-"""Signed distances in closed form, with what their exact rates need, as kernels.
+"""Signed distances in closed form, and the terms for their exact rates, as kernels.
 
-Either between two segments (balls, capsules), or from a point to a solid about its own
-origin (box, cylinder, half-space), with gradient n and Hessian H.
+Either between two segments (spheres, capsules), or from a point to a solid about its
+own origin (box, cylinder, half-space), with gradient n and Hessian H.
 """
 
 from math import sqrt
@@ -10,10 +10,10 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 
 SEGMENT, BOX, CYLINDER, HALF_SPACE = 0, 1, 2, 3
-"""Kinds of shapes: a ball is a segment without length."""
+"""Kinds of shapes; a sphere is a segment of length zero."""
 
-_PARALLEL = 1e-13  # of sin² of the angle between two segments
-_MEETING = 1e-12  # a distance without direction [m]
+_PARALLEL = 1e-13  # threshold of sin² of the angle between two segments
+_COINCIDENT = 1e-12  # below this distance two points define no direction [m]
 
 
 @kernel
@@ -28,13 +28,16 @@ def nearest_on_segments(
 ) -> tuple[float, float, bool, bool]:
     """Return (s, t) of the nearest points a + s e and b + t f, and which are free.
 
-    A free one is inside its segment, where the nearest point slides; the other is at an
-    end (Ericson, Real-Time Collision Detection, 2005, 5.1.9).
+    A free point is inside its segment, where it can slide; a fixed one is at an end
+    (Ericson, Real-Time Collision Detection, 2005, 5.1.9).
 
     Args:
-        segments: Each one's start and axis, shape (k, 2, 3).
-        i: Which is (a, e).
-        j: Which is (b, f).
+        segments: Start and axis of each segment, shape (k, 2, 3) [m].
+        i: Index of the segment (a, e).
+        j: Index of the segment (b, f).
+
+    Returns:
+        (s, t, whether s is free, whether t is free), s and t in [0, 1].
     """
     ee = ff = ef = er = fr = 0.0
     for c in range(3):
@@ -73,10 +76,11 @@ def nearest_rates(
     s_free: bool,
     t_free: bool,
 ) -> tuple[float, float]:
-    """Return (s', t') of segments that move: r = a - b + s e - t f stays across both.
+    """Return (s', t') of the nearest points of two moving segments.
 
-    Free coordinates obey e·r = 0 and f·r = 0; differentiated in time they are linear in
-    s' and t'. Lengths are constant.
+    With r = a - b + s e - t f, a free s obeys e·r = 0 and a free t obeys f·r = 0. The
+    time derivatives of these equations are linear in s' and t'. The lengths of the
+    segments are constant. Vectors have shape (3,).
     """
     if not (s_free or t_free):
         return 0.0, 0.0
@@ -101,14 +105,15 @@ def nearest_rates(
 
 @kernel
 def distance_to_solid(kind: int, size: Array, x: Array, n: Array, H: Array) -> float:
-    """Return the signed distance of a point to a solid, write its gradient and Hessian.
+    """Return the signed distance of a point to a solid; write gradient and Hessian.
 
     Args:
         kind: BOX, CYLINDER or HALF_SPACE.
-        size: Half the edges; radius, radius and half the height; nothing.
-        x: The point in the solid's axes, shape (3,).
-        n: Gradient, a unit vector, shape (3,).
-        H: Hessian, shape (3, 3).
+        size: Box: half the edges. Cylinder: radius, radius and half the height.
+            Half-space: not used. Shape (≥ 3,) [m].
+        x: The point in the solid's frame, shape (3,) [m].
+        n: Is overwritten with the gradient, a unit vector, shape (3,).
+        H: Is overwritten with the Hessian, shape (3, 3) [1/m].
     """
     for i in range(3):
         n[i] = 0.0
@@ -124,18 +129,18 @@ def distance_to_solid(kind: int, size: Array, x: Array, n: Array, H: Array) -> f
 
 @kernel
 def _box(size: Array, x: Array, n: Array, H: Array) -> float:
-    """Write n and H of a box: n and H start at zero."""
-    square, nearest, deepest = 0.0, 0, -1e300
+    """Return the distance to a box, write n and H, which must be zero before."""
+    square, nearest, largest = 0.0, 0, -1e300
     for i in range(3):
         beyond = abs(x[i]) - size[i]
-        if beyond > deepest:
-            nearest, deepest = i, beyond
+        if beyond > largest:
+            nearest, largest = i, beyond
         if beyond > 0.0:
             n[i] = beyond if x[i] > 0.0 else -beyond
             square += beyond * beyond
-    if deepest <= 0.0:  # inside: to the nearest face
+    if largest <= 0.0:  # inside: to the nearest face
         n[nearest] = 1.0 if x[nearest] > 0.0 else -1.0
-        return float(deepest)
+        return float(largest)
     distance = sqrt(square)
     for i in range(3):
         n[i] /= distance
@@ -149,16 +154,16 @@ def _box(size: Array, x: Array, n: Array, H: Array) -> float:
 
 @kernel
 def _cylinder(size: Array, x: Array, n: Array, H: Array) -> float:
-    """Write n and H of a cylinder along z: n and H start at zero."""
+    """Return the distance to a cylinder along z, write n and H, zero before."""
     r = sqrt(x[0] * x[0] + x[1] * x[1])
     side, end = r - size[0], abs(x[2]) - size[2]
     up = 1.0 if x[2] > 0.0 else -1.0
-    # Unit vectors outwards and round; on the axis any will do.
+    # (c, s) is the radial unit vector; on the axis any direction is right.
     c, s = (x[0] / r, x[1] / r) if r > 0.0 else (1.0, 0.0)
     if side <= 0.0 and end <= 0.0:  # inside: to the nearer of side and end
         if side > end:
             n[0], n[1] = c, s
-            distance, bend = side, 1.0 / r
+            distance, curvature = side, 1.0 / r
         else:
             n[2] = up
             return float(end)
@@ -167,12 +172,12 @@ def _cylinder(size: Array, x: Array, n: Array, H: Array) -> float:
         return float(end)
     elif end <= 0.0:
         n[0], n[1] = c, s
-        distance, bend = side, 1.0 / r
+        distance, curvature = side, 1.0 / r
     else:  # to the edge
         distance = sqrt(side * side + end * end)
         out, along = side / distance, up * end / distance
         n[0], n[1], n[2] = out * c, out * s, along
-        # across the gradient within the plane of the axis
+        # (p0, p1, p2) is normal to the gradient, in the plane through the axis
         p0, p1, p2 = along * c, along * s, -out
         H[0, 0] += p0 * p0 / distance
         H[0, 1] += p0 * p1 / distance
@@ -181,11 +186,11 @@ def _cylinder(size: Array, x: Array, n: Array, H: Array) -> float:
         H[1, 2] += p1 * p2 / distance
         H[2, 2] += p2 * p2 / distance
         H[1, 0], H[2, 0], H[2, 1] = H[0, 1], H[0, 2], H[1, 2]
-        bend = out / r
-    H[0, 0] += bend * s * s
-    H[0, 1] -= bend * s * c
-    H[1, 0] -= bend * s * c
-    H[1, 1] += bend * c * c
+        curvature = out / r
+    H[0, 0] += curvature * s * s
+    H[0, 1] -= curvature * s * c
+    H[1, 0] -= curvature * s * c
+    H[1, 1] += curvature * c * c
     return float(distance)
 
 
@@ -193,17 +198,18 @@ def _cylinder(size: Array, x: Array, n: Array, H: Array) -> float:
 def direction(points: Array) -> float:
     """Return the distance of two points, write the unit vector from second to first.
 
-    Where they meet there is none; z stands for it, so that nothing becomes infinite.
+    If the points coincide, the distance is 0 and the z axis is written, so that all
+    results are finite.
 
     Args:
-        points: Rows x, y and, written, n = (x - y)/|x - y|, shape (3, 3).
+        points: Rows x, y and n, shape (3, 3); n is overwritten with (x - y)/|x - y|.
     """
     square = 0.0
     for c in range(3):
         points[2, c] = points[0, c] - points[1, c]
         square += points[2, c] * points[2, c]
     distance = sqrt(square)
-    if distance < _MEETING:
+    if distance < _COINCIDENT:
         points[2, 0], points[2, 1], points[2, 2] = 0.0, 0.0, 1.0
         return 0.0
     for c in range(3):

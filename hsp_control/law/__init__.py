@@ -1,7 +1,6 @@
-"""Resolutions: from tasks and a field to an acceleration."""
+"""The law: from tasks and a field to an acceleration, equations (7) and (13)."""
 
+from .outcome import Outcome as Outcome
 from .problem import Problem as Problem
-from .resolution import DAMPED as DAMPED
-from .resolution import NOT_FINITE as NOT_FINITE
 from .resolution import Resolution as Resolution
 from .resolution import Resolved as Resolved

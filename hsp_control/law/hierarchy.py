@@ -17,6 +17,8 @@ below, by the interlacing of Schur complements, so that the two meet where they 
 over.) ``law.md`` §4.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
@@ -28,85 +30,92 @@ from hsp_control.common.linalg import (
     solve_lower,
     solve_lower_transposed,
 )
+from hsp_control.null_space.fields import FieldSample
+from hsp_control.null_space.metrics import MetricSample
 from hsp_control.null_space.metrics.metric import VARYING
+from hsp_control.tasks import TaskSample
+
+
+class LevelScratch(NamedTuple):
+    """Memory of `resolve_levels` between its steps.
+
+    Attributes:
+        Q: Shape (nv, nv); the last null space's Q_K = P W⁻¹ afterwards.
+        QJ: Q_{k-1} J_kᵀ of all levels side by side, shape (nv, m).
+        G_inverse: q(G_k) of all levels along the diagonal, shape (m, m).
+        square: Shape (2, m, m).
+        rows: Shape (6, max(nv, m)).
+    """
+
+    Q: Array
+    QJ: Array
+    G_inverse: Array
+    square: Array
+    rows: Array
 
 
 @kernel
 def resolve_levels(
-    J: Array,
-    J_dot: Array,
-    a_x: Array,
-    v: Array,
-    g: Array,
-    g_dot: Array,
-    K_N: Array,
-    W: Array,
-    L: Array,
-    W_dot: Array,
+    task: TaskSample,
+    field: FieldSample,
+    metric: MetricSample,
     form: int,
+    v: Array,
+    K_N: Array,
     threshold: float,
     controls: bool,
     ends: Indices,
-    Q: Array,
-    QJ: Array,
-    G_inverse: Array,
-    square: Array,
-    scratch: Array,
+    scratch: LevelScratch,
     e_N: Array,
     a: Array,
 ) -> bool:
     """Write e_N and a; return whether a singular value was damped.
 
     Args:
-        J: Jacobian of all tasks, level after level, shape (m, nv).
-        J_dot: Its time derivative, shape (m, nv).
-        a_x: Task accelerations, shape (m,).
-        v: Velocity, shape (nv,).
-        g: Field, shape (nv,).
-        g_dot: Its total time derivative, shape (nv,).
-        K_N: Null-space gain [1/s], shape (nv, nv).
-        W: Metric, shape (nv, nv).
-        L: Its Cholesky factor, shape (nv, nv).
-        W_dot: Its time derivative, shape (nv, nv).
+        task: All tasks, level after level: J, J' and a_x, m rows.
+        field: g and g', shape (nv,) each.
+        metric: W, its Cholesky factor L and W', shape (nv, nv) each.
         form: The metric's form.
+        v: Velocity, shape (nv,).
+        K_N: Null-space gain [1/s], shape (nv, nv).
         threshold: Singular value of a level's whitened Jacobian, in the null space of
             those above, below which it is damped.
         controls: False for φ_N = 0.
         ends: Where each level's rows end in the stack.
-        Q: Scratch, shape (nv, nv); the last null space's Q_K = P W⁻¹ afterwards.
-        QJ: Scratch, shape (nv, m).
-        G_inverse: Scratch, shape (m, m).
-        square: Scratch, shape (2, m, m).
-        scratch: Scratch, shape (6, max(nv, m)).
+        scratch: Memory.
         e_N: Null-space error, shape (nv,).
         a: Acceleration, shape (nv,).
     """
+    J, J_dot, a_x = task.jacobian, task.jacobian_dot, task.acceleration
+    g, g_dot, W, W_dot = field.g, field.g_dot, metric.W, metric.W_dot
+    Q, QJ, G_inverse = scratch.Q, scratch.QJ, scratch.G_inverse
+    square, rows = scratch.square, scratch.rows
     n = v.shape[0]
     damped = False
-    _invert(L, Q)
+    _invert(metric.L, Q)
     for i in range(n):
         a[i] = 0.0
     start = 0
     for level in range(ends.shape[0]):
         end = ends[level]
         block = slice(start, end)
-        G_inv, rest = G_inverse[block, block], scratch[0, start:end]
+        G_inv, rest = G_inverse[block, block], rows[0, start:end]
         if _open_level(J[block], Q, QJ[:, block], G_inv, square, threshold):
             damped = True
         for k in range(start, end):
             total = a_x[k]
             for i in range(n):
                 total -= J_dot[k, i] * v[i] + J[k, i] * a[i]
-            scratch[0, k] = total
-        pushed = scratch[1, : end - start]
+            rows[0, k] = total
+        pushed = rows[1, : end - start]
         multiply(G_inv, rest, pushed)
         for i in range(n):
             for k in range(end - start):
                 a[i] += QJ[i, start + k] * pushed[k]
-        _close_level(Q, QJ[:, block], G_inv, scratch[1])
+        _close_level(Q, QJ[:, block], G_inv, rows[1])
         start = end
 
-    x, Wx, Y, bent = scratch[0, :n], scratch[1, :n], scratch[2, :n], scratch[3, :n]
+    x, Wx, Y, bent = rows[0, :n], rows[1, :n], rows[2, :n], rows[3, :n]
     for i in range(n):
         x[i] = g[i] - v[i]
         Y[i] = bent[i] = 0.0
@@ -129,7 +138,7 @@ def resolve_levels(
     multiply(Q, Wx, e_N)
     if not controls:
         return damped
-    wanted = scratch[4, :n]
+    wanted = rows[4, :n]
     multiply(K_N, e_N, wanted)
     for i in range(n):
         wanted[i] += g_dot[i]

@@ -16,23 +16,22 @@ from hsp_control.law.pseudo_inverse import (
     apply_pseudo_inverse,
     apply_pseudo_inverse_transpose,
 )
+from hsp_control.null_space.fields import FieldSample
+from hsp_control.null_space.metrics import MetricSample
 from hsp_control.null_space.metrics.metric import IDENTITY, VARYING, raise_covector
+from hsp_control.tasks import TaskSample
 
 
 @kernel
 def null_space_command(
-    J: Array,
-    J_dot: Array,
+    task: TaskSample,
+    field: FieldSample,
+    metric: MetricSample,
+    form: int,
     Q: Array,
     X: Array,
     v: Array,
-    g: Array,
-    g_dot: Array,
     K_N: Array,
-    W: Array,
-    L: Array,
-    W_dot: Array,
-    form: int,
     scratch: Array,
     e_N: Array,
     u: Array,
@@ -42,22 +41,20 @@ def null_space_command(
     Then V = ½ e_Nᵀ W e_N obeys V' = -e_Nᵀ W K_N e_N (Proposition 2).
 
     Args:
-        J: Jacobian of all tasks, shape (m, nv).
-        J_dot: Its time derivative, shape (m, nv).
+        task: All tasks stacked: J and J' are read, shape (m, nv) each.
+        field: g and g', shape (nv,) each.
+        metric: W, its Cholesky factor L and W', shape (nv, nv) each.
+        form: The metric's form.
         Q: One factor of J# = L⁻ᵀ Qᵀ X, shape (m, nv).
         X: The other, shape (m, m).
         v: Velocity, shape (nv,).
-        g: Field, shape (nv,).
-        g_dot: Its total time derivative, shape (nv,).
         K_N: Null-space gain [1/s], shape (nv, nv).
-        W: Metric, shape (nv, nv).
-        L: Its Cholesky factor, shape (nv, nv).
-        W_dot: Its time derivative, shape (nv, nv).
-        form: The metric's form.
-        scratch: Shape (6, nv).
+        scratch: Shape (6, max(m, nv)).
         e_N: Null-space error, shape (nv,).
         u: Null-space command before projection, shape (nv,).
     """
+    J, J_dot, g, g_dot = task.jacobian, task.jacobian_dot, field.g, field.g_dot
+    W, L, W_dot = metric.W, metric.L, metric.W_dot
     m, n = Q.shape
     x, lowered, bent = scratch[0, :n], scratch[1, :n], scratch[2, :n]
     Jx, w, part = scratch[3, :m], scratch[4, :m], scratch[5, :m]
@@ -91,14 +88,12 @@ def null_space_command(
 
 @kernel
 def acceleration(
-    J: Array,
-    J_dot: Array,
-    Q: Array,
-    X: Array,
+    task: TaskSample,
     L: Array,
     form: int,
+    Q: Array,
+    X: Array,
     v: Array,
-    a_x: Array,
     u: Array,
     scratch: Array,
     a: Array,
@@ -106,18 +101,17 @@ def acceleration(
     """Write a = J#(a_x - J'v) + (I - J#J) u: equation (7) with φ_N = P u.
 
     Args:
-        J: Jacobian of all tasks, shape (m, nv).
-        J_dot: Its time derivative, shape (m, nv).
-        Q: One factor of J# = L⁻ᵀ Qᵀ X, shape (m, nv).
-        X: The other, shape (m, m).
+        task: All tasks stacked: J, J' and a_x = x_d'' + Kv e' + Kp e, m rows.
         L: Cholesky factor of the metric, shape (nv, nv).
         form: The metric's form.
+        Q: One factor of J# = L⁻ᵀ Qᵀ X, shape (m, nv).
+        X: The other, shape (m, m).
         v: Velocity, shape (nv,).
-        a_x: Task acceleration x_d'' + Kv e' + Kp e, shape (m,).
         u: Null-space command, shape (nv,); zero for the paper's first simulation.
-        scratch: Shape (6, nv).
+        scratch: Shape (6, max(m, nv)).
         a: Acceleration, shape (nv,).
     """
+    J, J_dot, a_x = task.jacobian, task.jacobian_dot, task.acceleration
     m, n = Q.shape
     drift, missing, part = scratch[3, :m], scratch[4, :m], scratch[5, :m]
     multiply(J_dot, v, drift)

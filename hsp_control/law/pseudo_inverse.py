@@ -9,11 +9,11 @@ triangular; near them Q = U B has orthogonal rows, and X = q(s²) U inverts the 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
-    least_singular_value_bound,
     multiply,
     multiply_transposed,
     orthogonalise_rows,
     orthonormalise_rows,
+    smallest_singular_value_bound,
     solve_lower,
     solve_lower_transposed,
 )
@@ -50,7 +50,7 @@ def weighted_pseudo_inverse(
     # The spectrum is asked for only where cheaper bounds leave open whether it is met.
     bound = orthonormalise_rows(B, Q, X)
     if 0.0 < bound < threshold:
-        bound = least_singular_value_bound(X)
+        bound = smallest_singular_value_bound(X)
     if bound < threshold:
         return _bounded_factors(B, threshold, Q, X)
     return False

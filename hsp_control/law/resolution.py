@@ -14,14 +14,16 @@ from hsp_control.common.linalg import (
     orthonormalise_rows,
 )
 from hsp_control.common.native import bind
-from hsp_control.law.hierarchy import resolve_levels
+from hsp_control.law.hierarchy import LevelScratch, resolve_levels
 from hsp_control.law.law import acceleration, null_space_command
+from hsp_control.law.outcome import OUTCOMES, Outcome
 from hsp_control.law.problem import Problem
 from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse, whiten
+from hsp_control.null_space.fields import FieldSample
+from hsp_control.null_space.metrics import MetricSample
+from hsp_control.tasks import TaskSample
 
-EXACT, DAMPED, NOT_FINITE = 0, 1, 2
-"""What became of the law: it is exact; a singular value was below the threshold, so
-that it was bounded instead; a is not made of numbers."""
+_EXACT, _DAMPED, _NOT_FINITE = map(int, Outcome)
 
 
 class Resolved(NamedTuple):
@@ -30,15 +32,30 @@ class Resolved(NamedTuple):
     Attributes:
         acceleration: a, shape (nv,).
         null_space_error: e_N = P(g - v), shape (nv,).
-        damped: Whether a singular value was below the threshold, so that the law was
-            bounded rather than exact.
-        finite: Whether a is made of numbers.
+        outcome: Whether the law is exact.
     """
 
     acceleration: Array
     null_space_error: Array
-    damped: bool
-    finite: bool
+    outcome: Outcome
+
+
+class Scratch(NamedTuple):
+    """Memory of the law between its steps.
+
+    Attributes:
+        wide: Shape (2, m, nv).
+        square: Shape (3, m, m).
+        rows: Shape (7, max(m, nv)).
+        tall: Shape (nv, m); for levels in conflict.
+        inner: Shape (nv, nv); for levels in conflict.
+    """
+
+    wide: Array
+    square: Array
+    rows: Array
+    tall: Array
+    inner: Array
 
 
 class Resolution:
@@ -72,13 +89,13 @@ class Resolution:
         self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
         self.form = form
         self.threshold = threshold
-        self._scratch = (
+        self._scratch = Scratch(
             np.zeros((2, m, nv)),
             np.zeros((3, m, m)),
             np.zeros((7, max(m, nv))),
+            np.zeros((nv, m)),
+            np.zeros((nv, nv)),
         )
-        # What only conflicting levels need.
-        self._levels_scratch = np.zeros((nv, m)), np.zeros((nv, nv))
         self.acceleration, self.null_space_error = np.zeros(nv), np.zeros(nv)
         self._norm = bind(norm, self.problem.metric.W, self.null_space_error)
         self._spectra: dict[int, tuple[Callable[[], float], Array]] = {}
@@ -90,26 +107,29 @@ class Resolution:
             v: Velocity, shape (nv,).
             controls_null_space: False for φ_N = 0, the paper's first simulation.
         """
-        how = self.compile(v, controls=controls_null_space)()
+        outcome = self.compile(v, controls=controls_null_space)()
         return Resolved(
-            self.acceleration, self.null_space_error, how == DAMPED, how != NOT_FINITE
+            self.acceleration, self.null_space_error, OUTCOMES[int(outcome)]
         )
 
     def compile(self, v: Array, *, controls: bool) -> Callable[[], float]:
         """Return what `resolve` calls for a velocity, an array that is followed.
 
-        It returns `EXACT`, `DAMPED` or `NOT_FINITE`.
+        It returns the number of an `Outcome`.
         """
+        problem = self.problem
         return bind(
             _resolve,
-            *self.problem.arrays,
-            v,
-            self.ends,
+            problem.task,
+            problem.field,
+            problem.metric,
             self.form,
+            v,
+            problem.gain,
             self.threshold,
             controls,
-            *self._scratch,
-            *self._levels_scratch,
+            self.ends,
+            self._scratch,
             self.null_space_error,
             self.acceleration,
         )
@@ -123,7 +143,7 @@ class Resolution:
         if values is None:
             J, L = self.problem.task.jacobian[first:], self.problem.metric.L
             out = np.zeros(min(J.shape))
-            wide, small, _ = self._scratch
+            wide, small = self._scratch.wide, self._scratch.square
             call = bind(_singular_values, J, L, self.form, wide, small, out)
             self._spectra[first] = values = call, out
         manipulability = values[0]()
@@ -136,75 +156,50 @@ class Resolution:
 
 @kernel
 def _resolve(
-    jacobians: Array,
-    tasks: Array,
-    field: Array,
-    squares: Array,
-    v: Array,
-    ends: Indices,
+    task: TaskSample,
+    field: FieldSample,
+    metric: MetricSample,
     form: int,
+    v: Array,
+    K_N: Array,
     threshold: float,
     controls: bool,
-    wide: Array,
-    small: Array,
-    scratch: Array,
-    tall: Array,
-    inner: Array,
+    ends: Indices,
+    scratch: Scratch,
     e_N: Array,
     a: Array,
 ) -> int:
-    """Write e_N and a; return `EXACT`, `DAMPED` or `NOT_FINITE`.
-
-    The first four arrays are those of a `Problem`, the next but the last two scratch.
-    """
-    J, J_dot, a_x, g, g_dot = jacobians[0], jacobians[1], tasks[2], field[0], field[1]
-    W, L, W_dot, K_N = squares[0], squares[1], squares[2], squares[3]
-    m, n = J.shape
-    Q, X, u = wide[1], small[1], scratch[6, :n]
+    """Write e_N and a; return the number of an `Outcome`."""
+    m, n = task.jacobian.shape
+    Q, X, rows = scratch.wide[1], scratch.square[1], scratch.rows
+    u = rows[6, :n]
 
     conflicting = m > n
     damped = False
     if not conflicting:
-        damped = weighted_pseudo_inverse(J, L, form, threshold, wide[0], Q, X)
+        damped = weighted_pseudo_inverse(
+            task.jacobian, metric.L, form, threshold, scratch.wide[0], Q, X
+        )
         conflicting = damped and ends.shape[0] > 1
     if conflicting:
+        levels = LevelScratch(
+            scratch.inner, scratch.tall, scratch.square[2], scratch.square, rows
+        )
         damped = resolve_levels(
-            J,
-            J_dot,
-            a_x,
-            v,
-            g,
-            g_dot,
-            K_N,
-            W,
-            L,
-            W_dot,
-            form,
-            threshold,
-            controls,
-            ends,
-            inner,
-            tall,
-            small[2],
-            small,
-            scratch,
-            e_N,
-            a,
+            task, field, metric, form, v, K_N, threshold, controls, ends, levels, e_N, a
         )
     else:
-        null_space_command(
-            J, J_dot, Q, X, v, g, g_dot, K_N, W, L, W_dot, form, scratch, e_N, u
-        )
+        null_space_command(task, field, metric, form, Q, X, v, K_N, rows, e_N, u)
         if not controls:
             for i in range(n):
                 u[i] = 0.0
-        acceleration(J, J_dot, Q, X, L, form, v, a_x, u, scratch, a)
+        acceleration(task, metric.L, form, Q, X, v, u, rows, a)
     total = 0.0
     for i in range(n):
         total += a[i]
     if not np.isfinite(total):
-        return NOT_FINITE
-    return DAMPED if damped else EXACT
+        return _NOT_FINITE
+    return _DAMPED if damped else _EXACT
 
 
 @kernel

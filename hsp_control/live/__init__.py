@@ -1,20 +1,20 @@
-"""A live loop: a controller on a robot, period by period, with a safe stop."""
+"""Real-time control: run a controller on a robot each period, ending in a safe stop."""
 
-from .commander import Commander as Commander
 from .deadlines import Deadlines as Deadlines
+from .effort_source import EffortSource as EffortSource
 from .faults import Faults as Faults
 from .hardware import Hardware as Hardware
 from .hardware import Measurement as Measurement
 from .in_process import InProcessRobot as InProcessRobot
 from .link import Link as Link
 from .loop import run_loop as run_loop
-from .operator import Operator as Operator
+from .operator_requests import OperatorRequests as OperatorRequests
 from .report import LoopReport as LoopReport
 from .safe_stop import Phase as Phase
 from .safe_stop import SafeStop as SafeStop
 from .settings import EffortInterface as EffortInterface
 from .settings import StopSettings as StopSettings
 from .settings import Tolerance as Tolerance
+from .simulated_robot import SimulatedRobot as SimulatedRobot
 from .udp_hardware import UdpHardware as UdpHardware
 from .udp_robot import serve as serve
-from .watched_robot import WatchedRobot as WatchedRobot

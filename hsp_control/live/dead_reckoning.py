@@ -1,4 +1,4 @@
-"""Where a robot that is not seen must be by now, if the model is right."""
+"""Predict the robot's state with the model while no measurement arrives."""
 
 import numpy as np
 
@@ -8,36 +8,47 @@ from hsp_control.robot import Robot, RobotState
 
 
 class DeadReckoning:
-    """The last state that was seen, carried on by the model under the efforts sent.
+    """The last measured state, integrated with the model under the applied efforts.
 
     Attributes:
-        state: The state, seen or reckoned.
-        blind: For how long it has not been seen [s].
+        state: The state, measured or predicted.
+        predicted_for: Time since the last measurement [s].
     """
 
     def __init__(self, robot: Robot, period: float) -> None:
-        """Allocate."""
+        """Allocate the state.
+
+        Args:
+            robot: The model.
+            period: Length of a period [s].
+        """
         self._robot, self._period = robot, period
         self.state = RobotState(robot)
-        self.blind = 0.0
+        self.predicted_for = 0.0
 
-    def see(self, t: float, q: Array, v: Array) -> None:
-        """Take a state that was measured, at time t [s]."""
+    def correct(self, t: float, q: Array, v: Array) -> None:
+        """Set the state to a measurement.
+
+        Args:
+            t: Time [s].
+            q: Configuration, shape (nq,).
+            v: Velocity, shape (nv,).
+        """
         self.state.update(t, q, v)
-        self.blind = 0.0
+        self.predicted_for = 0.0
 
-    def reckon(self, tau: Array) -> None:
-        """Carry the state on for a period under an effort, shape (nv,).
+    def predict(self, tau: Array) -> None:
+        """Integrate the state over one period under an effort, shape (nv,).
 
-        One semi-implicit Euler step. Where the model's answer is no state, it stays.
+        One semi-implicit Euler step. If its result is not finite, the state is kept.
         """
         state, h = self.state, self._period
-        self.blind += h
+        self.predicted_for += h
         a = self._robot.forward_dynamics(state.q, state.v, tau)
         v = state.v + h * a
         if not np.isfinite(v).all():
             return
         try:
             state.update(state.t + h, self._robot.integrate(state.q, h * v), v)
-        except HspControlError:  # a speed beyond all bounds: no configuration
+        except HspControlError:  # too fast: the configuration would overflow
             return

@@ -1,61 +1,66 @@
-"""How late a live loop was."""
+"""Response times, deadline misses and skipped states of a live loop."""
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.live.latency import Quantiles
 
-KEPT = 600_000
-"""Periods whose times are kept, the latest: ten minutes at 1 kHz."""
+CAPACITY = 600_000
+"""Number of periods whose times are stored, the latest ones: ten minutes at 1 kHz."""
 
 
 class Deadlines:
-    """Times from a state's arrival to its effort, and between arrivals.
+    """Response times (state received to effort sent) and intervals between states.
 
-    Counts and worst times are of the whole run, quantiles of its last `KEPT` periods.
+    Counts and worst times cover the whole run, quantiles the last `CAPACITY` periods.
 
     Attributes:
-        period: Length of a period [s].
-        periods: How many states were answered.
-        missed: How many answers took longer than a period.
-        silent: Periods in which no new state came.
-        unseen: States that the robot made and the loop did not see.
+        period: Length of a period, the deadline of a response [s].
+        periods: Number of states that were answered with an effort.
+        missed: Number of deadline misses: responses longer than a period.
+        without_state: Number of periods in which no new state arrived.
+        skipped_states: Number of states that the robot sent and the loop did not use.
     """
 
-    def __init__(self, period: float, kept: int = KEPT) -> None:
-        """Allocate, and touch every page of it: the loop shall find it in memory."""
-        self.period = period
-        self.periods = self.missed = self.silent = self.unseen = 0
-        self._responses: Array = np.full(kept, np.nan)
-        self._gaps: Array = np.full(kept, np.nan)
-        self._worst_response = self._worst_gap = 0.0
-
-    def add(self, gap: float, response: float) -> None:
-        """Note a period.
+    def __init__(self, period: float, capacity: int = CAPACITY) -> None:
+        """Allocate the memory and write to all of it, to avoid page faults later.
 
         Args:
-            gap: Time since the last state's arrival [s].
+            period: Length of a period [s].
+            capacity: Number of periods whose times are stored.
+        """
+        self.period = period
+        self.periods = self.missed = self.without_state = self.skipped_states = 0
+        self._responses: Array = np.full(capacity, np.nan)
+        self._intervals: Array = np.full(capacity, np.nan)
+        self._worst_response = self._worst_interval = 0.0
+
+    def add(self, interval: float, response: float) -> None:
+        """Record a period.
+
+        Args:
+            interval: Time between the arrivals of the last state and of this one [s].
             response: Time from this state's arrival until its effort was sent [s].
         """
         k = self.periods % len(self._responses)
-        self._responses[k], self._gaps[k] = response, gap
+        self._responses[k], self._intervals[k] = response, interval
         self.periods += 1
         self.missed += response > self.period
         self._worst_response = max(self._worst_response, response)
-        self._worst_gap = max(self._worst_gap, gap)
+        self._worst_interval = max(self._worst_interval, interval)
 
     @property
     def response(self) -> Quantiles | None:
-        """From a state's arrival to its effort [s]; None without any."""
+        """Time from a state's arrival to its effort [s]; None before the first."""
         return self._quantiles(self._responses, self._worst_response)
 
     @property
-    def gap(self) -> Quantiles | None:
-        """Between the arrivals of two states [s]; None without any."""
-        return self._quantiles(self._gaps, self._worst_gap)
+    def interval(self) -> Quantiles | None:
+        """Time between the arrivals of two states [s]; None before the first."""
+        return self._quantiles(self._intervals, self._worst_interval)
 
     def _quantiles(self, times: Array, worst: float) -> Quantiles | None:
         if not self.periods:
             return None
-        found = Quantiles.of(times[: min(self.periods, len(times))])
-        return found._replace(worst=worst)
+        stored = Quantiles.of(times[: min(self.periods, len(times))])
+        return stored._replace(worst=worst)

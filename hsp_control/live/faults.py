@@ -1,4 +1,4 @@
-"""A network that loses, delays, repeats and corrupts: injected, and counted."""
+"""Inject packet loss, delay, duplication and corruption, and count them."""
 
 from collections import Counter
 from dataclasses import asdict, dataclass, fields
@@ -11,15 +11,15 @@ from hsp_control.common.suggestions import did_you_mean
 
 @dataclass(frozen=True)
 class Faults:
-    """What happens to packets: the probability of each fault, at most one a packet.
+    """Probabilities of packet faults; a packet has one fault at most.
 
     Attributes:
-        late: It is sent after some later ones.
-        lost: It is not sent.
-        duplicated: It is sent twice.
-        corrupted: One of its bits is turned over.
-        delay: How many packets later a late one is sent.
-        seed: Of the random numbers.
+        late: Probability that a packet is sent after some later ones.
+        lost: Probability that it is not sent.
+        duplicated: Probability that it is sent twice.
+        corrupted: Probability that one of its bits is inverted.
+        delay: Number of packets that are sent before a late one.
+        seed: Seed of the random numbers.
     """
 
     late: float = 0.0
@@ -30,10 +30,10 @@ class Faults:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what are no probabilities.
+        """Check the probabilities and the delay.
 
         Raises:
-            LiveError: Names the value.
+            LiveError: If a value is out of range.
         """
         for name in _KINDS:
             if not 0.0 <= getattr(self, name) <= 1.0:
@@ -47,10 +47,10 @@ class Faults:
 
     @classmethod
     def parse(cls, text: str) -> "Faults":
-        """Return the faults of a text such as ``late=0.01,lost=0.02,seed=3``.
+        """Parse a text such as ``late=0.01,lost=0.02,seed=3``.
 
         Raises:
-            LiveError: If it is not such a text.
+            LiveError: If a name is unknown, or a value is not a valid number.
         """
         known = {field.name: field.type for field in fields(cls)}
         values: dict[str, float | int] = {}
@@ -79,26 +79,30 @@ _KINDS = ("late", "lost", "duplicated", "corrupted")
 
 
 class FaultInjector:
-    """Does to packets what `Faults` say.
+    """Applies `Faults` to packets.
 
     Attributes:
-        injected: How many of each fault there were.
+        injected: Number of injected faults of each kind.
     """
 
     def __init__(self, faults: Faults, stream: int = 0) -> None:
-        """Seed it; each sender has a stream of its own."""
+        """Seed the random numbers.
+
+        Args:
+            faults: The probabilities.
+            stream: Stream of random numbers; each sender has its own.
+        """
         self._faults = faults
         self._rng = np.random.default_rng((faults.seed, stream))
-        shares = np.cumsum([getattr(faults, kind) for kind in _KINDS])
-        self._shares = shares
+        self._cumulative = np.cumsum([getattr(faults, kind) for kind in _KINDS])
         self._waiting: list[tuple[int, bytes]] = []
         self.injected: Counter[str] = Counter(dict.fromkeys(_KINDS, 0))
 
-    def pass_on(self, data: bytes) -> list[bytes]:
-        """Return what is really sent when this packet is, in order."""
+    def apply(self, data: bytes) -> list[bytes]:
+        """Return the packets to send now in place of this one, in order."""
         released = [late for left, late in self._waiting if left <= 1]
         self._waiting = [(left - 1, late) for left, late in self._waiting if left > 1]
-        which = int(np.searchsorted(self._shares, self._rng.random(), side="right"))
+        which = int(np.searchsorted(self._cumulative, self._rng.random(), side="right"))
         if which == len(_KINDS):
             return [data, *released]
         kind = _KINDS[which]
@@ -110,12 +114,12 @@ class FaultInjector:
             return released
         if kind == "duplicated":
             return [data, data, *released]
-        broken = bytearray(data)
+        corrupted = bytearray(data)
         bit = int(self._rng.integers(8 * len(data)))
-        broken[bit // 8] ^= 1 << (bit % 8)
-        return [bytes(broken), *released]
+        corrupted[bit // 8] ^= 1 << (bit % 8)
+        return [bytes(corrupted), *released]
 
-    def rest(self) -> list[bytes]:
-        """Return the late packets that still wait: nothing else will be sent."""
+    def flush(self) -> list[bytes]:
+        """Return the late packets that still wait, before the last packet is sent."""
         waiting, self._waiting = self._waiting, []
         return [data for _, data in waiting]

@@ -1,4 +1,4 @@
-"""What a live loop needs of a robot: its state, its efforts, its period."""
+"""The interface between a live loop and a robot: states, efforts, period."""
 
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -6,16 +6,16 @@ from hsp_control.common.arrays import Array
 
 
 class Measurement(NamedTuple):
-    """What the robot says of itself.
+    """A measured state of the robot.
 
     Attributes:
-        sequence: Grows by one with every measurement that the robot makes: a gap tells
-            how many were not seen, the same number again that nothing is new.
-        t: When, on the robot's own clock [s]; trajectories follow this time.
+        sequence: Number of the measurement; the robot increments it by one. A jump is
+            the number of lost states; the same number again is an old state.
+        t: Time of the measurement on the robot's own clock [s]; trajectories use it.
         q: Configuration, shape (nq,).
         v: Velocity, shape (nv,).
-        age: How old it is, as far as the hardware can tell [s].
-        halted: Whether the robot has stopped by itself and follows no effort.
+        age: State age, as far as the hardware knows it [s].
+        halted: Whether the robot has stopped by itself and ignores efforts.
     """
 
     sequence: int
@@ -28,11 +28,11 @@ class Measurement(NamedTuple):
 
 @runtime_checkable
 class Hardware(Protocol):
-    """A robot under effort control: write one such class for each kind of robot.
+    """A robot under effort control: implement it once for each kind of robot.
 
-    The loop reads once and then, for seconds, does nothing but compile. From the second
-    read on it reads once a period, and each read is followed by a write, until it is
-    done and closes.
+    The loop calls `read` once, and then compiles kernels for some seconds. From the
+    second `read` on, it calls `read` and `write` once a period, and `close` at the end.
+    If it has no valid state any more, it calls `close` without further writes.
 
     Attributes:
         period: Time between two measurements [s].
@@ -41,24 +41,25 @@ class Hardware(Protocol):
     period: float
 
     def read(self, timeout: float) -> Measurement | None:
-        """Return the newest measurement not yet returned, as soon as there is one.
+        """Wait for a new measurement, and return the newest one.
 
         Args:
-            timeout: How long to wait for it at most [s]; 0: not at all.
+            timeout: Longest time to wait [s]; 0: do not wait.
 
         Returns:
-            The measurement, in arrays that are not written again; None if none came.
+            The measurement; its arrays must not be overwritten later. None if no new
+            one arrived.
 
         Raises:
-            HardwareError: If none will ever come.
+            HardwareError: If no measurement can arrive any more.
         """
 
     def write(self, effort: Array) -> None:
-        """Send an effort, shape (nv,), to be held until the next; never waits.
+        """Send an effort, shape (nv,), without waiting; it is held until the next.
 
         Raises:
             HardwareError: If the robot cannot be reached.
         """
 
     def close(self) -> None:
-        """Say that no more efforts will come; again is no error."""
+        """Tell the robot that no more efforts follow; a second call does nothing."""

@@ -1,25 +1,27 @@
-"""A robot without a clock of its own, in the loop's own process: for rehearsals."""
+"""A simulated robot in the loop's own process, not in real time: for dry runs."""
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.live.hardware import Measurement
-from hsp_control.live.watched_robot import WatchedRobot
+from hsp_control.live.simulated_robot import SimulatedRobot
 
 
 class InProcessRobot:
-    """A `WatchedRobot` as `Hardware`: each `read` is its next period, at once.
+    """A `SimulatedRobot` as `Hardware`: each `read` simulates the next period.
 
-    The first few reads show it waiting. A run against it is a rehearsal: no time
-    passes, nothing is late, and it equals `simulate` with the same plant and period.
+    Before the first effort, reads return the robot waiting at its start. A run is not
+    in real time and has no deadline misses; it equals `simulate` with the same plant
+    and period.
 
     Attributes:
         robot: The robot.
         period: Length of a period [s].
+        closed: Whether `close` was called.
     """
 
-    def __init__(self, robot: WatchedRobot) -> None:
-        """Set the robot."""
+    def __init__(self, robot: SimulatedRobot) -> None:
+        """Connect to the robot."""
         self.robot = robot
         self.period = robot.period
         self._sequence = 0
@@ -27,7 +29,7 @@ class InProcessRobot:
         self.closed = False
 
     def read(self, timeout: float) -> Measurement:
-        """Let a period pass, and return the state at its end."""
+        """Simulate a period, and return the state at its end, at once."""
         self.robot.advance(self._efforts)
         self._efforts = []
         self._sequence += 1
@@ -35,11 +37,11 @@ class InProcessRobot:
         return Measurement(self._sequence, self.robot.t, q, v, halted=self.robot.halted)
 
     def write(self, effort: Array) -> None:
-        """Take the effort of the next period, shape (nv,)."""
+        """Set the effort of the next period, shape (nv,)."""
         self._efforts.append(np.array(effort))
 
     def close(self) -> None:
-        """Have the robot stop, and live until it stands still."""
+        """Stop the robot, and simulate it until it has stopped."""
         if not self.closed:
             self.closed = True
             self.robot.halt("the loop has ended")

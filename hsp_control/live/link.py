@@ -1,4 +1,4 @@
-"""One end of a UDP connection: sends packets, and sorts out what comes."""
+"""One end of a UDP connection: send packets, and check those received."""
 
 import socket
 from collections import Counter
@@ -17,24 +17,24 @@ Address = tuple[str, int]
 
 LOOPBACK = "127.0.0.1"
 _BUFFER = 4 << 20
-"""Of what came and was not read [bytes]: some thousand packets."""
-_LARGEST = 65536
+"""Size of the receive buffer [bytes]: some thousand packets."""
+_MAX_DATAGRAM = 65536
 _NOTHING = np.zeros(0)
 
 
 class Link:
-    """One end of a connection.
+    """One end of a UDP connection.
 
-    Every packet that comes is one of: accepted; corrupted (not a whole packet); foreign
-    (of another session); duplicated (the newest again); stale (older than the newest).
-    Only accepted ones are passed on.
+    Every received packet is one of: accepted; corrupted (incomplete or changed);
+    foreign (of another session); duplicated (the newest again); stale (older than the
+    newest). `receive` returns the accepted ones only.
 
     Attributes:
-        session: Of both ends.
-        address: Of this end.
-        peer: Of the other end; None until it was heard of.
-        seen: Sequence of the newest packet that was accepted.
-        counts: How many of each came, by the names above, and were ``sent``.
+        session: Number of the session, the same at both ends.
+        address: Address of this end.
+        peer: Address of the other end; None until a packet arrived from it.
+        newest: Sequence number of the newest accepted packet.
+        counts: Number of packets of each kind above, and of packets ``sent``.
     """
 
     def __init__(
@@ -50,19 +50,19 @@ class Link:
 
         Args:
             session: A number that both ends know.
-            address: Where to listen; port 0: any that is free.
-            peer: The other end; None: whoever first sends a packet of the session.
-            faults: What happens to packets that are sent.
-            stream: Of the faults' random numbers.
+            address: Where to listen; port 0: any free port.
+            peer: The other end; None: the sender of the first packet of the session.
+            faults: Faults to inject into the packets sent.
+            stream: Stream of the faults' random numbers.
 
         Raises:
-            HardwareError: If there is no such address, or it is taken.
+            HardwareError: If the address does not exist or is in use.
         """
         self.session, self.peer = session, peer
         self._faults = FaultInjector(faults or Faults(), stream)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        with suppress(OSError):  # a smaller one does, too
+        with suppress(OSError):  # a smaller buffer works, too
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
         try:
             self._socket.bind(address)
@@ -72,7 +72,7 @@ class Link:
                 f"cannot listen at {address[0]}:{address[1]}: {error.strerror or error}"
             ) from error
         self.address: Address = self._socket.getsockname()
-        self.seen = self._sent = 0
+        self.newest = self._sent = 0
         self.counts: Counter[str] = Counter(
             dict.fromkeys(
                 ("sent", "accepted", "corrupted", "foreign", "duplicated", "stale"), 0
@@ -81,25 +81,31 @@ class Link:
 
     @property
     def injected(self) -> dict[str, int]:
-        """How many packets of each fault were sent."""
+        """Number of faults of each kind that were injected into packets sent."""
         return dict(self._faults.injected)
 
     @property
     def lost(self) -> int:
-        """How many packets the other end sent and this one never had."""
-        whole = self.counts["accepted"] + self.counts["stale"]
-        return max(0, self.seen - whole - self.counts["corrupted"])
+        """Packet loss: number of packets that the other end sent and did not arrive."""
+        valid = self.counts["accepted"] + self.counts["stale"]
+        return max(0, self.newest - valid - self.counts["corrupted"])
 
     def send(
         self, kind: Kind, payload: Array = _NOTHING, *, t: float = 0.0, phase: int = 0
     ) -> None:
-        """Send a packet; where the other end is not there, nothing happens.
+        """Send a packet; if the other end has closed, nothing happens.
+
+        Args:
+            kind: What the packet is.
+            payload: The numbers, shape (n,).
+            t: Time of the payload [s].
+            phase: The robot's phase.
 
         Raises:
-            HardwareError: If the other end was never heard of.
+            HardwareError: If the other end's address is not known yet.
         """
         if self.peer is None:
-            raise HardwareError("nothing was heard of the robot yet")
+            raise HardwareError("no packet of the robot has arrived yet")
         self._sent += 1
         self.counts["sent"] += 1
         packet = Packet(
@@ -107,25 +113,25 @@ class Link:
             phase,
             self.session,
             self._sent,
-            self.seen,
+            self.newest,
             monotonic_ns(),
             t,
             payload,
         )
-        # A bye is what must arrive: faults are for what is repeated.
+        # A BYE must arrive: faults are injected only into packets that repeat.
         if kind is Kind.BYE:
-            sent = [*self._faults.rest(), encode(packet)]
+            sent = [*self._faults.flush(), encode(packet)]
         else:
-            sent = self._faults.pass_on(encode(packet))
+            sent = self._faults.apply(encode(packet))
         for data in sent:
             with suppress(BlockingIOError, ConnectionRefusedError):
                 self._socket.sendto(data, self.peer)
 
     def receive(self, timeout: float) -> list[Packet]:
-        """Return the accepted packets that came, oldest first; none once closed.
+        """Return the accepted packets, oldest first; none after `close`.
 
         Args:
-            timeout: How long to wait for one if there is none [s]; 0: not at all.
+            timeout: Longest time to wait if there is none [s]; 0: do not wait.
         """
         accepted = self._drain() if self._socket.fileno() >= 0 else []
         if accepted or timeout <= 0.0 or self._socket.fileno() < 0:
@@ -138,58 +144,63 @@ class Link:
         return accepted
 
     def close(self) -> None:
-        """Close the socket; again is no error."""
+        """Close the socket; a second call does nothing."""
         self._socket.close()
 
     def _drain(self) -> list[Packet]:
         accepted: list[Packet] = []
         while True:
             try:
-                data, sender = self._socket.recvfrom(_LARGEST)
+                data, sender = self._socket.recvfrom(_MAX_DATAGRAM)
             except BlockingIOError:
                 return accepted
-            except ConnectionRefusedError:  # what was sent before found nobody
+            except ConnectionRefusedError:  # the other end had closed when we sent
                 continue
-            packet = self._sort(data, sender)
+            packet = self._classify(data, sender)
             if packet is not None:
                 accepted.append(packet)
 
-    def _sort(self, data: bytes, sender: Address) -> Packet | None:
+    def _classify(self, data: bytes, sender: Address) -> Packet | None:
         packet = decode(data)
         kind = "accepted"
         if packet is None:
             kind = "corrupted"
         elif packet.session != self.session:
             kind = "foreign"
-        elif packet.sequence == self.seen:
+        elif packet.sequence == self.newest:
             kind = "duplicated"
-        elif packet.sequence < self.seen:
+        elif packet.sequence < self.newest:
             kind = "stale"
         self.counts[kind] += 1
         if packet is None or kind != "accepted":
             return None
-        self.seen, self.peer = packet.sequence, sender
+        self.newest, self.peer = packet.sequence, sender
         return packet
 
 
-class Ages:
-    """How old packets are, though the clocks of two ends have nothing in common.
+class AgeEstimator:
+    """Estimates the age of packets without synchronised clocks.
 
-    The least difference of arrival and stamp that was seen lately belongs to a packet
-    that did not wait; what a packet's difference exceeds it by is its age. Lately: in
-    this window of time or the one before, for clocks drift.
+    age = (arrival - stamp) - min over recent packets of (arrival - stamp): the packet
+    with the smallest difference is taken to have had no delay. Recent: in this time
+    window or the one before, because clocks drift.
     """
 
     def __init__(self, window: float = 10.0) -> None:
-        """Set the window's length [s]."""
+        """Set the length of the time window [s]."""
         self._window = window
-        self._least = self._before = np.inf
+        self._smallest = self._smallest_before = np.inf
         self._end = -np.inf
 
     def age(self, arrival: float, stamp: float) -> float:
-        """Return a packet's age [s], from when it came and was sent [s]."""
+        """Return a packet's age [s].
+
+        Args:
+            arrival: When it arrived, by this end's clock [s].
+            stamp: When it was sent, by the sender's clock [s].
+        """
         if arrival > self._end:
-            self._before, self._least = self._least, np.inf
+            self._smallest_before, self._smallest = self._smallest, np.inf
             self._end = arrival + self._window
-        self._least = min(self._least, arrival - stamp)
-        return arrival - stamp - min(self._least, self._before)
+        self._smallest = min(self._smallest, arrival - stamp)
+        return arrival - stamp - min(self._smallest, self._smallest_before)

@@ -1,4 +1,4 @@
-"""The log of a live loop: the columns of every log, in a journal as they come."""
+"""The log of a live loop: rows are written to a journal while the loop runs."""
 
 from collections.abc import Mapping
 from math import floor, inf, nan
@@ -9,32 +9,32 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller, ControlOutput
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.geometry.scene import Scene
-from hsp_control.live.commander import Commander
-from hsp_control.live.effort_port import EffortPort
-from hsp_control.live.intake import Intake
+from hsp_control.live.effort_limiter import EffortLimiter
+from hsp_control.live.effort_source import EffortSource
 from hsp_control.live.report import LoopReport
 from hsp_control.live.safe_stop import Phase
+from hsp_control.live.state_reader import StateReader
 from hsp_control.robot import RobotState
 from hsp_control.simulation.journal import JournalWriter
 from hsp_control.simulation.recorder import Recorder
 
-ABOUT = {
+CHANNEL_INFO = {
     "phase": ("-", "0 waiting; 1 running; 2 safe stop, damping; 3 safe stop, hold"),
-    "sent": ("N·m or N", "what the robot was sent: tau, or tau - g(q)"),
-    "measured": ("-", "1 if the state was measured, 0 if the model reckoned it"),
-    "age": ("s", "of the state"),
-    "response": ("s", "from the state's arrival to its effort"),
+    "sent": ("N·m or N", "sent to the robot: tau, or tau - g(q)"),
+    "measured": ("-", "1 if the state was measured, 0 if the model predicted it"),
+    "age": ("s", "state age"),
+    "response": ("s", "response time: from the state's arrival to its effort"),
 }
 
 
 class Row(NamedTuple):
-    """One row; see `Recorder.record`.
+    """One row of the log; see `Recorder.record`.
 
     Attributes:
         state: The state.
-        output: What the controller makes of it, if anything.
+        output: The controller's output for it, or None.
         tau: The effort of the motors, shape (nv,).
-        readings: What else there is.
+        log_channels: Further values to log, by name.
     """
 
     state: RobotState
@@ -44,7 +44,7 @@ class Row(NamedTuple):
 
 
 class LiveLog:
-    """Records rows, and has each in the operating system's hands at once.
+    """Writes rows to a journal; each is passed to the operating system at once.
 
     Attributes:
         path: The journal.
@@ -57,7 +57,13 @@ class LiveLog:
         scene: Scene | None = None,
         meta: Mapping[str, Any] | None = None,
     ) -> None:
-        """Begin the journal.
+        """Create the journal.
+
+        Args:
+            path: The journal.
+            controller: The controller whose tasks and fields are logged.
+            scene: Obstacles to log.
+            meta: JSON data of the log.
 
         Raises:
             LogError: If it cannot be written.
@@ -68,16 +74,16 @@ class LiveLog:
         self._last_t = -inf
         self._journal = JournalWriter(path)
 
-    def rehearse(self, row: Row) -> None:
-        """Make a row, and write none: what it needs is compiled, its columns known."""
+    def warm_up(self, row: Row) -> None:
+        """Record a row without writing it: compiles kernels and writes the heading."""
         try:
             self._recorder.record(*row)
         finally:
-            self._recorder.forget()
+            self._recorder.clear()
         self._head()
 
     def add(self, row: Row) -> None:
-        """Write a row, if it is later than the last.
+        """Write a row if it is later than the last one.
 
         Raises:
             LogError: If it cannot be written.
@@ -88,139 +94,158 @@ class LiveLog:
         try:
             self._recorder.record(*row)
             columns = self._recorder.rows(0)
-            if not self._journal.has(columns):
+            if not self._journal.describes(columns):
                 self._head()
-            self._journal.append(columns)
+            self._journal.write_row(columns)
         finally:
-            self._recorder.forget()
+            self._recorder.clear()
 
     def end(self, status: str, message: str, **meta: Any) -> None:
-        """Say how it ended, and close the file.
+        """Write how the run ended, and close the file.
+
+        Args:
+            status: ``completed``, ``interrupted`` or ``stopped``.
+            message: Why it ended.
+            **meta: Further JSON data.
 
         Raises:
             LogError: If it cannot be written.
         """
         try:
-            self._journal.end(status, message, **meta)
+            self._journal.write_end(status, message, **meta)
         finally:
             self._journal.close()
 
     def _head(self) -> None:
         meta = self._recorder.meta("running", "", **self._meta)
-        self._journal.head(self._recorder.rows(0), meta)
+        self._journal.write_heading(self._recorder.rows(0), meta)
 
 
 class LoopLog:
-    """What a loop logs, and when: on a grid of times, and where its phase changes.
+    """Selects what a loop logs: rows on a time grid, and each change of the phase.
 
     Attributes:
-        path: The journal; None if there is none.
-        law_is_well: Whether the law may still be asked what it would do.
+        path: The journal; None without a log.
+        controller_failed: Whether the controller has raised; it is not called again.
     """
 
     def __init__(
         self,
         path: str | Path | None,
         period: float,
-        commander: Commander,
+        effort_source: EffortSource,
         scene: Scene | None,
         meta: Mapping[str, Any],
     ) -> None:
-        """Begin the journal, if one is wanted.
+        """Create the journal, if there is a path.
+
+        Args:
+            path: The journal; None: no log.
+            period: Time between two rows [s].
+            effort_source: Computes the efforts that are logged.
+            scene: Obstacles to log.
+            meta: JSON data of the log.
 
         Raises:
             LogError: If it cannot be written.
         """
-        self._commander, self._period = commander, period
+        self._effort_source, self._period = effort_source, period
         self._log: LiveLog | None = None
         self._next, self._phase = -inf, Phase.WAITING
         self.path = None if path is None else Path(path)
-        self.law_is_well = True
+        self.controller_failed = False
         if self.path is not None:
-            self._log = LiveLog(self.path, commander.controller, scene, meta)
+            self._log = LiveLog(self.path, effort_source.controller, scene, meta)
 
     def row(
         self,
         phase: Phase,
-        intake: Intake,
-        port: EffortPort,
+        reader: StateReader,
+        limiter: EffortLimiter,
         response: float,
         *,
         last: bool,
     ) -> None:
-        """Write a row, if it is time for one.
+        """Write a row if one is due.
+
+        Args:
+            phase: The loop's phase.
+            reader: The state.
+            limiter: The efforts.
+            response: Response time of this period [s].
+            last: Whether this is the last period, which is always logged.
 
         Raises:
-            LogError: If it cannot be written; no more are then.
+            LogError: If it cannot be written; later calls then do nothing.
         """
-        found, state = intake.found, intake.state
-        if self._log is None or (found is None and phase == Phase.RUNNING):
-            return  # nothing was seen, and nothing was computed
+        measurement, state = reader.measurement, reader.state
+        if self._log is None or (measurement is None and phase == Phase.RUNNING):
+            return  # no measurement, so no effort was computed
         if state.t < self._next and phase == self._phase and not last:
             return
         periods = floor(state.t / self._period + 1e-6) + 1
         self._next, self._phase = (periods - 1e-6) * self._period, phase
-        log, self._log = self._log, None  # if it cannot be written, there is none
-        log.add(self._row(phase, intake, port, response))
+        log, self._log = self._log, None  # if writing raises, no log is left
+        log.add(self._row(phase, reader, limiter, response))
         self._log = log
 
-    def rehearse(self, intake: Intake, port: EffortPort) -> None:
-        """Do all once that a row takes."""
+    def warm_up(self, reader: StateReader, limiter: EffortLimiter) -> None:
+        """Record a row without writing it, so that later rows compile nothing."""
         if self._log is not None:
-            self._log.rehearse(self._row(Phase.RUNNING, intake, port, 0.0))
+            self._log.warm_up(self._row(Phase.RUNNING, reader, limiter, 0.0))
 
     def _row(
-        self, phase: Phase, intake: Intake, port: EffortPort, response: float
+        self, phase: Phase, reader: StateReader, limiter: EffortLimiter, response: float
     ) -> Row:
-        found, state = intake.found, intake.state
+        measurement, state = reader.measurement, reader.state
         log_channels = live_channels(
             phase=float(phase),
-            sent=port.sent,
-            measured=float(found is not None),
-            age=nan if found is None else found.age,
+            sent=limiter.sent,
+            measured=float(measurement is not None),
+            age=nan if measurement is None else measurement.age,
             response=response,
         )
-        return Row(state, self._law(phase, state), port.acting, log_channels)
+        return Row(state, self._output(phase, state), limiter.applied, log_channels)
 
     def end(self, report: LoopReport) -> None:
-        """Close the journal, if there is one that can be written.
+        """Write how the loop ended, and close the journal, if there is one.
 
         Raises:
-            LogError: If it cannot.
+            LogError: If it cannot be written.
         """
         if self._log is None:
             return
         deadlines = report.deadlines
-        about = {
+        summary = {
             "ended": report.ended,
             "phase": report.phase.name.lower(),
             "silent": report.silent,
             "period": deadlines.period,
             "periods": deadlines.periods,
             "missed": deadlines.missed,
-            "silent_periods": deadlines.silent,
-            "unseen": deadlines.unseen,
+            "silent_periods": deadlines.without_state,
+            "unseen": deadlines.skipped_states,
             "response": deadlines.response,
-            "gap": deadlines.gap,
+            "gap": deadlines.interval,
         }
-        self._log.end(report.status, report.reason, live=about)
+        self._log.end(report.status, report.reason, live=summary)
 
-    def _law(self, phase: Phase, state: RobotState) -> ControlOutput | None:
-        """Return what the law says of this state, also where it is not followed."""
-        if not self.law_is_well:
+    def _output(self, phase: Phase, state: RobotState) -> ControlOutput | None:
+        """Return the controller's output, also during the safe stop, if possible."""
+        if self.controller_failed:
             return None
         if phase == Phase.RUNNING:
-            return self._commander.output
+            return self._effort_source.output
         try:
-            return self._commander.controller.compute(state)
-        except Exception:  # it is not followed any more: the log goes on without
-            self.law_is_well = False
+            return self._effort_source.controller.compute(state)
+        except Exception:  # its effort is not used any more: log without it
+            self.controller_failed = True
             return None
 
 
 def live_channels(**values: Array | float) -> dict[str, LogChannel]:
-    """Return readings by their names in `ABOUT`."""
+    """Return log channels; the names are the keys of `CHANNEL_INFO`."""
     return {
-        f"live.{name}": LogChannel(value, *ABOUT[name])
+        f"live.{name}": LogChannel(value, *CHANNEL_INFO[name])
         for name, value in values.items()
     }

@@ -1,4 +1,4 @@
-"""The live loop: states in, efforts out, and a safe stop whatever happens."""
+"""The live loop: read states, send efforts, and always end with a safe stop."""
 
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
@@ -12,13 +12,12 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.control.controller import Controller
 from hsp_control.geometry.scene import Scene
-from hsp_control.live.commander import Commander, as_commander
-from hsp_control.live.effort_port import EffortPort
+from hsp_control.live.effort_limiter import EffortLimiter
+from hsp_control.live.effort_source import EffortSource, as_effort_source
 from hsp_control.live.hardware import Hardware
-from hsp_control.live.intake import Intake
 from hsp_control.live.latency import no_garbage_collection, real_time_priority
 from hsp_control.live.live_log import LoopLog
-from hsp_control.live.operator import Operator
+from hsp_control.live.operator_requests import OperatorRequests
 from hsp_control.live.report import Ended, LoopReport
 from hsp_control.live.safe_stop import Phase, SafeStop
 from hsp_control.live.settings import (
@@ -27,21 +26,22 @@ from hsp_control.live.settings import (
     Tolerance,
     check_fixed,
 )
+from hsp_control.live.state_reader import StateReader
 from hsp_control.robot import Robot
 
 _WARM_UP = 20
-"""Steps off the clock: all kernels are compiled, all memory is touched."""
+"""Steps before real-time operation: they compile kernels and touch all memory."""
 
 
 def run_loop(
-    controller: Controller | Commander,
+    controller: Controller | EffortSource,
     hardware: Hardware,
     *,
     duration: float | None = None,
     interface: EffortInterface | None = None,
     tolerance: Tolerance | None = None,
     stop: StopSettings | None = None,
-    operator: Operator | None = None,
+    requests: OperatorRequests | None = None,
     log: str | Path | None = None,
     log_period: float = 0.01,
     scene: Scene | None = None,
@@ -51,65 +51,67 @@ def run_loop(
     on_period: Callable[[float], object] | None = None,
     clock: Callable[[], float] = monotonic,
 ) -> LoopReport:
-    """Control a robot until the time is over, the operator stops, or a fault.
+    """Control a robot until the duration is over, the operator stops, or a fault.
 
-    Every end is the same: a safe stop, damping and then hold (`SafeStop`), after which
-    the hardware is closed. Faults are a state that is not finite, missing, too old or
-    beyond the limits, a robot that stopped by itself or cannot be reached, and anything
-    that the controller or a change raises. Nothing is raised once the first effort is
-    out; the report has what was.
+    Every run ends with a safe stop, damping and then hold (`SafeStop`); then the
+    hardware is closed. Faults are: a state that is not finite, missing, too old or
+    outside the limits; a robot that stopped by itself or cannot be reached; any
+    exception of the controller or of a change. After the first effort was sent nothing
+    is raised; the report contains the fault.
 
     Args:
-        controller: The controller, or a `Commander` around one.
+        controller: The controller, or an `EffortSource` around one.
         hardware: The robot.
-        duration: When to stop, after the first state [s]; None: when the operator says.
-        interface: How the robot wants its efforts.
-        tolerance: What is put up with.
+        duration: Time from the first state to the stop [s]; None: until the operator
+            stops.
+        interface: Which efforts the robot accepts.
+        tolerance: Faults that are tolerated.
         stop: How the safe stop brakes and holds.
-        operator: What may stop the loop, and change the controller between periods.
-            Ctrl-C, where Python raises it, is the operator's stop as well.
-        log: The journal to write; `Rollout.load` reads it whatever happened.
+        requests: The operator's requests: stop the loop, or change the controller
+            between periods. Ctrl-C (`KeyboardInterrupt`) is the operator's stop, too.
+        log: The journal to write; `Rollout.load` reads it also after a crash.
         log_period: Time between two rows [s], a period or longer.
         scene: Obstacles to log.
         meta: JSON data to add to the log's.
-        start_time: The law's time at the first state [s].
-        priority: Real-time priority (SCHED_FIFO); None: that of all processes.
-        on_period: Called with the law's time [s] in the rest of every period.
+        start_time: The controller's time at the first state [s].
+        priority: Real-time priority (SCHED_FIFO), 1 to 99; None: ordinary scheduling.
+        on_period: Called with the controller's time [s] in the rest of every period.
         clock: A monotonic clock [s].
 
+    Returns:
+        How the run ended, and its response times.
+
     Raises:
-        LiveError: If the robot has a floating base, or settings contradict each other.
-        HardwareError: If no first state comes, or the robot is not fit to start.
-        LogError: If the journal cannot be begun.
-        HspControlError: If the law has no effort at the first state.
+        LiveError: If the robot has a floating base, or a setting is invalid.
+        HardwareError: If no first state arrives, or the robot cannot be started.
+        LogError: If the journal cannot be created.
+        HspControlError: If the controller raises at the first state.
     """
-    commander, tolerance = as_commander(controller), tolerance or Tolerance()
+    effort_source, tolerance = as_effort_source(controller), tolerance or Tolerance()
     settings, interface = stop or StopSettings(), interface or EffortInterface()
-    robot, period = commander.controller.robot, hardware.period
+    robot, period = effort_source.controller.robot, hardware.period
     try:
         _check(robot, period, duration, log_period)
-        port = EffortPort(robot, interface, period)
-        safe_stop = SafeStop(robot, settings, port.greatest, period)
-        limits = commander.controller.limits
-        intake = Intake(robot, limits, hardware, tolerance, clock)
-        first = intake.first(start_time)
-        for _ in range(
-            _WARM_UP
-        ):  # on the clock nothing shall happen for the first time
-            commander.effort(start_time, first.q, first.v, period)
-            safe_stop.effort(intake.state)
-            port.begin(first.q)
-        book = LoopLog(log, log_period, commander, scene, dict(meta or {}))
-        book.rehearse(intake, port)
-        commander.restart()
+        limiter = EffortLimiter(robot, interface, period)
+        safe_stop = SafeStop(robot, settings, limiter.effort_limits, period)
+        limits = effort_source.controller.limits
+        reader = StateReader(robot, limits, hardware, tolerance, clock)
+        first = reader.wait_for_first(start_time)
+        # Compile and allocate everything now, not in real-time operation.
+        for _ in range(_WARM_UP):
+            effort_source.effort(start_time, first.q, first.v, period)
+            safe_stop.effort(reader.state)
+            limiter.reset(first.q)
+        loop_log = LoopLog(log, log_period, effort_source, scene, dict(meta or {}))
+        loop_log.warm_up(reader, limiter)
+        effort_source.restart()
         safe_stop.begin()
         end = np.inf if duration is None else start_time + duration - 0.5 * period
-        loop = _Loop(commander, hardware, intake, port, safe_stop, book, end)
-        loop.operator, loop.blind = operator or Operator(), tolerance.blind
-        first_of_all = (
-            nullcontext() if priority is None else real_time_priority(priority)
-        )
-        with first_of_all, no_garbage_collection():
+        loop = _Loop(effort_source, hardware, reader, limiter, safe_stop, loop_log, end)
+        loop.requests = requests or OperatorRequests()
+        loop.prediction_time = tolerance.prediction_time
+        scheduling = nullcontext() if priority is None else real_time_priority(priority)
+        with scheduling, no_garbage_collection():
             loop.run(on_period)
     finally:
         hardware.close()
@@ -131,90 +133,94 @@ def _check(
 
 
 class _Loop:
-    """One run; `period` is one turn of it."""
+    """The state of one run; `period` is called once a period."""
 
-    operator: Operator
-    blind: float
+    requests: OperatorRequests
+    prediction_time: float
 
     def __init__(
         self,
-        commander: Commander,
+        effort_source: EffortSource,
         hardware: Hardware,
-        intake: Intake,
-        port: EffortPort,
+        reader: StateReader,
+        limiter: EffortLimiter,
         safe_stop: SafeStop,
-        book: LoopLog,
+        log: LoopLog,
         end: float,
     ) -> None:
-        self.commander, self.hardware, self.intake = commander, hardware, intake
-        self.port, self.safe_stop, self.book, self.end = port, safe_stop, book, end
+        self.effort_source, self.hardware, self.reader = effort_source, hardware, reader
+        self.limiter, self.safe_stop, self.log = limiter, safe_stop, log
+        self.end = end
         self.phase = Phase.RUNNING
         self.ended: Ended = "completed"
         self.reason = ""
         self.error: Exception | None = None
-        self.silent = self.over = False
+        self.silent = self.done = False
 
     def run(self, on_period: Callable[[float], object] | None) -> None:
-        """Run period after period until the safe stop is over."""
-        self.intake.begin()
-        self.port.begin(self.intake.state.q)
-        while not self.over:
+        """Run period after period until the safe stop is complete."""
+        self.reader.start()
+        self.limiter.reset(self.reader.state.q)
+        while not self.done:
             try:
                 self.period(on_period)
             except KeyboardInterrupt:
-                if self.phase != Phase.RUNNING:  # again: leave the robot to itself
-                    self.silent = self.over = True
+                if self.phase != Phase.RUNNING:  # the second: the robot must stop
+                    self.silent = self.done = True
                 self.stop("operator", "stopped by the operator (Ctrl-C)")
 
     def period(self, on_period: Callable[[float], object] | None) -> None:
-        """Take a state, send an effort, and do the rest."""
-        intake, port = self.intake, self.port
-        intake.take(port.acting)
-        if intake.trouble is not None:
-            self.stop("fault", intake.trouble, intake.error)
-        elif self.operator.reason is not None:
-            self.stop("operator", self.operator.reason)
-        elif intake.state.t >= self.end:
-            self.stop("completed", "its time is over")
-        tau = self.command() if self.phase == Phase.RUNNING else None
+        """Read a state, send an effort, then log and make the requested changes."""
+        reader, limiter = self.reader, self.limiter
+        reader.read(limiter.applied)
+        if reader.fault is not None:
+            self.stop("fault", reader.fault, reader.error)
+        elif self.requests.reason is not None:
+            self.stop("operator", self.requests.reason)
+        elif reader.state.t >= self.end:
+            self.stop("completed", "the duration is over")
+        tau = self.controller_effort() if self.phase == Phase.RUNNING else None
         if self.phase != Phase.RUNNING:
-            tau = self.stopping()
-        if tau is not None and not port.pass_on(tau, intake.state.q):
+            tau = self.stop_effort()
+        if tau is not None and not limiter.apply(tau, reader.state.q):
             self.stop("fault", f"the effort is not finite: {tau.tolist()}")
         self.send()
-        response = intake.answered()
-        self.commander.applied(port.acting, self.hardware.period)
+        response = reader.effort_sent()
+        self.effort_source.applied(limiter.applied, self.hardware.period)
         try:
-            self.book.row(self.phase, intake, port, response, last=self.over)
+            self.log.row(self.phase, reader, limiter, response, last=self.done)
             if self.phase == Phase.RUNNING:
-                self.operator.make_changes()
+                self.requests.run_pending()
                 if on_period is not None:
-                    on_period(intake.state.t)
-        except Exception as error:  # a user's change, or a disk that is full
+                    on_period(reader.state.t)
+        except Exception as error:  # of a user's change, or the disk is full
             self.stop("fault", f"{type(error).__name__}: {error}", error)
 
-    def command(self) -> Array | None:
-        """Return the law's effort; None, for the last one, where nothing was seen."""
-        found, t = self.intake.found, self.intake.state.t
-        if found is None:
+    def controller_effort(self) -> Array | None:
+        """Return the controller's effort; None without a measurement: hold the last."""
+        measurement, t = self.reader.measurement, self.reader.state.t
+        if measurement is None:
             return None
         try:
-            return self.commander.effort(t, found.q, found.v, self.hardware.period)
-        except Exception as error:  # whatever a user's task or field may raise
-            self.book.law_is_well = False
+            return self.effort_source.effort(
+                t, measurement.q, measurement.v, self.hardware.period
+            )
+        except Exception as error:  # a user's task or field may raise anything
+            self.log.controller_failed = True
             self.stop("fault", f"{type(error).__name__}: {error}", error)
             return None
 
-    def stopping(self) -> Array:
-        """Return the safe stop's effort, at the state that was seen or is reckoned."""
-        tau = self.safe_stop.effort(self.intake.state)
+    def stop_effort(self) -> Array:
+        """Return the safe stop's effort at the measured or predicted state."""
+        tau = self.safe_stop.effort(self.reader.state)
         self.phase = self.safe_stop.phase
-        self.silent = self.intake.gone or self.intake.blind > self.blind
-        self.over = self.silent or self.safe_stop.done
+        too_long = self.reader.predicted_for > self.prediction_time
+        self.silent = self.reader.connection_lost or too_long
+        self.done = self.silent or self.safe_stop.done
         return tau
 
     def stop(self, ended: Ended, reason: str, error: Exception | None = None) -> None:
-        """Begin the safe stop, once; what comes later changes no reason."""
+        """Start the safe stop; later calls change neither it nor the reason."""
         if self.phase != Phase.RUNNING:
             return
         self.phase = Phase.DAMPING
@@ -222,17 +228,17 @@ class _Loop:
         self.safe_stop.begin()
 
     def send(self) -> None:
-        """Send what the port has, unless nobody knows any more what that should be."""
+        """Send the limited effort, unless the state is unknown (fail-silent)."""
         if self.silent:
             return
         try:
-            self.hardware.write(self.port.sent)
+            self.hardware.write(self.limiter.sent)
         except (HardwareError, OSError) as error:
             self.stop("fault", f"the effort cannot be sent: {error}", error)
 
     def finish(self) -> LoopReport:
-        """Close the log, and say what was."""
-        state = self.intake.state
+        """Close the log, and return the report."""
+        state = self.reader.state
         report = LoopReport(
             ended=self.ended,
             reason=self.reason,
@@ -240,9 +246,9 @@ class _Loop:
             silent=self.silent,
             speed=float(np.abs(state.v).max()),
             t=state.t,
-            deadlines=self.intake.deadlines,
+            deadlines=self.reader.deadlines,
             error=self.error,
-            log=self.book.path,
+            log=self.log.path,
         )
-        self.book.end(report)
+        self.log.end(report)
         return report

@@ -1,20 +1,20 @@
-"""Datagrams between a loop and a robot: a fixed binary layout, checked to the last bit.
+"""Datagrams between a loop and a robot: a fixed binary layout with a checksum.
 
-All little-endian:
+All numbers are little-endian:
 
     magic     4 bytes   HSPC
     version   1 byte    1
     kind      1 byte    1 state, 2 effort, 3 bye
-    phase     1 byte    of the robot, see `Phase`
+    phase     1 byte    the robot's phase, see `Phase`
     (zero)    1 byte
-    count     4 bytes   of numbers in the payload
-    session   8 bytes   of both processes' run: others' packets are not for us
-    sequence  8 bytes   grows by one with every packet of this sender, from 1
-    answers   8 bytes   sequence of the newest packet that the sender had seen
+    count     4 bytes   number of doubles in the payload
+    session   8 bytes   number of the session; packets of others are ignored
+    sequence  8 bytes   number of the packet at this sender, from 1
+    acks      8 bytes   sequence of the newest packet that the sender has received
     stamp     8 bytes   when it was sent, on the sender's monotonic clock [ns]
     t         8 bytes   time of the payload [s], a double
     payload   8 count   doubles: q and v of a state, tau of an effort
-    check     4 bytes   CRC-32 of all before
+    check     4 bytes   CRC-32 of all bytes before
 """
 
 import struct
@@ -32,7 +32,7 @@ _CHECK = struct.Struct("<I")
 
 
 class Kind(IntEnum):
-    """What a packet is."""
+    """Kind of a packet: a state, an effort, or the end of the session."""
 
     STATE = 1
     EFFORT = 2
@@ -40,31 +40,31 @@ class Kind(IntEnum):
 
 
 class Packet(NamedTuple):
-    """A datagram's content.
+    """The content of a datagram.
 
     Attributes:
-        kind: What it is.
+        kind: State, effort or end of the session.
         phase: The robot's phase.
-        session: Of which run.
-        sequence: The sender's number of it.
-        answers: The newest packet that the sender had seen.
+        session: Number of the session.
+        sequence: Number of the packet at its sender.
+        acks: Sequence of the newest packet that the sender has received.
         stamp: When it was sent, on the sender's clock [ns].
         t: Time of the payload [s].
-        payload: The numbers.
+        payload: The doubles, shape (count,).
     """
 
     kind: Kind
     phase: int
     session: int
     sequence: int
-    answers: int
+    acks: int
     stamp: int
     t: float
     payload: Array
 
 
 def encode(packet: Packet) -> bytes:
-    """Return a packet as bytes."""
+    """Encode a packet as bytes."""
     numbers = np.asarray(packet.payload, dtype="<f8").tobytes()
     head = _HEAD.pack(
         MAGIC,
@@ -74,7 +74,7 @@ def encode(packet: Packet) -> bytes:
         len(packet.payload),
         packet.session,
         packet.sequence,
-        packet.answers,
+        packet.acks,
         packet.stamp,
         packet.t,
     )
@@ -83,7 +83,7 @@ def encode(packet: Packet) -> bytes:
 
 
 def decode(data: bytes) -> Packet | None:
-    """Return bytes as a packet; None if they are not one, whole and unchanged."""
+    """Decode bytes; return None if they are not a complete, unchanged packet."""
     if len(data) < _HEAD.size + _CHECK.size:
         return None
     body = data[: -_CHECK.size]
@@ -95,9 +95,9 @@ def decode(data: bytes) -> Packet | None:
         return None
     if len(body) != _HEAD.size + 8 * count:
         return None
-    session, sequence, answers, stamp, t = head[5:]
+    session, sequence, acks, stamp, t = head[5:]
     payload = np.frombuffer(body, "<f8", offset=_HEAD.size)
-    return Packet(Kind(kind), phase, session, sequence, answers, stamp, t, payload)
+    return Packet(Kind(kind), phase, session, sequence, acks, stamp, t, payload)
 
 
 _KINDS = frozenset(Kind)

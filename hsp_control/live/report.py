@@ -1,4 +1,4 @@
-"""What became of a live run."""
+"""The result of a live run."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,20 +12,21 @@ Ended = Literal["completed", "operator", "fault"]
 
 @dataclass(frozen=True)
 class LoopReport:
-    """How a loop ended, and how punctual it was.
+    """How a loop ended, and its response times.
 
     Attributes:
-        ended: ``completed``: its time was over; ``operator``: somebody stopped it;
-            ``fault``: something was wrong.
-        reason: What ended it, in a sentence.
-        phase: Where the safe stop got: `Phase.HOLDING` once the robot stood still, or
-            `Phase.DAMPING` if the loop fell silent before, blind or interrupted.
-        silent: Whether it fell silent before the stop was over: the robot's own
-            watchdog then has to stop it.
-        speed: The fastest joint's speed at the end, measured or reckoned.
+        ended: ``completed``: the duration is over; ``operator``: the operator stopped
+            it; ``fault``: a fault stopped it.
+        reason: Why it ended, in a sentence.
+        phase: The last phase of the safe stop: `Phase.HOLDING` if the robot stood
+            still, `Phase.DAMPING` if the loop fell silent before.
+        silent: Whether the loop fell silent, that is stopped sending efforts, before
+            the safe stop was complete: the robot's own watchdog must stop it.
+        speed: Speed of the fastest joint at the end, measured or predicted.
         t: The run's time at the end [s].
-        deadlines: How late it was.
-        error: What the controller, a change or the hardware raised, if that ended it.
+        deadlines: Response times and deadline misses.
+        error: What the controller, a change or the hardware raised, if it ended the
+            run.
         log: The journal, if one was written.
     """
 
@@ -41,6 +42,6 @@ class LoopReport:
 
     @property
     def status(self) -> str:
-        """What the log says: ``completed``, ``interrupted`` or ``stopped``."""
+        """The status in the log: ``completed``, ``interrupted`` or ``stopped``."""
         words = {"operator": "interrupted", "fault": "stopped"}
         return words.get(self.ended, self.ended)

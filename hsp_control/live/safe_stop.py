@@ -10,7 +10,7 @@ from hsp_control.robot import Robot, RobotState
 
 
 class Phase(IntEnum):
-    """Where a robot under a loop is on its way from the start to the stop."""
+    """Phase of a robot under a loop, from its start to its stop."""
 
     WAITING = 0
     RUNNING = 1
@@ -19,45 +19,47 @@ class Phase(IntEnum):
 
 
 class SafeStop:
-    """Brings a robot to rest, and holds it there.
+    """Brakes a robot until it is at rest, then holds its position.
 
-    Damping: tau = g(q) - s k M(q) v. The kinetic energy obeys T' = -s k vᵀM v, less
-    than zero whatever the robot's true inertia is, since M of the model is positive
+    Damping: tau = g(q) - s k M(q) v. The kinetic energy obeys T' = -s k vᵀM v. This is
+    negative for any true inertia of the robot, because the model's M is positive
     definite. (Coriolis terms do no work; compensating them with a wrong model would.)
-    With a right model T falls like exp(-2 k t), for heavy joints as for light ones, so
-    that one number suits all. s, within 0 and 1, keeps the whole vector within the
-    efforts: clipped joint by joint it might drive.
+    With an exact model T falls like exp(-2 k t) for heavy and light joints alike, so
+    that one gain k is enough. s, in [0, 1], scales the whole vector into the effort
+    limits: damping that is clipped joint by joint can accelerate the robot.
 
-    Hold: tau = g(q) - ω² M₀ (q ⊖ q₀) - 2 ω M₀ v with M₀ of the configuration q₀ where
-    it came to rest: the PD control with gravity compensation of Takegaki and Arimoto
-    (1981), stable for any inertia.
+    Hold: tau = g(q) - ω² M₀ (q ⊖ q₀) - 2 ω M₀ v with M₀ at the configuration q₀ where
+    the robot came to rest: the PD control with gravity compensation of Takegaki and
+    Arimoto (1981), stable for any inertia.
 
     Attributes:
         phase: `Phase.DAMPING` or `Phase.HOLDING`.
+        damped_for: Time spent damping [s].
+        held_for: Time spent holding [s].
     """
 
     def __init__(
-        self, robot: Robot, settings: StopSettings, effort: Array, period: float
+        self, robot: Robot, settings: StopSettings, effort_limits: Array, period: float
     ) -> None:
-        """Prepare it.
+        """Check the gains for this period.
 
         Args:
             robot: The model.
-            settings: How hard.
-            effort: Greatest effort, shape (nv,).
+            settings: Gains and durations.
+            effort_limits: Upper limits of the efforts, shape (nv,).
             period: Time between two calls of `effort` [s].
 
         Raises:
             LiveError: If the period is too long for the settings.
         """
         settings.check_period(period)
-        self._robot, self._settings, self._most = robot, settings, effort
-        self._period = period
+        self._robot, self._settings, self._period = robot, settings, period
+        self._effort_limits = effort_limits
         self._rest = np.zeros(robot.nv)
         self.begin()
 
     def begin(self) -> None:
-        """Start from the beginning."""
+        """Start a safe stop, with damping."""
         self.phase = Phase.DAMPING
         self.damped_for = self.held_for = 0.0
         self._held_q: Array = self._robot.neutral()
@@ -65,12 +67,12 @@ class SafeStop:
 
     @property
     def done(self) -> bool:
-        """Whether it has been held for long enough."""
+        """Whether the robot has been held for `StopSettings.hold`."""
         held = self.held_for >= self._settings.hold - 0.5 * self._period
         return self.phase == Phase.HOLDING and held
 
     def effort(self, state: RobotState) -> Array:
-        """Return the effort of this period at the state, shape (nv,)."""
+        """Return the effort of this period at the state, shape (nv,); once a period."""
         settings, v = self._settings, state.v
         if self.phase == Phase.DAMPING and (
             float(np.abs(v).max()) <= settings.rest_speed
@@ -84,22 +86,22 @@ class SafeStop:
         else:
             self.held_for += self._period
             w = settings.natural_frequency
-            away = self._robot.difference(self._held_q, state.q)
-            braking = -(self._held_mass @ (w * w * away + 2.0 * w * v))
+            displacement = self._robot.difference(self._held_q, state.q)
+            braking = -(self._held_mass @ (w * w * displacement + 2.0 * w * v))
         gravity = self._robot.inverse_dynamics(state.q, self._rest, self._rest)
-        return gravity + share_within(gravity, braking, self._most) * braking
+        return gravity + largest_scale(gravity, braking, self._effort_limits) * braking
 
 
-def share_within(base: Array, direction: Array, most: Array) -> float:
-    """Return the greatest s in [0, 1] with |base + s direction| ≤ most; 0 if none is.
+def largest_scale(base: Array, direction: Array, limits: Array) -> float:
+    """Return the largest s in [0, 1] with |base + s direction| ≤ limits; 0 if none.
 
     Args:
         base: Shape (n,).
         direction: Shape (n,).
-        most: Greatest magnitudes, shape (n,).
+        limits: Upper limits of the magnitudes, shape (n,).
     """
-    room = np.maximum(most - np.sign(direction) * base, 0.0)
+    room = np.maximum(limits - np.sign(direction) * base, 0.0)
     size = np.abs(direction)
     with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.where(size > room, room / size, 1.0)
-    return float(shares.min(initial=1.0))
+        scales = np.where(size > room, room / size, 1.0)
+    return float(scales.min(initial=1.0))

@@ -1,4 +1,4 @@
-"""What can be set of a live loop: the robot's interface, tolerances, the safe stop."""
+"""Settings of a live loop: the robot's interface, tolerances, the safe stop."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -12,15 +12,16 @@ from hsp_control.robot import Robot
 
 @dataclass(frozen=True)
 class EffortInterface:
-    """How a robot wants its efforts.
+    """Which efforts a robot accepts.
 
     Attributes:
-        compensates_gravity: Whether it adds g(q) itself, and is sent tau - g(q): a
-            Panda (libfranka) and an iiwa (FRI) do.
-        effort_rate: The greatest rate at which what is *sent* may change, one number or
-            one per freedom [N·m/s or N/s]; None: any. A Panda refuses more than 1000.
-        effort: The greatest effort of the motors, gravity's share included [N·m or N];
-            None: the URDF's.
+        compensates_gravity: Whether the robot adds g(q) itself, so that tau - g(q) is
+            sent: a Panda (libfranka) and an iiwa (FRI) do.
+        effort_rate: Upper limit of the rate of the *sent* value, one number or one per
+            degree of freedom [N·m/s or N/s]; None: unlimited. A Panda rejects more
+            than 1000.
+        effort: Upper limit of the motors' efforts, gravity included, one number or one
+            per degree of freedom [N·m or N]; None: the URDF's.
     """
 
     compensates_gravity: bool = False
@@ -28,74 +29,77 @@ class EffortInterface:
     effort: Any | None = None
 
     def rate_limits(self, robot: Robot) -> Array:
-        """Return the greatest rates, shape (nv,), inf where unlimited.
+        """Return the limits of the effort rates, shape (nv,), inf where unlimited.
 
         Raises:
-            LiveError: If they are not positive numbers, one or nv.
+            LiveError: If they are not one or nv positive numbers.
         """
-        return _greatest(robot, self.effort_rate, "effort_rate")
+        return _per_dof(robot, self.effort_rate, "effort_rate")
 
     def effort_limits(self, robot: Robot) -> Array:
-        """Return the greatest efforts, shape (nv,), inf where unlimited.
+        """Return the limits of the efforts, shape (nv,), inf where unlimited.
 
         Raises:
-            LiveError: If they are not positive numbers, one or nv.
+            LiveError: If they are not one or nv positive numbers.
         """
         if self.effort is not None:
-            return _greatest(robot, self.effort, "effort")
+            return _per_dof(robot, self.effort, "effort")
         own = np.array(robot.model.effortLimit, dtype=float)
-        # URDFs write 0, or the largest number there is, where they know no limit.
+        # URDFs contain 0, or the largest float, where there is no limit.
         own[(own <= 0.0) | (own >= np.finfo(np.float32).max)] = np.inf
         return own
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """What a loop puts up with before it stops the robot safely.
+    """Faults that a loop tolerates before it starts the safe stop.
 
     Attributes:
-        missing: Periods in a row without a new state, in which the last effort is held.
-        age: Greatest age of a state [s].
-        blind: How long a safe stop trusts the model where there is no state [s]; then
-            the loop falls silent, and the robot's own watchdog has it.
-        position_margin: How far beyond its limits a joint may be measured [rad or m].
-        velocity_margin: By what part a joint may be measured faster than its limit.
-        start: How long the first state may take [s].
+        missing: Periods in a row without a new state; the last effort is held.
+        age: Largest state age [s].
+        prediction_time: How long the safe stop uses the model's prediction without a
+            measurement [s]. Then the loop falls silent (stops sending efforts), and
+            the robot's own watchdog must stop it.
+        position_margin: How far a measured position may exceed its limits [rad or m].
+        velocity_margin: How far a measured speed may exceed its limit, as a fraction
+            of the limit.
+        start_timeout: Longest time to wait for the first state [s].
     """
 
     missing: int = 20
     age: float = 0.02
-    blind: float = 0.2
+    prediction_time: float = 0.2
     position_margin: float = 0.02
     velocity_margin: float = 0.1
-    start: float = 10.0
+    start_timeout: float = 10.0
 
     def __post_init__(self) -> None:
-        """Refuse what is none.
+        """Check the ranges of all values.
 
         Raises:
-            LiveError: Names the value.
+            LiveError: If a value is out of range.
         """
         if not isinstance(self.missing, int) or self.missing < 0:
             raise LiveError(f"missing is {self.missing!r}; needs a number of periods")
-        for name in ("age", "start"):
+        for name in ("age", "start_timeout"):
             if not getattr(self, name) > 0.0:
                 raise LiveError(f"{name} is {getattr(self, name)} s; must be positive")
-        for name in ("blind", "position_margin", "velocity_margin"):
+        for name in ("prediction_time", "position_margin", "velocity_margin"):
             if not getattr(self, name) >= 0.0:
                 raise LiveError(f"{name} is {getattr(self, name)}; must be at least 0")
 
 
 @dataclass(frozen=True)
 class StopSettings:
-    """How a safe stop brakes, and how it then holds.
+    """How the safe stop brakes, and how it then holds.
 
     Attributes:
         damping: k of the braking effort -k M(q) v [1/s]: speeds fall like exp(-k t).
-        natural_frequency: Of the position that is held [rad/s], critically damped.
-        rest_speed: Speed of every joint below which it is held [rad/s or m/s].
-        longest_damping: How long it brakes at most, if noise hides the rest [s].
-        hold: How long it is held before the loop ends [s].
+        natural_frequency: Of the position hold [rad/s], critically damped.
+        rest_speed: The hold starts when all joints are slower [rad/s or m/s].
+        longest_damping: Longest time of damping [s], if noise keeps the measured speed
+            above ``rest_speed``.
+        hold: Time of the hold before the loop ends [s].
     """
 
     damping: float = 20.0
@@ -105,10 +109,10 @@ class StopSettings:
     hold: float = 0.2
 
     def __post_init__(self) -> None:
-        """Refuse what is none.
+        """Check the ranges of all values.
 
         Raises:
-            LiveError: Names the value.
+            LiveError: If a value is out of range.
         """
         for name in ("damping", "natural_frequency", "rest_speed", "longest_damping"):
             value = getattr(self, name)
@@ -118,37 +122,38 @@ class StopSettings:
             raise LiveError(f"hold is {self.hold} s; must be at least 0 and finite")
 
     def check_period(self, period: float) -> None:
-        """Refuse gains that a loop of this period [s] could not hold stable.
+        """Check that the sampled safe stop is stable at this period [s].
 
         With one period of delay a rate k is stable for k h < 1 and a natural frequency
-        ω for ω h < 0.43 (law.md §7); half of it is left for models that are wrong.
+        ω for ω h < 0.43 (law.md §7); half of it is the margin for model errors.
 
         Raises:
-            LiveError: Names the gain and its largest value.
+            LiveError: If a gain is too large.
         """
-        for name, most in (("damping", 0.5), ("natural_frequency", 0.2)):
+        for name, upper in (("damping", 0.5), ("natural_frequency", 0.2)):
             value = getattr(self, name)
-            if value * period > most:
+            if value * period > upper:
                 raise LiveError(
                     f"the safe stop's {name} is {value:g}; at a period of {period:g} s "
-                    f"it may be {most / period:g} at most"
+                    f"it may be {upper / period:g} at most"
                 )
 
 
 def check_fixed(robot: Robot) -> None:
-    """Refuse a floating base.
+    """Check that the robot has a fixed base.
 
     Raises:
-        LiveError: If the robot has one.
+        LiveError: If it has a floating base.
     """
     if robot.unactuated:
         raise LiveError(
-            f"{robot.name} has a floating base; a live loop is for fixed ones: damping "
-            "and holding its joints does not keep a robot from falling"
+            f"{robot.name} has a floating base; a live loop needs a fixed base: "
+            "damping and holding joints does not keep a robot from falling"
         )
 
 
-def _greatest(robot: Robot, value: Any, what: str) -> Array:
+def _per_dof(robot: Robot, value: Any, what: str) -> Array:
+    """Return limits as an array, shape (nv,), from None, one number or nv numbers."""
     if value is None:
         return np.full(robot.nv, np.inf)
     try:
@@ -162,5 +167,5 @@ def _greatest(robot: Robot, value: Any, what: str) -> Array:
             f"{what} has shape {array.shape}; needs one number or {robot.nv}"
         )
     if not (array > 0.0).all():
-        raise LiveError(f"{what} is {array.tolist()}; must be greater than 0")
+        raise LiveError(f"{what} is {array.tolist()}; must be positive")
     return array

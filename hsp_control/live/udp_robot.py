@@ -1,4 +1,4 @@
-"""Serves a watched robot over UDP, in real time."""
+"""Run a simulated robot in real time, connected by UDP."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,91 +11,97 @@ from hsp_control.live.latency import no_garbage_collection
 from hsp_control.live.link import Link
 from hsp_control.live.packets import Kind
 from hsp_control.live.safe_stop import Phase
-from hsp_control.live.watched_robot import WatchedRobot
+from hsp_control.live.simulated_robot import SimulatedRobot
 
-BYE = "the loop said its end"
-"""Why a robot stops that has served well."""
+CLOSED_BY_LOOP = "the loop closed the connection"
+"""Why a robot stops at the regular end of a run."""
 
 
 @dataclass
-class Served:
-    """What a server did.
+class ServerReport:
+    """What `serve` counted.
 
     Attributes:
-        outdated: Efforts that answered a state older than the watchdog's patience.
-        slipped: By how much its clock fell behind, because it was not let run [s].
-        waited: Whether no effort ever came.
+        outdated: Number of efforts that were ignored, because they were computed from
+            a state older than the watchdog's limit.
+        overrun: By how much the robot's time fell behind real time, because its
+            process did not get the processor [s].
+        never_started: Whether no effort arrived.
     """
 
     outdated: int = 0
-    slipped: float = 0.0
-    waited: bool = False
+    overrun: float = 0.0
+    never_started: bool = False
 
 
 Row = Callable[[float, Array, Array, bool], object]
-"""Called with t [s], q and v at the beginning of a period, and if it is the last."""
+"""Called with t [s], q, shape (nq,), and v, shape (nv,), at the beginning of a period,
+and whether it is the last one."""
 
 
 def serve(
-    robot: WatchedRobot,
+    robot: SimulatedRobot,
     link: Link,
     *,
-    orphaned: Callable[[], str | None],
-    patience: float = 60.0,
+    stop_reason: Callable[[], str | None],
+    start_timeout: float = 60.0,
     on_row: Row | None = None,
-) -> Served:
-    """Let a robot live in real time, until it has stopped and stood for a while.
+) -> ServerReport:
+    """Run a robot in real time, until it has stopped and was held.
 
-    Each period it takes the efforts that came, moves, and sends its state. An effort
-    that came within the period of its state acts from that state on, as if it had not
-    taken any time; one that comes later, from the next period on.
+    Each period: receive efforts, advance the plant, send the state. An effort that
+    arrives within the period of its state acts from that state on, as if it had been
+    computed in no time; a later one acts from the next period on.
 
-    If this process is not let run for longer than a period, its clock stands still
-    meanwhile: that is the simulator's fault, and nobody's lateness.
+    If this process overruns by more than a period, the robot's time stands still
+    meanwhile, so that the loop's efforts do not count as late.
 
     Args:
-        robot: The robot, waiting.
-        link: The connection, which knows its peer.
-        orphaned: Asked every period; a text is a reason to stop.
-        patience: How long it waits for the first effort [s].
-        on_row: What to do in the rest of a period.
+        robot: The robot, waiting for its first effort.
+        link: The connection; its peer is known.
+        stop_reason: Called every period; returns a reason to stop, or None.
+        start_timeout: Longest time to wait for the first effort [s].
+        on_row: Called after the state was sent, in the rest of the period.
+
+    Returns:
+        The counts.
     """
-    served, nv = Served(), robot.plant.robot.nv
-    sequence_of_state = 0
+    report, nv = ServerReport(), robot.plant.robot.nv
+    state_sequence = 0
     with no_garbage_collection():
         begin = monotonic()
-        give_up = begin + patience
+        give_up = begin + start_timeout
         while True:
             begin += robot.period
             now = monotonic()
             if now < begin:
                 sleep(begin - now)
             elif now - begin > robot.period:
-                served.slipped += now - begin
+                report.overrun += now - begin
                 begin = now
             efforts = []
             for packet in link.receive(0.0):
                 if packet.kind is Kind.BYE:
-                    robot.halt(BYE)
+                    robot.halt(CLOSED_BY_LOOP)
                 elif packet.kind is Kind.EFFORT and len(packet.payload) == nv:
-                    if sequence_of_state - packet.answers > robot.watchdog:
-                        served.outdated += 1
+                    if state_sequence - packet.acks > robot.watchdog:
+                        report.outdated += 1
                     else:
                         efforts.append(packet.payload)
-            reason = orphaned()
+            reason = stop_reason()
             if robot.phase == Phase.WAITING and not efforts:
                 if reason is not None or monotonic() > give_up or robot.halted:
-                    served.waited = True
-                    return served
+                    report.never_started = True
+                    return report
             elif reason is not None:
                 robot.halt(reason)
             t, q, v = robot.t, robot.q, robot.v
             robot.advance(efforts)
             state = np.concatenate(robot.measure())
             link.send(Kind.STATE, state, t=robot.t, phase=int(robot.phase))
-            sequence_of_state = link.counts["sent"]
+            state_sequence = link.counts["sent"]
             done = robot.done
             if on_row is not None and robot.t > t:
                 on_row(t, q, v, done)
             if done:
-                return served
+                return report

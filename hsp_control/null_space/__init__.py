@@ -1,1 +1,1 @@
-"""What self-motion does: fields g with their rates g', and the metric W it lives in."""
+"""Self-motion: null-space fields g with their rates g', and joint-space metrics W."""

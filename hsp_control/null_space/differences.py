@@ -1,4 +1,4 @@
-"""Accurate differences on the configuration manifold, for what has no closed form."""
+"""Fourth-order differences on the configuration manifold."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,17 +9,21 @@ from hsp_control.common.arrays import Array
 from hsp_control.robot import RobotState
 
 GRADIENT_STEP = 1e-3
-"""Step of `gradient` [rad or m]: its fourth-order error balances rounding, 1e-12."""
+"""Step h of `gradient` [rad or m]; truncation and rounding errors are about equal."""
 
 RATE_STEP = 1e-3
-"""Largest step of `rate_along_flow` [s]; shortened so that no joint moves further."""
+"""Largest step of `rate_along_flow` [s]; smaller if an entry of v exceeds 1."""
 
 
 def gradient(function: Callable[[RobotState], float], state: RobotState) -> Array:
     """Return ∇f in the tangent space, shape (nv,), by fourth-order differences.
 
-    (f(-2h) - 8 f(-h) + 8 f(h) - f(2h)) / 12h along each freedom: 4 nv evaluations, good
-    to about 1e-11 of f's scale.
+    (f(-2h) - 8 f(-h) + 8 f(h) - f(2h)) / 12h along each degree of freedom: 4 nv
+    evaluations, with an error of about 1e-11 of the size of f.
+
+    Args:
+        function: f of q and t; it must not depend on v.
+        state: The state at which ∇f is computed.
     """
     nv = state.robot.nv
     result = np.empty(nv)
@@ -37,12 +41,19 @@ def gradient(function: Callable[[RobotState], float], state: RobotState) -> Arra
 def rate_along_flow(function: Callable[[RobotState], Any], state: RobotState) -> Array:
     """Return d/ds f(q ⊕ s v, t + s) at s = 0, by fourth-order differences.
 
-    The total time derivative of any function of (q, t): four evaluations.
+    The total time derivative of a function of (q, t): four evaluations.
+
+    Args:
+        function: f of q and t, a number or an array of any shape.
+        state: The state; the flow is q ⊕ s v.
+
+    Returns:
+        An array of the shape of f's value, in its unit per second.
     """
     step = RATE_STEP / max(1.0, float(np.abs(state.v).max()))
     total: Any = 0.0
     for factor, weight in _STENCIL:
-        # A copy, because functions may return arrays of the state's own.
+        # A copy, because a function may return an array that the state owns.
         value = np.array(function(state.ahead(factor * step)), dtype=float)
         total = total + weight * value
     return np.asarray(total / step)

@@ -1,4 +1,4 @@
-"""Where the robot is: its model, its state, and every term computed there."""
+"""The robot: its model, its state, and the kinematic and dynamic terms there."""
 
 from .friction import JointFriction as JointFriction
 from .integrators import Dop853 as Dop853

@@ -1,4 +1,4 @@
-"""The centre of mass and the angular momentum about it, with their exact Jacobians."""
+"""The centre of mass and the angular momentum about it, with exact Jacobians."""
 
 from functools import partial
 
@@ -12,21 +12,29 @@ from hsp_control.robot.matrix_view import matrix_view
 
 
 class CentroidalMotion:
-    """Where a robot's mass is and how it moves, in world axes.
+    """Centre of mass and centroidal angular momentum of a robot, in world axes.
 
     Attributes:
         mass: Total mass [kg].
         position: The centre of mass c [m], shape (3,).
         velocity: c' = J v [m/s], shape (3,).
         jacobian: J, shape (3, nv).
-        jacobian_dot: J' along v, exact, shape (3, nv).
-        momentum_matrix: A, with A v the angular momentum about c [kg·m²/s], (3, nv).
-        momentum_matrix_dot: A' along v, exact, shape (3, nv).
+        jacobian_dot: J' = dJ/dt along v, exact, shape (3, nv).
+        momentum_matrix: A, where A v is the angular momentum about c [kg·m²/s], shape
+            (3, nv).
+        momentum_matrix_dot: A' = dA/dt along v, exact, shape (3, nv).
     """
 
     def __init__(self, model: pin.Model, data: pin.Data, q: Array, v: Array) -> None:
-        """Allocate; `RobotState.centroidal` updates it, at whatever q and v hold."""
-        # Pinocchio makes its vectors when they are first asked for: views on them then.
+        """Allocate the arrays; `update` computes them at the values of q and v then.
+
+        Args:
+            model: The model.
+            data: Its data.
+            q: Configuration, shape (nq,); the array is kept.
+            v: Velocity, shape (nv,); the array is kept.
+        """
+        # Pinocchio allocates these results at the first call; take views after it.
         pin.computeCentroidalMapTimeVariation(model, data, q, v)
         self.mass: float = pin.computeTotalMass(model)
         self.position: Array = data.com[0]
@@ -35,9 +43,11 @@ class CentroidalMotion:
         self.jacobian_dot: Array = np.zeros((3, model.nv))
         self.momentum_matrix: Array = np.zeros((3, model.nv))
         self.momentum_matrix_dot: Array = np.zeros((3, model.nv))
-        self._move = partial(pin.computeCentroidalMapTimeVariation, model, data, q, v)
-        self._divide = bind(
-            _divide,
+        self._compute_momentum = partial(
+            pin.computeCentroidalMapTimeVariation, model, data, q, v
+        )
+        self._extract = bind(
+            _extract,
             matrix_view(data.Ag),
             matrix_view(data.dAg),
             self.mass,
@@ -50,13 +60,13 @@ class CentroidalMotion:
         )
 
     def update(self) -> None:
-        """Compute everything at the configuration and the velocity."""
-        self._move()
-        self._divide()
+        """Compute all attributes at the present q and v."""
+        self._compute_momentum()
+        self._extract()
 
 
 @kernel
-def _divide(
+def _extract(
     A: Array,
     A_dot: Array,
     mass: float,
@@ -67,11 +77,11 @@ def _divide(
     angular: Array,
     angular_dot: Array,
 ) -> None:
-    """Write the linear rows, per mass, and the angular ones with their true rate.
+    """Write the linear rows divided by the mass, and the angular rows with their rate.
 
-    Pinocchio's A' differentiates about a point at rest, though the centre of mass
-    moves: the derivative of the angular rows is A' - m c' × J (against differences; A'v
-    alone is right as it is, since c' × c' = 0).
+    Pinocchio's A' is the rate about a point at rest, but the centre of mass moves. The
+    rate of the angular rows about c is A' - m c' × J (checked against finite
+    differences; Pinocchio's product A'v is right as it is, since c' × c' = 0).
     """
     for i in range(3):
         velocity[i] = 0.0

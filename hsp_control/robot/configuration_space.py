@@ -1,4 +1,4 @@
-"""The space that configurations live in: a manifold, with tangent vectors (nv,)."""
+"""The configuration manifold of a robot, with tangent vectors of shape (nv,)."""
 
 from collections.abc import Mapping, Sequence
 from math import atan2
@@ -14,31 +14,41 @@ from hsp_control.robot.description.loading import moving_joints
 
 
 class ConfigurationSpace:
-    """Configurations q, shape (nq,), and what may be done with them.
+    """The configurations q of a robot, shape (nq,), and the operations on them.
 
     Attributes:
-        name: What messages call the robot.
+        name: The robot's name, for messages.
         model: The Pinocchio model.
-        nq: Numbers in a configuration.
-        nv: Freedoms.
-        joints: The joints that have freedoms, by name, in the order of velocities.
+        nq: Size of a configuration.
+        nv: Size of a velocity: the number of degrees of freedom.
+        joints: Pinocchio's models of the joints with degrees of freedom, by name, in
+            the order of v.
         joint_names: Their names.
-        dof_names: A name for each freedom, ``root_joint.x`` where a joint has many.
-        units: The unit of each freedom, ``rad`` or ``m``.
-        single_joints: Of each joint with one freedom the place of that freedom, and
-            where it begins in q and how many numbers it has there, shape (k, 3).
+        dof_names: A name for each degree of freedom: that of its joint, or
+            ``root_joint.x`` if the joint has several.
+        units: The unit of each degree of freedom, ``rad`` or ``m``.
+        single_dof_joints: (index in v, start in q, size in q) of every joint with one
+            degree of freedom, shape (k, 3); the size is 2 for continuous joints.
         unit_blocks: (start, size) of every quaternion and (cos, sin) pair in q.
-        flat: Whether every joint has one freedom, so that δ' = v holds globally.
-        mimics: Whether some joints follow others.
-        unactuated: The freedoms that no motor moves, those of a free-flyer root.
-        freedom_indices: Where each freedom's own coordinate stands in q; -1 where it
-            has none (roots, continuous joints).
+        flat: Whether every joint has one degree of freedom, so that δ' = v holds
+            globally for q = base ⊕ δ.
+        mimics: Whether some joints mimic others.
+        unactuated: Indices in v that have no motor: those of a free-flyer root.
+        dof_indices: Index in q of each degree of freedom's coordinate, shape (nv,); -1
+            if it has none of its own (roots, continuous joints).
     """
 
     def __init__(
         self, model: pin.Model, name: str, home: Sequence[float] | None = None
     ) -> None:
-        """Describe a model's configurations; ``home`` has shape (nv,)."""
+        """Set up the space of a model.
+
+        Args:
+            model: The Pinocchio model.
+            name: The robot's name, for messages.
+            home: Displacement from neutral of the home posture, shape (nv,), or None;
+                ignored if it has another size.
+        """
         self.model = model
         self.name = name
         self.nq: int = model.nq
@@ -47,7 +57,7 @@ class ConfigurationSpace:
         self.joint_names: tuple[str, ...] = tuple(self.joints)
         self.dof_names: tuple[str, ...] = _dof_names(self.joints)
         self.units: tuple[str, ...] = _units(self.joints)
-        self.single_joints: Indices = np.array(
+        self.single_dof_joints: Indices = np.array(
             [(j.idx_v, j.idx_q, j.nq) for j in self.joints.values() if j.nv == 1],
             dtype=np.int64,
         ).reshape(-1, 3)
@@ -67,17 +77,18 @@ class ConfigurationSpace:
         self.dof_indices: Indices = own
         fits = home is not None and len(home) == self.nv
         self._home = np.array(home) if fits else None
-        if self._home is not None:  # some SRDFs have a joint stand beyond its limit
+        if self._home is not None:  # some SRDFs give postures beyond the limits
             self._home = np.clip(self._home, *self.position_limits())
 
     def neutral(self) -> Array:
-        """Return the configuration with every joint at zero, shape (nq,)."""
+        """Return the configuration with all joints at zero, shape (nq,)."""
         return np.asarray(pin.neutral(self.model))
 
     def home(self) -> Array:
-        """Return the posture that the robot's source recommends, or the neutral one.
+        """Return the home posture of the robot's source, shape (nq,).
 
-        Where neutral lies outside the limits, the joint is put in their middle.
+        If the source has none, it is the neutral configuration, with joints whose
+        limits do not contain zero in the middle of their limits.
         """
         if self._home is not None:
             return self.integrate(self.neutral(), self._home)
@@ -90,9 +101,10 @@ class ConfigurationSpace:
         return self.integrate(self.neutral(), middle)
 
     def random_configuration(self, rng: np.random.Generator) -> Array:
-        """Draw a configuration: uniform within limits, any angle where there are none.
+        """Return a random configuration, shape (nq,).
 
-        A floating root is drawn within a unit box, with a uniform orientation.
+        Joints are uniform within their limits, or in ±π if they have none. A free-flyer
+        root is uniform in a box of ±1 m, with a uniform orientation.
         """
         lower, upper = self.position_limits()
         bounded = np.isfinite(lower) & np.isfinite(upper)
@@ -109,23 +121,23 @@ class ConfigurationSpace:
         return q
 
     def integrate(self, q: Any, displacement: Any) -> Array:
-        """Return q ⊕ displacement, shape (nq,).
+        """Return q ⊕ displacement, shape (nq,), for shapes (nq,) and (nv,).
 
         Raises:
-            ShapeError: If they are not nq and nv numbers.
+            ShapeError: If the arguments are not nq and nv numbers.
         """
         try:
             return np.asarray(pin.integrate(self.model, q, displacement))
-        except (TypeError, ValueError):  # lists, or what does not fit: look closer
+        except (TypeError, ValueError):  # lists are converted, wrong shapes reported
             q = self.check_configuration(q)
             displacement = self.check_tangent(displacement, "displacement")
             return np.asarray(pin.integrate(self.model, q, displacement))
 
     def difference(self, start: Any, end: Any) -> Array:
-        """Return end ⊖ start: the displacement that leads from start to end, (nv,).
+        """Return end ⊖ start: the displacement from start to end, shape (nv,).
 
         Raises:
-            ShapeError: If they are not nq numbers each.
+            ShapeError: If the arguments are not nq numbers each.
         """
         try:
             return np.asarray(pin.difference(self.model, start, end))
@@ -134,17 +146,18 @@ class ConfigurationSpace:
             return np.asarray(pin.difference(self.model, start, end))
 
     def joint_positions(self, q: Array) -> Array:
-        """Return every joint's position [rad or m], shape (nv,): the log from neutral.
+        """Return q ⊖ neutral: the joint positions [rad or m], shape (nv,).
 
-        Continuous joints come as angles in (-pi, pi].
+        Continuous joints have angles in (-π, π].
         """
         return self.difference(self.neutral(), q)
 
     def position_limits(self) -> tuple[Array, Array]:
-        """Return lower and upper joint positions, shape (nv,); ±inf where unlimited.
+        """Return lower and upper joint position limits, shape (nv,) [rad or m].
 
-        Continuous joints and the root have no limits, whatever the model's numbers,
-        and neither has a joint whose two limits are equal: its URDF leaves them out.
+        They are ±inf where there is no limit: for continuous joints and the root,
+        whatever the model says, and for a joint whose two limits are equal, which
+        means that its URDF gives none.
         """
         lower = np.full(self.nv, -np.inf)
         upper = np.full(self.nv, np.inf)
@@ -154,17 +167,17 @@ class ConfigurationSpace:
                 high = self.model.upperPositionLimit[joint.idx_q]
                 if low < high:
                     lower[joint.idx_v], upper[joint.idx_v] = low, high
-        largest = np.finfo(float).max  # Pinocchio's word for unlimited
+        largest = np.finfo(float).max  # Pinocchio's value for unlimited
         lower[lower <= -largest] = -np.inf
         upper[upper >= largest] = np.inf
         return lower, upper
 
     def check_configuration(self, q: Any) -> Array:
-        """Return q as a float array of shape (nq,) that is a configuration.
+        """Return q as a float array of shape (nq,) after checking that it is valid.
 
         Raises:
             ShapeError: If its shape is not (nq,).
-            NonFiniteError: If it holds a NaN or an infinity.
+            NonFiniteError: If it contains NaN or inf.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
         """
         configuration = _check_vector(q, self.nq, "configuration q", self)
@@ -182,9 +195,13 @@ class ConfigurationSpace:
     def check_tangent(self, vector: Any, what: str) -> Array:
         """Return a velocity, acceleration or effort as a float array of shape (nv,).
 
+        Args:
+            vector: The numbers.
+            what: Their name, for messages.
+
         Raises:
-            ShapeError: If its shape is not (nv,).
-            NonFiniteError: If it holds a NaN or an infinity.
+            ShapeError: If the shape is not (nv,).
+            NonFiniteError: If it contains NaN or inf.
         """
         return _check_vector(vector, self.nv, what, self)
 
@@ -249,18 +266,22 @@ def _check_vector(
 
 @kernel
 def joint_displacements(
-    q: Array, reference: Array, single_joints: Indices, out: Array
+    q: Array, reference: Array, single_dof_joints: Indices, out: Array
 ) -> None:
-    """Write q ⊖ reference for joints of one freedom, within ±π for continuous ones.
+    """Write q ⊖ reference for single-dof joints; continuous joints are within ±π.
 
     Args:
         q: Configuration, shape (nq,).
         reference: The other configuration, shape (nq,).
-        single_joints: See `ConfigurationSpace`, shape (k, 3).
-        out: Displacements, shape (nv,); entries of other joints are left alone.
+        single_dof_joints: See `ConfigurationSpace`, shape (k, 3).
+        out: Displacements, shape (nv,); entries of other joints are not changed.
     """
-    for k in range(single_joints.shape[0]):
-        i, at, size = single_joints[k, 0], single_joints[k, 1], single_joints[k, 2]
+    for k in range(single_dof_joints.shape[0]):
+        i, at, size = (
+            single_dof_joints[k, 0],
+            single_dof_joints[k, 1],
+            single_dof_joints[k, 2],
+        )
         if size == 1:
             out[i] = q[at] - reference[at]
         else:  # (cos, sin)

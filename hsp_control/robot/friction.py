@@ -1,4 +1,4 @@
-"""Friction in the joints: what a plant has of it."""
+"""Joint friction of a plant."""
 
 from dataclasses import dataclass
 from typing import Any, Self
@@ -12,12 +12,12 @@ from hsp_control.robot.robot import Robot
 
 @dataclass(frozen=True)
 class JointFriction:
-    """Friction that opposes each joint's motion: dry, and growing with speed.
+    """Coulomb and viscous friction in each joint.
 
     Attributes:
-        coulomb: The largest dry friction, shape (nv,) [N·m or N]: at rest a joint
-            sticks until more than that pushes it.
-        viscous: Friction for each unit of speed, shape (nv,) [N·m·s/rad or N·s/m].
+        coulomb: Dry friction, shape (nv,) [N·m or N]; a joint at rest sticks until the
+            effort on it exceeds this value.
+        viscous: Friction per velocity, shape (nv,) [N·m·s/rad or N·s/m].
     """
 
     coulomb: Array
@@ -25,10 +25,16 @@ class JointFriction:
 
     @classmethod
     def of(cls, robot: Robot, coulomb: Any = 0.0, viscous: Any = 0.0) -> Self:
-        """Return friction from numbers for all joints or one for each freedom.
+        """Return friction from one number for all joints, or nv numbers.
+
+        Args:
+            robot: The robot.
+            coulomb: One number or shape (nv,) [N·m or N].
+            viscous: One number or shape (nv,) [N·m·s/rad or N·s/m].
 
         Raises:
-            SimulationError: If a number is negative or does not fit the robot.
+            SimulationError: If a number is negative or not finite, or the shape is
+                wrong.
         """
         return cls(
             per_dof(robot, coulomb, "coulomb"),
@@ -37,6 +43,6 @@ class JointFriction:
 
     @classmethod
     def of_model(cls, robot: Robot) -> Self:
-        """Return the ``<dynamics friction= damping=>`` of the robot's URDF."""
+        """Return the friction in the URDF: ``<dynamics friction= damping=>``."""
         model = robot.model
         return cls.of(robot, np.abs(model.upperDryFrictionLimit), np.abs(model.damping))

@@ -1,7 +1,7 @@
-"""Integrators on the configuration manifold: SciPy's DOP853 and two fixed steps.
+"""Integrators on the configuration manifold: SciPy's DOP853 and two fixed-step ones.
 
-A chart q = base ⊕ δ turns the motion into an ordinary one of y = (δ, v), with δ' = v
-for joints of one freedom and δ' = J_r(δ)⁻¹ v for a floating root.
+In a chart q = base ⊕ δ the motion is an ordinary differential equation of y = (δ, v),
+with δ' = v for single-dof joints and δ' = J_r(δ)⁻¹ v for a root.
 """
 
 from collections.abc import Callable
@@ -9,7 +9,6 @@ from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
-from scipy.integrate import DOP853
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, SimulationError
@@ -22,24 +21,28 @@ Equation = Callable[[float, Array], Array]
 """(t, y) ↦ y'."""
 
 CHART_RADIUS = 1.0
-"""How far a root may turn [rad] before its chart is laid anew (singular at 2π)."""
+"""A new chart starts when a root has rotated by this [rad]; charts end at 2π."""
 
 
 class Chart:
-    """Coordinates y = (δ, v) about a configuration."""
+    """Coordinates y = (δ, v), shape (2 nv,), with q = base ⊕ δ."""
 
     def __init__(self, robot: Robot, base: Array) -> None:
-        """Lay the chart at a configuration, shape (nq,)."""
+        """Create the chart about a configuration, shape (nq,)."""
         self.robot = robot
         self.base = base.copy()
 
     def point(self, y: Array) -> tuple[Array, Array]:
-        """Return (q, v)."""
+        """Return (q, v), shapes (nq,) and (nv,)."""
         nv = self.robot.nv
         return self.robot.integrate(self.base, y[:nv]), y[nv:]
 
     def rate(self, y: Array, a: Array) -> Array:
-        """Return y' for an acceleration."""
+        """Return y' for an acceleration a, shape (nv,).
+
+        Raises:
+            SimulationError: If δ is at the singularity of the chart.
+        """
         nv = self.robot.nv
         delta, v = y[:nv], y[nv:]
         if self.robot.flat:
@@ -51,38 +54,47 @@ class Chart:
             return np.concatenate([np.linalg.solve(J_r, v), a])
         except np.linalg.LinAlgError:
             raise SimulationError(
-                "the motion diverged: within one step a root turns so far that its "
-                "coordinates end"
+                "the motion diverged: the root rotates by a full turn within one "
+                "step; use a smaller step"
             ) from None
 
     def equation(self, dynamics: Dynamics) -> Equation:
         """Return the ordinary differential equation (t, y) ↦ y'."""
         return lambda t, y: self.rate(y, dynamics(t, *self.point(y)))
 
-    def worn(self, y: Array) -> bool:
-        """Return whether the chart should be laid anew."""
-        reach = float(np.abs(y[: self.robot.nv]).max())
-        return not self.robot.flat and reach > CHART_RADIUS
+    def needs_new_base(self, y: Array) -> bool:
+        """Return whether δ is so large that a new chart should start there."""
+        largest = float(np.abs(y[: self.robot.nv]).max())
+        return not self.robot.flat and largest > CHART_RADIUS
 
 
 class Integrator(Protocol):
-    """Carries (q, v) from one time to the next."""
+    """Integrates the motion from one time to another."""
 
     def advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
     ) -> tuple[Array, Array]:
-        """Return (q, v) at time ``end`` [s]."""
+        """Return (q, v) at time ``end`` [s].
+
+        Args:
+            robot: The robot.
+            dynamics: (t, q, v) ↦ v', shape (nv,).
+            t: Start time [s].
+            end: End time [s].
+            q: Configuration at the start, shape (nq,).
+            v: Velocity at the start, shape (nv,).
+        """
         ...
 
 
 class Rk4:
-    """The classical fourth-order Runge-Kutta step, in the chart at its start."""
+    """The classical fourth-order Runge-Kutta method, with a new chart in each step."""
 
     def __init__(self, step: float) -> None:
-        """Set the largest step [s]; each interval is cut into equal ones.
+        """Set the maximum step [s]; each interval is divided into equal steps.
 
         Raises:
-            SimulationError: If it is not positive.
+            SimulationError: If the step is not positive.
         """
         self.step = _positive(step, "step")
 
@@ -110,13 +122,13 @@ class Rk4:
 
 
 class SemiImplicitEuler:
-    """v ← v + h v', then q ← q ⊕ h v: first order, cheap, well-behaved."""
+    """Semi-implicit Euler: v ← v + h v', then q ← q ⊕ h v. First order and cheap."""
 
     def __init__(self, step: float) -> None:
-        """Set the largest step [s]; each interval is cut into equal ones.
+        """Set the maximum step [s]; each interval is divided into equal steps.
 
         Raises:
-            SimulationError: If it is not positive.
+            SimulationError: If the step is not positive.
         """
         self.step = _positive(step, "step")
 
@@ -133,18 +145,17 @@ class SemiImplicitEuler:
 
 
 class Dop853:
-    """Dormand and Prince's adaptive eighth-order method, SciPy's implementation.
+    """Dormand and Prince's adaptive eighth-order method (SciPy's DOP853).
 
-    It first tries to take an interval in one step, which the tolerance then judges. A
-    trial that strays so far that the dynamics fail there is shortened, like any other
-    that misses the tolerance.
+    The first trial step covers the whole interval. A step is shortened if it misses the
+    tolerance, or if the dynamics raise an error at one of its trial states.
     """
 
     def __init__(self, rtol: float = 1e-9, atol: float = 1e-9) -> None:
-        """Set the relative and absolute tolerance of a step.
+        """Set the relative and the absolute tolerance of a step.
 
         Raises:
-            SimulationError: If one is not positive.
+            SimulationError: If a tolerance is not positive.
         """
         self.rtol, self.atol = _positive(rtol, "rtol"), _positive(atol, "atol")
 
@@ -154,9 +165,11 @@ class Dop853:
         """Return (q, v) at ``end``; see `Integrator.advance`.
 
         Raises:
-            SimulationError: If the tolerance cannot be met however small the step.
-            HspControlError: If the dynamics fail however small the step.
+            SimulationError: If no step, however small, meets the tolerance.
+            HspControlError: If the dynamics raise this error at every step size.
         """
+        from scipy.integrate import DOP853  # here: SciPy takes long to import
+
         while t < end:
             chart = Chart(robot, q)
             trial = _Trial(chart.equation(dynamics))
@@ -177,10 +190,10 @@ class Dop853:
                     raise trial.failure
                 if message is not None:
                     raise SimulationError(
-                        f"the integrator gave up at t = {solver.t:.6g} s: "
+                        f"the integrator failed at t = {solver.t:.6g} s: "
                         f"{trial.failure or message}"
                     ) from trial.failure
-                if chart.worn(solver.y):
+                if chart.needs_new_base(solver.y):
                     break
             t = float(solver.t)
             q, v = chart.point(solver.y)
@@ -188,7 +201,11 @@ class Dop853:
 
 
 class _Trial:
-    """An equation that is NaN where it fails, so that SciPy rejects the step."""
+    """An equation that returns NaN where it fails, so that SciPy rejects the step.
+
+    Attributes:
+        failure: The last error, or None.
+    """
 
     def __init__(self, equation: Equation) -> None:
         self.equation = equation
@@ -210,5 +227,5 @@ def _positive(value: float, name: str) -> float:
 
 
 def number_of_steps(duration: float, step: float) -> int:
-    """Return the least number of equal steps, none longer than ``step``."""
+    """Return the smallest number of equal steps that are not longer than ``step``."""
     return max(1, int(np.ceil(duration / step - 1e-9)))

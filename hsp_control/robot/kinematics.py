@@ -1,4 +1,4 @@
-"""Where joints and frames are and how they move: Jacobians, exact rates and drift."""
+"""Placements of joints and frames, Jacobians, their exact rates and drift."""
 
 from collections.abc import Callable
 
@@ -13,16 +13,19 @@ from hsp_control.robot.matrix_view import matrix_view
 
 
 class FrameKinematics:
-    """Where a frame is and how it moves, in world axes, linear before angular.
+    """Placement and motion of a frame, in world axes, linear rows before angular rows.
+
+    This is Pinocchio's LOCAL_WORLD_ALIGNED.
 
     Attributes:
-        compute: Brings everything below up to the state, if it is not.
-        rotation: World ← frame, shape (3, 3).
-        position: Its origin in the world [m], shape (3,).
-        jacobian: J with (velocity of the origin, angular velocity) = J v, (6, nv).
+        compute: Updates the attributes below to the state, if they are not up to date.
+        rotation: Rotation matrix from frame axes to world axes, shape (3, 3).
+        position: The frame's origin in the world [m], shape (3,).
+        jacobian: J, where J v = (velocity of the origin, angular velocity), shape
+            (6, nv).
         jacobian_dot: J' = dJ/dt along v, exact, shape (6, nv).
         velocity: J v, shape (6,) [m/s, rad/s].
-        drift: J' v, shape (6,): the classical acceleration when v' = 0.
+        drift: J' v, shape (6,) [m/s², rad/s²]: the classical acceleration for v' = 0.
     """
 
     __slots__ = (
@@ -36,19 +39,19 @@ class FrameKinematics:
     )
 
     def __init__(
-        self, model: pin.Model, data: pin.Data, v: Array, instant: Indices, index: int
+        self, model: pin.Model, data: pin.Data, v: Array, stamp: Indices, index: int
     ) -> None:
-        """Allocate; `compute` fills it.
+        """Allocate the arrays; `compute` fills them.
 
         Args:
             model: The model.
-            data: Its data, where joints and their Jacobians are found.
-            v: The velocity, shape (nv,).
-            instant: A number that changes whenever they do, shape (1,).
-            index: The frame's place in the model.
+            data: Its data, with the joints' placements and Jacobians.
+            v: The velocity, shape (nv,); the array is kept.
+            stamp: A number that changes when data and v do, shape (1,).
+            index: Index of the frame in the model.
         """
         nv, frame = model.nv, model.frames[index]
-        joint = data.oMi[frame.parentJoint]  # its parts are views: they follow the data
+        joint = data.oMi[frame.parentJoint]  # its arrays are views of data
         self.rotation: Array = np.zeros((3, 3))
         self.position: Array = np.zeros(3)
         self.jacobian: Array = np.zeros((6, nv))
@@ -57,7 +60,7 @@ class FrameKinematics:
         self.drift: Array = np.zeros(6)
         self.compute: Callable[[], object] = bind(
             frame_kinematics,
-            instant,
+            stamp,
             np.array([-1]),
             matrix_view(data.J),
             matrix_view(data.dJ),
@@ -78,7 +81,7 @@ class FrameKinematics:
 
 @kernel
 def frame_kinematics(
-    instant: Indices,
+    stamp: Indices,
     computed: Indices,
     J_world: Array,
     J_world_dot: Array,
@@ -96,17 +99,17 @@ def frame_kinematics(
     velocity: Array,
     drift: Array,
 ) -> None:
-    """Write where a frame of a joint is, and how its origin moves.
+    """Write the placement of a frame that is fixed to a joint, and its motion.
 
-    The joints' Jacobian and its rate are moved from the world's origin to the frame's.
-    A column (l, w) at the origin reads (l + w × p, w) at the point p, and its rate
+    Pinocchio gives the joints' Jacobian and its rate at the world's origin. A column
+    (l, w) there is (l + w × p, w) at a point p, and its rate is
     (l' + w' × p + w × p', w'). Only joints that carry the frame have columns; those of
-    joints that mimic add to their leader's. What has been computed at this instant is
-    left as it is.
+    mimic joints are added to their leader's. Nothing is done if ``computed`` equals
+    ``stamp``.
     """
-    if computed[0] == instant[0]:
+    if computed[0] == stamp[0]:
         return
-    computed[0] = instant[0]
+    computed[0] = stamp[0]
     for i in range(3):
         p[i] = p_joint[i]
         for j in range(3):
@@ -151,9 +154,10 @@ def frame_kinematics(
 
 
 def mass_matrix_difference(model: pin.Model, q: Array, v: Array) -> Array:
-    """Return M' by fourth-order differences along v, good to 1e-11 of M.
+    """Return M' along v by fourth-order differences, shape (nv, nv).
 
-    For robots with mimic joints, which Pinocchio's Coriolis matrix does not know.
+    The error is about 1e-11 of M. It is for robots with mimic joints, which Pinocchio's
+    Coriolis matrix does not support.
     """
     data, h = model.createData(), 1e-3 / max(1.0, float(np.abs(v).max()))
 
@@ -164,14 +168,14 @@ def mass_matrix_difference(model: pin.Model, q: Array, v: Array) -> Array:
 
 
 def joint_support(model: pin.Model, joint: int) -> tuple[Indices, Indices]:
-    """Return the columns of Pinocchio's J that move a joint, and their freedoms.
+    """Return the columns of Pinocchio's J that move a joint, and their indices in v.
 
-    The two differ where joints mimic others: such a joint has a column of its own,
-    already scaled, and its leader's freedom.
+    The two differ for mimic joints: a mimic joint has a column of its own, already
+    scaled, and the index of its leader.
     """
     columns: list[int] = []
     dofs: list[int] = []
-    for index in list(model.supports[joint])[1:]:  # not the universe
+    for index in list(model.supports[joint])[1:]:  # without the universe
         part = model.joints[index]
         width = part.nvExtended
         columns.extend(range(part.idx_vExtended, part.idx_vExtended + width))
@@ -180,13 +184,13 @@ def joint_support(model: pin.Model, joint: int) -> tuple[Indices, Indices]:
 
 
 def joint_placements(data: pin.Data) -> Array:
-    """Return where all joints are, a view that follows the data, shape (njoints, 12).
+    """Return the placements of all joints, a view of the data, shape (njoints, 12).
 
-    A row is R, column by column, and then the origin: Pinocchio's own placements, which
-    lie one after the other in memory.
+    A row is R, column by column, followed by the origin [m]. The view relies on how
+    Pinocchio stores its placements: one after the other in memory.
 
     Raises:
-        ModelError: If they do not, in a Pinocchio that is not known yet.
+        ModelError: If this version of Pinocchio stores them in another way.
     """
     first, address = data.oMi[0].rotation, "__array_interface__"
     turns = [getattr(M.rotation, address)["data"][0] for M in data.oMi]
@@ -195,8 +199,8 @@ def joint_placements(data: pin.Data) -> Array:
     offsets = {b - a for a, b in zip(turns, origins, strict=True)}
     if len(strides) > 1 or offsets != {9 * 8} or first.strides != (8, 24):
         raise ModelError(
-            f"Pinocchio {pin.__version__} lays placements out in an unknown way; "
-            "use 4.1, or ask for support of this one"
+            f"Pinocchio {pin.__version__} is not supported: it stores placements in an "
+            "unknown layout; use Pinocchio 4.1"
         )
     return np.lib.stride_tricks.as_strided(
         first.T.reshape(9), (len(turns), 12), (strides.pop() if strides else 96, 8)

@@ -1,11 +1,12 @@
-"""Matrices of Pinocchio's with a column for every freedom, however few there are."""
+"""Views of Pinocchio's matrices that keep two dimensions, also for nv = 1."""
 
 from hsp_control.common.arrays import Array
 
 
 def matrix_view(matrix: Array) -> Array:
-    """Return a matrix of Pinocchio's as one, a view that follows its memory.
+    """Return a matrix of Pinocchio's data as a two-dimensional view of its memory.
 
-    Those of a single column come to Python as vectors: where a robot has one freedom.
+    Pinocchio gives Python a matrix of one column as a vector: for a robot with one
+    degree of freedom.
     """
     return matrix.reshape(-1, 1) if matrix.ndim == 1 else matrix

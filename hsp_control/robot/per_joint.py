@@ -1,4 +1,4 @@
-"""Settings that are one number for all joints, or one for each freedom."""
+"""Settings that are one number for all joints, or one per degree of freedom."""
 
 from typing import Any
 
@@ -11,10 +11,10 @@ from hsp_control.robot.robot import Robot
 
 
 def joint_dofs(robot: Robot) -> NDArray[np.bool_]:
-    """Return which freedoms belong to joints with one, shape (nv,).
+    """Return a mask of the degrees of freedom of single-dof joints, shape (nv,).
 
-    The others are those of a root or of a ball joint, which have no motor, no gear and
-    no encoder.
+    The others belong to a root or to a ball joint, which have no motor, no gear and no
+    encoder.
     """
     joints = np.zeros(robot.nv, dtype=bool)
     joints[[j.idx_v for j in robot.joints.values() if j.nv == 1]] = True
@@ -22,16 +22,15 @@ def joint_dofs(robot: Robot) -> NDArray[np.bool_]:
 
 
 def per_dof(robot: Robot, value: Any, what: str) -> Array:
-    """Return a setting for each freedom, shape (nv,).
+    """Return a setting for each degree of freedom, shape (nv,).
 
     Args:
         robot: The robot.
-        value: One number, which is that of all joints with one freedom (a root has 0),
-            or a number for each freedom.
-        what: Its name, for messages.
+        value: One number for all single-dof joints (the others get 0), or shape (nv,).
+        what: Name of the setting, for messages.
 
     Raises:
-        SimulationError: If a number is negative, not finite, or there are too many.
+        SimulationError: If a number is negative or not finite, or the shape is wrong.
     """
     try:
         array = np.asarray(value, dtype=float)
@@ -40,8 +39,10 @@ def per_dof(robot: Robot, value: Any, what: str) -> Array:
     if array.shape not in ((), (robot.nv,)):
         raise SimulationError(
             f"{what} has shape {array.shape}; needs one number, or one for each of the "
-            f"{robot.nv} freedoms of {robot.name}"
+            f"{robot.nv} degrees of freedom of {robot.name}"
         )
     if not (np.isfinite(array).all() and (array >= 0.0).all()):
-        raise SimulationError(f"{what} is {array.tolist()}; must not be negative")
+        raise SimulationError(
+            f"{what} is {array.tolist()}; must be finite and not negative"
+        )
     return np.where(joint_dofs(robot), array, 0.0) if array.ndim == 0 else array

@@ -1,6 +1,9 @@
-"""The robot, and its state: every kinematic and dynamic quantity, computed once.
+"""The robot and its state: kinematic and dynamic terms, each computed once per state.
 
-This is the only module that asks Pinocchio for kinematics and dynamics.
+The controller gets its kinematics and dynamics from `RobotState`, which calls Pinocchio
+here, in `kinematics` and in `centroidal`. Other modules call Pinocchio directly only
+for what a state does not offer: loading and checks of models, integration, collision
+geometry, derivatives of gravity, plants with models of their own, and the viewer.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,7 +31,7 @@ from hsp_control.robot.description.loading import (
     ToolFrame,
     end_effector_frame,
     load_model,
-    standing,
+    reference_posture,
 )
 from hsp_control.robot.description.sources import RobotSource, Root, find_robot
 from hsp_control.robot.kinematics import (
@@ -42,25 +45,27 @@ from hsp_control.robot.matrix_view import matrix_view
 class Robot(ConfigurationSpace):
     """A robot's model: its joints, frames, limits and dynamics.
 
-    Configurations q have shape (nq,); velocities, accelerations, efforts, gradients
-    and errors live in the tangent space and have shape (nv,). Nothing assumes nq = nv.
-    A robot is never changed after it has been built and holds no meshes.
+    Configurations q have shape (nq,). Velocities, accelerations, efforts, gradients
+    and errors are tangent vectors of shape (nv,). Nothing assumes nq = nv. A robot does
+    not change after it has been built, and it contains no meshes.
 
     Attributes:
         source: Where it was loaded from.
-        parts: The robots that it consists of, itself alone unless it was combined.
+        parts: The robots that it consists of: itself only, unless it was combined.
         frame_names: Names of all frames.
     """
 
     def __init__(
         self, model: pin.Model, source: RobotSource, parts: Sequence[Part] = ()
     ) -> None:
-        """Wrap a Pinocchio model; most callers want `Robot.load`."""
-        super().__init__(model, source.name, source.home or standing(model, source))
+        """Wrap a Pinocchio model; `Robot.load` is the usual way to create a robot."""
+        super().__init__(
+            model, source.name, source.home or reference_posture(model, source)
+        )
         self.source = source
         self.parts = tuple(parts) or (Part("", source, pin.SE3.Identity()),)
         self.frame_names: tuple[str, ...] = tuple(f.name for f in model.frames)
-        # Where a joint and a link have one name, the link's frame is meant.
+        # If a joint and a link have the same name, it means the link's frame.
         links = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
         self._frame_ids = {
             frame.name: i
@@ -85,22 +90,28 @@ class Robot(ConfigurationSpace):
 
         Args:
             name: For example ``"panda"``, ``"talos_arm"`` or ``"my_arm/arm.urdf"``.
-            root: How it stands in the world: ``fixed``, ``planar`` (x, y, yaw) or
-                ``free_flyer``. None: as its source says, ``fixed`` for a file.
+            root: How its base is attached to the world: ``fixed``, ``planar``
+                (x, y, yaw) or ``free_flyer``. None: as its source says; ``fixed`` for a
+                file.
             locked: Joints to lock, name to value [rad or m]. None: as its source says
                 (the bundled Panda locks its fingers); ``{}``: none.
             tool_frames: Frames to add, by name.
-            gravity: Acceleration of gravity [m/s²], shape (3,). None: -9.81 along z.
-            mimic: Honour ``<mimic>`` joints, or load them as free ones.
-            access: Where a URDF given by path, and the meshes that it names, may lie:
-                `access.only_within` for files of strangers.
+            gravity: Acceleration of gravity in the world [m/s²], shape (3,). None:
+                -9.81 along z.
+            mimic: Whether ``<mimic>`` joints follow their leader. False: they are
+                independent joints.
+            access: Which files may be read: a URDF given by path, and the meshes that
+                it names. Use `access.only_within` for untrusted files.
 
         Raises:
             RobotNotFoundError: If there is no such robot.
             AccessError: If a file is not allowed.
-            ModelError: If the URDF does not parse or moves no mass somewhere.
+            ModelError: If the URDF is invalid, an option does not fit the model, or the
+                mass matrix is singular.
             JointNotFoundError: If a joint to lock does not exist.
             FrameNotFoundError: If a tool frame's parent does not exist.
+            ShapeError: If gravity or a tool frame's placement is not 3 numbers.
+            NonFiniteError: If one of these, or a locked joint's value, is NaN or inf.
         """
         source = find_robot(name, access)
         model = load_model(
@@ -115,14 +126,15 @@ class Robot(ConfigurationSpace):
 
     @classmethod
     def combine(cls, robots: Mapping[str, tuple["Robot", pin.SE3]]) -> Self:
-        """Return several robots in one workspace as one.
+        """Return one robot that consists of several robots in one workspace.
 
         Args:
-            robots: Name to (robot, placement of its root in the world). Joints and
-                frames are called ``<name>_<own name>``.
+            robots: For each name a robot and the placement of its root in the world.
+                Joints and frames are renamed to ``<name>_<own name>``.
 
         Raises:
-            ModelError: If there are fewer than two, or a joint mimics another.
+            ModelError: If there are fewer than two robots, one is already combined,
+                their gravity differs, or one has mimic joints.
         """
         parts = [
             (Part(f"{name}_", robot.source, place), robot.model)
@@ -143,8 +155,8 @@ class Robot(ConfigurationSpace):
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self.mimics:
-            # A restored model would end the process: Pinocchio's archives leave out
-            # what its mimic joints refer to (seen with 4.1).
+            # A restored model would crash the process: Pinocchio's archives omit what
+            # mimic joints refer to (seen with 4.1).
             raise ModelError(
                 f"{self.name}: a robot with mimic joints cannot be pickled; "
                 "load it in each process, or with mimic=False"
@@ -156,9 +168,10 @@ class Robot(ConfigurationSpace):
 
     @property
     def joint_coordinates(self) -> Array | None:
-        """The matrix A of the coordinates theta = A q that the literature uses, if any.
+        """The matrix A of the coordinates theta = A q in the literature, or None.
 
-        For the planar arm theta are the absolute angles, measured from the horizontal.
+        Shape (nv, nv). For the planar arm, theta are the absolute angles of its links,
+        measured from the horizontal.
         """
         if self.source.joint_coordinates != "absolute":
             return None
@@ -166,7 +179,7 @@ class Robot(ConfigurationSpace):
 
     @property
     def end_effector(self) -> str:
-        """The frame of its hand: as its source says, or the likeliest by its joints."""
+        """The frame of the hand: as the source says, or else `end_effector_frame`."""
         named = self.source.end_effector
         if named is not None and named in self._frame_ids:
             return named
@@ -178,7 +191,7 @@ class Robot(ConfigurationSpace):
         """Return the index of a frame in the Pinocchio model.
 
         Raises:
-            FrameNotFoundError: If there is none; the message names the nearest.
+            FrameNotFoundError: If there is no such frame; the message suggests one.
         """
         try:
             return self._frame_ids[name]
@@ -189,10 +202,10 @@ class Robot(ConfigurationSpace):
             ) from None
 
     def velocity_index(self, joint: str) -> slice:
-        """Return the place of a joint's freedoms in a velocity.
+        """Return the indices of a joint's degrees of freedom in v.
 
         Raises:
-            JointNotFoundError: If there is no such joint, or it has no freedom.
+            JointNotFoundError: If there is no moving joint with this name.
         """
         if joint not in self.joints:
             raise JointNotFoundError(
@@ -205,7 +218,13 @@ class Robot(ConfigurationSpace):
     # -- dynamics ---------------------------------------------------------------------
 
     def state(self, t: float, q: Any, v: Any) -> "RobotState":
-        """Return the state at time t [s]: see `RobotState`. Its memory is its own."""
+        """Return a new `RobotState` at time t [s], q (nq,) and v (nv,).
+
+        Raises:
+            ShapeError: If q or v has the wrong shape.
+            NonFiniteError: If t, q or v contains NaN or inf.
+            ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
+        """
         return RobotState(self).update(
             t, self.check_configuration(q), self.check_tangent(v, "velocity v")
         )
@@ -217,8 +236,11 @@ class Robot(ConfigurationSpace):
     def forward_dynamics(self, q: Array, v: Array, tau: Array) -> Array:
         """Return the acceleration M(q)⁻¹ (tau - N(q, v)), shape (nv,).
 
-        By ABA; by CRBA and a Cholesky solve where joints mimic others, which ABA does
-        not know.
+        Computed by ABA; with mimic joints, which ABA does not support, by CRBA and a
+        linear solve.
+
+        Raises:
+            ModelError: If M is singular (only detected with mimic joints).
         """
         if not self.mimics:
             return np.array(pin.aba(self.model, self._data, q, v, tau))
@@ -233,30 +255,29 @@ class Robot(ConfigurationSpace):
 
 
 class RobotState:
-    """The robot at one instant: if you hold one, its terms exist and agree.
+    """The robot at one time, with all its kinematic and dynamic terms.
 
-    Each quantity is computed once, when it is first asked for, and kept until the next
-    `update`. Arrays handed out belong to the state and change with it: copy what must
-    outlive it. A state is for one thread.
+    A term is computed at its first use and kept until the next `update`. The returned
+    arrays belong to the state and change with it: copy an array to keep its values. Use
+    a state in one thread only.
 
     Attributes:
         robot: The robot.
         t: Time [s].
         q: Configuration, shape (nq,).
         v: Velocity, shape (nv,).
-        instant: A number that changes with every `update`, shape (1,): what is computed
-            may be kept until then.
-        data: Pinocchio's data at (q, v), for terms that are not offered here.
+        stamp_array: `stamp` as an array of shape (1,), for kernels.
+        data: Pinocchio's data at (q, v), for terms that this class does not offer.
     """
 
     def __init__(self, robot: Robot) -> None:
-        """Allocate everything; `update` makes it a state."""
+        """Allocate the memory; call `update` before using any term."""
         self.robot = robot
         self.t = 0.0
         self.q: Array = robot.neutral()
         self.v: Array = np.zeros(robot.nv)
         self.data: pin.Data = robot.model.createData()
-        self._move = partial(
+        self._compute_jacobians = partial(
             pin.computeJointJacobiansTimeVariation,
             robot.model,
             self.data,
@@ -269,7 +290,7 @@ class RobotState:
         self._world: WorldKinematics | None = None
         self._unit_blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
         self._frames: dict[str, FrameKinematics] = {}
-        self.instant: Indices = np.zeros(1, dtype=np.int64)
+        self.stamp_array: Indices = np.zeros(1, dtype=np.int64)
         self._mass_matrix_stamp = self._mass_matrix_rate_stamp = -1
         self._coriolis_stamp = self._effects_stamp = self._centroidal_stamp = -1
         self._centroidal: CentroidalMotion | None = None
@@ -281,31 +302,31 @@ class RobotState:
 
         Raises:
             ShapeError: If q or v has the wrong shape.
-            NonFiniteError: If t, q or v holds a NaN or an infinity.
+            NonFiniteError: If t, q or v contains NaN or inf.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
         """
         robot, own_q, own_v = self.robot, self.q, self.v
         t = float(t)
         try:
-            taken = q.ndim == v.ndim == 1 and _take(
-                t, q, v, own_q, own_v, self._unit_blocks, self.instant
+            copied = q.ndim == v.ndim == 1 and _copy_valid(
+                t, q, v, own_q, own_v, self._unit_blocks, self.stamp_array
             )
-        except AttributeError:  # lists are welcome, too
-            taken = False
-        if not taken:
-            # Off the hot path: find out what is wrong, and say it.
+        except AttributeError:  # q or v is a list
+            copied = False
+        if not copied:
+            # Slow path: convert the arguments, or raise an error that says the fault.
             q = robot.check_configuration(q)
             v = robot.check_tangent(v, "velocity v")
             if not np.isfinite(t):
                 raise NonFiniteError(f"time t is {t}; needs a finite number of seconds")
             own_q[:], own_v[:] = q, v
-            self.instant[0] += 1
+            self.stamp_array[0] += 1
         self.t = t
-        self._move()
+        self._compute_jacobians()
         return self
 
     def frame(self, name: str) -> FrameKinematics:
-        """Return the frame's placement, Jacobian, its time derivative and its motion.
+        """Return the placement, the Jacobian and the motion of a frame.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
@@ -314,7 +335,7 @@ class RobotState:
         if frame is None:
             index = self.robot.frame_id(name)
             frame = FrameKinematics(
-                self.robot.model, self.data, self.v, self.instant, index
+                self.robot.model, self.data, self.v, self.stamp_array, index
             )
             self._frames[name] = frame
         frame.compute()
@@ -346,7 +367,7 @@ class RobotState:
 
     @property
     def coriolis_matrix(self) -> Array:
-        """C(q, v), with C v the Coriolis and centrifugal efforts, shape (nv, nv)."""
+        """C(q, v), where C v are Coriolis and centrifugal efforts, shape (nv, nv)."""
         if self._coriolis_stamp != self.stamp:
             pin.computeCoriolisMatrix(self.robot.model, self.data, self.q, self.v)
             self._coriolis_stamp = self.stamp
@@ -376,17 +397,17 @@ class RobotState:
         return self.data.nle  # type: ignore[no-any-return]
 
     def inverse_dynamics(self, acceleration: Array) -> Array:
-        """Return the effort M a + N for an acceleration of shape (nv,) (RNEA)."""
+        """Return the effort M a + N, shape (nv,), for an acceleration (nv,) (RNEA)."""
         return self._inverse_dynamics(acceleration)  # type: ignore[no-any-return]
 
     @property
     def stamp(self) -> int:
-        """A number that changes with every `update`: what is computed may be kept."""
-        return int(self.instant[0])
+        """A number that changes with every `update`: use it to invalidate caches."""
+        return int(self.stamp_array[0])
 
     @property
     def world(self) -> "WorldKinematics":
-        """All joints seen from the world's origin; the arrays follow the state."""
+        """Placements and Jacobians of all joints at the world's origin, as views."""
         if self._world is None:
             self._world = WorldKinematics(
                 joint_placements(self.data),
@@ -399,8 +420,12 @@ class RobotState:
     def displaced(self, dt: float, displacement: Array) -> "RobotState":
         """Return the state at (t + dt, q ⊕ displacement) with the same velocity.
 
-        It is the companion of this state: one place in memory, moved by every call.
-        Finite differences use it.
+        For finite differences. Each call overwrites and returns the same object, the
+        companion of this state.
+
+        Args:
+            dt: Time difference [s].
+            displacement: Shape (nv,) [rad or m].
         """
         if self._displaced is None:
             self._displaced = RobotState(self.robot)
@@ -408,18 +433,19 @@ class RobotState:
         return self._displaced.update(self.t + dt, q, self.v)
 
     def ahead(self, dt: float) -> "RobotState":
-        """Return the companion state at (t + dt, q ⊕ v dt), the flow of v."""
+        """Return the companion state at (t + dt, q ⊕ v dt), see `displaced`; dt [s]."""
         return self.displaced(dt, self.v * dt)
 
 
 class WorldKinematics(NamedTuple):
-    """All joints seen from the world's origin: what distances are computed from.
+    """Placements and Jacobians of all joints, from which distances are computed.
 
     Attributes:
-        placements: Where they are, shape (njoints, 12), see `joint_placements`.
-        jacobian: Their columns at the world's origin, shape (6, nv_extended), see
-            `joint_support`.
-        jacobian_dot: Its time derivative, of the same shape.
+        placements: Placements of the joints, shape (njoints, 12): see
+            `joint_placements`.
+        jacobian: Pinocchio's J, in world axes at the world's origin, shape
+            (6, nvExtended): see `joint_support`.
+        jacobian_dot: Its time derivative, shape (6, nvExtended).
         v: The velocity, shape (nv,).
     """
 
@@ -430,16 +456,19 @@ class WorldKinematics(NamedTuple):
 
 
 @kernel
-def _take(
+def _copy_valid(
     t: float,
     q_in: Array,
     v_in: Array,
     q: Array,
     v: Array,
     unit_blocks: Indices,
-    instant: Indices,
+    stamp: Indices,
 ) -> bool:
-    """Copy q and v if they fit, are finite and of norm 1 in unit blocks; were they?"""
+    """Copy q and v if they are valid; return whether they are.
+
+    Valid means of the right size, finite, and of norm 1 in the unit blocks.
+    """
     if q_in.shape[0] != q.shape[0] or v_in.shape[0] != v.shape[0]:
         return False
     total = t
@@ -458,5 +487,5 @@ def _take(
             q[i] = q_in[i]
         for i in range(v.shape[0]):
             v[i] = v_in[i]
-        instant[0] += 1
+        stamp[0] += 1
     return bool(ok)

@@ -1,26 +1,25 @@
-"""What the law promises of self-motion: how its error decays, read from a log."""
+"""The decay of the null-space error that the law predicts, computed from a log."""
 
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import constant_metric
 
 ROUNDING = 1e-12
-"""‖e_N(0)‖ over the speeds that it is made of, below which it is rounding."""
+"""Ratio of ‖e_N(0)‖ to the speeds it is computed from, below which it is rounding."""
 
 
 class Decay(NamedTuple):
-    """What the law promises of ‖e_N‖_W, or why it promises nothing.
+    """The prediction of ‖e_N‖_W, or the reason why there is none.
 
     Attributes:
-        slow: Upper bound, shape (N,); None without a promise.
+        slow: Upper bound, shape (N,); None without a prediction.
         fast: Lower bound, shape (N,); the same array for a scalar gain.
-        gains: The rates of both bounds [1/s].
-        why_not: Why there is no prediction.
+        gains: The rates of the upper and the lower bound [1/s].
+        why_not: Why there is no prediction; "" if there is one.
     """
 
     slow: Array | None
@@ -32,8 +31,8 @@ class Decay(NamedTuple):
 def predicted_decay(rollout: Rollout) -> Decay:
     """Return ‖e_N(0)‖_W exp(-K_N t), law.md §2, or bounds for a matrix K_N.
 
-    V' = -e_NᵀW K_N e_N lies between -2V times the greatest and the least eigenvalue of
-    the symmetric part of W K_N relative to W.
+    V' = -e_NᵀW K_N e_N lies between -2V times the largest and -2V times the smallest
+    eigenvalue of the symmetric part of W K_N relative to W.
     """
     if not rollout.meta.get("controls_null_space", True):
         why = "no prediction: self-motion is not controlled"
@@ -50,7 +49,9 @@ def predicted_decay(rollout: Rollout) -> Decay:
         why = "no prediction: $K_N$ is a matrix, $W$ not in the log"
         return Decay(None, None, (0.0, 0.0), why)
     power = 0.5 * (W @ K_N + (W @ K_N).T)
-    rates = scipy.linalg.eigh(power, W, eigvals_only=True)
+    from scipy.linalg import eigh  # here: SciPy takes long to import
+
+    rates = eigh(power, W, eigvals_only=True)
     slowest, fastest = float(rates[0]), float(rates[-1])
     norm, elapsed = rollout["null_space_norm"], rollout.t - rollout.t[0]
     speeds = np.linalg.norm(rollout["field.g"], axis=1)

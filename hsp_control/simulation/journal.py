@@ -1,18 +1,18 @@
-"""A log that is written row by row: whatever ends the writer, all whole rows are there.
+"""A log that is written row by row, so that no complete row is lost if a process dies.
 
-An ``.npz`` exists when a run is over, or not at all. A journal is appended to: a line
-that says what it is, then frames, each of
+An ``.npz`` is written only when a run is over. A journal is appended to. It is the line
+`MAGIC`, then frames, each of
 
     kind     1 byte: H a heading, R a row, E the end
     length   4 bytes, of the payload
     check    4 bytes, CRC-32 of kind and payload
     payload
 
-all little-endian. A heading is JSON: the log's meta data and the shape of every column;
-a new one stands wherever columns have come or grown. A row is the columns' numbers in
-the heading's order. The end tells how the run ended. Each frame is one `write`: from
-then on the operating system has it, and a killed process loses nothing that it wrote. A
-frame that is torn ends the journal where it begins.
+all little-endian. A heading is JSON: the log's meta data and the shape of every column.
+A new heading is written whenever columns are added or grow. A row is the columns'
+numbers in the order of the heading. The end is JSON: the status of the run and more.
+Each frame is one `write`. After that the operating system has it, and a killed process
+loses nothing that it wrote. Reading stops at the first incomplete frame.
 """
 
 import json
@@ -36,14 +36,14 @@ _HEADING, _ROW, _END = b"H", b"R", b"E"
 
 
 class JournalWriter:
-    """A journal that is being written.
+    """Writes a journal.
 
     Attributes:
         path: The file.
     """
 
     def __init__(self, path: Path) -> None:
-        """Begin a journal; one that is there is overwritten.
+        """Begin a journal; an existing file is overwritten.
 
         Raises:
             LogError: If the file cannot be written.
@@ -58,12 +58,14 @@ class JournalWriter:
         except OSError as error:
             raise self._failure(error) from error
 
-    def has(self, columns: Mapping[str, Array]) -> bool:
-        """Return whether the last heading describes these columns, (rows, ...) each."""
+    def describes(self, columns: Mapping[str, Array]) -> bool:
+        """Return whether the last heading fits these columns, (rows, ...) each."""
         return self._shapes == {name: a.shape[1:] for name, a in columns.items()}
 
-    def head(self, columns: Mapping[str, Array], meta: Mapping[str, Any]) -> None:
-        """Write a heading for the rows to come.
+    def write_heading(
+        self, columns: Mapping[str, Array], meta: Mapping[str, Any]
+    ) -> None:
+        """Write a heading for the next rows.
 
         Raises:
             LogError: If it cannot be written.
@@ -71,8 +73,8 @@ class JournalWriter:
         self._shapes = {name: a.shape[1:] for name, a in columns.items()}
         self._frame(_HEADING, _json({"columns": self._shapes, "meta": meta}))
 
-    def append(self, columns: Mapping[str, Array]) -> None:
-        """Write the first row of columns that the last heading describes.
+    def write_row(self, columns: Mapping[str, Array]) -> None:
+        """Write the first row of columns that fit the last heading.
 
         Raises:
             LogError: If it cannot be written.
@@ -80,8 +82,8 @@ class JournalWriter:
         row = np.concatenate([columns[name][0].ravel() for name in self._shapes])
         self._frame(_ROW, row.astype("<f8").tobytes())
 
-    def end(self, status: str, message: str, **meta: Any) -> None:
-        """Say how the run ended.
+    def write_end(self, status: str, message: str, **meta: Any) -> None:
+        """Write how the run ended, and meta data that replaces the heading's.
 
         Raises:
             LogError: If it cannot be written.
@@ -89,7 +91,7 @@ class JournalWriter:
         self._frame(_END, _json({"status": status, "message": message, **meta}))
 
     def close(self) -> None:
-        """Close the file; again is no error."""
+        """Close the file; a second call does nothing."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
@@ -102,7 +104,7 @@ class JournalWriter:
             raise self._failure(error) from error
 
     def _put(self, data: bytes) -> None:
-        while data:  # a disk that is nearly full takes a part
+        while data:  # a nearly full disk may take only a part
             data = data[os.write(self._file, data) :]
 
     def _failure(self, error: OSError) -> LogError:
@@ -111,7 +113,7 @@ class JournalWriter:
 
 
 def is_journal(path: Path) -> bool:
-    """Return whether a file is a journal, whatever its name.
+    """Return whether a file is a journal, by its content, not by its name.
 
     Raises:
         OSError: If it cannot be read.
@@ -121,12 +123,12 @@ def is_journal(path: Path) -> bool:
 
 
 def read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the columns and the meta data of a journal, up to its first torn frame.
+    """Return the columns and the meta data of a journal, up to an incomplete frame.
 
-    A column that came later, or was narrower at first, holds NaN before.
+    Where a column was added later or was narrower, earlier rows hold NaN.
 
     Raises:
-        LogError: If not even the first heading is whole.
+        LogError: If the first heading is incomplete.
     """
     meta: dict[str, Any] = {}
     shapes: dict[str, tuple[int, ...]] = {}
@@ -148,6 +150,7 @@ def read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
 
 
 def _frames(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Yield kind and payload of every frame before the first incomplete one."""
     at = len(MAGIC)
     while at + _FRAME.size <= len(data):
         kind, length, check = _FRAME.unpack_from(data, at)
@@ -162,6 +165,7 @@ def _frames(data: bytes) -> Iterator[tuple[bytes, bytes]]:
 def _joined(
     parts: list[tuple[dict[str, tuple[int, ...]], list[Array]]],
 ) -> dict[str, Array]:
+    """Return the columns of all parts, each of a heading's shapes and its rows."""
     final: dict[str, tuple[int, ...]] = {}
     for shapes, _ in parts:
         for name, shape in shapes.items():

@@ -1,8 +1,9 @@
-"""The file of a log: an ``.npz`` that is written whole, and read with suspicion.
+"""Reads and writes the ``.npz`` file of a log; files that are read are not trusted.
 
-NumPy's own reader believes what a file says of its sizes. This one asks for plain
-numbers and texts, of the size that stands in the archive's directory, and no more of
-them than `MAX_SIZE`, before it reserves any memory. Nothing is ever unpickled.
+NumPy's own reader trusts the sizes that a file declares. Before this reader allocates
+memory, it checks that an entry holds plain numbers or text, has the size given in the
+archive's directory, and that all entries together are at most `MAX_SIZE`. Nothing is
+ever unpickled.
 """
 
 import math
@@ -17,20 +18,20 @@ from numpy.lib import format as npy
 from hsp_control.common.arrays import Array
 
 MAX_SIZE = 2_000_000_000
-"""Bytes of all columns together, in memory: an hour at 1 kHz with 70 numbers a row."""
+"""Most bytes of all columns in memory: an hour at 1 kHz with 70 numbers per row."""
 MAX_COLUMNS = 10_000
-"""Entries of a log."""
+"""Most entries of a log."""
 
 _KINDS = "fiubU"
-"""Numbers, truth values and text."""
+"""NumPy kinds that are allowed: numbers, booleans and text."""
 
 
 def read_arrays(path: Path) -> dict[str, Array]:
     """Return the arrays of an ``.npz`` by name.
 
     Raises:
-        OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error: If it is not
-            whole, too large, or holds something else than plain arrays.
+        OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error: If the file
+            is incomplete, too large, or holds anything else than plain arrays.
     """
     with path.open("rb") as file, zipfile.ZipFile(file) as archive:
         entries = archive.infolist()
@@ -39,14 +40,14 @@ def read_arrays(path: Path) -> dict[str, Array]:
         for entry in entries:
             name = entry.filename.removesuffix(".npy")
             if name == entry.filename:
-                raise ValueError(f"its entry {shortened(name)} is no array")
+                raise ValueError(f"its entry {shortened(name)} is not an array")
             if name in arrays:
                 raise ValueError(f"it has two entries {shortened(name)}")
             with archive.open(entry) as stream:
                 arrays[name] = read_array(stream, entry.file_size, name)
                 if stream.read(1):
                     raise ValueError(
-                        f"its entry {shortened(name)} is longer than it says"
+                        f"its entry {shortened(name)} is longer than it declares"
                     )
     return arrays
 
@@ -55,8 +56,8 @@ def read_array(stream: IO[bytes], size: int, name: str) -> Array:
     """Return the array of an ``.npy`` stream that is ``size`` bytes long.
 
     Raises:
-        ValueError: If it holds no plain array of just this size.
-        EOFError: If the stream ends before.
+        ValueError: If it is not a plain array of exactly this size.
+        EOFError: If the stream ends early.
     """
     version = npy.read_magic(stream)
     if version == (1, 0):
@@ -64,17 +65,17 @@ def read_array(stream: IO[bytes], size: int, name: str) -> Array:
     elif version == (2, 0):
         shape, fortran, dtype = npy.read_array_header_2_0(stream)
     else:
-        raise ValueError(f"its entry {shortened(name)} has a format that is not known")
+        raise ValueError(f"its entry {shortened(name)} has an unknown format")
     if dtype.hasobject:
         raise ValueError(
-            f"its entry {shortened(name)} is a pickle, which is never opened"
+            f"its entry {shortened(name)} is a pickle; pickles are never opened"
         )
     plain = dtype.kind in _KINDS and (dtype.kind == "U" or dtype.itemsize <= 8)
     if not plain or dtype.fields is not None or dtype.subdtype:
         raise ValueError(f"its entry {shortened(name)} is neither numbers nor text")
     content = math.prod(shape) * dtype.itemsize
     if min(shape, default=0) < 0 or stream.tell() + content != size:
-        raise ValueError(f"its entry {shortened(name)} has another size than its shape")
+        raise ValueError(f"its entry {shortened(name)}: size contradicts its shape")
     data = bytearray(content)
     read, view = 0, memoryview(data)
     while read < content:
@@ -90,12 +91,12 @@ def read_array(stream: IO[bytes], size: int, name: str) -> Array:
 
 
 def write_arrays(file: IO[bytes], arrays: Mapping[str, Any]) -> None:
-    """Write arrays as an ``.npz``, in their order, without pickles."""
+    """Write arrays as an ``.npz``, in the given order, without pickles."""
     np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
 def shortened(value: object) -> str:
-    """Return a name or a value for a message, in one short line."""
+    """Return a name or a value as one line of at most 60 characters, for a message."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 

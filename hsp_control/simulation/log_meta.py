@@ -1,7 +1,7 @@
-"""What a log says of itself: checked against its columns before anybody believes it.
+"""Checks the meta data of an untrusted log, also against the log's columns.
 
-Only what readers rely on is checked. How the run ended and what the robot is must be
-there; of the rest a log may say less, and a user's own data may say more.
+Only what the readers of logs rely on is checked. The status and the robot are required.
+Other entries may be missing, and a user may add entries.
 """
 
 import math
@@ -13,16 +13,20 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SceneError
-from hsp_control.geometry.shapes import described_shape
+from hsp_control.geometry.shapes import shape_from_log
 
 _MOTION = ("t", "q", "v", "tau")
-_PLACED = {*_MOTION, "joint_positions", "skeleton"}
-"""What is drawn in space or over time: it needs a place."""
-_FARTHEST, _LARGEST = 1e12, 1e100
-"""What the axes of a picture can tell apart; motion that diverges ends long before."""
+_DRAWN = {*_MOTION, "joint_positions", "skeleton"}
+"""Columns that are drawn in space or over time: they must be finite."""
+_MAX_DRAWN, _MAX_VALUE = 1e12, 1e100
+"""Largest values of drawn and of other columns.
 
-_NORM = 1e-6
-_LONGEST = 1e4
+The axes of a plot cannot resolve larger ones. A motion that diverges ends long before.
+"""
+_NORM_TOLERANCE = 1e-6
+"""Tolerance of a quaternion's norm."""
+_MAX_LENGTH = 1e4
+"""Largest length in the parameters of an obstacle [m]."""
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
@@ -80,56 +84,80 @@ class _Meta(_Model):
     config: dict[str, Any] | None = None
 
 
-def complaint(meta: dict[str, Any], columns: dict[str, Array]) -> str:
-    """Return what is wrong with a log's description or its columns, or nothing."""
+def renamed_entries(meta: dict[str, Any]) -> dict[str, Any]:
+    """Return the meta data of a log with the entry names of this version.
+
+    Logs of version 0.1 have ``robot.freedoms`` instead of ``robot.dofs``.
+    """
+    robot = meta.get("robot")
+    if not isinstance(robot, dict) or "freedoms" not in robot or "dofs" in robot:
+        return meta
+    entries = {"dofs" if name == "freedoms" else name: robot[name] for name in robot}
+    return {**meta, "robot": entries}
+
+
+def find_fault(meta: dict[str, Any], columns: dict[str, Array]) -> str:
+    """Return the first fault of a log's meta data or columns, "" if there is none.
+
+    Args:
+        meta: The meta data, as JSON data.
+        columns: The columns by name, N rows each; t, q, v and tau must be there.
+    """
     try:
-        told = _Meta.model_validate(meta)
+        parsed = _Meta.model_validate(meta)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(str(part) for part in first["loc"])
         if first["type"] == "missing":
-            return f"its entry 'meta' does not say {place!r}"
-        return f"its entry 'meta' says nonsense at {place!r}: {first['msg']}"
+            return f"its entry 'meta' lacks {place!r}"
+        return f"its entry 'meta' is wrong at {place!r}: {first['msg']}"
     except RecursionError:
         return "its entry 'meta' is nested too deeply"
     return (
-        _wrong_columns(columns)
-        or _wrong_shapes(told, columns)
-        or _wrong_robot(told, columns)
+        _fault_of_columns(columns)
+        or _fault_of_shapes(parsed, columns)
+        or _fault_of_meta(parsed, columns)
     )
 
 
-def _wrong_columns(columns: dict[str, Array]) -> str:
+def _fault_of_columns(columns: dict[str, Array]) -> str:
     for name, column in columns.items():
         if column.dtype.kind not in "fiub":
-            return f"its column {name!r} holds no numbers"
+            return f"its column {name!r} does not hold numbers"
         if 0 in column.shape[1:]:
-            return f"its column {name!r} has no number in a row"
-        placed = (
-            name in _PLACED
+            return f"its column {name!r} has rows without numbers"
+        drawn = (
+            name in _DRAWN
             or name.startswith("obstacle.")
             or (name.startswith("task.") and name.endswith((".reference", ".actual")))
         )
-        if placed and not np.isfinite(column).all():
-            return f"its column {name!r} holds a NaN or an infinity"
+        if drawn and not np.isfinite(column).all():
+            return f"its column {name!r} contains NaN or inf"
         largest = np.abs(column[np.isfinite(column)], dtype=float).max(initial=0.0)
-        if largest > (_FARTHEST if placed else _LARGEST):
-            return f"its column {name!r} holds {largest:.3g}, no number of a robot"
+        limit = _MAX_DRAWN if drawn else _MAX_VALUE
+        if largest > limit:
+            return (
+                f"its column {name!r} contains {largest:.3g}, which is too large "
+                f"(at most {limit:.0e})"
+            )
     for name in _MOTION:
         dimensions = 1 if name == "t" else 2
         if columns[name].ndim != dimensions:
-            return f"its column {name!r} has {columns[name].ndim} dimensions"
+            return (
+                f"its column {name!r} has {columns[name].ndim} dimensions; needs "
+                f"{dimensions}"
+            )
     if (np.diff(columns["t"]) < 0.0).any():
-        return "its time runs backwards"
+        return "its time decreases"
     return ""
 
 
-def _wrong_shapes(told: _Meta, columns: dict[str, Array]) -> str:
+def _fault_of_shapes(meta: _Meta, columns: dict[str, Array]) -> str:
     nq, nv = columns["q"].shape[1], columns["v"].shape[1]
-    points = len(told.robot.skeleton_parents) or None
+    points = len(meta.robot.skeleton_parents) or None
     wanted: dict[str, tuple[int | None, ...]] = {
-        "q": (told.robot.nq or nq,),
-        "v": (told.robot.nv or nv,),
+        "q": (meta.robot.nq or nq,),
+        "v": (meta.robot.nv or nv,),
         **dict.fromkeys(("tau", "acceleration", "joint_positions"), (nv,)),
         **dict.fromkeys(("field.g", "null_space_error"), (nv,)),
         **dict.fromkeys(("field.value", "null_space_norm", "manipulability"), ()),
@@ -137,12 +165,12 @@ def _wrong_shapes(told: _Meta, columns: dict[str, Array]) -> str:
         "singular_values": (None,),
         "skeleton": (points, 3),
     }
-    for task, about in told.tasks.items():
-        for what in ("error", "error_rate"):
-            wanted[f"task.{task}.{what}"] = (about.rows,)
-        for what in ("reference", "actual"):
-            wanted[f"task.{task}.{what}"] = (_width(about),)
-    for obstacle in told.obstacles:
+    for name, task in meta.tasks.items():
+        for part in ("error", "error_rate"):
+            wanted[f"task.{name}.{part}"] = (task.rows,)
+        for part in ("reference", "actual"):
+            wanted[f"task.{name}.{part}"] = (_reference_width(task),)
+    for obstacle in meta.obstacles:
         wanted[f"obstacle.{obstacle}"] = (3,)
         wanted[f"obstacle.{obstacle}.quaternion"] = (4,)
     for name in columns:
@@ -157,83 +185,84 @@ def _wrong_shapes(told: _Meta, columns: dict[str, Array]) -> str:
             for size, here in zip(shape, found, strict=True)
         ):
             return (
-                f"its column {name!r} has rows of shape {found}; what it says of "
-                f"itself needs {tuple('any' if n is None else n for n in shape)}"
+                f"its column {name!r} has rows of shape {found}; the entry 'meta' "
+                f"needs {tuple('any' if n is None else n for n in shape)}"
             )
     return ""
 
 
-def _wrong_robot(told: _Meta, columns: dict[str, Array]) -> str:
-    robot, nv = told.robot, columns["v"].shape[1]
-    for name in ("freedoms", "units"):
+def _fault_of_meta(meta: _Meta, columns: dict[str, Array]) -> str:
+    robot, nv = meta.robot, columns["v"].shape[1]
+    for name in ("dofs", "units"):
         given = getattr(robot, name)
         if len(given) != nv:
-            return f"its robot has {len(given)} {name}, its motion {nv}"
+            return f"its robot has {len(given)} {name}, its column 'v' has {nv}"
     if any(parent >= k for k, parent in enumerate(robot.skeleton_parents)):
-        return "a point of its skeleton comes before its parent"
+        return "a point of its skeleton is listed before its parent"
     for name in ("null_space_gain", "metric_matrix"):
-        matrix = getattr(told, name)
+        matrix = getattr(meta, name)
         if matrix is not None and [len(row) for row in matrix] != [nv] * nv:
-            return f"its {name} is not of shape ({nv}, {nv})"
-    matrix = told.metric_matrix
-    if matrix is not None and not _definite(np.array(matrix)):
+            return f"its {name} does not have the shape ({nv}, {nv})"
+    matrix = meta.metric_matrix
+    if matrix is not None and not _is_positive_definite(np.array(matrix)):
         return "its metric_matrix is not symmetric positive definite"
-    for name, part in _quaternions(told, columns):
-        if not (np.abs(np.linalg.norm(part, axis=1) - 1.0) < _NORM).all():
-            return f"its column {name!r} holds what is no orientation"
-    for name, obstacle in told.obstacles.items():
-        if reason := _wrong_obstacle(obstacle):
+    for name, quaternions in _quaternions(meta, columns):
+        errors = np.abs(np.linalg.norm(quaternions, axis=1) - 1.0)
+        if not (errors < _NORM_TOLERANCE).all():
+            return f"its column {name!r} contains a quaternion that is not of unit norm"
+    for name, obstacle in meta.obstacles.items():
+        if reason := _fault_of_obstacle(obstacle):
             return f"its obstacle {name!r} {reason}"
         if f"obstacle.{name}" not in columns:
             return f"the log lacks the column 'obstacle.{name}'"
-    for name, task in told.tasks.items():
+    for name, task in meta.tasks.items():
         if task.type == "FramePosition" and task.axes is None:
-            return f"its entry 'meta' does not say 'tasks.{name}.axes'"
+            return f"its entry 'meta' lacks 'tasks.{name}.axes'"
     return ""
 
 
-def _wrong_obstacle(about: _Obstacle) -> str:
-    if about.radius is not None and not 0.0 <= about.radius < math.inf:
-        return f"has the radius {about.radius}"
-    if not _drawable(about.parameters):
-        return "has parameters that no obstacle has"
+def _fault_of_obstacle(obstacle: _Obstacle) -> str:
+    if obstacle.radius is not None and not 0.0 <= obstacle.radius < math.inf:
+        return f"has the radius {obstacle.radius}; must not be negative"
+    if not _lengths_are_drawable(obstacle.parameters):
+        return f"has a parameter that is too large (at most {_MAX_LENGTH:g} m)"
     try:
-        shape = described_shape(about.shape, about.parameters)
+        shape = shape_from_log(obstacle.shape, obstacle.parameters)
     except SceneError as error:
-        return f"is no shape: {error}"
-    if shape is None and about.radius is None:
+        return f"has wrong parameters: {error}"
+    if shape is None and obstacle.radius is None:
         return "has neither a known shape nor a radius"
     return ""
 
 
-def _quaternions(told: _Meta, columns: dict[str, Array]) -> Iterator[tuple[str, Array]]:
-    """Yield the columns that hold quaternions, and where in them."""
+def _quaternions(meta: _Meta, columns: dict[str, Array]) -> Iterator[tuple[str, Array]]:
+    """Yield the name of every column with quaternions, and those, shape (N, 4)."""
     for name, column in columns.items():
         if name.startswith("obstacle.") and name.endswith(".quaternion"):
             yield name, column
-    for task, about in told.tasks.items():
-        for what in ("reference", "actual"):
-            name = f"task.{task}.{what}"
-            if name in columns and _width(about) in (4, 7):
-                yield name, columns[name][:, -4:]
+    for name, task in meta.tasks.items():
+        for part in ("reference", "actual"):
+            key = f"task.{name}.{part}"
+            if key in columns and _reference_width(task) in (4, 7):
+                yield key, columns[key][:, -4:]
 
 
-def _drawable(value: Any) -> bool:
-    """Say whether all numbers in plain data are lengths of an obstacle [m]."""
+def _lengths_are_drawable(value: Any) -> bool:
+    """Return whether all numbers in JSON data are at most `_MAX_LENGTH`."""
     if isinstance(value, dict):
-        return all(_drawable(inner) for inner in value.values())
+        return all(_lengths_are_drawable(inner) for inner in value.values())
     if isinstance(value, list):
-        return all(_drawable(inner) for inner in value)
-    return not isinstance(value, int | float) or abs(value) <= _LONGEST
+        return all(_lengths_are_drawable(inner) for inner in value)
+    return not isinstance(value, int | float) or abs(value) <= _MAX_LENGTH
 
 
-def _definite(matrix: Array) -> bool:
+def _is_positive_definite(matrix: Array) -> bool:
     symmetric = bool(np.allclose(matrix, matrix.T))
     return symmetric and bool(np.linalg.eigvalsh(matrix)[0] > 0.0)
 
 
-def _width(task: _Task) -> int | None:
-    """Return how many numbers a task's reference has, where that is known."""
+def _reference_width(task: _Task) -> int | None:
+    """Return how many numbers a task's reference has; None if that is not known."""
     known = {"FramePose": 7, "FrameOrientation": 4}
     if task.type == "FramePosition" and task.axes is not None:
         return len(task.axes)

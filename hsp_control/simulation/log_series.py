@@ -1,4 +1,4 @@
-"""What a log says, in the form in which a person would plot it."""
+"""Series for plots, computed from a log: task errors, joint positions, units, names."""
 
 import re
 from collections.abc import Sequence
@@ -11,13 +11,13 @@ from hsp_control.simulation import Rollout
 
 
 class ErrorPart(NamedTuple):
-    """Components of a task's error that have one unit.
+    """The components of a task's error that have the same unit.
 
     Attributes:
-        label: The task's name, and what of it, if it has several parts.
+        label: The task's name, and the name of the part if there are several.
         unit: The components' unit.
-        task: The task's place among the tasks.
-        norm: Their Euclidean norm at every row, shape (N,).
+        task: The task's index among the tasks.
+        norm: The components' Euclidean norm at every row, shape (N,).
     """
 
     label: str
@@ -33,7 +33,7 @@ _PARTS = {
     "Pointing": (("tan of half the angle", "–", slice(None)),),
     "JointPosture": (("", None, slice(None)),),
 }
-"""The error's parts by type of task: what, unit (None: the joints'), components."""
+"""The error's parts by type of task: name, unit (None: the joints'), components."""
 
 
 def task_names(rollout: Rollout) -> list[str]:
@@ -42,46 +42,46 @@ def task_names(rollout: Rollout) -> list[str]:
 
 
 def task_type(rollout: Rollout, name: str) -> str:
-    """Return the name of a task's class, or nothing if the log does not tell."""
+    """Return the name of a task's class, "" if it is not in the log."""
     return str(rollout.meta.get("tasks", {}).get(name, {}).get("type", ""))
 
 
 def task_errors(rollout: Rollout) -> list[ErrorPart]:
-    """Return the norms of all tasks' errors, metres and radians apart."""
+    """Return the norms of all tasks' errors, with metres and radians separate."""
     parts = []
-    for place, name in enumerate(task_names(rollout)):
+    for index, name in enumerate(task_names(rollout)):
         error = rollout[f"task.{name}.error"]
         unit_in_log = column_unit(rollout, f"task.{name}.error")
-        whole = (("", unit_in_log, slice(None)),)
-        for what, unit, rows in _PARTS.get(task_type(rollout, name), whole):
+        all_rows = (("", unit_in_log, slice(None)),)
+        for part, unit, rows in _PARTS.get(task_type(rollout, name), all_rows):
             norm = np.linalg.norm(error[:, rows], axis=1)
-            label = f"{name} {what}".strip()
-            parts.append(ErrorPart(label, unit or position_unit(rollout), place, norm))
+            label = f"{name} {part}".strip()
+            parts.append(ErrorPart(label, unit or position_unit(rollout), index, norm))
     return parts
 
 
 def joint_names(rollout: Rollout) -> list[str]:
-    """Return the freedoms' names, without what all of them begin with.
+    """Return the dofs' names, without the prefix that all of them share.
 
     ``panda_joint1, panda_joint2`` become ``joint1, joint2``.
     """
-    names = [str(name) for name in rollout.meta["robot"]["freedoms"]]
+    names = [str(name) for name in rollout.meta["robot"]["dofs"]]
     first, last = min(names), max(names)
-    same = 0
-    while same < min(len(first), len(last)) and first[same] == last[same]:
-        same += 1
-    cut = first[:same].rfind("_") + 1
+    shared = 0
+    while shared < min(len(first), len(last)) and first[shared] == last[shared]:
+        shared += 1
+    cut = first[:shared].rfind("_") + 1
     short = [name[cut:] for name in names]
     return short if all(name[:1].isalpha() for name in short) else names
 
 
 def joint_positions(rollout: Rollout, *, absolute: bool = True) -> tuple[Array, str]:
-    """Return the joints' unwound positions, shape (N, nv), and what they are.
+    """Return the joints' unwrapped positions, shape (N, nv), and their description.
 
     Args:
         rollout: The log.
-        absolute: For a robot that the literature describes by absolute angles, return
-            those: theta = A q, A lower-triangular ones, theta_i = q_1 + ... + q_i.
+        absolute: Whether to return absolute angles theta_i = q_1 + ... + q_i for a
+            robot that the literature describes by those.
     """
     positions = rollout["joint_positions"]
     if absolute and rollout.meta["robot"].get("joint_coordinates") == "absolute":
@@ -95,13 +95,13 @@ def position_unit(rollout: Rollout) -> str:
 
 
 def effort_unit(rollout: Rollout) -> str:
-    """Return the unit of the efforts that goes with the joints' positions."""
+    """Return the unit of the efforts: ``N·m``, ``N``, or as the log has it."""
     efforts = {"rad": "N·m", "m": "N"}
     return efforts.get(position_unit(rollout), column_unit(rollout, "tau"))
 
 
 def constant_metric(rollout: Rollout) -> Array | None:
-    """Return the metric W, shape (nv, nv), if it is constant."""
+    """Return the metric W, shape (nv, nv); None if it is not constant."""
     if rollout.meta.get("metric") == "IdentityMetric":
         return np.eye(int(rollout.meta["robot"]["nv"]))
     matrix = rollout.meta.get("metric_matrix")
@@ -109,20 +109,20 @@ def constant_metric(rollout: Rollout) -> Array | None:
 
 
 def field_terms(rollout: Rollout) -> list[str]:
-    """Return the names of a sum's terms whose share of g the log has."""
+    """Return the names of the field's terms whose share of g is in the log."""
     inside = re.compile(r"field\.(.+)\.g")
     found = (inside.fullmatch(name) for name in rollout.columns)
     return [match[1] for match in found if match]
 
 
 def distances(rollout: Rollout) -> list[str]:
-    """Return the names of the fields that watch a distance."""
+    """Return the names of the fields whose minimum distance is in the log."""
     names = (name for name in rollout.columns if name.startswith("distance."))
     return [name.removeprefix("distance.") for name in names]
 
 
 def column_unit(rollout: Rollout, name: str) -> str:
-    """Return the unit of a column as the log has it; a dash for a mere number."""
+    """Return the unit of a column in the log; a dash if it has none."""
     unit = str(rollout.meta.get("columns", {}).get(name, {}).get("unit", "-"))
     return "–" if unit == "-" else unit
 
@@ -130,12 +130,12 @@ def column_unit(rollout: Rollout, name: str) -> str:
 def chosen_rows(
     rollout: Rollout, count: int = 8, times: Sequence[float] | None = None
 ) -> list[int]:
-    """Return the rows of movie frames, in order and each once.
+    """Return the rows of movie frames, in order and without repetition.
 
     Args:
         rollout: The log.
-        count: How many, evenly from the first row to the last.
-        times: When [s], instead; the nearest rows are taken.
+        count: How many, evenly spaced from the first row to the last.
+        times: Times [s] to take instead; the nearest rows are taken.
     """
     t = rollout.t
     if times is None:

@@ -16,17 +16,17 @@ from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation.plants import ContinuousPlant, SampledPlant
 
 RUNAWAY_SPEED = 1e4
-"""Joint speed [rad/s or m/s] beyond which a simulation is said to have diverged."""
+"""Joint speed [rad/s or m/s] above which a simulation has diverged."""
 
 
 class Instant(NamedTuple):
-    """One instant of the closed loop; what it holds is overwritten by the next.
+    """One instant of the closed loop; the next one overwrites its arrays.
 
     Attributes:
         state: The true state.
-        output: What the controller makes of the true state.
-        tau: The effort that it commands, of what it is shown, shape (nv,).
-        readings: What its compensation tell of themselves.
+        output: The controller's output for the true state.
+        tau: The commanded effort, computed from the measured state, shape (nv,).
+        log_channels: What the command logs, by name: its compensators' channels.
     """
 
     state: RobotState
@@ -43,7 +43,15 @@ def continuous_loop(
     q: Array,
     v: Array,
 ) -> Iterator[Instant]:
-    """Yield the instants at given times of a loop without sampling, as in the proofs.
+    """Yield the instants of a loop without sampling, as in the proofs.
+
+    Args:
+        controller: The controller.
+        plant: The plant.
+        integrator: Integrates the plant, with the law in its stages.
+        times: When to yield an instant [s], increasing.
+        q: Start configuration, shape (nq,).
+        v: Start velocity, shape (nv,).
 
     Raises:
         SimulationError: If the motion diverges.
@@ -58,7 +66,7 @@ def continuous_loop(
     for k, t in enumerate(times):
         if k > 0:
             q, v = integrator.advance(plant.robot, feedback, times[k - 1], t, q, v)
-            _stop_runaway(t, q, v)
+            _check_divergence(t, q, v)
         output = controller.compute(state.update(t, q, v))
         yield Instant(state, output, output.tau, {})
 
@@ -71,7 +79,15 @@ def sampled_loop(
     q: Array,
     v: Array,
 ) -> Iterator[Instant]:
-    """Yield the instants at given times of a loop with ``periods`` efforts in between.
+    """Yield the instants of a loop that holds each effort for a control period.
+
+    Args:
+        command: The controller and its compensation.
+        plant: The plant.
+        periods: How many control periods are between two of the times.
+        times: When to yield an instant [s], increasing.
+        q: Start configuration, shape (nq,).
+        v: Start velocity, shape (nv,).
 
     Raises:
         SimulationError: If the motion diverges.
@@ -88,28 +104,28 @@ def sampled_loop(
             if k == 0:
                 output, state = command.output, command.state
                 if not (t == state.t and _equal(state.q, q) and _equal(state.v, v)):
-                    output = command.at(t, q, v)
+                    output = command.evaluate(t, q, v)
                 yield Instant(state, output, tau, command.log_channels())
-            if end == start:  # the last row: nobody waits for what comes next
+            if end == start:  # the last row
                 return
             stop = start + (k + 1) * (end - start) / periods
             q, v = plant.advance(t, stop, tau)
-        _stop_runaway(end, q, v)
+        _check_divergence(end, q, v)
 
 
-def _stop_runaway(t: float, q: Array, v: Array) -> None:
+def _check_divergence(t: float, q: Array, v: Array) -> None:
     if not (_within(q, np.inf) and _within(v, RUNAWAY_SPEED)):
         speed = float(np.abs(v).max())
         raise SimulationError(
             f"the motion diverged before t = {t:.6g} s: a joint moves at {speed:.3g} "
-            "rad/s (or m/s). A singularity, gains too high for the control period, or "
-            "a field without a minimum do that"
+            "rad/s (or m/s). Possible causes: a singularity, gains too high for the "
+            "control period, a field without a minimum"
         )
 
 
 @kernel
 def _within(x: Array, bound: float) -> bool:
-    """Return whether every component is a number smaller than a bound."""
+    """Return whether every component's magnitude is below a bound; NaN is not."""
     inside = True
     for i in range(x.shape[0]):
         inside = inside and bool(-bound < x[i] < bound)
@@ -118,7 +134,7 @@ def _within(x: Array, bound: float) -> bool:
 
 @kernel
 def _equal(x: Array, y: Array) -> bool:
-    """Return whether two vectors are the same."""
+    """Return whether two vectors are equal."""
     same = bool(x.shape[0] == y.shape[0])
     for i in range(x.shape[0]):
         same = same and bool(x[i] == y[i])

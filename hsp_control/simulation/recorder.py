@@ -1,4 +1,4 @@
-"""Fills a rollout's columns, one row at a time, into memory that is there already."""
+"""Records a rollout row by row, into columns that are allocated before the run."""
 
 import math
 import platform
@@ -20,35 +20,44 @@ from hsp_control.null_space.fields import FieldSample, NullSpaceField, WeightedS
 from hsp_control.null_space.metrics import ConstantMetric, Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.log_file import MAX_SIZE
-from hsp_control.simulation.rollout import FORMAT, Rollout, settle
+from hsp_control.simulation.rollout import FORMAT, Rollout, complete_columns
 
 _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
 
 class Recorder:
-    """Columns for a known number of rows; only whole rows count."""
+    """Columns for a known number of rows; an incomplete row is never returned."""
 
     def __init__(self, controller: Controller, scene: Scene, rows: int) -> None:
-        """Allocate every column."""
+        """Allocate all columns.
+
+        Args:
+            controller: The controller; its tasks and fields may change during the run.
+            scene: Obstacles to log.
+            rows: The largest number of rows.
+
+        Raises:
+            SimulationError: If the log would be too large to be loaded.
+        """
         self._controller = controller
         self._scene = scene
         self._rows = 0
         self._capacity = rows
         self._columns: dict[str, Array] = {}
-        self._meaning: dict[str, dict[str, str]] = {}
+        self._descriptions: dict[str, dict[str, str]] = {}
         robot = controller.robot
         nv, units = robot.nv, dict.fromkeys(robot.units)
         self._joint_unit = joint_unit = " or ".join(units)
         effort_unit = " or ".join(_EFFORT_UNITS[unit] for unit in units)
         self._size = 0
-        column = self._open
+        column = self._add_column
         column("t", (), "s", "time")
         column("q", (robot.nq,), joint_unit, "configuration")
         column("v", (nv,), f"{joint_unit}/s", "velocity")
         column("tau", (nv,), effort_unit, "effort M a + N")
         column("acceleration", (nv,), f"({joint_unit})/s²", "commanded acceleration")
-        column("joint_positions", (nv,), joint_unit, "joints' positions, unwound")
-        self._open_tasks()
+        column("joint_positions", (nv,), joint_unit, "joint positions, unwrapped")
+        self._add_task_columns()
         column("field.g", (nv,), f"{joint_unit}/s", "null-space field")
         column("field.value", (), "-", "cost f, or norm of a vector field")
         column("null_space_error", (nv,), f"{joint_unit}/s", "e_N = (I - J#J)(g - v)")
@@ -56,58 +65,59 @@ class Recorder:
         column("manipulability", (), "-", "det(J W⁻¹ Jᵀ) of all tasks")
         rows_of_tasks = sum(task.rows for task in controller.tasks)
         column("singular_values", (rows_of_tasks,), "-", "of J L⁻ᵀ, W = L Lᵀ")
-        column("damped", (), "-", "1 where a singularity made the law bounded")
-        column("status", (), "-", "0 the law; 1 forces redistributed; 2 limited; 3 "
-               "limits relaxed")  # fmt: skip
-        column(
-            "relaxation", (), "(rad or m)/s²", "by how much the worst limit is missed"
-        )
+        column("damped", (), "-", "1 where the law is damped at a singularity")
+        column("status", (), "-", "0 exact law; 1 forces redistributed; 2 limited; "
+               "3 limits relaxed")  # fmt: skip
+        column("relaxation", (), "(rad or m)/s²", "largest violation of a limit")
         for contact in controller.contacts:
             prefix = f"contact.{contact.name}"
-            column(f"{prefix}.force", (3,), "N", "on the robot, in the world")
-            column(f"{prefix}.position", (3,), "m", "its centre of pressure")
+            column(f"{prefix}.force", (3,), "N", "on the robot, in world axes")
+            column(f"{prefix}.position", (3,), "m", "centre of pressure")
             column(
-                f"{prefix}.friction_used", (), "-", "‖f_t‖/(μ f_n), the worst point's"
+                f"{prefix}.friction_used", (), "-", "largest ‖f_t‖/(μ f_n) of a point"
             )
-        self._joints, self._edges = _skeleton(robot, controller)
-        column("skeleton", (len(self._edges), 3), "m", "joints and task frames")
-        self._open_terms()
+        self._points, self._parents = _skeleton(robot, controller)
+        column("skeleton", (len(self._parents), 3), "m", "joints and task frames")
+        self._add_term_columns()
         for obstacle in scene.values():
-            column(f"obstacle.{obstacle.name}", (3,), "m", "its centre")
-            column(f"obstacle.{obstacle.name}.quaternion", (4,), "-", "x, y, z, w")
+            prefix = f"obstacle.{obstacle.name}"
+            column(prefix, (3,), "m", "position of its frame")
+            column(f"{prefix}.quaternion", (4,), "-", "orientation (x, y, z, w)")
 
-    def _open(self, name: str, shape: tuple[int, ...], unit: str, meaning: str) -> None:
-        """Open a column, if it is not; rows without a value of it hold NaN."""
+    def _add_column(
+        self, name: str, shape: tuple[int, ...], unit: str, meaning: str
+    ) -> None:
+        """Add a column if it does not exist; rows without a value hold NaN."""
         if name not in self._columns:
             self._reserve(self._capacity, shape)
             self._columns[name] = np.full((self._capacity, *shape), np.nan)
-            self._meaning[name] = {"unit": unit, "meaning": meaning}
+            self._descriptions[name] = {"unit": unit, "meaning": meaning}
 
-    def _open_tasks(self) -> None:
-        """Open the columns of all tasks: some may have come while it runs."""
-        self._tasks = self._controller.tasks
+    def _add_task_columns(self) -> None:
+        """Add the columns of all tasks; tasks may be added during the run."""
+        self._tasks, column = self._controller.tasks, self._add_column
         probe, unit = _probe(self._controller.robot), "m or rad"
         for task in self._tasks:
             m, prefix = task.rows, f"task.{task.name}"
             width = len(task.measure(probe)[0])
-            self._open(f"{prefix}.error", (m,), unit, "e in the task's coordinates")
-            self._open(f"{prefix}.error_rate", (m,), f"{unit}/s", "e'")
-            self._open(f"{prefix}.reference", (width,), unit, "desired")
-            self._open(f"{prefix}.actual", (width,), unit, "measured")
+            column(f"{prefix}.error", (m,), unit, "error e in the task's coordinates")
+            column(f"{prefix}.error_rate", (m,), f"{unit}/s", "error rate e'")
+            column(f"{prefix}.reference", (width,), unit, "desired value")
+            column(f"{prefix}.actual", (width,), unit, "actual value")
 
-    def _open_terms(self) -> None:
-        """Open the columns of the field's terms: it may have changed while it runs."""
+    def _add_term_columns(self) -> None:
+        """Add the columns of the field's terms; the field may change during the run."""
         controller, probe = self._controller, _probe(self._controller.robot)
         self._field, self._terms = controller.field, _terms(controller)
         shape, unit = (controller.robot.nv,), f"{self._joint_unit}/s"
         for name, (_, field) in self._terms.items():
-            self._open(f"field.{name}.g", shape, unit, "weighted contribution")
-            self._open(f"field.{name}.value", (), "-", "unweighted cost or norm")
-            if field.least_distance(probe) is not None:
-                self._open(f"distance.{name}", (), "m", "least distance it watches")
+            self._add_column(f"field.{name}.g", shape, unit, "weighted share of g")
+            self._add_column(f"field.{name}.value", (), "-", "unweighted cost or norm")
+            if field.minimum_distance(probe) is not None:
+                self._add_column(f"distance.{name}", (), "m", "minimum distance")
 
     def _reserve(self, rows: int, shape: tuple[int, ...]) -> None:
-        """Refuse a log that could not be read again, before memory is asked for it."""
+        """Check that the log can be loaded again, before memory is allocated."""
         self._size += 8 * rows * math.prod(shape)
         if self._size > MAX_SIZE:
             raise SimulationError(
@@ -126,17 +136,17 @@ class Recorder:
 
         Args:
             state: The true state.
-            output: What the controller makes of that state; None: nothing, and what
-                only the law tells is not a number in this row.
-            tau: The effort that it commands, of what it is shown, shape (nv,).
-            log_channels: What the plant tells of itself.
+            output: The controller's output for that state; None: none, and the columns
+                of the law hold NaN in this row.
+            tau: The commanded effort, computed from the measured state, shape (nv,).
+            log_channels: Further columns by name, of the plant and the compensation.
         """
         i, columns = self._rows, self._columns
         robot = self._controller.robot
         if self._controller.tasks is not self._tasks:
-            self._open_tasks()
+            self._add_task_columns()
         if self._controller.field is not self._field:
-            self._open_terms()
+            self._add_term_columns()
         columns["t"][i] = state.t
         columns["q"][i] = state.q
         columns["v"][i] = state.v
@@ -146,7 +156,7 @@ class Recorder:
             reference, actual = task.measure(state)
             columns[f"task.{task.name}.reference"][i] = reference
             columns[f"task.{task.name}.actual"][i] = actual
-        for k, (frame, joint) in enumerate(self._joints):
+        for k, (frame, joint) in enumerate(self._points):
             columns["skeleton"][i, k] = (
                 state.position(frame) if frame else state.data.oMi[joint].translation
             )
@@ -156,15 +166,17 @@ class Recorder:
             columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
         if output is not None:
             self._record_law(state, output)
-        for name, reading in log_channels.items():
-            self._open(name, np.shape(reading.value), reading.unit, reading.meaning)
-            columns[name][i] = reading.value
+        for name, channel in log_channels.items():
+            self._add_column(
+                name, np.shape(channel.value), channel.unit, channel.meaning
+            )
+            columns[name][i] = channel.value
         self._rows += 1
 
     def _record_law(self, state: RobotState, output: ControlOutput) -> None:
         i, columns, controller = self._rows, self._columns, self._controller
         columns["acceleration"][i] = output.acceleration
-        for name, rows in controller.task_rows.items():  # those that count
+        for name, rows in controller.task_rows.items():  # of the active tasks
             columns[f"task.{name}.error"][i] = output.task.error[rows]
             columns[f"task.{name}.error_rate"][i] = output.task.error_rate[rows]
         diagnostics = controller.diagnose(state)
@@ -174,10 +186,10 @@ class Recorder:
         columns["null_space_norm"][i] = diagnostics.null_space_norm
         columns["manipulability"][i] = diagnostics.manipulability
         values = diagnostics.singular_values
-        if (more := len(values) - columns["singular_values"].shape[1]) > 0:
+        if (added := len(values) - columns["singular_values"].shape[1]) > 0:
             old = columns["singular_values"]
             columns["singular_values"] = np.pad(
-                old, ((0, 0), (0, more)), constant_values=np.nan
+                old, ((0, 0), (0, added)), constant_values=np.nan
             )
         columns["singular_values"][i, : len(values)] = values
         columns["damped"][i] = output.damped
@@ -188,61 +200,67 @@ class Recorder:
             columns[f"field.{name}.g"][i] = (sample or output.field).g
             columns[f"field.{name}.value"][i] = field.value(state)
             if f"distance.{name}" in columns:
-                columns[f"distance.{name}"][i] = field.least_distance(state)
+                columns[f"distance.{name}"][i] = field.minimum_distance(state)
 
     def _record_contacts(self, output: ControlOutput) -> None:
-        columns, support = self._columns, self._controller.mode.support
+        columns, support = self._columns, self._controller.active_stack.support
         world = support.in_world(output.forces)
         for contact in self._controller.contacts:
             prefix = f"contact.{contact.name}"
             force = columns[f"{prefix}.force"][self._rows]
-            place = columns[f"{prefix}.position"][self._rows]
+            center = columns[f"{prefix}.position"][self._rows]
             used = columns[f"{prefix}.friction_used"]
-            force[:], place[:] = 0.0, np.nan
+            force[:], center[:] = 0.0, np.nan
             if contact not in support.contacts:
                 continue
-            where = support.points[support.contacts.index(contact)]
-            local = output.forces.reshape(-1, 3)[where]
-            force[:] = world[where].sum(axis=0)
-            pressed = np.maximum(local[:, 2], 1e-9)
-            place[:] = pressed @ support.places[where] / pressed.sum()
-            tangential = np.hypot(local[:, 0], local[:, 1])  # no square overflows
-            loaded = local[:, 2] > 1e-3  # [N]: below it the ratio is of two zeros
+            points = support.points[support.contacts.index(contact)]
+            local = output.forces.reshape(-1, 3)[points]
+            force[:] = world[points].sum(axis=0)
+            normal = np.maximum(local[:, 2], 1e-9)
+            center[:] = normal @ support.positions[points] / normal.sum()
+            tangential = np.hypot(local[:, 0], local[:, 1])  # without overflow
+            loaded = local[:, 2] > 1e-3  # [N]: below it the ratio is rounding
             ratios = tangential[loaded] / (contact.friction * local[loaded, 2])
             used[self._rows] = ratios.max(initial=0.0)
 
     def rows(self, start: int) -> dict[str, Array]:
-        """Return the columns from a row on, as far as they have come; no copies."""
+        """Return views of the columns from a row to the last one recorded."""
         return {name: a[start : self._rows] for name, a in self._columns.items()}
 
-    def forget(self) -> None:
-        """Make room: the rows so far have another place."""
+    def clear(self) -> None:
+        """Remove all rows, to make room for new ones."""
         for column in self._columns.values():
             column[: self._rows] = np.nan
         self._rows = 0
 
     def rollout(self, status: str, message: str, **meta: Any) -> Rollout:
-        """Return the rows recorded so far as a rollout."""
+        """Return the rows recorded so far as a rollout.
+
+        Args:
+            status: How the run ended; see `Rollout.status`.
+            message: Why it ended.
+            **meta: JSON data to add to the rollout's meta data.
+        """
         columns = {name: array[: self._rows] for name, array in self._columns.items()}
-        settle(columns, continuous_dofs(self._controller.robot))
+        complete_columns(columns, continuous_dofs(self._controller.robot))
         return Rollout(columns, self.meta(status, message, **meta))
 
     def meta(self, status: str, message: str, **meta: Any) -> dict[str, Any]:
-        """Return what a rollout of these rows says of itself, as JSON data."""
+        """Return the meta data of a rollout of these rows, as JSON data."""
         controller, robot = self._controller, self._controller.robot
         return {
             "format": FORMAT,
             "status": status,
             "message": message,
-            "columns": self._meaning,
+            "columns": self._descriptions,
             "robot": {
                 "name": robot.name,
                 "nq": robot.nq,
                 "nv": robot.nv,
-                "freedoms": list(robot.dof_names),
+                "dofs": list(robot.dof_names),
                 "units": list(robot.units),
                 "continuous": continuous_dofs(robot),
-                "skeleton_parents": self._edges,
+                "skeleton_parents": self._parents,
                 "joint_coordinates": robot.source.joint_coordinates,
             },
             "tasks": {
@@ -260,20 +278,20 @@ class Recorder:
             "null_space_gain": controller.null_space_gain.tolist(),
             "metric": type(controller.metric).__name__,
             "metric_matrix": _constant_matrix(controller.metric),
-            "obstacles": {o.name: _described(o) for o in self._scene.values()},
+            "obstacles": {o.name: _obstacle_meta(o) for o in self._scene.values()},
             "versions": versions(),
             **meta,
         }
 
 
 def continuous_dofs(robot: Robot) -> list[int]:
-    """Return the freedoms of joints that turn without end, as (cos, sin)."""
-    joints = robot.single_joints
+    """Return the dofs of continuous joints, whose configuration is (cos, sin)."""
+    joints = robot.single_dof_joints
     return [int(i) for i in joints[joints[:, 2] == 2, 0]]
 
 
 def versions() -> dict[str, str]:
-    """Return the versions that a run depends on."""
+    """Return the versions of the packages that a run depends on."""
     packages = ("pin", "numpy", "scipy", "numba")
     return {
         "hsp_control": __version__,
@@ -285,9 +303,9 @@ def versions() -> dict[str, str]:
 def _terms(
     controller: Controller,
 ) -> dict[str, tuple[FieldSample | None, NullSpaceField]]:
-    """Return each term of the controller's field and where its share of g stands.
+    """Return the controller's field by terms, each with the sample of its share of g.
 
-    None stands for the whole g, where there is but one.
+    The sample is None if there is only one term: its share is the whole g.
     """
     field = controller.field
     if not isinstance(field, WeightedSum):
@@ -300,13 +318,13 @@ def _terms(
     }
 
 
-def _described(obstacle: Obstacle) -> dict[str, Any]:
-    reach = obstacle.shape.reach
+def _obstacle_meta(obstacle: Obstacle) -> dict[str, Any]:
+    radius = obstacle.shape.bounding_radius
     return {
         "shape": type(obstacle.shape).__name__,
         "parameters": {k: str(v) if isinstance(v, Path) else v
                        for k, v in vars(obstacle.shape).items()},
-        "radius": reach if np.isfinite(reach) else None,
+        "radius": radius if np.isfinite(radius) else None,
     }  # fmt: skip
 
 
@@ -323,9 +341,9 @@ def _probe(robot: Robot) -> RobotState:
 def _skeleton(
     robot: Robot, controller: Controller
 ) -> tuple[list[tuple[str, int]], list[int]]:
-    """Return the points to draw as (frame, joint) and the parent of each, -1 for none.
+    """Return the points to draw as (frame, joint), and each one's parent, -1 for none.
 
-    One point a joint, and one a frame that a task follows.
+    There is one point per joint, and one per frame that a task controls.
     """
     points: list[tuple[str, int]] = []
     parents: list[int] = []

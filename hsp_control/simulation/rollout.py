@@ -1,4 +1,4 @@
-"""A rollout: what happened, as named columns that describe themselves, and its file."""
+"""The rollout of a run: named columns with their descriptions, and its file."""
 
 import errno
 import json
@@ -21,17 +21,17 @@ from hsp_control.simulation.log_file import (
     shortened,
     write_arrays,
 )
-from hsp_control.simulation.log_meta import complaint
-from hsp_control.simulation.salvage import read_whole_entries
+from hsp_control.simulation.log_meta import find_fault, renamed_entries
+from hsp_control.simulation.salvage import read_complete_entries
 
 FORMAT = "hsp_control rollout 1"
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_LONGEST = 1000  # characters of a name: an archive has room for 65535 bytes
+_DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_MAX_NAME = 1000  # characters; a name in a zip archive has at most 65535 bytes
 _REQUIRED = ("t", "q", "v", "tau")
 
 
 class Rollout:
-    """One run: columns of equal length, row i at time t[i], and what they mean.
+    """One run: columns of equal length, row i at time t[i], and their descriptions.
 
     Attributes:
         columns: Arrays by name; ``t``, ``q``, ``v``, ``tau`` always exist.
@@ -40,7 +40,7 @@ class Rollout:
     """
 
     def __init__(self, columns: Mapping[str, Array], meta: dict[str, Any]) -> None:
-        """Keep columns and their description."""
+        """Set the columns and the meta data; arrays are not copied."""
         self.columns = dict(columns)
         self.meta = meta
 
@@ -85,48 +85,51 @@ class Rollout:
 
     @property
     def status(self) -> str:
-        """``completed``, ``interrupted``, ``diverged``; ``stopped``: a safe stop."""
+        """``completed``, ``interrupted``, ``diverged``; ``stopped`` by a safe stop."""
         return str(self.meta["status"])
 
     @property
     def config(self) -> dict[str, Any] | None:
-        """The resolved configuration that the run came from, if it came from one."""
+        """The resolved configuration of the run; None if it was made in Python."""
         return self.meta.get("config")
 
     def measure(self, robot: Robot, function: Callable[[RobotState], Any]) -> Array:
         """Return a function of the state at every row, shape (N, ...).
 
-        For what the run did not log: ``run.measure(robot, cost.value)``, or
+        For quantities that are not logged: ``run.measure(robot, cost.value)``, or
         ``run.measure(robot, lambda state: state.position("panda_link4"))``.
 
         Args:
             robot: The run's robot.
-            function: What to compute of a state: a number or an array.
+            function: Returns a number or an array for a state.
 
         Raises:
             ShapeError: If the run is of another robot.
         """
         state = RobotState(robot)
         rows = zip(self.t.tolist(), self.q, self.v, strict=True)
-        # The state's arrays move on with it: np.array copies.
+        # Each update overwrites the state's arrays, so np.array must copy.
         return np.array([np.array(function(state.update(*row))) for row in rows])
 
     def save(self, path: str | Path) -> Path:
-        """Write one ``.npz`` that NumPy alone reads, without pickles.
+        """Write one ``.npz`` without pickles, which NumPy can read by itself.
 
-        Written beside its place and moved there, so that no half file bears its name.
-        Where the disk fills, as much as fits stays beside it for `salvage`, if that has
-        the motion; the message names it.
+        It is written to a temporary file and then renamed, so that ``path`` is never an
+        incomplete file. If the disk is full, the part that fits is kept beside it for
+        `salvage`, provided that it has the motion; the message names that file.
+
+        Returns:
+            The path.
 
         Raises:
             LogError: If the file cannot be written.
         """
         path = Path(path)
         part = path.with_name(f".{path.name}.part")
-        if any(len(name) > _LONGEST for name in self.columns):
+        if any(len(name) > _MAX_NAME for name in self.columns):
             raise LogError(
                 f"{path}: cannot write the log: a column's name has more than "
-                f"{_LONGEST} characters"
+                f"{_MAX_NAME} characters"
             )
         meta = np.array(json.dumps(self.meta, ensure_ascii=False))
         try:
@@ -135,30 +138,30 @@ class Rollout:
                 write_arrays(file, {"meta": meta, **self.columns})
             part.replace(path)
         except OSError as error:
-            kept = _keep_part(part, path) if error.errno in _FULL else ""
+            kept = _keep_part(part, path) if error.errno in _DISK_FULL else ""
             _remove(part)
             reason = error.strerror or str(error)
             raise LogError(f"{path}: cannot write the log: {reason}{kept}") from error
-        except BaseException:  # a second Ctrl-C: then without it
+        except BaseException:  # also a second Ctrl-C: leave no temporary file
             _remove(part)
             raise
         return path
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a log: an ``.npz``, or a `journal` with all its whole rows.
+        """Read a log: an ``.npz``, or a `journal` with all its complete rows.
 
-        It may be a stranger's: nothing in it is ever executed.
+        The file may be untrusted: nothing in it is ever executed.
 
         Raises:
             LogError: If the file is missing, truncated, too large, not a log of this
-                package, or one that contradicts itself.
+                package, or inconsistent.
         """
         path = Path(path)
         try:
             if is_journal(path):
                 columns, meta = read_journal(path)
-                settle(columns, meta["robot"]["continuous"])
+                complete_columns(columns, meta["robot"]["continuous"])
                 columns["meta"] = np.array(json.dumps(meta, ensure_ascii=False))
             else:
                 columns = read_arrays(path)
@@ -172,26 +175,27 @@ class Rollout:
         except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise LogError(
-                f"{path}: not a whole .npz log (cut short, or another file): {reason}"
+                f"{path}: not a complete .npz log (truncated, or another file): "
+                f"{reason}"
                 f"{_salvageable(path)}"
             ) from error
         except Exception as error:  # zlib.error, struct.error, NotImplementedError...
             raise LogError(
-                f"{path}: not a whole .npz log: {type(error).__name__}: {error}"
+                f"{path}: not a complete .npz log: {type(error).__name__}: {error}"
             ) from error
         return cls(*_checked(path, columns))
 
     @classmethod
     def salvage(cls, path: str | Path) -> Self:
-        """Read what is whole of a log that was cut; ``meta["lost"]`` names the rest.
+        """Read the complete entries of a truncated log; ``meta["lost"]`` has the rest.
 
         Raises:
-            LogError: If not even the motion (t, q, v, tau) is whole, or what is whole
-                is no log.
+            LogError: If the meta data or the motion (t, q, v, tau) is incomplete, or
+                the complete entries are not a log.
         """
         path = Path(path)
         try:
-            columns, cut = read_whole_entries(path)
+            columns, cut_entry = read_complete_entries(path)
         except OSError as error:
             reason = error.strerror or str(error)
             raise LogError(f"{path}: cannot be read: {reason}") from error
@@ -199,43 +203,43 @@ class Rollout:
         lost = [name for name in described if name not in columns]
         missing = [name for name in ("meta", *_REQUIRED) if name not in columns]
         if missing:
-            where = f": it is cut in {cut!r}" if cut else ""
+            where = f": it is truncated in {cut_entry!r}" if cut_entry else ""
             raise LogError(
-                f"{path}: nothing to salvage{where}; {missing[0]!r} is not whole"
+                f"{path}: nothing to salvage{where}; {missing[0]!r} is incomplete"
             )
         return cls(*_checked(path, columns, lost))
 
 
 def _keep_part(part: Path, path: Path) -> str:
-    """Keep a half-written log if it has the motion; say where, or nothing."""
+    """Keep an incomplete log if it has the motion; return a note with its name."""
     kept = path.with_suffix(".cut.npz")
     try:
-        columns, _ = read_whole_entries(part)
+        columns, _ = read_complete_entries(part)
         if {"meta", *_REQUIRED} <= set(columns):
             part.replace(kept)
-            return f"; what fits is in {kept}: hsp salvage {kept}"
+            return f"; the part that fits is in {kept}: hsp salvage {kept}"
     except OSError:
         pass
     return ""
 
 
 def _remove(part: Path) -> None:
-    with suppress(OSError):  # its folder may be no folder
+    with suppress(OSError):  # its folder may not exist
         part.unlink(missing_ok=True)
 
 
 def _salvageable(path: Path) -> str:
-    """Return what to do with a log that is cut, if something can be done."""
+    """Return a hint for a truncated log that can be salvaged, "" for any other."""
     try:
-        columns, _ = read_whole_entries(path)
+        columns, _ = read_complete_entries(path)
     except OSError:
         return ""
-    whole = {"meta", *_REQUIRED} <= set(columns)
-    return f"; its motion is whole: hsp salvage {path}" if whole else ""
+    complete = {"meta", *_REQUIRED} <= set(columns)
+    return f"; its motion is complete: hsp salvage {path}" if complete else ""
 
 
 def _described(columns: dict[str, Array]) -> list[str]:
-    """Return the columns that the entry 'meta' describes, as far as it can be read."""
+    """Return the names of the columns in the entry 'meta', [] if it is not readable."""
     try:
         described = json.loads(str(columns["meta"]))["columns"]
     except (KeyError, TypeError, ValueError, RecursionError):
@@ -243,25 +247,36 @@ def _described(columns: dict[str, Array]) -> list[str]:
     return list(described) if isinstance(described, dict) else []
 
 
-def settle(columns: Mapping[str, Array], continuous: Sequence[int]) -> None:
-    """Make rows that were written one by one a whole, in place.
+def complete_columns(columns: Mapping[str, Array], continuous: Sequence[int]) -> None:
+    """Complete columns that were written row by row, in place.
 
-    Positions of continuous joints pass ±π without a jump. Tasks that came on the way
-    are, before that, where they first were: what is drawn needs a place. Their errors
-    stay NaN there.
+    Positions of continuous joints pass ±π without a jump. For a task that was added
+    during the run, the earlier rows get its first reference and position, because what
+    is drawn must be finite. Its errors stay NaN there.
+
+    Args:
+        columns: The columns by name, N rows each.
+        continuous: The dofs of continuous joints.
     """
-    positions, where = columns["joint_positions"], list(continuous)
-    positions[:, where] = np.unwrap(positions[:, where], axis=0)
+    positions, dofs = columns["joint_positions"], list(continuous)
+    positions[:, dofs] = np.unwrap(positions[:, dofs], axis=0)
     for name, column in columns.items():
         if name.startswith("task.") and name.endswith((".reference", ".actual")):
-            known = np.flatnonzero(np.isfinite(column).all(axis=1))
-            if known.size:
-                column[: known[0]] = column[known[0]]
+            finite = np.flatnonzero(np.isfinite(column).all(axis=1))
+            if finite.size:
+                column[: finite[0]] = column[finite[0]]
 
 
 def _checked(
     path: Path, columns: dict[str, Array], lost: Sequence[str] = ()
 ) -> tuple[dict[str, Array], dict[str, Any]]:
+    """Return the columns and the meta data of an untrusted log.
+
+    Every log passes here, however it was read.
+
+    Raises:
+        LogError: If it is not a log of this package, or inconsistent.
+    """
     if "meta" not in columns or columns["meta"].dtype.kind != "U":
         raise LogError(
             f"{path}: not a log of hsp_control: it has no text entry 'meta' "
@@ -276,6 +291,7 @@ def _checked(
         raise LogError(
             f"{path}: its format is {shortened(found)}; this version reads {FORMAT!r}"
         )
+    meta = renamed_entries(meta)
     if lost:
         kept = {n: d for n, d in meta["columns"].items() if n not in lost}
         meta = {**meta, "columns": kept, "lost": list(lost)}
@@ -292,6 +308,6 @@ def _checked(
         raise LogError(f"{path}: the log's columns differ in length")
     if 8 * sum(column.size for column in columns.values()) > MAX_SIZE:
         raise LogError(f"{path}: larger than {MAX_SIZE / 1e9:g} GB in memory")
-    if reason := complaint(meta, columns):
+    if reason := find_fault(meta, columns):
         raise LogError(f"{path}: {reason}")
     return {name: np.asarray(c, dtype=float) for name, c in columns.items()}, meta

@@ -1,8 +1,8 @@
-"""Read what is whole of a log that was cut: by a full disk, a lost connection.
+"""Reads the complete entries of a truncated log (a full disk, a lost connection).
 
-The directory of a zip archive stands at its end, so that a cut one has none. But each
-entry begins with a header of its own; they are read in their order until one is not
-whole. What a log cannot do without is written first.
+The directory of a zip archive is at its end, so a truncated archive has none. But each
+entry begins with a header of its own. The entries are read in order until one is
+incomplete. The entries that every log needs are written first.
 """
 
 import io
@@ -20,18 +20,18 @@ _SIGNATURE = b"PK\x03\x04"
 _ZIP64 = 1
 _UNKNOWN = 0xFFFFFFFF
 _STREAMED = 0x08
-"""The flag of an entry whose size stands behind it: no log of ours has one."""
+"""Flag of an entry whose size follows its content; our logs have no such entry."""
 
 
 class Entry(NamedTuple):
-    """An entry's local header.
+    """The local header of an entry.
 
     Attributes:
         name: Its name, without ``.npy``.
-        method: How it is packed: 0 not at all, 8 deflated.
+        method: Its compression: 0 none, 8 deflate.
         checksum: CRC-32 of its content.
-        packed: Bytes in the file.
-        size: Bytes of its content.
+        packed: Compressed size in the file [bytes].
+        size: Size of its content [bytes].
     """
 
     name: str
@@ -41,10 +41,10 @@ class Entry(NamedTuple):
     size: int
 
 
-def read_whole_entries(path: Path) -> tuple[dict[str, Array], str]:
-    """Return the arrays that are whole, by name, and the first that is not.
+def read_complete_entries(path: Path) -> tuple[dict[str, Array], str]:
+    """Return the complete arrays by name, and the name of the first incomplete one.
 
-    The name is empty where the archive ends between two of them.
+    That name is empty if the archive ends between two entries.
 
     Raises:
         OSError: If the file cannot be read.
@@ -57,7 +57,7 @@ def read_whole_entries(path: Path) -> tuple[dict[str, Array], str]:
             if entry is None:
                 return arrays, ""
             try:
-                array = _content(file, entry, left)
+                array = _read_content(file, entry, left)
             except (ValueError, EOFError, zlib.error):
                 return arrays, entry.name
             arrays[entry.name] = array
@@ -66,26 +66,26 @@ def read_whole_entries(path: Path) -> tuple[dict[str, Array], str]:
 
 
 def _next_entry(file: IO[bytes]) -> Entry | None:
-    """Read a local header; None where there is none, or half of one."""
+    """Read a local header; return None if there is none, or only a part of one."""
     header = file.read(_HEADER.size)
     if len(header) < _HEADER.size:
         return None
-    fields = _HEADER.unpack(header)
-    signature, _, flags, method, _, _, checksum, packed, size, of_name, of_more = fields
-    name, more = file.read(of_name), file.read(of_more)
-    if signature != _SIGNATURE or flags & _STREAMED or len(more) < of_more:
+    signature, _, flags, method, _, _, checksum, *sizes = _HEADER.unpack(header)
+    packed, size, name_length, extra_length = sizes
+    name, extra = file.read(name_length), file.read(extra_length)
+    if signature != _SIGNATURE or flags & _STREAMED or len(extra) < extra_length:
         return None
     if packed == _UNKNOWN or size == _UNKNOWN:
-        kind, length = struct.unpack_from("<2H", more) if len(more) >= 4 else (0, 0)
-        if kind != _ZIP64 or length < 16 or len(more) < 20:
+        kind, length = struct.unpack_from("<2H", extra) if len(extra) >= 4 else (0, 0)
+        if kind != _ZIP64 or length < 16 or len(extra) < 20:
             return None
-        size, packed = struct.unpack_from("<2Q", more, 4)
+        size, packed = struct.unpack_from("<2Q", extra, 4)
     text = name.decode("utf-8", "replace").removesuffix(".npy")
     return Entry(text, method, checksum, packed, size)
 
 
-def _content(file: IO[bytes], entry: Entry, most: int) -> Array:
-    if not 0 < entry.size <= most or entry.packed > MAX_SIZE:
+def _read_content(file: IO[bytes], entry: Entry, max_size: int) -> Array:
+    if not 0 < entry.size <= max_size or entry.packed > MAX_SIZE:
         raise ValueError("empty, or too large")
     packed = file.read(entry.packed)
     if len(packed) < entry.packed:
@@ -93,7 +93,7 @@ def _content(file: IO[bytes], entry: Entry, most: int) -> Array:
     if entry.method == zipfile.ZIP_DEFLATED:
         packed = zlib.decompressobj(-zlib.MAX_WBITS).decompress(packed, entry.size)
     elif entry.method != zipfile.ZIP_STORED:
-        raise ValueError("packed in another way")
+        raise ValueError("unknown compression")
     if len(packed) != entry.size or zlib.crc32(packed) != entry.checksum:
-        raise ValueError("not what was written")
+        raise ValueError("wrong size or checksum")
     return read_array(io.BytesIO(packed), entry.size, entry.name)

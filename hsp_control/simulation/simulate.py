@@ -1,4 +1,4 @@
-"""Close the loop: controller, plant and integrator, from a start to a rollout."""
+"""Simulates the closed loop of a controller and a plant."""
 
 from collections.abc import Callable
 from typing import Any
@@ -24,9 +24,9 @@ from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.rollout import Rollout
 
 MAX_ROWS = 10_000_000
-"""Rows of a log; see also `log_file.MAX_SIZE`."""
+"""Most rows of a log; see also `log_file.MAX_SIZE`."""
 MAX_STEPS = 1e9
-"""Control periods, or steps of an integrator, in a run: at 50 µs each, 14 hours."""
+"""Most control periods, or integrator steps, of a run: at 50 µs each, 14 hours."""
 
 
 def simulate(
@@ -46,7 +46,7 @@ def simulate(
     on_row: Callable[[Recorder], None] | None = None,
     meta: dict[str, Any] | None = None,
 ) -> Rollout:
-    """Run the closed loop and return what happened.
+    """Run the closed loop and return its rollout.
 
     Args:
         controller: The controller.
@@ -56,30 +56,30 @@ def simulate(
         control_period: How long an effort is held [s], as on a real robot; None: the
             law is evaluated in the integrator's stages, as in the proofs.
         log_period: Time between two rows [s]; with a control period, a multiple of it.
-        integrator: How a continuous plant moves on; None: `Dop853`.
-        plant: What the effort moves; None: the controller's own model. One that is
-            sampled has an integrator of its own, and needs a control period.
-        compensation: What is done about what the plant has beside the model; it needs
-            a control period.
+        integrator: Integrates a continuous plant; None: `Dop853`.
+        plant: The plant; None: rigid bodies, the controller's own model. A sampled
+            plant has its own integrator, and needs a control period.
+        compensation: Compensators for what the model lacks; they need a control
+            period.
         scene: Obstacles to log.
         start_time: Time of the first row [s].
-        on_progress: Called with the fraction done at every row.
-        on_row: Called with the recorder at every row, once that is recorded.
-        meta: JSON data to add to the rollout's.
+        on_progress: Called at every row with the fraction of the run that is done.
+        on_row: Called with the recorder after every recorded row.
+        meta: JSON data to add to the meta data of the rollout.
 
     Returns:
         The rollout. Ctrl-C ends it early, with the status ``interrupted`` and all rows
-        computed until then.
+        computed so far.
 
     Raises:
         SimulationError: If durations, periods and plant do not fit, or the motion
             diverged; its ``rollout`` then holds what was computed.
-        HspControlError: If the start is not a state of the robot.
+        HspControlError: If q0 or v0 is not a valid state of the robot.
     """
     robot = controller.robot
     plant = RigidBodyPlant(robot) if plant is None else plant
     integrator = Dop853() if integrator is None else integrator
-    rows, periods = planned(duration, log_period, control_period)
+    rows, periods = count_rows(duration, log_period, control_period)
     check_plant(plant, robot)
     q = robot.check_configuration(q0).copy()
     v = robot.check_tangent(np.zeros(robot.nv) if v0 is None else v0, "velocity v0")
@@ -98,18 +98,18 @@ def simulate(
         loop = sampled_loop(command, plant, periods, times, q, v)
     else:
         raise SimulationError(
-            f"{type(plant).__name__} holds the effort it is given: it needs a "
+            f"{type(plant).__name__} holds the effort during a period: it needs a "
             "control_period [s], for example 0.001"
         )
     recorder = Recorder(controller, scene or Scene(), rows)
-    about = {**plant.describe(), **differing_bodies(plant, robot)}
-    meta = {"plant": about, **(meta or {})}
+    description = {**plant.describe(), **differing_bodies(plant, robot)}
+    meta = {"plant": description, **(meta or {})}
 
     status, message = "completed", ""
     try:
-        for row, (state, output, tau, remembered) in enumerate(loop):
-            log_channels = plant.log_channels(state.t, state.q, state.v, tau)
-            recorder.record(state, output, tau, {**remembered, **log_channels})
+        for row, (state, output, tau, own_channels) in enumerate(loop):
+            plant_channels = plant.log_channels(state.t, state.q, state.v, tau)
+            recorder.record(state, output, tau, {**own_channels, **plant_channels})
             if on_progress is not None:
                 on_progress(row / (rows - 1) if rows > 1 else 1.0)
             if on_row is not None:
@@ -123,13 +123,18 @@ def simulate(
     return recorder.rollout(status, message, **meta)
 
 
-def planned(
+def count_rows(
     duration: float, log_period: float, control_period: float | None
 ) -> tuple[int, int]:
-    """Return how many rows a run has, and control periods a row; 0 without any.
+    """Return the number of rows of a run, and of control periods per row.
+
+    Args:
+        duration: Length of the run [s].
+        log_period: Time between two rows [s].
+        control_period: The control period [s]; None: none, and 0 periods per row.
 
     Raises:
-        SimulationError: If the periods do not fit, or the run would never end.
+        SimulationError: If the periods do not fit, or the run is too long.
     """
     rows = _whole(duration, log_period, "duration", "log_period") + 1
     if rows > MAX_ROWS:
@@ -145,10 +150,15 @@ def planned(
 
 
 def check_steps(duration: float, step: float, name: str) -> None:
-    """Refuse a run of more steps than anybody waits for.
+    """Check that a run has at most `MAX_STEPS` steps.
+
+    Args:
+        duration: Length of the run [s].
+        step: The step [s].
+        name: The name of the step in the message.
 
     Raises:
-        SimulationError: If it has.
+        SimulationError: If it has more.
     """
     if duration / step > MAX_STEPS:
         raise SimulationError(
@@ -167,7 +177,7 @@ def _whole(total: float, part: float, total_name: str, part_name: str) -> int:
         if not 0.0 < value < np.inf:
             raise SimulationError(f"{name} is {value} s; must be positive")
     ratio = total / part
-    if not ratio < 2**53:  # beyond it every number is whole
+    if not ratio < 2**53:  # every larger float is a whole number
         raise SimulationError(
             f"{total_name} = {total:g} s is {ratio:.3g} times "
             f"{part_name} = {part:g} s; at most {MAX_STEPS:.0e} times"

@@ -1,4 +1,4 @@
-"""Sweeps: one experiment many times, over gains, starts, masses, obstacles, noise."""
+"""Sweeps: run one experiment many times with different values."""
 
 from .distributions import Choices as Choices
 from .distributions import Distribution as Distribution

@@ -1,8 +1,8 @@
 """Run tasks on an existing Dask cluster.
 
-Only texts and the name of `run_task` travel: no code of the user's is pickled. The
-workers need this package, the same versions of what its numbers depend on, and the
-robot's files under the same paths.
+Only text and the name of `run_task` are sent; no code of the user is pickled. The
+workers need this package, the same versions of the packages that its results depend on,
+and the robot's files under the same paths.
 """
 
 from collections.abc import Iterable, Iterator
@@ -14,28 +14,28 @@ from hsp_control.common.exceptions import SweepError
 from hsp_control.sweeps.running import crashed, run_task
 
 PATIENCE = 10.0
-"""How long [s] a scheduler may take to answer."""
+"""Time in which a scheduler must answer [s]."""
 
 _WINDOW = 1000
-"""Tasks that the scheduler knows of at a time: it holds them all in memory."""
+"""Tasks that the scheduler has at a time; it keeps them all in memory."""
 
 
 class DaskWorkers:
-    """The workers of a Dask scheduler, used within a ``with`` block.
+    """The workers of a Dask scheduler, used in a ``with`` block.
 
-    A worker that dies loses nothing: the scheduler gives its tasks to others. Only a
-    task over which several workers die is given up.
+    If a worker dies, the scheduler gives its tasks to other workers. A task is given up
+    after several workers have died during it.
     """
 
     def __init__(self, address: str) -> None:
         """Connect to a scheduler.
 
         Args:
-            address: Such as ``tcp://192.168.0.10:8786``; ``tls://`` takes its
-                certificates from Dask's configuration.
+            address: For example ``tcp://192.168.0.10:8786``; for ``tls://`` the
+                certificates of Dask's configuration are used.
 
         Raises:
-            SweepError: If no scheduler answers there, or Dask is not installed.
+            SweepError: If no scheduler answers, or Dask is not installed.
         """
         try:
             self._dask: Any = import_module("distributed")
@@ -50,35 +50,35 @@ class DaskWorkers:
         except (OSError, ValueError, TimeoutError) as error:
             raise SweepError(
                 f"no Dask scheduler answers at {address!r} ({_brief(error)}); "
-                "its address is printed by `dask scheduler`, such as tcp://host:8786"
+                "`dask scheduler` prints its address, for example tcp://host:8786"
             ) from None
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Forget what is not done, and leave the cluster as it was."""
+        """Cancel unfinished tasks and disconnect; the cluster keeps running."""
         self._client.close()
 
     def map(self, tasks: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-        """Yield every task's result as soon as it is there; see `LocalWorkers.map`.
+        """Yield every task's result as soon as it is available; see `LocalWorkers.map`.
 
         Raises:
-            SweepError: If the scheduler is lost.
+            SweepError: If the connection to the scheduler is lost.
         """
         try:
             yield from self._map(iter(tasks))
-        except Exception as error:  # connections end in many ways
+        except Exception as error:  # connections fail with many kinds of errors
             raise SweepError(
-                f"the Dask cluster is gone ({_brief(error)}); what is done is kept, "
-                "and the same command does the rest"
+                f"lost the connection to the Dask cluster ({_brief(error)}); finished "
+                "runs are kept, and the same command continues the sweep"
             ) from error
 
     def _map(self, pending: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
         runs: dict[str, int] = {}
 
         def submit(run: int, task: str) -> Any:
-            # Not pure: a result that an earlier sweep left there would be taken.
+            # Not pure: otherwise results of an earlier sweep could be returned.
             future = self._client.submit(run_task, task, pure=False)
             runs[future.key] = run
             return future
@@ -87,7 +87,7 @@ class DaskWorkers:
         running = self._dask.as_completed(first, loop=self._client.loop)
         for future in running:
             run = runs.pop(future.key)
-            # What a future has whose worker died too often; a cancelled one raises.
+            # Set if the task's workers died too often; raises if it was cancelled.
             error = future.exception()
             yield run, crashed(_brief(error)) if error else future.result()
             for task in islice(pending, 1):

@@ -1,7 +1,7 @@
-"""What a swept value may be: a list to choose from, or a probability distribution.
+"""The values of a swept parameter: a list of choices, or a probability distribution.
 
-Each is given by its quantile function, so that every design (random, Latin hypercube,
-Sobol) is a set of fractions in [0, 1) and knows nothing of distributions.
+Each is defined by its quantile function. A design (random, Latin hypercube, Sobol) is
+then only a set of fractions in [0, 1), independent of the distributions.
 """
 
 import math
@@ -13,28 +13,28 @@ from scipy.special import ndtr, ndtri
 
 from hsp_control.common.exceptions import SweepError
 
-_LEAST, _MOST = 2.0**-53, 1.0 - 2.0**-53  # the normal's quantile is finite between
+_LOWEST, _HIGHEST = 2.0**-53, 1.0 - 2.0**-53  # the normal quantile is finite here
 
 
 class Distribution(ABC):
-    """Values that a parameter takes."""
+    """The values of a parameter."""
 
     @abstractmethod
     def quantile(self, fraction: float) -> Any:
-        """Return the value below which this fraction of all values lies.
+        """Return the quantile: the value below which this fraction of all values lies.
 
         Args:
             fraction: In [0, 1).
         """
 
     def levels(self) -> tuple[Any, ...] | None:
-        """Return all values, if they can be listed: what a grid is made of."""
+        """Return all values for a grid; None if they cannot be listed."""
         return None
 
 
 @dataclass(frozen=True)
 class Choices(Distribution):
-    """One of a list of values (plain data of any kind), each as likely.
+    """One of a list of values (plain data of any kind), all equally likely.
 
     Attributes:
         values: The values, at least one.
@@ -43,9 +43,9 @@ class Choices(Distribution):
     values: tuple[Any, ...]
 
     def __post_init__(self) -> None:
-        """Refuse an empty list."""
+        """Check that there is a value."""
         if not self.values:
-            raise SweepError("there are no values to choose from")
+            raise SweepError("the list of values is empty")
 
     def quantile(self, fraction: float) -> Any:
         """Return one of the values."""
@@ -58,18 +58,18 @@ class Choices(Distribution):
 
 @dataclass(frozen=True)
 class Uniform(Distribution):
-    """Any number of an interval, each as likely.
+    """A number of an interval, uniformly distributed.
 
     Attributes:
-        low: Its lower end.
-        high: Its upper end.
+        low: Lower end.
+        high: Upper end.
     """
 
     low: float
     high: float
 
     def __post_init__(self) -> None:
-        """Refuse an interval without inside."""
+        """Check that the ends are finite, and low is below high."""
         _check_interval(self.low, self.high)
 
     def quantile(self, fraction: float) -> float:
@@ -79,18 +79,18 @@ class Uniform(Distribution):
 
 @dataclass(frozen=True)
 class LogUniform(Distribution):
-    """A number whose logarithm is uniform: as often in 1 to 10 as in 10 to 100.
+    """A number with a uniform logarithm: 1 to 10 is as likely as 10 to 100.
 
     Attributes:
-        low: Its lower end, positive.
-        high: Its upper end.
+        low: Lower end, positive.
+        high: Upper end.
     """
 
     low: float
     high: float
 
     def __post_init__(self) -> None:
-        """Refuse an interval without inside or logarithm."""
+        """Check that the ends are finite and positive, and low is below high."""
         _check_interval(self.low, self.high)
         _check_positive(self.low)
 
@@ -101,13 +101,13 @@ class LogUniform(Distribution):
 
 @dataclass(frozen=True)
 class Normal(Distribution):
-    """A normally distributed number, cut off where it would be senseless.
+    """A normally distributed number, truncated to an interval.
 
     Attributes:
-        mean: Its mean before the cut.
-        deviation: Its standard deviation before the cut, positive.
-        low: What it never falls below.
-        high: What it never exceeds.
+        mean: Mean before truncation.
+        deviation: Standard deviation before truncation, positive.
+        low: Lower end of the interval.
+        high: Upper end of the interval.
     """
 
     mean: float
@@ -116,26 +116,29 @@ class Normal(Distribution):
     high: float = math.inf
 
     def __post_init__(self) -> None:
-        """Refuse what is no normal distribution."""
+        """Check the numbers, and that the interval has a positive probability."""
         if not (math.isfinite(self.mean) and 0.0 < self.deviation < math.inf):
             raise SweepError(
                 f"a normal distribution of mean {self.mean:g} and standard deviation "
-                f"{self.deviation:g}: the deviation must be positive, both finite"
+                f"{self.deviation:g}; both must be finite, the deviation positive"
             )
         if not self.low < self.high:
-            raise SweepError(f"cut off below {self.low:g} and above {self.high:g}")
+            raise SweepError(
+                f"a normal distribution is cut to {self.low:g} ... {self.high:g}; "
+                "low must be below high"
+            )
         if not self._below(self.low) < self._below(self.high):
             raise SweepError(
                 f"a normal distribution of mean {self.mean:g} and standard deviation "
-                f"{self.deviation:g} has nothing from {self.low:g} to {self.high:g}"
+                f"{self.deviation:g} has no values from {self.low:g} to {self.high:g}"
             )
 
     def quantile(self, fraction: float) -> float:
-        """Return the quantile of the normal distribution between the cuts."""
+        """Return the quantile of the truncated normal distribution."""
         below, above = self._below(self.low), self._below(self.high)
         inside = below + fraction * (above - below)
         value = self.mean + self.deviation * float(
-            ndtri(min(max(inside, _LEAST), _MOST))
+            ndtri(min(max(inside, _LOWEST), _HIGHEST))
         )
         return float(min(max(value, self.low), self.high))
 
@@ -145,30 +148,30 @@ class Normal(Distribution):
 
 @dataclass(frozen=True)
 class Integers(Distribution):
-    """A whole number from low to high, both included: seeds, counts.
+    """An integer from low to high, both included: for seeds and counts.
 
     Attributes:
-        low: The least.
-        high: The greatest.
+        low: Smallest integer.
+        high: Largest integer.
     """
 
     low: int
     high: int
 
     def __post_init__(self) -> None:
-        """Refuse ends in the wrong order."""
+        """Check that low is not above high."""
         if self.low > self.high:
             raise SweepError(f"there are no integers from {self.low} to {self.high}")
 
     def quantile(self, fraction: float) -> int:
-        """Return a whole number."""
+        """Return an integer."""
         return self.low + int(fraction * (self.high - self.low + 1))
 
 
 def linear(low: float, high: float, count: int) -> Choices:
     """Return ``count`` evenly spaced numbers, both ends included.
 
-    They are integers where both ends and the spacing are.
+    They are integers if both ends and the spacing are integers.
     """
     _check_interval(low, high)
     _check_count(count)
@@ -180,7 +183,7 @@ def linear(low: float, high: float, count: int) -> Choices:
 
 
 def logarithmic(low: float, high: float, count: int) -> Choices:
-    """Return ``count`` numbers in a constant ratio, both ends included."""
+    """Return ``count`` numbers with a constant ratio, both ends included."""
     _check_interval(low, high)
     _check_positive(low)
     _check_count(count)
@@ -192,16 +195,18 @@ def logarithmic(low: float, high: float, count: int) -> Choices:
 def _check_interval(low: float, high: float) -> None:
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise SweepError(
-            f"the interval from {low:g} to {high:g}: its ends must be finite and the "
-            "first below the second"
+            f"the interval is from {low:g} to {high:g}; its ends must be finite, and "
+            "the first below the second"
         )
 
 
 def _check_positive(low: float) -> None:
     if low <= 0.0:
-        raise SweepError(f"begins at {low:g}; a logarithmic range must be positive")
+        raise SweepError(
+            f"the range begins at {low:g}; a logarithmic range must be positive"
+        )
 
 
 def _check_count(count: int) -> None:
     if count < 2:
-        raise SweepError(f"has {count} values; a range has at least 2")
+        raise SweepError(f"the range has {count} values; must have at least 2")

@@ -1,4 +1,4 @@
-"""A factor: one key path of a configuration and the values that it takes."""
+"""A factor: one key path of a configuration, and its values."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -9,17 +9,18 @@ import numpy as np
 
 from hsp_control.common.exceptions import SweepError
 from hsp_control.config.keys import split_assignment, written
+from hsp_control.config.renamed import current_keys
 from hsp_control.sweeps.distributions import Choices, Distribution
 from hsp_control.sweeps.spelling import values
 
 
 @dataclass(frozen=True)
 class Factor:
-    """What is varied, and how.
+    """A varied parameter.
 
     Attributes:
-        keys: The parts of the key path, as text.
-        distribution: The values.
+        keys: The parts of its key path, as text.
+        distribution: Its values.
     """
 
     keys: tuple[str, ...]
@@ -27,16 +28,16 @@ class Factor:
 
     @property
     def name(self) -> str:
-        """The key path with dots: a column of the result."""
+        """The key path with dots: the name of its column in the result."""
         return written(self.keys)
 
     @property
     def origin(self) -> str:
-        """What stands for file and line in messages about its values."""
+        """What messages about its values contain instead of file and line."""
         return f"--over {self.name}"
 
     def description(self) -> dict[str, Any]:
-        """Return what the factor is, as JSON data."""
+        """Return the factor as JSON data."""
         kind = type(self.distribution).__name__
         numbers = {
             name: str(value) if value in (-math.inf, math.inf) else value  # not in JSON
@@ -50,17 +51,18 @@ def factors(over: Mapping[str, Any] | Iterable[str]) -> tuple[Factor, ...]:
 
     Args:
         over: Key paths and their values: texts ``key=values`` as on the command line,
-            or a mapping from key path to such a text, a sequence or a `Distribution`.
+            or a mapping from key path to such a text, to a sequence of values, or to a
+            `Distribution`.
 
     Raises:
-        SweepError: If a key path or values cannot be read, a key comes twice, or there
-            is none.
+        SweepError: If a key path or values cannot be read, a key is given twice, or
+            there is no key.
     """
     pairs = over.items() if isinstance(over, Mapping) else map(_split, over)
     found = [_factor(key, spec) for key, spec in pairs]
     if not found:
         raise SweepError(
-            "a sweep varies something: --over null_space.gain=1:20:5, for example"
+            "nothing is varied; give --over, for example --over null_space.gain=1:20:5"
         )
     names = [factor.name for factor in found]
     for name in names:
@@ -82,11 +84,12 @@ def _split(text: str) -> tuple[str, str]:
 
 def _factor(key: str, spec: Any) -> Factor:
     try:
-        keys, nothing = split_assignment(f"{key}=")
+        keys, rest = split_assignment(f"{key}=")
     except ValueError:
-        nothing = key
-    if nothing:
-        raise SweepError(f"--over {key}: is no key path such as null_space.gain")
+        rest = key
+    if rest:
+        raise SweepError(f"--over {key}: is not a key path such as null_space.gain")
+    keys = current_keys(keys, f"--over {key}")
     try:
         return Factor(tuple(keys), _distribution(spec))
     except SweepError as error:
@@ -102,12 +105,12 @@ def _distribution(spec: Any) -> Distribution:
         spec = spec.tolist()
     if not isinstance(spec, list | tuple | range):
         raise SweepError(
-            f"{spec!r} is neither a text such as '1:10:5', nor a list of values, nor "
+            f"{spec!r} is not valid; needs text such as '1:10:5', a list of values, or "
             "a distribution"
         )
     return Choices(tuple(_plain(value) for value in spec))
 
 
 def _plain(value: Any) -> Any:
-    """Return NumPy's scalars and arrays as Python's, for JSON."""
+    """Return NumPy scalars and arrays as Python numbers and lists, for JSON."""
     return value.tolist() if isinstance(value, np.generic | np.ndarray) else value

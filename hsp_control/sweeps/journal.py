@@ -1,8 +1,8 @@
-"""The journal: rows in the order in which they came, safe against any end.
+"""The journal: finished rows in their order of arrival, safe if the process is killed.
 
-Parquet cannot be appended to, so rows go to a text file beside it, one JSON text a
-line. A process that is killed in the middle of a line leaves half a line, which reading
-leaves out and writing cuts off.
+Rows cannot be appended to a Parquet file, so they are written to a text file beside it,
+one line of JSON per row. A process that is killed while writing leaves an incomplete
+line; reading ignores it, and the next writing removes it.
 """
 
 import fcntl
@@ -18,26 +18,26 @@ from hsp_control.sweeps.row import Row
 
 
 def journal_of(out: Path) -> Path:
-    """Return the place of a sweep's journal."""
+    """Return the path of a sweep's journal."""
     return out.with_name(f"{out.name}.journal")
 
 
 class Journal:
-    """A file of finished runs, open for appending by one process alone.
+    """A file of finished runs, open for appending by only one process.
 
     Attributes:
         path: The file.
-        identity: Of the sweep that it belongs to; None for a new journal.
-        rows: The rows that it held when it was opened.
-        described: Units and meanings of the metrics in them.
+        identity: The identity of its sweep; None for a new journal.
+        rows: The rows that it contained when it was opened.
+        described: Units and meanings of the metrics in these rows.
     """
 
     def __init__(self, path: Path) -> None:
-        """Open a journal, or begin one.
+        """Open a journal, or create one.
 
         Raises:
-            SweepError: If another process has it open, it is no journal, or its folder
-                cannot be written.
+            SweepError: If another process has opened it, it is not a journal, or its
+                folder cannot be written.
         """
         self.path = path
         self.identity: dict[str, Any] | None = None
@@ -67,13 +67,13 @@ class Journal:
             ) from None
 
     def begin(self, identity: dict[str, Any]) -> None:
-        """Empty the journal, and say whose it is."""
+        """Empty the journal, and write the identity of its sweep."""
         self._file.truncate(0)
         self.identity, self.rows, self.described = identity, [], {}
         self._write({"sweep": identity})
 
     def add(self, row: Row, found: dict[str, Measure]) -> None:
-        """Append a row; it is in the operating system's hands when this returns."""
+        """Append a row; when this returns, the operating system has the data."""
         new = {name: m for name, m in found.items() if name not in self.described}
         if new:
             self.described |= new
@@ -81,13 +81,13 @@ class Journal:
         self._write({"row": asdict(row)})
 
     def close(self) -> None:
-        """Close the file; it can be resumed from."""
+        """Close the file; a sweep can resume from it."""
         self._file.flush()
         os.fsync(self._file.fileno())
         self._file.close()
 
     def remove(self) -> None:
-        """Close and delete the file: its rows have another place."""
+        """Close and delete the file, after its rows were saved elsewhere."""
         self._file.close()
         self.path.unlink(missing_ok=True)
 
@@ -96,7 +96,7 @@ class Journal:
         self._file.flush()
 
     def _read(self) -> None:
-        """Take what whole lines say, and cut off half a line."""
+        """Read the complete lines, and remove an incomplete last line."""
         self._file.seek(0)
         text = self._file.read()
         whole = text[: text.rfind("\n") + 1]
@@ -111,6 +111,6 @@ class Journal:
                 self.rows.append(Row(**entry["row"]))
         beginning = '{"sweep": '
         if not whole and not beginning.startswith(text[: len(beginning)]):
-            raise ValueError("its first line is another program's")
+            raise ValueError("its first line has another format")
         if len(whole) < len(text):
             self._file.truncate(len(whole.encode()))

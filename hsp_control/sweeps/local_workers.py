@@ -1,8 +1,8 @@
 """Run tasks in processes on this machine.
 
-Each worker is a fresh interpreter that speaks lines of JSON. That needs no
-``if __name__ == "__main__"`` in the user's script and pickles nothing; and where a
-worker dies, it is known which task it was at, which a process pool does not tell.
+Each worker is a new interpreter that reads and writes lines of JSON. So the user's
+script needs no ``if __name__ == "__main__"``, and nothing is pickled. If a worker dies,
+its task is known; a process pool does not report it.
 """
 
 import os
@@ -21,32 +21,32 @@ from hsp_control.sweeps.running import crashed
 from hsp_control.sweeps.worker import READY, main
 
 _ATTEMPTS = 2
-"""How often a task is begun whose worker dies, before it is held to be the cause."""
+"""How often a task may kill its worker before it is given up."""
 
 _ONE_THREAD = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1"
 )
-"""The matrices are small: more threads only wait, and take the other workers' cores."""
+"""The matrices are small: more threads would only slow down the other workers."""
 
 
 _MAIN = f"from {main.__module__} import main; main()"
 
 _Results: TypeAlias = "queue.SimpleQueue[tuple[int, str] | Exception | None]"
-"""What the threads that feed workers report; None: one of them is done."""
+"""Runs and results from the threads that serve workers; None: a thread has ended."""
 
 
 class LocalWorkers:
-    """Processes that run tasks, used within a ``with`` block.
+    """Processes that run tasks, used in a ``with`` block.
 
     Attributes:
-        count: How many.
+        count: The number of processes.
     """
 
     def __init__(self, count: int) -> None:
-        """Set how many; they start with the first task.
+        """Set the number of processes; they start with the first task.
 
         Raises:
-            SweepError: If there are none.
+            SweepError: If the number is less than 1.
         """
         if count < 1:
             raise SweepError(f"{count} workers; needs at least 1")
@@ -59,14 +59,14 @@ class LocalWorkers:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Stop all workers at once; a run in progress is lost."""
+        """Stop all workers at once; unfinished runs are lost."""
         self._closed.set()
         with self._lock:
             for process in self._processes.values():
                 process.kill()
 
     def map(self, tasks: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-        """Yield every task's result as soon as it is there.
+        """Yield every task's result as soon as it is available.
 
         Args:
             tasks: Runs and their tasks (`hsp_control.sweeps.plan.Plan.task`).
@@ -95,7 +95,7 @@ class LocalWorkers:
                 yield result
 
     def _serve(self, source: "_Shared", done: "_Results") -> None:
-        """Feed one worker until there are no tasks; replace it when it dies."""
+        """Give tasks to one worker until there are no more; replace it if it dies."""
         process: subprocess.Popen[str] | None = None
         try:
             while not self._closed.is_set() and (next_one := source.take()):
@@ -123,7 +123,7 @@ class LocalWorkers:
             if self._closed.is_set():
                 raise SweepError("the workers are closed")
             process = subprocess.Popen(
-                # -P: this package is meant, not one in the folder one stands in.
+                # -P: import this package, not one in the working folder.
                 [sys.executable, "-P", "-c", _MAIN],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
@@ -134,12 +134,12 @@ class LocalWorkers:
             self._processes[process.pid] = process
         assert process.stdout is not None
         if process.stdout.readline().strip() != READY:
-            raise SweepError(f"a worker does not start: {_end(process)}")
+            raise SweepError(f"a worker cannot start: {_end(process)}")
         return process
 
 
 class _Shared:
-    """An iterator that several threads take from."""
+    """An iterator that several threads share."""
 
     def __init__(self, tasks: Iterator[tuple[int, str]]) -> None:
         self._tasks = tasks
@@ -151,27 +151,27 @@ class _Shared:
 
 
 def _ask(process: subprocess.Popen[str], task: str) -> str | None:
-    """Return a worker's answer; None if it died over it."""
+    """Return a worker's result; None if the worker died."""
     assert process.stdin is not None
     assert process.stdout is not None
     try:
         process.stdin.write(task + "\n")
         process.stdin.flush()
         answer = process.stdout.readline()
-    except OSError:  # its end of the pipe is closed
+    except OSError:  # the worker has closed its end of the pipe
         return None
     return answer if answer.endswith("\n") else None
 
 
 def _end(process: subprocess.Popen[str]) -> str:
-    """Stop a worker, if it has not stopped, and say how it ended."""
+    """Stop a worker if it is still running, and return how it ended."""
     for pipe in (process.stdin, process.stdout):
         assert pipe is not None
-        with suppress(OSError):  # what was not yet written to a dead worker
+        with suppress(OSError):  # data left for a dead worker
             pipe.close()
     code = process.wait()
     if code >= 0:
-        return f"the worker left with status {code}"
+        return f"the worker exited with status {code}"
     try:
         name = signal.Signals(-code).name
     except ValueError:

@@ -1,4 +1,4 @@
-"""What a run is summarised by: a few numbers of its rollout."""
+"""Metrics: the numbers that summarise a run."""
 
 from typing import NamedTuple
 
@@ -19,8 +19,8 @@ class Measure(NamedTuple):
 
     Attributes:
         value: The number.
-        unit: Its unit, a dash for a mere number.
-        meaning: What it is, in a few words.
+        unit: Its unit; a dash if it has none.
+        meaning: A short description.
     """
 
     value: float
@@ -29,10 +29,10 @@ class Measure(NamedTuple):
 
 
 def measures(rollout: Rollout) -> dict[str, Measure]:
-    """Return a run's summary, by the names of a sweep's columns.
+    """Return the metrics of a run, by the names of a sweep's columns.
 
-    A run that ended early is summarised as far as it came; ``simulated_time`` says how
-    far that is.
+    For a run that ended early they are computed until its end; ``simulated_time`` is
+    the time until then.
     """
     if not len(rollout):
         return {}
@@ -41,7 +41,9 @@ def measures(rollout: Rollout) -> dict[str, Measure]:
         name = f"tracking.{part.label.replace(' ', '.')}"
         what = f"error of {part.label}"
         found[f"{name}.rms"] = Measure(_rms(part.norm), part.unit, f"rms {what}")
-        found[f"{name}.max"] = Measure(_most(part.norm), part.unit, f"largest {what}")
+        found[f"{name}.max"] = Measure(
+            _maximum(part.norm), part.unit, f"largest {what}"
+        )
         found[f"{name}.end"] = Measure(
             float(part.norm[-1]), part.unit, f"{what} at the end"
         )
@@ -49,33 +51,35 @@ def measures(rollout: Rollout) -> dict[str, Measure]:
     unit = column_unit(rollout, "null_space_norm")
     found["null_space_error.rms"] = Measure(_rms(e_N), unit, "rms null-space error")
     found["null_space_error.max"] = Measure(
-        _most(e_N), unit, "largest null-space error"
+        _maximum(e_N), unit, "largest null-space error"
     )
     found["null_space_error.end"] = Measure(
         float(e_N[-1]), unit, "null-space error at the end"
     )
     found["manipulability.min"] = Measure(
-        _least(rollout["manipulability"]), "–", "least det(J W⁻¹ Jᵀ)"
+        _minimum(rollout["manipulability"]), "–", "minimum det(J W⁻¹ Jᵀ)"
     )
     found["singular_value.min"] = Measure(
-        _least(rollout["singular_values"]), "–", "least singular value"
+        _minimum(rollout["singular_values"]), "–", "smallest singular value"
     )
     found["damped.fraction"] = Measure(
-        float(np.mean(rollout["damped"])), "–", "share of time near a singularity"
+        float(np.mean(rollout["damped"])), "–", "fraction of time near a singularity"
     )
     for field in distances(rollout):
         found[f"distance.{field}.min"] = Measure(
-            _least(rollout[f"distance.{field}"]), "m", f"least distance of {field}"
+            _minimum(rollout[f"distance.{field}"]), "m", f"minimum distance of {field}"
         )
     unit = effort_unit(rollout)
-    found["effort.max"] = Measure(_most(np.abs(rollout.tau)), unit, "largest effort")
+    found["effort.max"] = Measure(_maximum(np.abs(rollout.tau)), unit, "largest effort")
     found["effort.rms"] = Measure(
         _rms(np.linalg.norm(rollout.tau, axis=1)), unit, "rms effort of all joints"
     )
     unit = column_unit(rollout, "v")
-    found["speed.max"] = Measure(_most(np.abs(rollout.v)), unit, "largest joint speed")
+    found["speed.max"] = Measure(
+        _maximum(np.abs(rollout.v)), unit, "largest joint speed"
+    )
     found["simulated_time"] = Measure(
-        float(rollout.t[-1] - rollout.t[0]), "s", "how far the run came"
+        float(rollout.t[-1] - rollout.t[0]), "s", "simulated time"
     )
     return found
 
@@ -84,9 +88,9 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _most(values: Array) -> float:
+def _maximum(values: Array) -> float:
     return float(values.max())
 
 
-def _least(values: Array) -> float:
+def _minimum(values: Array) -> float:
     return float(values.min())

@@ -1,4 +1,4 @@
-"""Named columns and their description, in one Parquet file."""
+"""Read and write named columns and their metadata as one Parquet file."""
 
 import json
 import os
@@ -18,7 +18,7 @@ _KEY = b"hsp_control"
 
 
 def require_parquet() -> None:
-    """Say at once, not after hours, that a file could not be written.
+    """Check that Parquet files can be written, before hours of computation.
 
     Raises:
         SweepError: If pyarrow is not installed.
@@ -34,7 +34,7 @@ def require_parquet() -> None:
 def write_parquet(
     path: Path, columns: Mapping[str, NDArray[Any]], meta: dict[str, Any]
 ) -> Path:
-    """Write columns; beside their place first, so that no half file bears the name.
+    """Write columns and metadata; to a temporary file first, which is then renamed.
 
     Raises:
         SweepError: If the file cannot be written.
@@ -43,7 +43,7 @@ def write_parquet(
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    # from_pandas: NaN, a metric that a run has not, becomes Parquet's null.
+    # from_pandas: NaN (a metric that a run does not have) becomes null.
     arrays = {
         name: pa.array(column, from_pandas=True) for name, column in columns.items()
     }
@@ -57,7 +57,7 @@ def write_parquet(
             os.fsync(file.fileno())
         part.replace(path)
     except OSError as error:
-        with suppress(OSError):  # its folder may be no folder
+        with suppress(OSError):  # its folder may not exist
             part.unlink(missing_ok=True)
         reason = error.strerror or str(error)
         raise SweepError(f"{path}: cannot write the sweep: {reason}") from error
@@ -65,10 +65,10 @@ def write_parquet(
 
 
 def read_parquet(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Return columns and description.
+    """Return columns and metadata.
 
     Raises:
-        SweepError: If the file is missing, broken, or another program's.
+        SweepError: If the file is missing, damaged, or not a sweep.
     """
     require_parquet()
     import pyarrow as pa
@@ -80,8 +80,8 @@ def read_parquet(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     except FileNotFoundError:
         if journal_of(path).is_file():
             raise SweepError(
-                f"{path}: not there yet, only its journal: the sweep is running or was "
-                "killed. The same command resumes it"
+                f"{path}: does not exist yet, only its journal: the sweep is running "
+                "or was killed; the same command resumes it"
             ) from None
         near = [file.name for file in path.parent.glob("*.parquet")]
         raise SweepError(
@@ -89,10 +89,10 @@ def read_parquet(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         ) from None
     except (OSError, pa.ArrowException) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise SweepError(f"{path}: not a whole Parquet file: {reason}") from error
+        raise SweepError(f"{path}: not a complete Parquet file: {reason}") from error
     described = (table.schema.metadata or {}).get(_KEY)
     if described is None:
-        raise SweepError(f"{path}: a Parquet file, but not of a sweep")
+        raise SweepError(f"{path}: a Parquet file, but not a sweep")
     return {name: _column(table[name]) for name in table.column_names}, dict(
         json.loads(described)
     )

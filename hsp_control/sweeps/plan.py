@@ -1,4 +1,4 @@
-"""A plan: every run of a sweep, as plain data, and what makes two sweeps the same."""
+"""A plan: every run of a sweep as plain data, and the identity of the sweep."""
 
 import hashlib
 import json
@@ -14,7 +14,7 @@ from hsp_control.config.experiment import build
 from hsp_control.simulation.recorder import versions
 from hsp_control.sweeps.factor import Factor
 
-_TRIALS = 20  # a sweep of which that many runs cannot be built is a mistake
+_TRIALS = 20  # if so many runs cannot be built, the sweep itself is wrong
 
 
 @dataclass(frozen=True)
@@ -22,13 +22,12 @@ class Plan:
     """Every run of a sweep.
 
     Attributes:
-        name: Of the configuration: a bundled name or a path, whose folder is where
-            relative paths in it begin.
+        name: Path of the configuration; relative paths in it begin at its folder.
         data: The configuration, plain data.
-        factors: What is varied.
+        factors: The varied parameters.
         design: See `hsp_control.sweeps.design.Design`.
-        samples: How many runs were asked for; None for a grid.
-        seed: Of the design.
+        samples: The requested number of runs; None for a grid.
+        seed: Seed of the design.
         points: Each run's values, in the order of the factors.
     """
 
@@ -44,14 +43,14 @@ class Plan:
         return len(self.points)
 
     def task(self, run: int) -> str:
-        """Return all that a worker needs for a run, as a JSON text."""
-        # Its paths begin where its file is, and a worker may stand anywhere.
+        """Return all data that a worker needs for a run, as a JSON text."""
+        # Absolute, because a worker may have another working folder.
         name = str(Path(self.name).resolve())
         parts = {"name": name, "data": self.data, "changes": self.changes(run)}
         return json.dumps(parts)
 
     def changes(self, run: int) -> list[dict[str, Any]]:
-        """Return where a run's values go, for `insert`."""
+        """Return the values of a run and their key paths, for `insert`."""
         return [
             {"keys": list(factor.keys), "value": value, "origin": factor.origin}
             for factor, value in zip(self.factors, self.points[run], strict=True)
@@ -60,36 +59,36 @@ class Plan:
     def first_run(self) -> int:
         """Return the first run that can be built.
 
-        Single runs may be refused, and are then rows that say why. Where none of the
-        first can be built, the sweep itself is wrong.
+        A single run that cannot be built becomes a row with the reason. If none of the
+        first runs can be built, the sweep itself is wrong.
 
         Raises:
-            HspControlError: What refused the first run, if its successors fail too.
+            HspControlError: The error of the first run, if the next runs fail, too.
         """
-        refusal: HspControlError | None = None
+        first_error: HspControlError | None = None
         for run in range(min(len(self), _TRIALS)):
             try:
                 self.experiment(run)
             except HspControlError as error:
-                refusal = refusal or error
+                first_error = first_error or error
             else:
                 return run
-        assert refusal is not None
-        raise refusal
+        assert first_error is not None
+        raise first_error
 
     def experiment(self, run: int) -> Experiment:
         """Return a run's objects.
 
         Raises:
-            HspControlError: If its configuration is refused.
+            HspControlError: If its configuration is wrong.
         """
         return build(document(self.task(run)))
 
     def identity(self, experiment: Experiment) -> dict[str, Any]:
-        """Return what two sweeps must share for one to continue the other.
+        """Return the data that must be equal for one sweep to continue another.
 
-        The model itself is in it, for a URDF may change under its name; so are the
-        versions that numbers depend on.
+        They include the model, because a URDF may change under its name, and the
+        versions of packages that the numbers depend on.
         """
         model = experiment.robot.model.saveToString()
         identity = {
@@ -101,11 +100,11 @@ class Plan:
             "model": hashlib.sha256(model.encode()).hexdigest(),
             "versions": versions(),
         }
-        return dict(json.loads(json.dumps(identity)))  # as files give it back
+        return dict(json.loads(json.dumps(identity)))  # as read from files
 
 
 def document(task: str) -> Document:
-    """Return the configuration of a task: the plan's with the run's values in it.
+    """Return the configuration of a task: the plan's, with the run's values.
 
     Raises:
         ConfigError: If a key path leads nowhere.
@@ -117,7 +116,7 @@ def document(task: str) -> Document:
 
 
 def insert(base: Document, changes: Iterable[dict[str, Any]]) -> None:
-    """Put a run's values into a configuration.
+    """Set a run's values in a configuration.
 
     Raises:
         ConfigError: If a key path leads nowhere.

@@ -1,4 +1,4 @@
-"""A sweep: what was varied and what came of it, as named columns; and its file."""
+"""A sweep: its parameters and metrics as named columns, and its file."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -21,20 +21,21 @@ Column = NDArray[Any]
 
 
 class Sweep:
-    """Runs of one configuration: columns of equal length, one row a run.
+    """Runs of one configuration: columns of equal length, one row per run.
 
     Columns are ``run``, ``status``, ``message``, ``wall_time``, the parameters by their
-    key paths, and the metrics, NaN where a run has none.
+    key paths, and the metrics. A metric that a run does not have is NaN.
 
     Attributes:
-        columns: Arrays by name; texts are of NumPy's type ``object``.
+        columns: Arrays by name; text columns have NumPy's type ``object``.
         meta: JSON data: ``format``; ``identity`` (configuration, factors, design, seed,
-            versions); ``name``; ``runs``, how many are planned; ``parameters``, name to
-            keys and whether values are JSON; ``metrics``, name to unit and meaning.
+            versions); ``name``; ``runs``, the number of planned runs; ``parameters``:
+            for each name its keys and whether its values are JSON; ``metrics``: for
+            each name its unit and meaning.
     """
 
     def __init__(self, columns: Mapping[str, Column], meta: dict[str, Any]) -> None:
-        """Keep columns and their description."""
+        """Create it from columns and metadata."""
         self.columns = dict(columns)
         self.meta = meta
 
@@ -56,14 +57,14 @@ class Sweep:
         }
         parameters = {}
         for k, factor in enumerate(plan.factors):
-            # By all values of the plan, so that the type is that of the whole sweep.
+            # From all values of the plan, so that partial sweeps have the same type.
             column = _parameter([point[k] for point in plan.points])
             encoded = column is None
             if column is None:
                 column = _texts([json.dumps(point[k]) for point in plan.points])
             columns[factor.name] = column[columns["run"]]
             parameters[factor.name] = {"keys": list(factor.keys), "json": encoded}
-        # By run, not in the order in which runs were done: that is another each time.
+        # In the order of runs; the order in which they finish varies.
         measured = [name for row in ordered for name in row.metrics]
         names = list(dict.fromkeys([*measured, *described]))
         for name in names:
@@ -102,26 +103,26 @@ class Sweep:
 
     @property
     def parameters(self) -> list[str]:
-        """The names of what was varied."""
+        """The names of the varied parameters."""
         return list(self.meta["parameters"])
 
     @property
     def metrics(self) -> list[str]:
-        """The names of what was measured."""
+        """The names of the metrics."""
         return list(self.meta["metrics"])
 
     @property
     def complete(self) -> bool:
-        """Whether every run that was planned has its row."""
+        """Whether every planned run has a row."""
         return len(self) == int(self.meta["runs"])
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """Which runs reached their end, shape (N,)."""
+        """Whether each run was completed, shape (N,)."""
         return np.asarray(self.columns["status"] == "completed")
 
     def configuration(self, run: int) -> dict[str, Any]:
-        """Return the whole configuration of a run, to look at it again.
+        """Return the complete configuration of a run, to repeat or inspect it.
 
         For example ``hsp.load_experiment(sweep.configuration(17)).run()``.
 
@@ -147,7 +148,7 @@ class Sweep:
         return document(json.dumps(task)).to_dict()
 
     def rows(self) -> list[Row]:
-        """Return the runs as rows, without the parameters, which the plan knows."""
+        """Return the runs as rows, without the parameters, which are in the plan."""
         names = self.metrics
         return [
             Row(
@@ -161,7 +162,7 @@ class Sweep:
         ]
 
     def save(self, path: str | Path) -> Path:
-        """Write one Parquet file.
+        """Write the sweep to one Parquet file.
 
         Raises:
             SweepError: If it cannot be written, or pyarrow is not installed.
@@ -173,7 +174,7 @@ class Sweep:
         """Read a sweep's file.
 
         Raises:
-            SweepError: If it is missing or not a sweep's, or pyarrow is not installed.
+            SweepError: If the file is missing or not a sweep, or pyarrow is missing.
         """
         path = Path(path)
         columns, meta = read_parquet(path)
@@ -190,7 +191,7 @@ def _texts(values: list[str]) -> Column:
 
 
 def _parameter(values: list[Any]) -> Column | None:
-    """Return values as a column of one type; None if they have none in common."""
+    """Return values as a column of one type; None if they have different types."""
     kinds = {type(value) for value in values}
     if kinds == {str}:
         return _texts(values)

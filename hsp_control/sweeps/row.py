@@ -1,9 +1,9 @@
-"""A row: how one run ended and what it measured."""
+"""A row: how one run ended, and its metrics."""
 
 from dataclasses import dataclass, field
 
 CRASHED = "crashed"
-"""The worker died: not a result, and tried again when the sweep is resumed."""
+"""The worker died: this is not a result; the run is repeated when the sweep resumes."""
 
 
 @dataclass(frozen=True)
@@ -11,14 +11,14 @@ class Row:
     """One run of a sweep.
 
     Attributes:
-        run: Its place in the plan.
-        status: ``completed``; ``diverged``: summarised as far as it came; ``refused``:
-            the configuration is not one; ``failed``: an error nobody foresaw;
+        run: Its number in the plan.
+        status: ``completed``; ``diverged``: the metrics are those until then;
+            ``refused``: the configuration is wrong; ``failed``: an unexpected error;
             ``crashed``: the worker died.
-        message: Why, where it is not ``completed``.
+        message: The reason, if the status is not ``completed``.
         metrics: Numbers by name.
-        wall_time: How long it took [s]; the only thing that may differ from one
-            machine, or number of workers, to another.
+        wall_time: Computation time [s]; the only entry that depends on the machine and
+            the number of workers.
     """
 
     run: int

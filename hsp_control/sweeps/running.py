@@ -1,4 +1,4 @@
-"""Run one task: plain text in, plain text out, in whatever process and machine."""
+"""Run one task, in any process or machine: text in, text out."""
 
 import json
 from functools import cache
@@ -14,9 +14,9 @@ from hsp_control.sweeps.row import CRASHED, Row
 
 
 def run_task(task: str) -> str:
-    """Run a task and return its result; nothing is raised, whatever happens.
+    """Run a task and return its result; no error is raised.
 
-    Both are JSON: a worker needs no code but this package's, and trusts no other.
+    Both are JSON: a worker needs and executes only the code of this package.
 
     Args:
         task: See `Plan.task`.
@@ -30,7 +30,7 @@ def run_task(task: str) -> str:
         status, message, rollout = _run(task)
         if rollout is not None:
             found = measures(rollout)
-    except Exception as error:  # one run must not end thousands
+    except Exception as error:  # one failed run must not end the sweep
         status, message = "failed", f"{type(error).__name__}: {error}"
     return json.dumps(
         {
@@ -49,7 +49,7 @@ def crashed(reason: str) -> str:
 
 
 def read_result(run: int, text: str) -> tuple[Row, dict[str, Measure], dict[str, str]]:
-    """Return a result's row, what it measured, and the versions it was made with."""
+    """Return a result's row, its measures, and the package versions of its worker."""
     result = json.loads(text)
     found = {k: Measure(*measure) for k, measure in result.get("measures", {}).items()}
     metrics = {name: measure.value for name, measure in found.items()}

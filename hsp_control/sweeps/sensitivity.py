@@ -1,4 +1,4 @@
-"""Which parameter moves which result, from the runs of any design."""
+"""The influence of each parameter on each metric, from the runs of any design."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,31 +11,31 @@ from hsp_control.common.exceptions import SweepError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.sweeps.results import Column, Sweep
 
-LEAST_RUNS = 8
-"""Completed runs below which nothing is said: chance alone correlates so few."""
+MIN_RUNS = 8
+"""Fewest completed runs; fewer runs correlate by chance."""
 
 CHANCE = 0.05
-"""How likely chance alone may be to look like what counts as an influence."""
+"""Significance level: the probability that chance alone looks like an influence."""
 
-_CLASSES = 12  # into which a parameter with more values is cut
+_CLASSES = 12  # for a parameter with more values
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What the runs of a sweep tell of each parameter's influence on each result.
+    """The influence of each parameter of a sweep on each metric.
 
     Attributes:
-        parameters: Names of p parameters, those that took more than one value.
-        outcomes: Names of m results.
-        correlation: Spearman's rank correlation, shape (p, m): 1 where the result grows
-            whenever the parameter does, -1 where it falls; NaN where the parameter has
-            no order (texts, lists) or the result does not vary.
-        share: First-order share of the result's variance (of its ranks) that the
-            parameter explains alone, in any form, also where it has an optimum in the
-            middle, shape (p, m): 0, where it may be chance, to 1; NaN where all values
-            differ and have no order.
-        noise: What |correlation| chance alone exceeds in one of twenty cases.
-        runs: How many completed runs it is made of.
+        parameters: Names of the p parameters that have more than one value.
+        outcomes: Names of the m metrics.
+        correlation: Spearman's rank correlation, shape (p, m): 1 if the metric always
+            increases with the parameter, -1 if it always decreases; NaN if the
+            parameter has no order (texts, lists) or the metric is constant.
+        share: First-order share of the variance of the metric's ranks that the
+            parameter explains alone, shape (p, m), from 0 (also if not significant) to
+            1. It includes non-monotonic influences, such as an optimum in the middle.
+            NaN if all values differ and have no order.
+        noise: The |correlation| that chance alone exceeds in one of twenty cases.
+        runs: The number of completed runs.
     """
 
     parameters: tuple[str, ...]
@@ -47,7 +47,7 @@ class Sensitivity:
 
 
 def default_outcomes(sweep: Sweep) -> list[str]:
-    """Return the results that one asks for first: tracking, null space, distances."""
+    """Return the most useful metrics: tracking, null space, distances, efforts."""
     wanted = [
         *(name for name in sweep.metrics if _is(name, "tracking.", ".rms")),
         "null_space_error.rms",
@@ -59,17 +59,17 @@ def default_outcomes(sweep: Sweep) -> list[str]:
 
 
 def sensitivity(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Sensitivity:
-    """Return how results depend on parameters, over the completed runs.
+    """Return how metrics depend on parameters, over the completed runs.
 
-    Ranks are compared, not values: errors and distances span decades, and one run near
-    a singularity would outweigh all others.
+    Ranks are compared, not values: errors and distances span orders of magnitude, and
+    one run near a singularity would dominate all others.
 
     Args:
         sweep: The sweep.
         outcomes: Names of metrics; None: see `default_outcomes`.
 
     Raises:
-        SweepError: If there is no such metric, or too few runs were completed.
+        SweepError: If there is no such metric, or there are too few completed runs.
     """
     names = default_outcomes(sweep) if outcomes is None else list(outcomes)
     for name in names:
@@ -82,9 +82,9 @@ def sensitivity(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Sensitiv
             raise SweepError(f"no completed run has the metric {name!r}")
     chosen = sweep.completed
     runs = int(chosen.sum())
-    if runs < LEAST_RUNS:
+    if runs < MIN_RUNS:
         raise SweepError(
-            f"{runs} runs were completed; sensitivities need at least {LEAST_RUNS}"
+            f"{runs} runs were completed; sensitivities need at least {MIN_RUNS}"
         )
     parameters = [p for p in sweep.parameters if len(set(sweep[p][chosen])) > 1]
     shape = (len(parameters), len(names))
@@ -94,7 +94,7 @@ def sensitivity(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Sensitiv
         for j, name in enumerate(names):
             y = sweep[name][chosen].astype(float)
             known = np.isfinite(y)
-            if known.sum() >= LEAST_RUNS:
+            if known.sum() >= MIN_RUNS:
                 correlation[i, j], share[i, j] = _influence(x[known], y[known])
     noise = 1.96 / np.sqrt(runs - 1)
     return Sensitivity(
@@ -103,13 +103,13 @@ def sensitivity(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Sensitiv
 
 
 def has_order(column: Column) -> bool:
-    """Return whether a parameter's values are numbers, which one can be more of."""
+    """Return whether a parameter's values have an order (numbers and booleans)."""
     return bool(np.issubdtype(column.dtype, np.number) or column.dtype == bool)
 
 
 def _influence(x: Column, y: Array) -> tuple[float, float]:
-    """Return rank correlation and explained share of one result by one parameter."""
-    from scipy.stats import rankdata  # here: it takes longer to import than all else
+    """Return rank correlation and explained share of one metric by one parameter."""
+    from scipy.stats import rankdata  # here, because this import is slow
 
     rank = rankdata(y)
     if np.ptp(rank) == 0.0:
@@ -130,11 +130,10 @@ def _influence(x: Column, y: Array) -> tuple[float, float]:
 
 
 def _explained(classes: Column, rank: Array) -> float:
-    """Return ε² = 1 - (within-class variance)/(variance), both without bias.
+    """Return ε² = 1 - (within-class variance)/(variance), both unbiased.
 
-    The correlation ratio η² alone would call chance an influence where classes are
-    small; what an F test (here nearly Kruskal and Wallis's) does not tell from chance
-    counts as nothing.
+    The correlation ratio η² alone is too large for small classes. So the result is 0 if
+    an F test (here nearly the Kruskal-Wallis test) is not significant.
     """
     count = np.bincount(classes)
     means = np.bincount(classes, rank) / np.maximum(count, 1)

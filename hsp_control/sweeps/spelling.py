@@ -1,4 +1,4 @@
-"""How values are spelled on the command line: ``1:10:5``, ``normal:0:0.1``, ``a,b``."""
+"""Parse values from the command line: ``1:10:5``, ``normal:0:0.1``, ``a,b``."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -20,7 +20,7 @@ from hsp_control.sweeps.distributions import (
 )
 
 MAX_LEVELS = 100_000
-"""Values in a range; more is a slip of the finger."""
+"""Most values in a range; more is probably a typing error."""
 
 _WHOLE = re.compile(r"[-+]?[0-9]{1,18}")
 _WORDS: dict[str, tuple[str, tuple[int, ...], Callable[..., Distribution]]] = {
@@ -31,29 +31,31 @@ _WORDS: dict[str, tuple[str, tuple[int, ...], Callable[..., Distribution]]] = {
     "normal": ("normal:MEAN:DEVIATION[:LOW:HIGH]", (2, 4), Normal),
     "integers": ("integers:LOW:HIGH", (2,), Integers),
 }
-_WANTING_INTEGERS = {"linear": (2,), "log": (2,), "integers": (0, 1)}
+_INTEGER_ARGUMENTS = {"linear": (2,), "log": (2,), "integers": (0, 1)}
 
 
 def values(text: str) -> Distribution:
-    """Return what a text means: a list, a range, or a distribution.
+    """Return the distribution for a text: a list, a range, or a random distribution.
 
     ========================= =========================================================
     ``a,b,c``                 these values, each any YAML: ``[0,0,1],[0,1,0]``
     ``1:10:5``                5 numbers from 1 to 10; also ``linear:1:10:5``
-    ``log:1:100:5``           5 numbers in a constant ratio
-    ``1:10``                  any number between; also ``uniform:1:10``
-    ``loguniform:1:100``      any number between, its logarithm uniform
-    ``normal:0:0.1``          mean and standard deviation
-    ``normal:1:0.1:0:2``      the same, cut off at 0 and 2
-    ``integers:0:999``        any whole number between, both included
+    ``log:1:100:5``           5 numbers with a constant ratio
+    ``1:10``                  random numbers, uniform; also ``uniform:1:10``
+    ``loguniform:1:100``      random numbers with a uniform logarithm
+    ``normal:0:0.1``          random numbers: mean and standard deviation
+    ``normal:1:0.1:0:2``      the same, truncated to 0 ... 2
+    ``integers:0:999``        random integers, both ends included
     ========================= =========================================================
 
     Raises:
-        SweepError: If it means nothing.
+        SweepError: If the text has none of these forms.
     """
     text = text.strip()
     if not text:
-        raise SweepError("needs values, such as 1,2,5 or 1:10:5 or uniform:1:10")
+        raise SweepError(
+            "the values are missing; give them as 1,2,5 or 1:10:5 or uniform:1:10"
+        )
     word, *arguments = (part.strip() for part in text.split(":"))
     if not arguments or text[0] in "[{'\"":
         return Choices(tuple(_listed(text)))
@@ -61,8 +63,8 @@ def values(text: str) -> Distribution:
         return _spelled(word, arguments)
     if _number(word) is None:
         raise SweepError(
-            f"{word!r} is no kind of range{did_you_mean(word, _WORDS)} "
-            f"(there are {', '.join(_WORDS)}; texts with a colon go in quotes)"
+            f"unknown kind of range {word!r}{did_you_mean(word, _WORDS)} "
+            f"(allowed: {', '.join(_WORDS)}; put text with a colon in quotes)"
         )
     numbers = [word, *arguments]
     if len(numbers) > 3:
@@ -76,14 +78,16 @@ def _spelled(word: str, arguments: Sequence[str]) -> Distribution:
     form, counts, make = _WORDS[word]
     numbers = [_number(argument) for argument in arguments]
     if len(numbers) not in counts:
-        raise SweepError(f"{word} takes {form}, not {len(numbers)} numbers")
+        raise SweepError(f"{word} has {len(numbers)} numbers; needs {form}")
     for place, (number, argument) in enumerate(zip(numbers, arguments, strict=True)):
-        whole = place in _WANTING_INTEGERS.get(word, ())
+        whole = place in _INTEGER_ARGUMENTS.get(word, ())
         if number is None or (whole and not isinstance(number, int)):
             what = "an integer" if whole else "a number"
-            raise SweepError(f"{argument!r} is not {what}; {word} takes {form}")
+            raise SweepError(f"{argument!r} is not {what}; needs {form}")
         if form.endswith("COUNT") and whole and number > MAX_LEVELS:
-            raise SweepError(f"{number} values are more than {MAX_LEVELS}")
+            raise SweepError(
+                f"the range has {number} values; at most {MAX_LEVELS} are allowed"
+            )
     return make(*numbers)
 
 

@@ -1,4 +1,4 @@
-"""Where a sweep's rows are kept, from the first run to the finished file."""
+"""The store of a sweep's rows, from the first run to the finished file."""
 
 import json
 from pathlib import Path
@@ -15,25 +15,26 @@ from hsp_control.sweeps.row import CRASHED, Row
 
 
 class Store:
-    """The rows of a sweep: in memory, and in files if it has one.
+    """The rows of a sweep: in memory, and in its files if it has a file name.
 
     Attributes:
-        rows: What is done, by run.
+        rows: The finished rows, by run.
     """
 
     def __init__(
         self, plan: Plan, identity: dict[str, Any], out: Path | None, *, fresh: bool
     ) -> None:
-        """Take up what files have of the sweep.
+        """Read the rows that the files already contain.
 
         Args:
-            plan: What is to be run.
+            plan: The planned runs.
             identity: See `Plan.identity`.
-            out: The sweep's file; None: rows are kept in memory alone.
-            fresh: Begin anew, whatever there is.
+            out: The sweep's file; None: rows are only kept in memory.
+            fresh: Start again, and overwrite the files.
 
         Raises:
-            SweepError: If the files are of another sweep, in use, or unwritable.
+            SweepError: If the files belong to another sweep, are in use, or cannot be
+                written.
         """
         self.rows: dict[int, Row] = {}
         self._described: dict[str, Measure] = {}
@@ -56,21 +57,21 @@ class Store:
 
     @property
     def pending(self) -> list[int]:
-        """The runs that are left to do."""
+        """The runs that are not finished."""
         return [run for run in range(len(self._plan)) if run not in self.rows]
 
     def add(self, row: Row, found: dict[str, Measure]) -> None:
-        """Keep a row: once this returns, no end of this process loses it."""
+        """Store a row; after that, it survives even if the process is killed."""
         self.rows[row.run] = row
         self._described = {**found, **self._described}
         if self._journal is not None:
             self._journal.add(row, found)
 
     def close(self) -> Sweep:
-        """Write the file, of all rows that there are, and return the sweep.
+        """Write all finished rows to the file, and return the sweep.
 
         Raises:
-            SweepError: If it cannot be written; the journal then stays.
+            SweepError: If the file cannot be written; the journal is then kept.
         """
         sweep = Sweep.collect(
             self._plan, self._identity, self.rows.values(), self._described
@@ -93,11 +94,11 @@ class Store:
             self._compare(out, sweep.meta["identity"])
             earlier = sweep.rows()
             self._described = {
-                name: Measure(0.0, **told)
-                for name, told in sweep.meta["metrics"].items()
+                name: Measure(0.0, **entry)
+                for name, entry in sweep.meta["metrics"].items()
             }
         self._described = {**self._described, **journal.described}
-        # A run that took a worker with it has no result; it is tried once more.
+        # A run whose worker died has no result; it is repeated.
         self.rows = {
             row.run: row for row in [*earlier, *journal.rows] if row.status != CRASHED
         }
@@ -107,17 +108,17 @@ class Store:
             other = identity.get(name)
             if json.dumps(own) != json.dumps(other):
                 raise SweepError(
-                    f"{path}: holds another sweep: {_difference(name, other, own)}; "
-                    "give another --out, or --fresh to begin anew"
+                    f"{path}: contains another sweep: {_difference(name, other, own)}; "
+                    "give another --out, or --fresh to overwrite it"
                 )
 
 
 def _difference(name: str, other: Any, own: Any) -> str:
-    """Return what differs between two parts of sweeps' identities."""
+    """Return the difference between two parts of sweeps' identities, as text."""
     if isinstance(own, dict) and isinstance(other, dict):
         for key in sorted({*own, *other}):
             if json.dumps(own.get(key)) != json.dumps(other.get(key)):
                 return _difference(f"{name}.{key}", other.get(key), own.get(key))
     if name == "model":
-        return "its robot's model is another one"
-    return f"its {name} is {shown(other)}, and not {shown(own)}"
+        return "the model of its robot is different"
+    return f"its {name} is {shown(other)}, not {shown(own)}"

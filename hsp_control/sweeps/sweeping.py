@@ -34,39 +34,39 @@ def sweep(
     fresh: bool = False,
     on_progress: Callable[[int, int, int], None] | None = None,
 ) -> Sweep:
-    """Run an experiment with other values, many times, and return what came of it.
+    """Run an experiment many times with different values, and return the results.
 
-    The numbers depend on the arguments above ``out`` alone: not on how many workers
-    there are, in which order they finish, or how often the sweep was interrupted.
+    The results depend only on the arguments before ``out`` and on ``overrides``: not on
+    the number of workers, the order in which they finish, or interruptions.
 
     Args:
         source: A configuration; see `hsp_control.load_experiment`.
-        over: What is varied: key paths of the configuration and their values, as a
-            mapping ``{"null_space.gain": "1:20:5"}`` or as texts ``key=values``. Values
-            are a text (see `hsp_control.sweeps.spelling.values`), a sequence or a
-            `hsp_control.sweeps.Distribution`.
-        samples: How many runs; None: every combination.
+        over: The varied parameters: key paths of the configuration and their values, as
+            a mapping ``{"null_space.gain": "1:20:5"}`` or as texts ``key=values``.
+            Values are a text (see `hsp_control.sweeps.spelling.values`), a sequence or
+            a `hsp_control.sweeps.Distribution`.
+        samples: The number of runs; None: all combinations.
         design: ``grid``, ``random``, ``latin_hypercube`` or ``sobol``; None: the grid
             without ``samples``, Latin hypercube with them.
-        seed: Of the design.
-        out: A Parquet file. What it or its journal already has of the same sweep is not
-            computed again. None: nothing is written.
+        seed: Seed of the design.
+        out: A Parquet file. Runs of the same sweep that it or its journal contains are
+            not computed again. None: nothing is written.
         overrides: Values to change in all runs, each ``key.path=value``.
-        workers: How many processes; None: one a core.
+        workers: The number of processes; None: one per core.
         scheduler: Address of a Dask scheduler, whose workers are used instead.
-        fresh: Begin anew, whatever ``out`` holds.
-        on_progress: Called with how many runs are done, how many there are, and how
-            many of the done did not complete.
+        fresh: Start again, and overwrite ``out``.
+        on_progress: Called with the number of runs that are done, of all runs, and of
+            runs that are done but not completed.
 
     Returns:
-        The sweep. Ctrl-C ends it early, with all rows computed until then, also in the
-        file; `Sweep.complete` tells.
+        The sweep. Ctrl-C ends it early; the sweep and its file then contain all rows
+        computed so far, and `Sweep.complete` is False.
 
     Raises:
-        SweepError: If the sweep is ill-defined, its file is another sweep's or cannot
-            be written, or no worker can be had.
+        SweepError: If the sweep is not well defined, its file belongs to another sweep
+            or cannot be written, or no worker can be started.
         HspControlError: If the configuration cannot be built with any of the first
-            values. Single runs that are refused, diverge or crash are rows.
+            values. Single runs that cannot be built, diverge or crash are rows.
     """
     varied = factors(over)
     form = chosen_design(design, samples)
@@ -86,19 +86,19 @@ def sweep(
         first = plan.first_run()
     except HspControlError:
         insert(base, plan.changes(0))
-        build(base)  # says the same, and in which line of the file
+        build(base)  # raises the same error, with the line of the file
         raise
     identity = plan.identity(plan.experiment(first))
     path = None if out is None else Path(out)
     if path is not None and path.suffix != ".parquet":
-        raise SweepError(f"{path}: the name of a sweep's file ends in .parquet")
-    with _workers(workers, scheduler) as crew:
+        raise SweepError(f"{path}: the name of a sweep's file must end with .parquet")
+    with _workers(workers, scheduler) as pool:
         store = Store(plan, identity, path, fresh=fresh)
         try:
             with suppress(KeyboardInterrupt):
                 if store.pending:
                     _compile(plan, first)
-                _work(plan, store, crew, on_progress)
+                _run_pending(plan, store, pool, on_progress)
         except BaseException:
             store.close()
             raise
@@ -108,7 +108,7 @@ def sweep(
 def _workers(count: int | None, scheduler: str | None) -> LocalWorkers | DaskWorkers:
     if scheduler is not None:
         if count is not None:
-            raise SweepError("the scheduler has its own workers: leave --workers out")
+            raise SweepError("the scheduler has its own workers; remove --workers")
         return DaskWorkers(scheduler)
     if count is None:
         count = len(os.sched_getaffinity(0))
@@ -116,32 +116,32 @@ def _workers(count: int | None, scheduler: str | None) -> LocalWorkers | DaskWor
 
 
 def _compile(plan: Plan, run: int) -> None:
-    """Run one row, so that workers find kernels compiled instead of all compiling."""
+    """Simulate one log period of a run: workers then find compiled kernels."""
     period = plan.experiment(run).scenario.simulation.log_period
     short = document(plan.task(run))
     short.assign(["simulation", "duration"], period, "")
-    with suppress(HspControlError):  # whatever is wrong with that run, its row will say
+    with suppress(HspControlError):  # the row of that run will contain the error
         if build(short).run().status == "interrupted":
             raise KeyboardInterrupt
 
 
-def _work(
+def _run_pending(
     plan: Plan,
     store: Store,
-    crew: LocalWorkers | DaskWorkers,
+    pool: LocalWorkers | DaskWorkers,
     on_progress: Callable[[int, int, int], None] | None,
 ) -> None:
     own = versions()
     failures = sum(row.status != "completed" for row in store.rows.values())
     if on_progress is not None:
         on_progress(len(store.rows), len(plan), failures)
-    for run, text in crew.map((run, plan.task(run)) for run in store.pending):
+    for run, text in pool.map((run, plan.task(run)) for run in store.pending):
         row, found, others = read_result(run, text)
         if others and others != own:
             name = next(name for name in own if others.get(name) != own[name])
             raise SweepError(
-                f"a worker has {name} {others.get(name)}, here is {own[name]}: its "
-                "numbers would not be comparable"
+                f"a worker has {name} {others.get(name)}, here is {own[name]}: "
+                "they must be equal"
             )
         store.add(row, found)
         failures += row.status != "completed"

@@ -1,4 +1,4 @@
-"""A worker process: reads tasks, a line each, and writes results, a line each."""
+"""A worker process: reads tasks and writes results, one line each."""
 
 import os
 import queue
@@ -7,20 +7,23 @@ import sys
 import threading
 import warnings
 
+from hsp_control.config.renamed import RenamedKeyWarning
 from hsp_control.sweeps.running import run_task
 
 READY = "ready"
-"""The first line that a worker writes: it has imported all that it needs."""
+"""The first line that a worker writes, after all imports."""
 
 
 def main() -> None:
-    """Serve until the standard input ends, which it does when the parent dies."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
-    # What anything prints must not come between the results.
+    """Run tasks until the standard input ends, also because the parent died."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C
+    # Other output must not be mixed with the results.
     results = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
-    # A run that diverges overflows on its way; its row says so.
+    # A run that diverges overflows; its row contains that.
     warnings.simplefilter("ignore", RuntimeWarning)
+    # The parent process has warned of these already.
+    warnings.simplefilter("ignore", RenamedKeyWarning)
     tasks: queue.SimpleQueue[str] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(tasks,), daemon=True).start()
     print(READY, file=results, flush=True)
@@ -29,7 +32,7 @@ def main() -> None:
 
 
 def _listen(tasks: "queue.SimpleQueue[str]") -> None:
-    """Pass tasks on; leave in the middle of a run when nobody waits for it any more."""
+    """Pass tasks on; end the process, even during a run, when the input ends."""
     for line in sys.stdin:
         tasks.put(line)
     os._exit(0)

@@ -1,4 +1,4 @@
-"""Tasks: what the robot shall track."""
+"""Tasks: the motions that the robot tracks, each with its linear error equation."""
 
 from .angular_momentum import AngularMomentum as AngularMomentum
 from .center_of_mass import CenterOfMass as CenterOfMass

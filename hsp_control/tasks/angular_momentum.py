@@ -1,4 +1,4 @@
-"""The angular momentum about the centre of mass follows a trajectory."""
+"""The task of the angular momentum about the centre of mass."""
 
 import numpy as np
 
@@ -11,12 +11,16 @@ from hsp_control.trajectories import Trajectory, TrajectorySample
 
 
 class AngularMomentum(Task):
-    """Angular momentum about the centre of mass, per mass: ℓ = A v / m [m²/s].
+    """e' + K e = 0 with e = ℓ_d - ℓ, ℓ = A v / m the angular momentum per mass [m²/s].
 
-    Momentum has no configuration that it is the rate of, so that its error equation is
-    of first order, and exact: e' + K e = 0 with e = ℓ_d - ℓ, by ℓ' = ℓ_d' + K e. Per
-    mass its rows are of the size of a position's, which the singularity threshold
-    compares them with.
+    In world axes, about the centre of mass; J = A / m, a_x = ℓ_d' + K e. The error
+    equation is exact and of first order, because angular momentum is not the rate of
+    any function of the configuration. Divided by the mass, the rows of J have the same
+    size as those of a position, with which the singularity threshold compares them.
+
+    Attributes:
+        rate: K [1/s].
+        trajectory: ℓ_d(t).
     """
 
     def __init__(
@@ -34,13 +38,15 @@ class AngularMomentum(Task):
             trajectory: ℓ_d(t) in world axes [m²/s], of dimension 3; its velocity is
                 ℓ_d'.
             rate: K > 0 [1/s].
-            name: What the log calls it.
+            name: Name of the task in the log.
 
         Raises:
-            TaskError: If the trajectory has another dimension.
+            TaskError: If the trajectory has another dimension, or the robot has fewer
+                than three degrees of freedom.
             GainError: If the rate is not positive.
         """
-        # (s + K)² has the same decay; the gains say what `Gains` would of e' + K e.
+        # `Gains` needs Kp and Kv, which `evaluate` does not use. Those of (s + K)² have
+        # the same decay, and `Gains` checks K.
         super().__init__(robot, 3, Gains.from_frequency(rate), name)
         if trajectory.dimension != 3:
             raise TaskError(
@@ -52,7 +58,7 @@ class AngularMomentum(Task):
         self._desired = TrajectorySample.allocate(3)
 
     def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
-        """Return the three rows; e' is what the law makes it, -K e."""
+        """Return the three rows, with e' = -K e; see `Task.evaluate`."""
         out = self._out(out)
         mass = state.centroidal
         desired = self.trajectory.sample(state.t, self._desired)
@@ -64,11 +70,11 @@ class AngularMomentum(Task):
         return out
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return ℓ_d [m²/s]: what J v is on the reference."""
+        """Return ℓ_d, shape (3,) [m²/s]."""
         return self.trajectory.sample(state.t).position
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return desired and actual angular momentum per mass [m²/s]."""
+        """Return ℓ_d and ℓ in world axes, shape (3,) each [m²/s]."""
         mass = state.centroidal
         actual = mass.momentum_matrix @ state.v / mass.mass
         return self.trajectory.sample(state.t).position, actual

@@ -1,4 +1,4 @@
-"""World axes by their letters, and a point that is tracked along some of them."""
+"""World axes by their letters, and the kernel of a point tracked along them."""
 
 from collections.abc import Sequence
 
@@ -7,18 +7,18 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import TaskError
 from hsp_control.common.kernels import kernel
-from hsp_control.tasks.task import track
+from hsp_control.tasks.task import add_feedback
 
 
 def axis_indices(axes: str | Sequence[str]) -> Indices:
-    """Return the indices that ``"xz"`` or ``["x", "z"]`` name.
+    """Return the indices of axes: [0, 2] for ``"xz"`` or ``["x", "z"]``.
 
     Raises:
         TaskError: If they are not distinct letters of "xyz", at least one.
     """
     letters = "".join(axes)
     if not letters or len(set(letters)) < len(letters) or set(letters) - set("xyz"):
-        raise TaskError(f"axes {letters!r}: name distinct axes among x, y and z")
+        raise TaskError(f"axes {letters!r}: must be distinct letters of x, y and z")
     return np.array(["xyz".index(letter) for letter in letters], dtype=np.int64)
 
 
@@ -41,7 +41,11 @@ def track_axes(
     e_dot: Array,
     a_x: Array,
 ) -> None:
-    """Write the sample of a point's axes; a_x = x_d'' + Kv e' + Kp e."""
+    """Write a point's sample: e = x_d - x, a_x = x_d'' + Kv e' + Kp e + offset.
+
+    The rows of the point's Jacobian, (3 or more, nv), and its position and velocity
+    are in world axes; ``axes`` selects m of them.
+    """
     for k in range(axes.shape[0]):
         i = axes[k]
         for j in range(J.shape[1]):
@@ -49,4 +53,4 @@ def track_axes(
             J_dot[k, j] = J_point_dot[i, j]
         e[k] = x_d[k] - position[i]
         e_dot[k] = x_d_dot[k] - velocity[i]
-    track(x_d_ddot, Kp, Kv, offset, e, e_dot, a_x)
+    add_feedback(x_d_ddot, Kp, Kv, offset, e, e_dot, a_x)

@@ -1,4 +1,4 @@
-"""The centre of mass follows a trajectory."""
+"""The task of the centre of mass."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -15,10 +15,13 @@ from hsp_control.trajectories import Trajectory, TrajectorySample
 
 
 class CenterOfMass(CompiledTask):
-    """Centre of mass in the world: e = c_d - c, exactly linear.
+    """e = c_d - c, the centre of mass in world axes [m].
+
+    a_x = c_d'' + Kv e' + Kp e + offset; J is the Jacobian of the centre of mass.
 
     Attributes:
         axes: World axes that are tracked, such as ``"xyz"`` or ``"xy"``.
+        trajectory: c_d(t).
     """
 
     def __init__(
@@ -34,15 +37,15 @@ class CenterOfMass(CompiledTask):
 
         Args:
             robot: The robot.
-            trajectory: c_d(t) of the tracked axes [m], of dimension ``len(axes)``.
-            gains: Feedback gains.
+            trajectory: c_d(t) along the tracked axes [m], of dimension ``len(axes)``.
+            gains: Feedback gains of the rows.
             axes: World axes that are tracked, in the trajectory's order.
-            name: What the log calls it.
+            name: Name of the task in the log.
 
         Raises:
             TaskError: If the axes are not distinct letters of "xyz", or the trajectory
                 has another dimension.
-            GainError: If the gains do not fit.
+            GainError: If the gains do not fit the rows.
         """
         self._axes = axis_indices(axes)
         super().__init__(robot, len(self._axes), gains, name)
@@ -54,7 +57,7 @@ class CenterOfMass(CompiledTask):
             )
         self.trajectory = trajectory
 
-    def _calls(self, state: RobotState, out: TaskSample) -> StepPlan:
+    def _step_plan(self, state: RobotState, out: TaskSample) -> StepPlan:
         mass, desired = state.centroidal, TrajectorySample.allocate(self.rows)
         write = bind(
             track_axes,
@@ -73,10 +76,10 @@ class CenterOfMass(CompiledTask):
         return StepPlan((self.trajectory.follow(desired),), (centroidal, write))
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return c_d' [m/s]."""
+        """Return c_d', shape (m,) [m/s]."""
         return self.trajectory.sample(state.t).velocity
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return desired and actual centre of mass along the tracked axes [m]."""
+        """Return c_d and c along the tracked axes, shape (m,) each [m]."""
         desired = self.trajectory.sample(state.t)
         return desired.position, state.centroidal.position[self._axes]

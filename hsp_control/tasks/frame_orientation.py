@@ -1,4 +1,4 @@
-"""A frame's orientation follows a trajectory on SO(3), with an exactly linear error."""
+"""The task of a frame's orientation on SO(3), with an exactly linear error."""
 
 from collections.abc import Callable
 from typing import Any
@@ -24,23 +24,25 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import TaskSample, copy_rows, named_after, track
+from hsp_control.tasks.task import TaskSample, add_feedback, copy_rows, default_name
 from hsp_control.trajectories import OrientationSample, OrientationTrajectory
 from hsp_control.trajectories.following import Follower
 
 ORIENTATION_SCRATCH = 12
-"""Rows of three numbers that `orientation_error` and its sister work on."""
+"""Rows of the scratch array of `orientation_error` and `orientation_acceleration`."""
 
 
 class FrameOrientation(FrameTask):
-    """Orientation of a frame in the world.
+    """e = -log(R_dᵀ R), the orientation of a frame in the world [rad].
 
-    The error is e = -log(R_dᵀ R), in the desired frame: rotation vector [rad], exact up
-    to an angle of pi (law.md §1). At pi the shortest way back changes side: the error
-    jumps from e to -e, and everything stays finite.
+    e is a rotation vector in the axes of the desired frame. The error equation is
+    exact up to an angle of pi (docs/law.md). At pi the shortest rotation back changes
+    its side: e jumps to -e, and all values stay finite. J are the angular rows of the
+    frame's Jacobian in world axes.
 
     Attributes:
-        frame: The frame's name.
+        frame: Name of the frame.
+        trajectory: R_d(t).
     """
 
     def __init__(
@@ -58,15 +60,15 @@ class FrameOrientation(FrameTask):
             robot: The robot.
             frame: Name of the frame.
             trajectory: R_d(t), world ← frame.
-            gains: Feedback gains.
-            name: What the log calls it; ``<frame>_orientation`` by default.
+            gains: Feedback gains of the three rows, in the axes of the desired frame.
+            name: Name of the task in the log; ``<frame>_orientation`` by default.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            TaskError: If the robot has fewer than three freedoms.
-            GainError: If the gains do not fit.
+            TaskError: If the robot has fewer than three degrees of freedom.
+            GainError: If the gains do not fit the rows.
         """
-        name = name or f"{named_after(frame)}_orientation"
+        name = name or f"{default_name(frame)}_orientation"
         super().__init__(robot, frame, 3, gains, name)
         self.trajectory = trajectory
 
@@ -90,15 +92,15 @@ class FrameOrientation(FrameTask):
         return self.trajectory.follow(desired), write
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return w_d [rad/s]."""
+        """Return the desired angular velocity w_d in world axes, shape (3,) [rad/s]."""
         return self.trajectory.sample(state.t).angular_velocity
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return desired and actual orientation as quaternions (x, y, z, w)."""
+        """Return desired and actual orientation, quaternions (x, y, z, w)."""
         desired, actual = np.zeros(4), np.zeros(4)
         quaternion_from_rotation(self.trajectory.sample(state.t).rotation, desired)
         quaternion_from_rotation(state.frame(self.frame).rotation, actual)
-        # Of the two quaternions of one rotation, the one that plots beside the other.
+        # q and -q are one rotation: choose the sign that is closer to the desired one.
         return desired, actual if desired @ actual >= 0.0 else -actual
 
 
@@ -114,14 +116,16 @@ def orientation_error(
 ) -> None:
     """Write e = -y and e' = -y' with y = log(R_dᵀ R) and y' = Jlog(y) w̃.
 
+    w̃ = Rᵀ(w - w_d) is the relative angular velocity in the axes of the frame.
+
     Args:
         R: World ← frame, shape (3, 3).
-        w: Angular velocity, world axes, shape (3,).
-        R_d: Desired orientation, shape (3, 3).
-        w_d: Desired angular velocity, world axes, shape (3,).
-        scratch: Shape (ORIENTATION_SCRATCH, 3).
-        e: Error, shape (3,).
-        e_dot: Its rate, shape (3,).
+        w: Angular velocity, world axes, shape (3,) [rad/s].
+        R_d: Desired orientation, world ← frame, shape (3, 3).
+        w_d: Desired angular velocity, world axes, shape (3,) [rad/s].
+        scratch: Shape (ORIENTATION_SCRATCH, 3), overwritten.
+        e: Error, written, shape (3,) [rad].
+        e_dot: Error rate, written, shape (3,) [rad/s].
     """
     w_tilde, y, E = scratch[0], scratch[1], scratch[6:9]
     compose_back(R_d, R, E)
@@ -147,35 +151,35 @@ def orientation_acceleration(
     scratch: Array,
     out: Array,
 ) -> None:
-    """Turn a wanted -e'' into the angular acceleration, world axes, that gives it.
+    """Overwrite y'' = -e'' by the angular acceleration w' that produces it.
 
-    w̃ = Jexp(y) y' gives w̃' = Jexp y'' + Jexp' y'; the desired frame's own motion adds
+    w̃ = Jexp(y) y' gives w̃' = Jexp y'' + Jexp' y'. The motion of the desired frame adds
     the transport term: w' = R w̃' - w × w_d + w_d'.
 
     Args:
         R: World ← frame, shape (3, 3).
-        w: Angular velocity, world axes, shape (3,).
-        w_d: Desired angular velocity, world axes, shape (3,).
-        w_d_dot: Desired angular acceleration, world axes, shape (3,).
-        e: Error, shape (3,).
-        e_dot: Its rate, shape (3,).
-        scratch: Shape (ORIENTATION_SCRATCH, 3).
-        out: -e'' = y'', overwritten by w', shape (3,).
+        w: Angular velocity, world axes, shape (3,) [rad/s].
+        w_d: Desired angular velocity, world axes, shape (3,) [rad/s].
+        w_d_dot: Desired angular acceleration, world axes, shape (3,) [rad/s²].
+        e: Error, shape (3,) [rad].
+        e_dot: Error rate, shape (3,) [rad/s].
+        scratch: Shape (ORIENTATION_SCRATCH, 3), overwritten.
+        out: y'', overwritten by w' in world axes, shape (3,) [rad/s²].
     """
-    y, y_dot, turned, bent = scratch[0], scratch[1], scratch[2], scratch[3]
+    y, y_dot, w_tilde_dot, term = scratch[0], scratch[1], scratch[2], scratch[3]
     for i in range(3):
         y[i], y_dot[i] = -e[i], -e_dot[i]
     J_exp, J_exp_dot = scratch[6:9], scratch[9:12]
     jexp3(y, J_exp)
     jexp3_dot(y, y_dot, J_exp_dot)
-    multiply(J_exp, out, turned)
-    multiply(J_exp_dot, y_dot, bent)
+    multiply(J_exp, out, w_tilde_dot)
+    multiply(J_exp_dot, y_dot, term)
     for i in range(3):
-        turned[i] += bent[i]
-    rotate(R, turned, out)
-    cross(w, w_d, bent)
+        w_tilde_dot[i] += term[i]
+    rotate(R, w_tilde_dot, out)
+    cross(w, w_d, term)
     for i in range(3):
-        out[i] += w_d_dot[i] - bent[i]
+        out[i] += w_d_dot[i] - term[i]
 
 
 @kernel
@@ -202,5 +206,5 @@ def _frame_orientation(
     orientation_error(R, w, R_d, w_d, scratch, e, e_dot)
     for i in range(3):
         a_x[i] = 0.0
-    track(a_x, Kp, Kv, offset, e, e_dot, a_x)
+    add_feedback(a_x, Kp, Kv, offset, e, e_dot, a_x)
     orientation_acceleration(R, w, w_d, w_d_dot, e, e_dot, scratch, a_x)

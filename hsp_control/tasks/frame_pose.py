@@ -1,4 +1,4 @@
-"""A frame follows a trajectory in space: its origin and its orientation together."""
+"""The task of a frame's pose: its origin and its orientation together."""
 
 from collections.abc import Callable
 from typing import Any
@@ -18,20 +18,22 @@ from hsp_control.tasks.frame_orientation import (
 )
 from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import TaskSample, copy_rows, named_after, track
+from hsp_control.tasks.task import TaskSample, add_feedback, copy_rows, default_name
 from hsp_control.trajectories import PoseSample, PoseTrajectory
 from hsp_control.trajectories.following import Follower
 
 
 class FramePose(FrameTask):
-    """Pose of a frame: the origin in the world [m], then -log(R_dᵀ R) [rad].
+    """e = (x_d - x, -log(R_dᵀ R)), the pose of a frame in the world [m, rad].
 
-    Position in world axes beside orientation keeps both errors decoupled and exactly
-    linear, and the origin's way home straight; the logarithm on SE(3) would make it a
-    screw (law.md §1).
+    Position rows are in world axes; orientation rows are those of `FrameOrientation`.
+    The two errors are decoupled and exactly linear, and the origin returns on a
+    straight line. With the logarithm on SE(3) it would return on a screw
+    (docs/law.md).
 
     Attributes:
-        frame: The frame's name.
+        frame: Name of the frame.
+        trajectory: The desired pose.
     """
 
     def __init__(
@@ -48,16 +50,16 @@ class FramePose(FrameTask):
         Args:
             robot: The robot.
             frame: Name of the frame.
-            trajectory: The desired pose in the world.
-            gains: Feedback gains of the six rows.
-            name: What the log calls it; the frame's name by default.
+            trajectory: The desired pose, world ← frame.
+            gains: Feedback gains of the six rows, position before orientation.
+            name: Name of the task in the log; the frame's name by default.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            TaskError: If the robot has fewer than six freedoms.
-            GainError: If the gains do not fit.
+            TaskError: If the robot has fewer than six degrees of freedom.
+            GainError: If the gains do not fit the rows.
         """
-        super().__init__(robot, frame, 6, gains, name or named_after(frame))
+        super().__init__(robot, frame, 6, gains, name or default_name(frame))
         self.trajectory = trajectory
 
     def _compile(
@@ -81,7 +83,7 @@ class FramePose(FrameTask):
         return self.trajectory.follow(PoseSample.over(desired)), write
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return x_d' and w_d [m/s, rad/s]."""
+        """Return x_d' and w_d in world axes, shape (6,) [m/s, rad/s]."""
         sample = self.trajectory.sample(state.t)
         velocity, turning = (
             sample.position.velocity,
@@ -90,7 +92,7 @@ class FramePose(FrameTask):
         return np.concatenate([velocity, turning])
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return desired and actual (x, y, z, quaternion x, y, z, w)."""
+        """Return desired and actual pose: x, y, z [m], quaternion (x, y, z, w)."""
         frame = state.frame(self.frame)
         sample = self.trajectory.sample(state.t)
         desired, actual = np.zeros(7), np.zeros(7)
@@ -120,9 +122,10 @@ def pose_error_equation(
     e_dot: Array,
     a_x: Array,
 ) -> None:
-    """Write the sample; the gains may couple position and orientation.
+    """Write the sample of a pose task; gains may couple position and orientation.
 
-    The reference's rows are x, x', x'', R (three), ω, ω', see `PoseSample.over`.
+    ``desired`` has shape (8, 3): x, x', x'', R (three rows), ω, ω', see
+    `PoseSample.over`.
     """
     copy_rows(J_frame, J_frame_dot, 0, J, J_dot)
     for i in range(3):
@@ -133,5 +136,5 @@ def pose_error_equation(
     R_d, w_d, w_d_dot = desired[3:6], desired[6], desired[7]
     w, angle, angle_dot, turning = velocity[3:], e[3:], e_dot[3:], a_x[3:]
     orientation_error(R, w, R_d, w_d, scratch, angle, angle_dot)
-    track(a_x, Kp, Kv, offset, e, e_dot, a_x)
+    add_feedback(a_x, Kp, Kv, offset, e, e_dot, a_x)
     orientation_acceleration(R, w, w_d, w_d_dot, angle, angle_dot, scratch, turning)

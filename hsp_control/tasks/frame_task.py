@@ -1,4 +1,4 @@
-"""What tasks of one frame share: they follow, and one kernel writes the rows."""
+"""The base class of tasks that track one frame."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -13,21 +13,32 @@ from hsp_control.trajectories.following import Follower
 
 
 class FrameTask(CompiledTask):
-    """A task of one frame: write `_compile`.
+    """J a + J'v = a_x for one frame, with a reference that a trajectory gives.
+
+    A subclass implements `_compile`, `reference_rate` and `measure`. The frame's
+    kinematics are in world axes at its origin, linear rows before angular rows
+    (Pinocchio's LOCAL_WORLD_ALIGNED).
 
     Attributes:
-        frame: The frame's name.
+        frame: Name of the frame.
     """
 
     def __init__(
         self, robot: Robot, frame: str, rows: int, gains: Gains, name: str
     ) -> None:
-        """Set the task; see its class.
+        """Check the arguments and store them.
+
+        Args:
+            robot: The robot.
+            frame: Name of the frame.
+            rows: Number of rows m.
+            gains: Feedback gains of the m rows.
+            name: Name of the task in the log.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            TaskError: If the task has more rows than the robot has freedoms.
-            GainError: If the gains do not fit.
+            TaskError: If the task has more rows than the robot has degrees of freedom.
+            GainError: If the gains do not fit the rows.
         """
         robot.frame_id(frame)
         super().__init__(robot, rows, gains, name)
@@ -37,12 +48,18 @@ class FrameTask(CompiledTask):
     def _compile(
         self, frame: FrameKinematics, out: TaskSample
     ) -> tuple[Follower, Callable[[], Any]]:
-        """Return what brings the reference up to a time, and what then writes ``out``.
+        """Return two calls: one updates the reference, the other writes ``out``.
 
-        Called whenever another state's frame, or another sample, is to be used.
+        Args:
+            frame: The kinematics of the frame, computed before the second call.
+            out: The sample that the second call writes.
+
+        Returns:
+            A function of time [s] that updates the reference, and a function without
+            arguments that reads reference and frame and writes ``out``.
         """
 
-    def _calls(self, state: RobotState, out: TaskSample) -> StepPlan:
+    def _step_plan(self, state: RobotState, out: TaskSample) -> StepPlan:
         frame = state.frame(self.frame)
         follow, write = self._compile(frame, out)
         return StepPlan((follow,), (frame.compute, write))

@@ -1,4 +1,4 @@
-"""A task's gains on their way to others."""
+"""A smooth change of a task's gains."""
 
 import numpy as np
 
@@ -8,13 +8,19 @@ from hsp_control.trajectories.schedule import Schedule
 
 
 class GainRamp:
-    """Kp and Kv of a task, from what they are to what they shall be.
+    """Kp(t) = (1 - w) Kp_0 + w Kp_1, Kv alike, w(t) from 0 to 1.
 
-    The error equation holds with the gains of each instant.
+    The error equation holds at every instant with the gains of that instant.
     """
 
     def __init__(self, task: Task, gains: Gains, start: float, ramp: float) -> None:
-        """Set the ramp; it starts at ``start`` and lasts ``ramp`` [s].
+        """Start from the present gains of the task.
+
+        Args:
+            task: The task; `apply` changes its Kp and Kv in place.
+            gains: The new gains, Kp_1 and Kv_1.
+            start: Start of the ramp [s].
+            ramp: Duration of the ramp ≥ 0 [s].
 
         Raises:
             GainError: If the gains do not fit the task.
@@ -24,11 +30,11 @@ class GainRamp:
         self._from = task.Kp.copy(), task.Kv.copy()
         self._to = gains.matrices(task.rows)
         self._end = start + ramp
-        self._share = Schedule([(start, np.inf)], ramp=ramp)
+        self._schedule = Schedule([(start, np.inf)], ramp=ramp)
 
     def apply(self, t: float) -> bool:
-        """Set the gains of time t [s]; return whether they have arrived."""
-        w = self._share.weight(t)
+        """Set the task's gains for time t [s]; return whether the ramp is over."""
+        w = self._schedule.weight(t)
         self._task.Kp[:] = (1.0 - w) * self._from[0] + w * self._to[0]
         self._task.Kv[:] = (1.0 - w) * self._from[1] + w * self._to[1]
         return t >= self._end

@@ -1,4 +1,4 @@
-"""Joints follow a posture that may move."""
+"""The task of joint positions, which track a posture that may move."""
 
 from collections.abc import Sequence
 from math import atan2, cos, sin
@@ -14,18 +14,20 @@ from hsp_control.common.step_plan import StepPlan
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.configuration_space import joint_displacements
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import CompiledTask, TaskSample, track
+from hsp_control.tasks.task import CompiledTask, TaskSample, add_feedback
 from hsp_control.trajectories import Trajectory, TrajectorySample
 from hsp_control.trajectories.following import stay
 
 
 class JointPosture(CompiledTask):
-    """Posture of some joints: e = q_d ⊖ q, exactly linear for one-freedom joints.
+    """e = q_d ⊖ q of some joints, with q_d(t) = reference ⊕ displacement(t).
 
-    q_d(t) = reference ⊕ displacement(t).
+    Each joint has one degree of freedom, in rad or m. The error is exactly linear, and
+    J are rows of the identity.
 
     Attributes:
-        joints: Names of the joints.
+        joints: Names of the joints, in the order of the rows.
+        displacement: Motion of the joints about the reference, or None.
     """
 
     def __init__(
@@ -43,17 +45,19 @@ class JointPosture(CompiledTask):
         Args:
             robot: The robot.
             reference: Configuration of the whole robot, shape (nq,).
-            gains: Feedback gains.
-            displacement: Motion of the named joints about the reference [rad or m], of
-                dimension ``len(joints)``; None: none.
-            joints: Names of the joints; None: all that have one freedom.
-            name: What the log calls it.
+            gains: Feedback gains of the rows, one row per joint.
+            displacement: Motion of the joints about the reference [rad or m], of
+                dimension ``len(joints)``; None: the posture is constant.
+            joints: Names of the joints; None: all with one degree of freedom.
+            name: Name of the task in the log.
 
         Raises:
             JointNotFoundError: If a joint does not exist.
-            TaskError: If no joint is named, one twice, or one of several freedoms (a
-                root: give it a pose task), or the displacement has another dimension.
+            TaskError: If there is no joint, a joint is named twice, a joint has several
+                degrees of freedom (a floating root: use a pose task), or the
+                displacement has another dimension.
             ShapeError: If the reference has the wrong shape.
+            GainError: If the gains do not fit the rows.
         """
         self._reference = robot.check_configuration(reference).copy()
         indices = []
@@ -67,25 +71,26 @@ class JointPosture(CompiledTask):
             where = robot.velocity_index(joint)
             if where.stop - where.start != 1:
                 raise TaskError(
-                    f"joint {joint!r} has {where.stop - where.start} freedoms; a "
-                    "posture task holds joints of one (give a root a pose task)"
+                    f"joint {joint!r} has {where.stop - where.start} degrees of "
+                    "freedom; a posture task needs joints with one (use a pose task "
+                    "for a root)"
                 )
             indices.append(where.start)
         super().__init__(robot, len(indices), gains, name)
         if displacement is not None and displacement.dimension != self.rows:
             raise TaskError(
-                f"task {name!r} holds {self.rows} joints; its displacement has "
+                f"task {name!r} has {self.rows} joints; its displacement has "
                 f"dimension {displacement.dimension}"
             )
         self.joints = tuple(joints)
         self.displacement = displacement
         self._indices = np.array(indices, dtype=np.int64)
         self._moved = np.zeros(robot.nv)
-        # The rows of `single_joints` that are held, in the order of the task's.
-        place = {int(row[0]): row for row in robot.single_joints}
+        # The rows of `single_dof_joints`, in the order of the joints of the task.
+        place = {int(row[0]): row for row in robot.single_dof_joints}
         self._rows: Indices = np.array([place[i] for i in indices], dtype=np.int64)
 
-    def _calls(self, state: RobotState, out: TaskSample) -> StepPlan:
+    def _step_plan(self, state: RobotState, out: TaskSample) -> StepPlan:
         sample, displacement = TrajectorySample.allocate(self.rows), self.displacement
         write = bind(
             _joint_posture,
@@ -104,13 +109,17 @@ class JointPosture(CompiledTask):
         return StepPlan((follow,), (write,))
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return the joints' desired rates [rad/s or m/s]."""
+        """Return the desired velocities of the joints, shape (m,) [rad/s or m/s]."""
         if self.displacement is None:
             return np.zeros(self.rows)
         return self.displacement.sample(state.t).velocity
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return desired and actual positions of the joints [rad or m]."""
+        """Return desired and actual joint positions, shape (m,) each [rad or m].
+
+        The desired position of a continuous joint is the one nearest to the actual
+        position.
+        """
         actual = self.robot.joint_positions(state.q)[self._indices]
         error = self.robot.difference(state.q, self._desired(state.t))[self._indices]
         return actual + error, actual
@@ -127,10 +136,10 @@ def _joint_posture(
     q: Array,
     v: Array,
     reference: Array,
-    held: Indices,
-    moved: Array,
-    moved_dot: Array,
-    moved_ddot: Array,
+    joints: Indices,
+    displacement: Array,
+    displacement_dot: Array,
+    displacement_ddot: Array,
     Kp: Array,
     Kv: Array,
     offset: Array,
@@ -141,15 +150,15 @@ def _joint_posture(
     e_dot: Array,
     a_x: Array,
 ) -> None:
-    """Write the sample: e = moved - (q ⊖ reference), the short way round."""
-    joint_displacements(q, reference, held, away)
-    for k in range(held.shape[0]):
+    """Write the sample: e = displacement - (q ⊖ reference), within ±π if continuous."""
+    joint_displacements(q, reference, joints, away)
+    for k in range(joints.shape[0]):
         for j in range(J.shape[1]):
             J[k, j] = J_dot[k, j] = 0.0
-        i = held[k, 0]
+        i = joints[k, 0]
         J[k, i] = 1.0
-        e[k] = moved[k] - away[i]
-        if held[k, 2] == 2:
+        e[k] = displacement[k] - away[i]
+        if joints[k, 2] == 2:
             e[k] = atan2(sin(e[k]), cos(e[k]))
-        e_dot[k] = moved_dot[k] - v[i]
-    track(moved_ddot, Kp, Kv, offset, e, e_dot, a_x)
+        e_dot[k] = displacement_dot[k] - v[i]
+    add_feedback(displacement_ddot, Kp, Kv, offset, e, e_dot, a_x)

@@ -1,4 +1,4 @@
-"""An axis of a frame points along a direction that may move: a task on the sphere."""
+"""The task of an axis of a frame that points along a direction, which may move."""
 
 from collections.abc import Callable, Sequence
 from math import sqrt
@@ -15,26 +15,31 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import TaskSample, named_after, track
+from hsp_control.tasks.task import TaskSample, add_feedback, default_name
 from hsp_control.trajectories import OrientationSample, OrientationTrajectory
 from hsp_control.trajectories.following import Follower
 
-NEAREST_TO_ANTIPODE = 0.02
-"""Below this 1 + cos(angle) the coordinates are held from blowing up (168 degrees)."""
+ANTIPODE_MARGIN = 0.02
+"""Smallest 1 + cos(angle) of the coordinates; below it (angle > 168°) they are held."""
 
 
 class Pointing(FrameTask):
-    """Pointing axis: two rows, the turn about the axis itself is free.
+    """e = -(n_x, n_y)/(1 + n_z), the direction n of an axis in the desired frame [-].
 
-    The error is e = -(n_x, n_y)/(1 + n_z), the stereographic coordinates of the axis
-    n seen from the desired direction: |e| = tan(angle/2). In them the error equation is
-    exact up to the antipode (law.md §1). Within 12 degrees of it all is held bounded:
-    |e| stays at 9.9, the equation no longer holds, but the axis is still led back. The
-    pull is the sine of the angle: an axis at rest exactly opposite stays there.
+    Two rows; the rotation about the axis itself is free. e are stereographic
+    coordinates about the desired direction, |e| = tan(angle/2), in which the error
+    equation is exact up to the antipode (docs/law.md). Within 12 degrees of the
+    antipode |e| is held at 9.9: the error equation no longer holds there, but the axis
+    still moves back. The acceleration is then proportional to the sine of the angle:
+    an axis that rests exactly at the antipode stays there.
+
+    J are the angular rows of the frame's Jacobian along two directions perpendicular
+    to the axis.
 
     Attributes:
-        frame: The frame's name.
-        axis: The pointing axis in the frame, a unit vector.
+        frame: Name of the frame.
+        axis: The pointing axis in the frame, a unit vector, shape (3,).
+        trajectory: The desired orientation; its third axis is the desired direction.
     """
 
     def __init__(
@@ -52,27 +57,31 @@ class Pointing(FrameTask):
         Args:
             robot: The robot.
             frame: Name of the frame.
-            axis: Pointing axis in the frame, shape (3,); normalised here.
-            trajectory: An orientation whose third axis is the desired direction.
+            axis: Pointing axis in the frame, of any length but zero, shape (3,).
+            trajectory: An orientation, world ← desired frame, whose third axis is the
+                desired direction.
             gains: Feedback gains of the two rows.
-            name: What the log calls it; ``<frame>_pointing`` by default.
+            name: Name of the task in the log; ``<frame>_pointing`` by default.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            TaskError: If the axis has no direction.
-            GainError: If the gains do not fit.
+            TaskError: If the axis is not a non-zero vector of three finite numbers, or
+                the robot has fewer than two degrees of freedom.
+            GainError: If the gains do not fit the rows.
         """
-        name = name or f"{named_after(frame)}_pointing"
+        name = name or f"{default_name(frame)}_pointing"
         super().__init__(robot, frame, 2, gains, name)
         vector = np.asarray(axis, dtype=float)
         if vector.shape != (3,) or not 0.0 < np.linalg.norm(vector) < np.inf:
-            raise TaskError(f"axis {list(axis)} is not a direction: needs 3 numbers")
+            raise TaskError(
+                f"axis must be 3 finite numbers, not all zero; got {list(axis)}"
+            )
         self.axis: Array = vector / np.linalg.norm(vector)
         self.trajectory = trajectory
-        # Two directions across the axis, right-handed with it: the rows of the task.
-        across = np.linalg.svd(self.axis[None, :])[2][1:]
-        across[1] *= np.sign(np.linalg.det(np.vstack([across, self.axis])))
-        self._across = across.copy()
+        # Two unit vectors perpendicular to the axis, right-handed with it: the rows.
+        normals = np.linalg.svd(self.axis[None, :])[2][1:]
+        normals[1] *= np.sign(np.linalg.det(np.vstack([normals, self.axis])))
+        self._normals = normals.copy()
 
     def _compile(
         self, frame: FrameKinematics, out: TaskSample
@@ -81,7 +90,7 @@ class Pointing(FrameTask):
         write = bind(
             _pointing,
             self.axis,
-            self._across,
+            self._normals,
             frame.jacobian,
             frame.jacobian_dot,
             frame.rotation,
@@ -96,12 +105,12 @@ class Pointing(FrameTask):
         return self.trajectory.follow(desired), write
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return the components of w_d across the axis [rad/s]."""
+        """Return the part of w_d perpendicular to the axis, shape (2,) [rad/s]."""
         w_d = self.trajectory.sample(state.t).angular_velocity
-        return self._across @ state.frame(self.frame).rotation.T @ w_d
+        return self._normals @ state.frame(self.frame).rotation.T @ w_d
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return desired and actual direction in the world, unit vectors."""
+        """Return desired and actual direction, unit vectors in the world, (3,) each."""
         desired = self.trajectory.sample(state.t).rotation[:, 2].copy()
         return desired, state.frame(self.frame).rotation @ self.axis
 
@@ -109,7 +118,7 @@ class Pointing(FrameTask):
 @kernel
 def _pointing(
     axis: Array,
-    across: Array,
+    normals: Array,
     J_frame: Array,
     J_frame_dot: Array,
     R: Array,
@@ -131,16 +140,16 @@ def _pointing(
 
     With m the axis in the world, n = R_dᵀ m and n' = R_dᵀ((w - w_d) × m). The
     coordinates y = n_xy/s, s = 1 + n_z, are conformal: y' = Q n'/s, where
-    Q v = v_xy - n_xy v_z/s is an isometry of the tangent plane at n. Hence y'' = u asks
-    n for the acceleration
+    Q v = v_xy - n_xy v_z/s is an isometry of the tangent plane at n. Hence y'' = u
+    needs the acceleration of n along the sphere
 
-        s Qᵀu + 2 (s'/s) n' - (|n'|²/s) ẑ,   ẑ the part of z across n,
+        s Qᵀu + 2 (s'/s) n' - (|n'|²/s) ẑ,   ẑ the part of z perpendicular to n,
 
-    along the sphere, where s Qᵀu = -Qᵀ(Kv Q n' + Kp n_xy) for u = -Kv y' - Kp y: only
-    the terms of second order in n' grow towards the antipode; they are held bounded.
+    where s Qᵀu = -Qᵀ(Kv Q n' + Kp n_xy) for u = -Kv y' - Kp y. Only the terms of
+    second order in n' grow towards the antipode; they are kept bounded.
     """
     m, c0, c1 = scratch[0], scratch[1], scratch[2]
-    w_rel, m_rel, n, n_dot, rest, turn, moved = (
+    w_rel, m_rel, n, n_dot, n_ddot_free, turn, moved = (
         scratch[3],
         scratch[4],
         scratch[5],
@@ -150,8 +159,8 @@ def _pointing(
         scratch[9],
     )
     rotate(R, axis, m)
-    rotate(R, across[0], c0)
-    rotate(R, across[1], c1)
+    rotate(R, normals[0], c0)
+    rotate(R, normals[1], c1)
 
     # The rows and their rates: J = cᵀ J_w, J' = cᵀ J_w' + (w × c)ᵀ J_w.
     for k in range(2):
@@ -165,7 +174,7 @@ def _pointing(
                 J_dot[k, j] += c[i] * J_frame_dot[3 + i, j]
                 J_dot[k, j] += turn[i] * J_frame[3 + i, j]
 
-    # n, n' and the part of n'' that no choice of w' changes.
+    # n, n' and the part of n'' that does not depend on w'.
     for i in range(3):
         w_rel[i] = w[i] - w_d[i]
     cross(w_rel, m, m_rel)
@@ -179,10 +188,10 @@ def _pointing(
     cross(w_d_dot, m, turn)
     for i in range(3):
         moved[i] -= turn[i]
-    rotate_back(R_d, moved, rest)
+    rotate_back(R_d, moved, n_ddot_free)
 
-    # s e and s e', which stay bounded, and what Kv, Kp and the offset make of them.
-    s = max(1.0 + n[2], NEAREST_TO_ANTIPODE)
+    # s e and s e', which stay bounded, and the feedback s u of Kv, Kp and the offset.
+    s = max(1.0 + n[2], ANTIPODE_MARGIN)
     e_scaled, e_dot_scaled, wanted, zero = (
         scratch[10, :2],
         scratch[11, :2],
@@ -196,19 +205,19 @@ def _pointing(
         e_dot[k] = e_dot_scaled[k] / s
         zero[k] = 0.0
     _stereographic(n, e)
-    track(zero, Kp, Kv, zero, e_scaled, e_dot_scaled, wanted)
+    add_feedback(zero, Kp, Kv, zero, e_scaled, e_dot_scaled, wanted)
     for k in range(2):
         wanted[k] += s * offset[k]
 
-    # The tangent vectors R_dᵀc0 and R_dᵀc1: w' along c1 moves n along the first, w'
-    # along c0 against the second.
+    # The tangent vectors R_dᵀc0 and R_dᵀc1: w' along c1 accelerates n along the first,
+    # w' along c0 against the second.
     square = n_dot[0] * n_dot[0] + n_dot[1] * n_dot[1] + n_dot[2] * n_dot[2]
     for k in range(2):
         rotate_back(R_d, c0 if k == 0 else c1, turn)
         _flatten(n, turn, moved)
         total = moved[0] * wanted[0] + moved[1] * wanted[1] - square / s * turn[2]
         for i in range(3):
-            total += turn[i] * (2.0 * n_dot[2] / s * n_dot[i] - rest[i])
+            total += turn[i] * (2.0 * n_dot[2] / s * n_dot[i] - n_ddot_free[i])
         if k == 0:
             a_x[1] = total
         else:
@@ -217,10 +226,10 @@ def _pointing(
 
 @kernel
 def _flatten(n: Array, v: Array, out: Array) -> None:
-    """Write Q v = v_xy - n_xy v_z/(1 + n_z) for v across the unit vector n.
+    """Write Q v = v_xy - n_xy v_z/(1 + n_z) for v perpendicular to the unit vector n.
 
-    Below, where digits would cancel, v_z is had from v · n = 0: Q is then a reflection
-    of v_xy, stretched along n_xy.
+    For n_z ≤ -0.5, where digits would cancel, v_z comes from v · n = 0: Q is then a
+    reflection of v_xy, stretched along n_xy.
     """
     if n[2] > -0.5:
         for k in range(2):
@@ -233,19 +242,19 @@ def _flatten(n: Array, v: Array, out: Array) -> None:
 
 @kernel
 def _stereographic(n: Array, e: Array) -> None:
-    """Write -n_xy/(1 + n_z), of bounded length."""
-    if 1.0 + n[2] >= NEAREST_TO_ANTIPODE:
+    """Write -n_xy/(1 + n_z), with 1 + n_z at least ANTIPODE_MARGIN."""
+    if 1.0 + n[2] >= ANTIPODE_MARGIN:
         for k in range(2):
             e[k] = -n[k] / (1.0 + n[2])
         return
-    longest = sqrt(2.0 / NEAREST_TO_ANTIPODE - 1.0)
+    longest = sqrt(2.0 / ANTIPODE_MARGIN - 1.0)
     x, y = _horizontal(n)
     e[0], e[1] = -longest * x, -longest * y
 
 
 @kernel
 def _horizontal(n: Array) -> tuple[float, float]:
-    """Return the direction of n_xy, any if there is none."""
+    """Return the unit vector along n_xy, or (1, 0) if n_xy is zero."""
     length = sqrt(n[0] * n[0] + n[1] * n[1])
     if length == 0.0:
         return 1.0, 0.0

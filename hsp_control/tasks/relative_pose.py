@@ -1,4 +1,4 @@
-"""One frame follows a pose as seen from another: two hands carry one thing."""
+"""The task of a frame's pose relative to another frame, as for two hands on a part."""
 
 from typing import NamedTuple
 
@@ -15,19 +15,19 @@ from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.frame_orientation import ORIENTATION_SCRATCH
 from hsp_control.tasks.frame_pose import pose_error_equation
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import CompiledTask, TaskSample, named_after
+from hsp_control.tasks.task import CompiledTask, TaskSample, default_name
 from hsp_control.trajectories import PoseSample, PoseTrajectory
 
 
-class Relative(NamedTuple):
-    """How a frame moves as seen from another, in the other's axes.
+class RelativeKinematics(NamedTuple):
+    """The motion of a frame relative to a reference frame, in the reference's axes.
 
     Attributes:
-        jacobian: Shape (6, nv), linear before angular.
-        jacobian_dot: Its time derivative, shape (6, nv).
+        jacobian: J, linear before angular rows, shape (6, nv).
+        jacobian_dot: J', shape (6, nv).
         rotation: Reference ← frame, shape (3, 3).
         position: The frame's origin [m], shape (3,).
-        velocity: J v, shape (6,).
+        velocity: J v [m/s, rad/s], shape (6,).
     """
 
     jacobian: Array
@@ -37,20 +37,22 @@ class Relative(NamedTuple):
     velocity: Array
 
     @classmethod
-    def allocate(cls, nv: int) -> "Relative":
+    def allocate(cls, nv: int) -> "RelativeKinematics":
         """Return zeros."""
         matrices = np.zeros((6, nv)), np.zeros((6, nv)), np.zeros((3, 3))
         return cls(*matrices, np.zeros(3), np.zeros(6))
 
 
 class RelativePose(CompiledTask):
-    """Pose of a frame in another frame's axes; both errors are exactly linear there.
+    """e = (x_d - x, -log(R_dᵀ Q)), x = R_rᵀ(p - p_r), Q = R_rᵀ R [m, rad].
 
-    Position is R_rᵀ(p - p_r) and orientation R_rᵀR; the rest is `FramePose`.
+    The pose of a frame relative to a reference frame r, in the axes of r. Both errors
+    are exactly linear; all else is as in `FramePose`.
 
     Attributes:
-        frame: The frame that is seen.
-        reference: The frame that it is seen from.
+        frame: Name of the frame that is controlled.
+        reference: Name of the frame that it is measured in.
+        trajectory: The desired relative pose.
     """
 
     def __init__(
@@ -68,30 +70,32 @@ class RelativePose(CompiledTask):
         Args:
             robot: The robot.
             frame: Name of the frame.
-            reference: Name of the frame that it is seen from.
-            trajectory: The desired pose in the reference's axes.
-            gains: Feedback gains of the six rows.
-            name: What the log calls it; ``<frame>_from_<reference>`` by default.
+            reference: Name of the frame that the pose is measured in.
+            trajectory: The desired pose, reference ← frame.
+            gains: Feedback gains of the six rows, position before orientation.
+            name: Name of the task in the log; ``<frame>_from_<reference>`` by default.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            TaskError: If the two are one frame, or the robot has fewer than six
-                freedoms.
-            GainError: If the gains do not fit.
+            TaskError: If the two frames are the same, or the robot has fewer than six
+                degrees of freedom.
+            GainError: If the gains do not fit the rows.
         """
         robot.frame_id(frame)
         robot.frame_id(reference)
         if frame == reference:
-            raise TaskError(f"a pose of {frame!r} relative to itself is no task")
-        default = named_after(f"{frame}_from_{reference}")
+            raise TaskError(
+                f"frame and reference are both {frame!r}; they must be different frames"
+            )
+        default = default_name(f"{frame}_from_{reference}")
         super().__init__(robot, 6, gains, name or default)
         self.frame = frame
         self.reference = reference
         self.trajectory = trajectory
 
-    def _calls(self, state: RobotState, out: TaskSample) -> StepPlan:
+    def _step_plan(self, state: RobotState, out: TaskSample) -> StepPlan:
         frame, reference = state.frame(self.frame), state.frame(self.reference)
-        desired, relative = np.zeros((8, 3)), Relative.allocate(self.robot.nv)
+        desired, relative = np.zeros((8, 3)), RelativeKinematics.allocate(self.robot.nv)
         relate = bind(
             _relative_kinematics, *_kinematics(frame, reference), state.v, *relative
         )
@@ -109,35 +113,35 @@ class RelativePose(CompiledTask):
         return StepPlan((follow,), (frame.compute, reference.compute, relate, write))
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return x_d' and w_d in the reference's axes [m/s, rad/s]."""
+        """Return x_d' and w_d in the reference's axes, shape (6,) [m/s, rad/s]."""
         sample = self.trajectory.sample(state.t)
         return np.concatenate(
             [sample.position.velocity, sample.orientation.angular_velocity]
         )
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return desired and actual (x, y, z, quaternion x, y, z, w)."""
-        sample, seen = self.trajectory.sample(state.t), self._seen(state)
+        """Return desired and actual pose: x, y, z [m], quaternion (x, y, z, w)."""
+        sample, relative = self.trajectory.sample(state.t), self._relative(state)
         desired, actual = np.zeros(7), np.zeros(7)
-        desired[:3], actual[:3] = sample.position.position, seen.position
+        desired[:3], actual[:3] = sample.position.position, relative.position
         quaternion_from_rotation(sample.orientation.rotation, desired[3:])
-        quaternion_from_rotation(seen.rotation, actual[3:])
+        quaternion_from_rotation(relative.rotation, actual[3:])
         if desired[3:] @ actual[3:] < 0.0:
             actual[3:] *= -1.0
         return desired, actual
 
-    def _seen(self, state: RobotState) -> Relative:
+    def _relative(self, state: RobotState) -> RelativeKinematics:
         frames = state.frame(self.frame), state.frame(self.reference)
-        relative = Relative.allocate(self.robot.nv)
+        relative = RelativeKinematics.allocate(self.robot.nv)
         _relative_kinematics(*_kinematics(*frames), state.v, *relative)
         return relative
 
 
-_Both = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
+_PairKinematics = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
 
 
-def _kinematics(frame: FrameKinematics, reference: FrameKinematics) -> _Both:
-    """Return what the relative motion is made of."""
+def _kinematics(frame: FrameKinematics, reference: FrameKinematics) -> _PairKinematics:
+    """Return J, J', R and p of the frame, then those of the reference."""
     return (
         frame.jacobian,
         frame.jacobian_dot,
@@ -167,10 +171,11 @@ def _relative_kinematics(
     p: Array,
     velocity: Array,
 ) -> None:
-    """Write the kinematics of frame f in the axes of frame r.
+    """Write the kinematics of frame f relative to frame r, in the axes of r.
 
-    With d = p_f - p_r: J = R_rᵀ(J_f - J_r - [w_r-part] × d), and since R_rᵀ' =
-    -R_rᵀ[w_r]×, J' = R_rᵀ(K' - w_r × K) with K the bracket.
+    With d = p_f - p_r and K = J_f - J_r, whose linear rows also lose
+    (angular rows of J_r) × d: J = R_rᵀ K. Since (R_rᵀ)' = -R_rᵀ[w_r]×,
+    J' = R_rᵀ(K' - w_r × K).
     """
     n = v.shape[0]
     for i in range(3):

@@ -1,4 +1,4 @@
-"""What a task is: rows of J, their rates, and the acceleration that tracks exactly."""
+"""The abstract task: error, Jacobian and desired acceleration."""
 
 import re
 from abc import ABC, abstractmethod
@@ -9,6 +9,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
+from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.robot import Robot, RobotState
@@ -16,14 +17,19 @@ from hsp_control.tasks.gains import Gains
 
 
 class TaskSample(NamedTuple):
-    """A task at one state; the law wants J a + J'v = a_x.
+    """J a + J'v = a_x: the rows of a task at one state.
+
+    Units are given for positions and orientations; other tasks have their own.
 
     Attributes:
-        jacobian: J, shape (m, nv).
-        jacobian_dot: J', shape (m, nv).
-        error: e in the task's own coordinates, desired minus actual, shape (m,).
-        error_rate: e', shape (m,).
-        acceleration: a_x, which makes e'' + Kv e' + Kp e = 0, shape (m,).
+        jacobian: Task Jacobian J, shape (m, nv).
+        jacobian_dot: Its time derivative J', shape (m, nv).
+        error: e, reference minus actual, in the error coordinates of the task, shape
+            (m,) [m or rad].
+        error_rate: e', shape (m,) [m/s or rad/s].
+        acceleration: Desired acceleration a_x, with which
+            e'' + Kv e' + Kp e + offset = 0, in the frame of J's rows, shape (m,)
+            [m/s² or rad/s²].
     """
 
     jacobian: Array
@@ -34,7 +40,7 @@ class TaskSample(NamedTuple):
 
     @classmethod
     def allocate(cls, rows: int, nv: int) -> "TaskSample":
-        """Return a sample of zeros."""
+        """Return a sample of zeros with m = ``rows``."""
         return cls(
             np.zeros((rows, nv)),
             np.zeros((rows, nv)),
@@ -44,44 +50,63 @@ class TaskSample(NamedTuple):
         )
 
     def rows(self, start: int, stop: int) -> "TaskSample":
-        """Return the sample of some rows, sharing memory."""
+        """Return the rows from ``start`` to ``stop`` - 1, as views of this memory."""
         return TaskSample(*(array[start:stop] for array in self))
 
 
 class Task(ABC):
-    """Something that the robot shall track, with an exactly linear error equation.
+    """e'' + Kv e' + Kp e + offset = 0: a task with an exactly linear error equation.
 
-    To implement one: call ``super().__init__``, and write `evaluate`, which fills every
-    array of ``out`` such that e'' + Kv e' + Kp e + offset = 0 follows *exactly* from
-    J a + J'v = a_x in the error coordinates that it reports, `reference_rate` and
-    `measure`.
+    A subclass calls ``super().__init__`` and implements three methods:
+
+    * `evaluate` writes J, J', e, e' and a_x. The error equation must follow *exactly*
+      from J a + J'v = a_x, in the coordinates of e.
+    * `reference_rate` returns J v on the reference.
+    * `measure` returns the reference and the actual value, for logs and plots.
+
+    The task chooses the frame and units of its m rows; J, J' and a_x use the same.
+    J acts on the tangent space: v and a have shape (nv,), as in Pinocchio. The
+    coordinates of e, e' and offset may be others, in which the error equation is linear
+    (a rotation vector, for example).
+
+    A subclass may override `compile` to make a step faster. The default calls
+    `evaluate` at every step. `CompiledTask` is the base class for tasks that compile.
 
     Attributes:
         robot: The robot.
-        name: What the log calls it.
+        name: Name of the task in the log.
         rows: Number of rows m.
-        Kp: Stiffness, shape (m, m) [1/s²].
-        Kv: Damping, shape (m, m) [1/s].
-        offset: What the error equation has besides, shape (m,) [m/s² or rad/s²]:
-            e'' + Kv e' + Kp e + offset = 0. Zero, unless something that remembers
-            writes it, as integral action does.
+        Kp: Stiffness, shape (m, m) [1/s²]. Compiled steps read this array: change it
+            in place.
+        Kv: Damping, shape (m, m) [1/s]. Change it in place.
+        offset: Additional term of the error equation, shape (m,) [m/s² or rad/s²].
+            Zero, unless a compensator such as integral action writes it. Change it in
+            place.
     """
 
     def __init__(self, robot: Robot, rows: int, gains: Gains, name: str) -> None:
-        """Check the gains against the rows and keep them.
+        """Check the arguments and store them.
+
+        Args:
+            robot: The robot.
+            rows: Number of rows m, at most nv.
+            gains: Feedback gains of the m rows.
+            name: Name of the task in the log: letters, digits, ``_`` and ``-``.
 
         Raises:
-            GainError: If the gains do not fit the rows or do not decay.
-            TaskError: If the task has more rows than the robot has freedoms.
+            GainError: If the gains do not fit the rows, or the error would not decay.
+            TaskError: If the task has more rows than the robot has degrees of freedom,
+                or the name has other characters.
         """
         if rows > robot.nv:
             raise TaskError(
-                f"task {name!r} has {rows} rows; {robot.name} has {robot.nv} freedoms"
+                f"task {name!r} has {rows} rows; {robot.name} has {robot.nv} degrees "
+                "of freedom"
             )
         if not name or not name.replace("_", "").replace("-", "").isalnum():
             raise TaskError(
-                f"task name {name!r}: use letters, digits, '_' and '-' (it names the "
-                "log's columns)"
+                f"task name {name!r}: use letters, digits, '_' and '-' (the columns of "
+                "the log contain it)"
             )
         self.robot = robot
         self.name = name
@@ -90,72 +115,96 @@ class Task(ABC):
         self.offset: Array = np.zeros(rows)
 
     def __init_subclass__(cls, **arguments: Any) -> None:
-        """Let an `evaluate` that is overridden count, also of a ready task."""
+        """Reset `compile` if a subclass overrides `evaluate` only.
+
+        Otherwise a subclass of a compiled task would inherit a step plan that ignores
+        its `evaluate`.
+        """
         super().__init_subclass__(**arguments)
         if "evaluate" in vars(cls) and "compile" not in vars(cls):
             cls.compile = Task.compile  # type: ignore[method-assign]
 
     def compile(self, state: RobotState, out: TaskSample) -> StepPlan:
-        """Return what `evaluate` does with this state and this sample."""
+        """Return the step plan that does what `evaluate` does; may be overridden.
+
+        Args:
+            state: The state that every step reads. Its values change between steps.
+            out: The sample that every step writes.
+        """
         return StepPlan(write=(partial(self.evaluate, state, out),))
 
     @abstractmethod
     def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
         """Return J, J', e, e' and a_x at a state.
 
+        Start an implementation with ``out = self._out(out)``, write every entry of the
+        five arrays, and return ``out``.
+
         Args:
-            state: The robot's state.
-            out: Where to write; None: a new sample.
+            state: The robot's state: t, q, v and the kinematics.
+            out: The sample to write into; None: a new one.
+
+        Returns:
+            ``out``, or the new sample.
         """
 
     @abstractmethod
     def reference_rate(self, state: RobotState) -> Array:
-        """Return J v of a robot on its reference and staying there, shape (m,)."""
+        """Return J v of a robot that is on its reference and stays there, shape (m,).
+
+        In the rows and units of J v. Friction feed-forward uses it, for example.
+        """
 
     @abstractmethod
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return (reference, actual) in the coordinates that a person would plot."""
+        """Return (reference, actual) for logs and plots, two arrays of one shape (k,).
+
+        Choose coordinates that are easy to read, for example a quaternion; k need not
+        be m.
+        """
 
     def _out(self, out: TaskSample | None) -> TaskSample:
+        """Return ``out``, or a new sample if it is None."""
         return TaskSample.allocate(self.rows, self.robot.nv) if out is None else out
 
 
 class CompiledTask(Task):
-    """A task of which `_calls` says all: calls that write a sample, decided once."""
+    """A task that compiles its step plan once and runs it at every step.
+
+    A subclass implements `_step_plan` instead of `evaluate`; `reference_rate` and
+    `measure` as for `Task`.
+    """
 
     def __init__(self, robot: Robot, rows: int, gains: Gains, name: str) -> None:
-        """Set the task; see `Task`."""
+        """Check the arguments and store them; see `Task`."""
         super().__init__(robot, rows, gains, name)
-        self._bound: tuple[RobotState, TaskSample, StepPlan] | None = None
+        self._compiled = IdentityCache(self._step_plan)
 
     @abstractmethod
-    def _calls(self, state: RobotState, out: TaskSample) -> StepPlan:
-        """Return what writes a sample at whatever a state then is."""
+    def _step_plan(self, state: RobotState, out: TaskSample) -> StepPlan:
+        """Return the calls that write ``out``.
+
+        The calls read the state each time that they run; see `Task.compile`.
+        """
 
     def compile(self, state: RobotState, out: TaskSample) -> StepPlan:
-        """Return what `evaluate` does; see `Task.bind`."""
-        return self._calls(state, out)
+        """Return the step plan that does what `evaluate` does; see `Task.compile`."""
+        return self._step_plan(state, out)
 
     def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
-        """Return the sample; see `Task.evaluate`."""
+        """Return J, J', e, e' and a_x at a state; see `Task.evaluate`."""
         if out is None:
             out = TaskSample.allocate(self.rows, self.robot.nv)
-        bound = self._bound
-        if bound is None or bound[0] is not state or bound[1] is not out:
-            self._bound = bound = state, out, self._calls(state, out)
-        for follow in bound[2].follow:
+        plan = self._compiled(state, out)
+        for follow in plan.follow:
             follow(state.t)
-        for write in bound[2].write:
+        for write in plan.write:
             write()
         return out
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Return all but what is bound to a state's memory."""
-        return self.__dict__ | {"_bound": None}
 
-
-def named_after(frame: str) -> str:
-    """Return a task's name for a frame's, without what a log's column may not have."""
+def default_name(frame: str) -> str:
+    """Return a frame's name as a task name: other characters become ``_``."""
     return re.sub("[^0-9A-Za-z_-]", "_", frame)
 
 
@@ -163,7 +212,7 @@ def named_after(frame: str) -> str:
 def copy_rows(
     J_frame: Array, J_frame_dot: Array, first: int, J: Array, J_dot: Array
 ) -> None:
-    """Write J and J', which are rows of the frame's from ``first`` on."""
+    """Write J and J': rows ``first``, ``first`` + 1, ... of the frame's."""
     for i in range(J.shape[0]):
         for j in range(J.shape[1]):
             J[i, j] = J_frame[first + i, j]
@@ -171,7 +220,7 @@ def copy_rows(
 
 
 @kernel
-def track(
+def add_feedback(
     feed_forward: Array,
     Kp: Array,
     Kv: Array,

@@ -1,4 +1,4 @@
-"""Motions to follow: points of Rⁿ, orientations and poses, with two exact rates."""
+"""Reference motions in Rⁿ, SO(3) and SE(3), with their first two derivatives."""
 
 from hsp_control.trajectories.blend import Blend as Blend
 from hsp_control.trajectories.blend_orientation import (

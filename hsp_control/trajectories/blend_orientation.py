@@ -1,4 +1,4 @@
-"""From how the body is turned now into a turn that is already under way."""
+"""A smooth transition from a given orientation into a moving orientation trajectory."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,15 +26,16 @@ from hsp_control.trajectories.polynomial import QUINTIC, horner
 
 
 class BlendOrientation(OrientationTrajectory):
-    """R(t) = R_d(t) exp(y(t)), with y the quintic that dies with two rates at t0 + T.
+    """R(t) = R_d(t) exp(y(t)), y a quintic with y = y' = y'' = 0 at t0 + T.
 
-    y(t0) and its rates are such that the body starts at R0 with angular velocity ω0 and
-    without angular acceleration. It is C², is R_d itself from t0 + T on, and holds R0
-    at rest before t0. One logarithm is taken, at t0: unlike exp(s log(R0ᵀ R_d)), which
-    jumps where R_d passes half a turn away from R0, this is smooth whatever R_d does.
+    y, y' and y'' at t0 are such that the body starts at R0 with angular velocity ω0 and
+    zero angular acceleration. The motion is C² from t0 on, equals R_d from t0 + T on,
+    and rests at R0 before t0. It needs the logarithm at t0 only. It is therefore smooth
+    for any R_d, whereas exp(s log(R0ᵀ R_d)) jumps where R_d passes an angle of π from
+    R0.
 
     Attributes:
-        start: R0, shape (3, 3).
+        start: R0, body to world, shape (3, 3).
         trajectory: R_d.
         duration: T [s].
         start_angular_velocity: ω0 in the world frame, shape (3,) [rad/s].
@@ -58,7 +59,7 @@ class BlendOrientation(OrientationTrajectory):
         start_angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
         start_time: float = 0.0,
     ) -> None:
-        """Lead from ``start`` into ``trajectory``.
+        """Set the transition from ``start`` into ``trajectory``.
 
         Args:
             start: R0, body to world, shape (3, 3).
@@ -66,6 +67,10 @@ class BlendOrientation(OrientationTrajectory):
             duration: T > 0 [s].
             start_angular_velocity: ω0 in the world frame, shape (3,) [rad/s].
             start_time: t0 [s].
+
+        Raises:
+            TrajectoryError: If R0 is not a rotation matrix, ω0 has another shape, a
+                value is not finite, or the duration is not positive.
         """
         self.start = checks.rotation(start, "start")
         self.trajectory = trajectory
@@ -81,7 +86,10 @@ class BlendOrientation(OrientationTrajectory):
         )
 
     def _start_offset(self) -> tuple[Array, Array, Array]:
-        """Return y, y' and y'' at t0: ω = ω_d + R w = ω0 and ω' = 0, w = Jexp y'."""
+        """Return y, y' and y'' at t0, with which ω = ω_d + R w = ω0 and ω' = 0.
+
+        w = Jexp(y) y' is the angular velocity relative to R_d, in the body frame.
+        """
         R_d, omega_d, omega_d_dot = self.trajectory.sample(self.start_time)
         R, omega = self.start, self.start_angular_velocity
         E, y = np.empty((3, 3)), np.empty(3)
@@ -130,9 +138,9 @@ def _blend(
     acceleration: Array,
     t: float,
 ) -> None:
-    """Turn the sample of R_d on by exp(y), in place.
+    """Multiply the sample of R_d by exp(y) from the right, in place.
 
-    ω = ω_d + R w and ω' = ω_d' + ω x R w + R w', where w = Jexp y' in the body frame.
+    ω = ω_d + R w and ω' = ω_d' + ω × R w + R w', where w = Jexp y' in the body frame.
     """
     elapsed = t - start_time
     if elapsed < 0.0:

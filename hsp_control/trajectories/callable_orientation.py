@@ -15,14 +15,13 @@ from hsp_control.trajectories.orientation import (
 
 
 class CallableOrientation(OrientationTrajectory):
-    """R(t) = f(t), with numerical rates.
+    """R(t) = f(t), with numerical ω and ω'.
 
     With y(τ) = log(R(t)ᵀ R(t + τ)), y'(0) and y''(0) are exactly the angular velocity
-    and acceleration in the body frame; both are central differences of sixth order over
-    seven points (`time_derivatives`), good to about 1e-10 for turns of a few rad/s. The
-    function must be smooth, and defined three steps before and after every time asked
-    for; anything but a rotation matrix raises `TrajectoryError`. To be pickled it must
-    be defined at the top of a module.
+    and acceleration in the body frame. Both are central differences of sixth order over
+    seven points (`time_derivatives`), with an error of about 1e-10 for rotations of a
+    few rad/s. The function must be smooth, and defined three steps before and after
+    every sampled time. For pickling it must be defined at the top level of a module.
 
     Attributes:
         function: f, time [s] to a rotation matrix of shape (3, 3), body to world.
@@ -36,11 +35,14 @@ class CallableOrientation(OrientationTrajectory):
         function: Callable[[float], ArrayLike],
         step: float = time_derivatives.STEP,
     ) -> None:
-        """Follow ``function``.
+        """Set the function.
 
         Args:
             function: f, time [s] to a rotation matrix of shape (3, 3), body to world.
             step: Time between the points of the differences [s].
+
+        Raises:
+            TrajectoryError: If the step is not positive.
         """
         self.function = function
         self.step = checks.positive(step, "step")
@@ -48,19 +50,23 @@ class CallableOrientation(OrientationTrajectory):
     def sample(
         self, t: float, out: OrientationSample | None = None
     ) -> OrientationSample:
-        """Return the orientation at time t; see `OrientationTrajectory.sample`."""
+        """Return R(t), ω(t) and ω'(t); see `OrientationTrajectory.sample`.
+
+        Raises:
+            TrajectoryError: If the function does not return a rotation matrix.
+        """
         if out is None:
             out = OrientationSample.allocate()
         R = self._call(t)
 
-        def turned_since(time: float) -> Array:
+        def relative_rotation(time: float) -> Array:
             between, y = np.empty((3, 3)), np.empty(3)
             compose_back(R, self._call(time), between)
             log3(between, y)
             return y
 
         velocity, acceleration = time_derivatives.both_derivatives(
-            turned_since, t, self.step
+            relative_rotation, t, self.step
         )
         out.rotation[:] = R
         out.angular_velocity[:] = R @ velocity

@@ -16,10 +16,9 @@ class CallableTrajectory(Trajectory):
     """x(t) = f(t); derivatives that are not given are numerical.
 
     They are central differences of sixth order over seven points (`time_derivatives`),
-    good to about 1e-10 for motions of a few rad/s. The function must be smooth, and
-    defined three steps before and after every time asked for; anything but n finite
-    numbers raises `TrajectoryError`. To be pickled it must be defined at the top of a
-    module.
+    with an error of about 1e-10 for motions of a few rad/s. The function must be
+    smooth, and defined three steps before and after every sampled time. For pickling it
+    must be defined at the top level of a module.
 
     Attributes:
         function: f, time [s] to a point of shape (n,).
@@ -38,17 +37,18 @@ class CallableTrajectory(Trajectory):
         acceleration: PointFunction | None = None,
         step: float = time_derivatives.STEP,
     ) -> None:
-        """Follow ``function``.
+        """Set the function and the derivatives that are known.
 
         Args:
             function: f, time [s] to a point of shape (n,).
             dimension: n.
-            velocity: f', if known.
-            acceleration: f'', if known.
+            velocity: f', time [s] to shape (n,), if known.
+            acceleration: f'', time [s] to shape (n,), if known.
             step: Time between the points of the differences [s].
 
         Raises:
-            TrajectoryError: If the dimension is not a positive integer.
+            TrajectoryError: If the dimension is not a positive integer, or the step is
+                not positive.
         """
         if dimension < 1 or dimension != int(dimension):
             raise TrajectoryError(
@@ -66,7 +66,11 @@ class CallableTrajectory(Trajectory):
         return self._dimension
 
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
-        """Return the point at time t; see `Trajectory.sample`."""
+        """Return x(t), x'(t) and x''(t); see `Trajectory.sample`.
+
+        Raises:
+            TrajectoryError: If a function does not return n finite numbers.
+        """
         out = self._output(out)
         velocity, acceleration = self._rates(t)
         out.position[:] = self._call(self.function, "function", t)
@@ -75,7 +79,7 @@ class CallableTrajectory(Trajectory):
         return out
 
     def _rates(self, t: float) -> tuple[Array, Array]:
-        """Return f' and f'', each by the least differentiation that is left to do."""
+        """Return f' and f'', each from the highest derivative that is given."""
         f, v, a = self.function, self.velocity, self.acceleration
         if v is None:
             rates = time_derivatives.both_derivatives(

@@ -1,4 +1,4 @@
-"""What every trajectory asks of its arguments; each check returns a copy of its own."""
+"""Checks of the arguments of trajectories; each returns a new, checked copy."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -6,14 +6,14 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 
-_ORTHONORMAL = 1e-8  # largest entry of A Aᵀ - I that is put down to rounding
+_ORTHONORMAL = 1e-8  # largest entry of A Aᵀ - I that counts as rounding error
 
 
 def array(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Array:
     """Return ``value`` as an array of finite numbers; None in ``shape`` fits any size.
 
     Raises:
-        TrajectoryError: If it is not one, or not of that shape.
+        TrajectoryError: If it is not numeric, not finite, or has another shape.
     """
     wanted = f"({', '.join('n' if n is None else str(n) for n in shape)})"
     try:
@@ -34,15 +34,19 @@ def array(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Array:
 
 
 def number(value: float, name: str) -> float:
-    """Return ``value`` as a finite number."""
+    """Return ``value`` as a finite number.
+
+    Raises:
+        TrajectoryError: If it is not one finite number.
+    """
     return float(array(value, name, ()))
 
 
 def positive(value: float, name: str) -> float:
-    """Return ``value`` as a positive number.
+    """Return ``value`` as a finite, positive number.
 
     Raises:
-        TrajectoryError: If it is none.
+        TrajectoryError: If it is not one finite, positive number.
     """
     result = number(value, name)
     if result <= 0.0:
@@ -54,10 +58,11 @@ def waypoint_times(value: ArrayLike, count: int) -> Array:
     """Return the times of ``count`` waypoints, shape (count,) [s].
 
     Raises:
-        TrajectoryError: If there are fewer than two, or if they do not increase.
+        TrajectoryError: If there are fewer than two waypoints, or another number of
+            times, or the times do not increase.
     """
     if count < 2:
-        raise TrajectoryError(f"a path needs two waypoints or more; it has {count}")
+        raise TrajectoryError(f"a path needs at least two waypoints; it has {count}")
     times = array(value, "times", (count,))
     for i in range(1, count):
         if times[i] <= times[i - 1]:
@@ -72,37 +77,40 @@ def direction(value: ArrayLike, name: str) -> Array:
     """Return the unit vector along ``value``, shape (3,).
 
     Raises:
-        TrajectoryError: If it is zero.
+        TrajectoryError: If it is zero, or not three finite numbers.
     """
     vector = array(value, name, (3,))
     length = float(np.linalg.norm(vector))
     if not length > 0.0:
-        raise TrajectoryError(f"{name} must have a direction; {name} = [0, 0, 0]")
+        raise TrajectoryError(f"{name} must be non-zero; {name} = [0, 0, 0]")
     return vector / length
 
 
 def orthonormal(value: ArrayLike, name: str, shape: tuple[int, int]) -> Array:
-    """Return ``value``, a matrix of orthonormal rows.
+    """Return ``value`` as a matrix with orthonormal rows.
 
     Raises:
-        TrajectoryError: If the rows are not orthonormal.
+        TrajectoryError: If it has another shape, or the rows are not orthonormal.
     """
     matrix = array(value, name, shape)
     error = float(np.abs(matrix @ matrix.T - np.eye(shape[0])).max())
     if error > _ORTHONORMAL:
         raise TrajectoryError(
-            f"the rows of {name} must be orthonormal; they are off by {error:.1e}"
+            f"the rows of {name} must be orthonormal; the largest entry of A Aᵀ - I "
+            f"is {error:.1e}"
         )
     return matrix
 
 
 def rotation(value: ArrayLike, name: str) -> Array:
-    """Return ``value``, a rotation matrix of shape (3, 3).
+    """Return ``value`` as a rotation matrix of shape (3, 3).
 
     Raises:
-        TrajectoryError: If it is not orthonormal, or if it mirrors.
+        TrajectoryError: If it is not orthonormal, or its determinant is -1.
     """
     matrix = orthonormal(value, name, (3, 3))
     if np.linalg.det(matrix) < 0.0:
-        raise TrajectoryError(f"{name} must be a rotation; it mirrors (determinant -1)")
+        raise TrajectoryError(
+            f"{name} must be a rotation; it is a reflection (determinant -1)"
+        )
     return matrix

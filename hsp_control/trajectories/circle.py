@@ -1,4 +1,4 @@
-"""A circle at constant speed, in the plane, in space or in any Rⁿ."""
+"""A circle at constant speed, in any Rⁿ with n ≥ 2."""
 
 from math import cos, sin
 
@@ -26,7 +26,7 @@ class Circle(Compiled, Trajectory):
         axes: u1 and u2, orthonormal, shape (2, n).
     """
 
-    __slots__ = ("_arms", "angular_rate", "axes", "center", "phase", "radius")
+    __slots__ = ("_radii", "angular_rate", "axes", "center", "phase", "radius")
 
     def __init__(
         self,
@@ -39,25 +39,32 @@ class Circle(Compiled, Trajectory):
         normal: ArrayLike | None = None,
         start: ArrayLike | None = None,
     ) -> None:
-        """Lay the circle into the plane of ``axes``, or across ``normal``.
+        """Set the circle; its plane is given by ``axes`` or by ``normal``.
 
         Args:
             center: c, shape (n,).
-            radius: r > 0.
+            radius: r > 0, in the units of the center.
             angular_rate: ω [rad/s].
             phase: θ0 [rad].
-            axes: u1 and u2, orthonormal, shape (2, n); in the plane x and y by default.
-            normal: In space, instead of ``axes``: the vector about which the point
-                turns with the right hand when ω > 0, shape (3,).
-            start: With ``normal``: where u1 points, as seen along it, shape (3,); the
-                world axis that is most nearly across by default.
+            axes: u1 and u2, orthonormal, shape (2, n); the x and y axes by default if
+                n = 2.
+            normal: For n = 3, instead of ``axes``: normal of the plane, of any length
+                but zero, shape (3,). For ω > 0 the rotation about it is right-handed.
+            start: With ``normal``: a vector whose projection onto the plane gives u1,
+                shape (3,); by default the coordinate axis that is most nearly
+                perpendicular to the normal.
+
+        Raises:
+            TrajectoryError: If the plane is missing or given twice, a shape does not
+                fit, a value is not finite, the radius is not positive, the axes are not
+                orthonormal, or ``start`` is parallel to ``normal``.
         """
         self.center = checks.array(center, "center", (None,))
         self.radius = checks.positive(radius, "radius")
         self.angular_rate = checks.number(angular_rate, "angular_rate")
         self.phase = checks.number(phase, "phase")
         self.axes = _plane(self.dimension, axes, normal, start)
-        self._arms = self.radius * self.axes
+        self._radii = self.radius * self.axes
 
     @property
     def dimension(self) -> int:
@@ -65,20 +72,20 @@ class Circle(Compiled, Trajectory):
         return len(self.center)
 
     def _kernel(self) -> Kernel:
-        return _circle, (self.angular_rate, self.phase, self.center, self._arms)
+        return _circle, (self.angular_rate, self.phase, self.center, self._radii)
 
 
 def _plane(
     n: int, axes: ArrayLike | None, normal: ArrayLike | None, start: ArrayLike | None
 ) -> Array:
-    """Return u1 and u2, shape (2, n), however they were given.
+    """Return u1 and u2, shape (2, n), from ``axes``, or from ``normal`` and ``start``.
 
     Raises:
-        TrajectoryError: If they were not given, or given twice.
+        TrajectoryError: If the plane is missing, or given twice.
     """
     if normal is None:
         if start is not None:
-            raise TrajectoryError("start goes with normal; axes say it already")
+            raise TrajectoryError("start needs a normal; axes define the start already")
         if axes is not None:
             return checks.orthonormal(axes, "axes", (2, n))
         if n == 2:
@@ -88,15 +95,15 @@ def _plane(
     if axes is not None:
         raise TrajectoryError("give axes or a normal, not both")
     if n != 3:
-        raise TrajectoryError(f"a normal is for dimension 3; center has dimension {n}")
-    return _across(checks.direction(normal, "normal"), start)
+        raise TrajectoryError(f"a normal needs dimension 3; center has dimension {n}")
+    return _axes_from_normal(checks.direction(normal, "normal"), start)
 
 
-def _across(normal: Array, start: ArrayLike | None) -> Array:
-    """Return u1 and u2 = normal x u1, shape (2, 3); ``normal`` has length 1.
+def _axes_from_normal(normal: Array, start: ArrayLike | None) -> Array:
+    """Return u1 and u2 = normal × u1, shape (2, 3); ``normal`` has length 1.
 
     Raises:
-        TrajectoryError: If ``start`` points along ``normal``.
+        TrajectoryError: If ``start`` is parallel to ``normal``.
     """
     if start is None:
         first = np.eye(3)[np.argmin(np.abs(normal))]
@@ -106,7 +113,8 @@ def _across(normal: Array, start: ArrayLike | None) -> Array:
     length = float(np.linalg.norm(first))
     if length < 1e-6:
         raise TrajectoryError(
-            f"start must not point along normal; both are along {normal.tolist()}"
+            "start must not be parallel to normal; both have the direction "
+            f"{normal.tolist()}"
         )
     first /= length
     return np.stack([first, np.cross(normal, first)])
@@ -117,7 +125,7 @@ def _circle(
     rate: float,
     phase: float,
     center: Array,
-    arms: Array,
+    radii: Array,
     position: Array,
     velocity: Array,
     acceleration: Array,
@@ -125,8 +133,8 @@ def _circle(
 ) -> None:
     cosine, sine = cos(rate * t + phase), sin(rate * t + phase)
     for i in range(center.size):
-        outward = cosine * arms[0, i] + sine * arms[1, i]
-        forward = cosine * arms[1, i] - sine * arms[0, i]
-        position[i] = center[i] + outward
-        velocity[i] = rate * forward
-        acceleration[i] = -rate * rate * outward
+        radial = cosine * radii[0, i] + sine * radii[1, i]
+        tangential = cosine * radii[1, i] - sine * radii[0, i]
+        position[i] = center[i] + radial
+        velocity[i] = rate * tangential
+        acceleration[i] = -rate * rate * radial

@@ -1,4 +1,4 @@
-"""Sampling again and again into the same memory, as a control loop does."""
+"""Followers: repeated sampling of trajectories into the same memory."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -12,18 +12,18 @@ from hsp_control.common.native import bind
 from hsp_control.common.step_plan import CallSequence, TimeWindow
 
 Follower = Callable[[float], object]
-"""A function of time [s] that brings a sample, its own, up to that time."""
+"""A function of time [s] that writes the sample at that time into fixed memory."""
 
 Kernel = tuple[Callable[..., None], tuple[Any, ...]]
 """``(function, parameters)``, called as ``function(*parameters, *sample, t)``."""
 
 
 def stay(t: float) -> None:
-    """Follow what does not move: its sample has been written already."""
+    """Do nothing: the follower of a constant sample that is already written."""
 
 
 def follow_all(*followers: Follower) -> Follower:
-    """Return what calls followers in turn; those that `stay` are left out."""
+    """Return a follower that calls others in order, without those that are `stay`."""
     moving = [follower for follower in followers if follower is not stay]
     if len(moving) < 2:
         return moving[0] if moving else stay
@@ -31,7 +31,10 @@ def follow_all(*followers: Follower) -> Follower:
 
 
 def follow_by(sampler: Callable[[float, Any], Any], out: Any) -> Follower:
-    """Return the follower of anything that has a ``sample(t, out)``."""
+    """Return a follower that calls ``sampler(t, out)``.
+
+    If the sampler returns another sample than ``out``, its arrays are copied.
+    """
 
     def follower(t: float) -> None:
         sample = sampler(t, out)
@@ -45,44 +48,52 @@ def follow_by(sampler: Callable[[float, Any], Any], out: Any) -> Follower:
 def follow_blended(
     trajectory: Any, out: Any, blend: Follower, start: float, end: float
 ) -> Follower:
-    """Return the follower of a trajectory that a blend changes in place until its end.
+    """Return the follower of a trajectory whose sample a blend changes in place.
 
     Args:
-        trajectory: What is led to, from ``start`` on.
-        out: The sample.
-        blend: What changes it, until ``end``.
-        start: When the blend begins [s].
-        end: When it ends [s].
+        trajectory: The trajectory, sampled from ``start`` on.
+        out: The sample to write into.
+        blend: The follower that changes ``out`` until ``end``.
+        start: Start of the blend [s].
+        end: End of the blend [s].
     """
-    lead_to: Follower = trajectory.follow(out)
-    if lead_to is stay:  # but the blend does not leave it alone
-        parts = (bind(_put, part.copy(), part, timed=True) for part in out)
-        lead_to = CallSequence(*parts)
+    target: Follower = trajectory.follow(out)
+    if target is stay:  # the blend changes ``out``, so it must be written every time
+        parts = (bind(_restore, part.copy(), part, timed=True) for part in out)
+        target = CallSequence(*parts)
     return CallSequence(
-        TimeWindow(lead_to, start, np.inf), TimeWindow(blend, -np.inf, end)
+        TimeWindow(target, start, np.inf), TimeWindow(blend, -np.inf, end)
     )
 
 
 @kernel
-def _put(kept: Array, out: Array, t: float) -> None:
-    """Write what was kept, whatever the time."""
+def _restore(constant: Array, out: Array, t: float) -> None:
+    """Write the constant values into ``out``, at any time."""
     for i in range(out.size):
-        out.flat[i] = kept.flat[i]
+        out.flat[i] = constant.flat[i]
 
 
 class Compiled(ABC):
-    """What one kernel samples: say which in `_kernel`, and no more is to be written."""
+    """Mixin of trajectories whose sample one kernel writes; implement `_kernel`.
+
+    Name it before the abstract class: ``class Circle(Compiled, Trajectory)``. It
+    provides `sample` and `follow`.
+    """
 
     __slots__ = ()
 
-    _output: Callable[[Any], Any]  # the family's: ``out`` if it fits, or a new sample
+    _output: Callable[[Any], Any]  # the abstract class's: ``out``, or a new sample
 
     @abstractmethod
     def _kernel(self) -> Kernel:
-        """Return the kernel and its parameters."""
+        """Return the kernel and its parameters.
+
+        The kernel is called as ``function(*parameters, *sample, t)`` and writes all
+        arrays of the sample.
+        """
 
     def sample(self, t: float, out: Any = None) -> Any:
-        """Return the sample at time t; see `Trajectory.sample`."""
+        """Return the sample at time t [s]; see `Trajectory.sample`."""
         out = self._output(out)
         function, parameters = self._kernel()
         function(*parameters, *out, float(t))

@@ -1,4 +1,4 @@
-"""A point that stays."""
+"""A constant point."""
 
 from numpy.typing import ArrayLike
 
@@ -8,7 +8,7 @@ from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
 class Hold(Trajectory):
-    """x(t) = x0.
+    """x(t) = x0, a constant point.
 
     Attributes:
         point: x0, shape (n,).
@@ -17,7 +17,11 @@ class Hold(Trajectory):
     __slots__ = ("point",)
 
     def __init__(self, point: ArrayLike) -> None:
-        """Stay at ``point``, shape (n,)."""
+        """Set the point x0, shape (n,).
+
+        Raises:
+            TrajectoryError: If it is not an array of finite numbers, shape (n,).
+        """
         self.point = checks.array(point, "point", (None,))
 
     @property
@@ -26,7 +30,7 @@ class Hold(Trajectory):
         return len(self.point)
 
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
-        """Return the point, at rest; see `Trajectory.sample`."""
+        """Return x0 and zero rates; see `Trajectory.sample`."""
         out = self._output(out)
         out.position[:] = self.point
         out.velocity.fill(0.0)
@@ -34,6 +38,6 @@ class Hold(Trajectory):
         return out
 
     def follow(self, out: TrajectorySample) -> Follower:
-        """Write ``out`` once and for all; see `Trajectory.follow`."""
+        """Write ``out`` once, and return a follower that does nothing."""
         self.sample(0.0, out)
         return stay

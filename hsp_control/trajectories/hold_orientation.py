@@ -1,4 +1,4 @@
-"""An orientation that stays."""
+"""A constant orientation."""
 
 from numpy.typing import ArrayLike
 
@@ -11,7 +11,7 @@ from hsp_control.trajectories.orientation import (
 
 
 class HoldOrientation(OrientationTrajectory):
-    """R(t) = R0.
+    """R(t) = R0, a constant orientation.
 
     Attributes:
         rotation: R0, body to world, shape (3, 3).
@@ -20,13 +20,17 @@ class HoldOrientation(OrientationTrajectory):
     __slots__ = ("rotation",)
 
     def __init__(self, rotation: ArrayLike) -> None:
-        """Stay at ``rotation``, shape (3, 3)."""
+        """Set R0, body to world, shape (3, 3).
+
+        Raises:
+            TrajectoryError: If it is not a rotation matrix.
+        """
         self.rotation = checks.rotation(rotation, "rotation")
 
     def sample(
         self, t: float, out: OrientationSample | None = None
     ) -> OrientationSample:
-        """Return the orientation, at rest; see `OrientationTrajectory.sample`."""
+        """Return R0 and zero rates; see `OrientationTrajectory.sample`."""
         if out is None:
             out = OrientationSample.allocate()
         out.rotation[:] = self.rotation
@@ -35,6 +39,6 @@ class HoldOrientation(OrientationTrajectory):
         return out
 
     def follow(self, out: OrientationSample) -> Follower:
-        """Write ``out`` once and for all; see `Trajectory.follow`."""
+        """Write ``out`` once, and return a follower that does nothing."""
         self.sample(0.0, out)
         return stay

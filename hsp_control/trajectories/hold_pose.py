@@ -1,4 +1,4 @@
-"""A pose that stays."""
+"""A constant pose."""
 
 import pinocchio as pin
 
@@ -8,10 +8,15 @@ from hsp_control.trajectories.pose import ComposedPose
 
 
 class HoldPose(ComposedPose):
-    """M(t) = M0."""
+    """M(t) = M0, a constant pose."""
 
     __slots__ = ()
 
     def __init__(self, pose: pin.SE3) -> None:
-        """Stay at ``pose``, body to world."""
+        """Set M0, body to world.
+
+        Raises:
+            TrajectoryError: If M0 is not finite, or its rotation is not a rotation
+                matrix.
+        """
         super().__init__(Hold(pose.translation), HoldOrientation(pose.rotation))

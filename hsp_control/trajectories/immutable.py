@@ -1,4 +1,4 @@
-"""Objects whose attributes are bound once, in ``__init__``."""
+"""Objects whose attributes are assigned once, in ``__init__``."""
 
 from typing import Any
 
@@ -6,20 +6,21 @@ import numpy as np
 
 
 class Immutable:
-    """An object that cannot change once it is made.
+    """An object that cannot change after ``__init__``.
 
-    An attribute can be bound but not rebound, and an array that is bound becomes
-    read-only. With ``__slots__`` in each class no attribute can be added either, and
-    unpickling binds, hence freezes, in the same way.
+    Each attribute can be assigned once. An array that is assigned becomes read-only, so
+    assign a copy of an array that belongs to the caller. With ``__slots__`` in each
+    class no attribute can be added later. Unpickling assigns in the same way, so that
+    its arrays are read-only too.
     """
 
     __slots__ = ()
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Bind an attribute for the first and only time.
+        """Assign an attribute for the first and only time.
 
         Raises:
-            AttributeError: If the attribute is bound already.
+            AttributeError: If the attribute has a value already.
         """
         if hasattr(self, name):
             raise AttributeError(
@@ -30,12 +31,14 @@ class Immutable:
         object.__setattr__(self, name, value)
 
     def __delattr__(self, name: str) -> None:
-        """Refuse to unbind an attribute.
+        """Raise: an attribute cannot be deleted.
 
         Raises:
             AttributeError: Always.
         """
-        raise AttributeError(f"{type(self).__name__} is immutable: {name} stays")
+        raise AttributeError(
+            f"{type(self).__name__} is immutable: {name} cannot be deleted"
+        )
 
     def __repr__(self) -> str:
         """Return the class and its public attributes."""

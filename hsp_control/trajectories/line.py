@@ -11,8 +11,8 @@ from hsp_control.trajectories.polynomial import QUINTIC
 class Line(PiecewisePolynomial):
     """x(t) = x0 + s (x1 - x0), with s the `smooth_step` from rest to rest.
 
-    It is C², holds x0 before and x1 after; its peak speed is 1.875 |x1 - x0| / T.
-    `UniformLine` is the one of constant speed.
+    C². It rests at x0 before and at x1 after; the peak speed is 1.875 |x1 - x0| / T.
+    For a line of constant speed use `UniformLine`.
     """
 
     __slots__ = ()
@@ -24,13 +24,17 @@ class Line(PiecewisePolynomial):
         duration: float,
         start_time: float = 0.0,
     ) -> None:
-        """Lead from ``start`` to ``end``.
+        """Set the line.
 
         Args:
             start: x0, shape (n,).
             end: x1, shape (n,).
             duration: T > 0 [s].
-            start_time: When it leaves [s].
+            start_time: Start of the motion [s].
+
+        Raises:
+            TrajectoryError: If a shape does not fit, a value is not finite, or the
+                duration is not positive.
         """
         x0 = checks.array(start, "start", (None,))
         x1 = checks.array(end, "end", x0.shape)

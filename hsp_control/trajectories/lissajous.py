@@ -1,4 +1,4 @@
-"""A sine in each coordinate."""
+"""A Lissajous curve: a sine in each coordinate."""
 
 from math import cos, sin
 
@@ -31,13 +31,16 @@ class Lissajous(Compiled, Trajectory):
         rates: ArrayLike,
         phases: ArrayLike | None = None,
     ) -> None:
-        """Swing about ``center``.
+        """Set the sines.
 
         Args:
             center: c, shape (n,).
             amplitudes: a, shape (n,).
             rates: ω, shape (n,) [rad/s].
             phases: φ, shape (n,) [rad]; 0 by default.
+
+        Raises:
+            TrajectoryError: If the shapes differ, or a value is not finite.
         """
         self.center = checks.array(center, "center", (None,))
         shape = self.center.shape

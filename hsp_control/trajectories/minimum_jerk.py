@@ -1,4 +1,4 @@
-"""The motion of least jerk through waypoints."""
+"""The minimum-jerk motion through waypoints."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,8 +8,8 @@ from hsp_control.trajectories import checks
 from hsp_control.trajectories.piecewise_polynomial import PiecewisePolynomial
 from hsp_control.trajectories.polynomial import QUINTIC
 
-# Third and fourth derivative of Σ c_k u^k at u = 0 and u = 1, in terms of the quintic's
-# end values; the rows of `QUINTIC` are its coefficients.
+# Third and fourth derivative of Σ c_k u^k at u = 0 and u = 1, as functions of the end
+# values of the quintic; the rows of `QUINTIC` give its coefficients.
 _START = np.array([6.0 * QUINTIC[3], 24.0 * QUINTIC[4]])
 _END = np.array(
     [
@@ -20,12 +20,13 @@ _END = np.array(
 
 
 class MinimumJerk(PiecewisePolynomial):
-    """The motion through waypoints that minimises ∫ |x'''|² dt, at rest at both ends.
+    """min ∫ |x'''|² dt through waypoints, at rest at both ends.
 
-    It is a quintic between waypoints and C⁴ across them; velocity and acceleration
-    vanish at both ends, so that it is C² with the holds before and after. The
-    velocities and accelerations at the inner waypoints are the unknowns, the continuity
-    of jerk and snap there the equations: one dense linear system, made once.
+    The motion is a quintic between waypoints, and C⁴ at the inner waypoints. Velocity
+    and acceleration are zero at both ends, so that it is C² together with the rest
+    before and after. ``__init__`` solves one dense linear system: the unknowns are
+    velocity and acceleration at the inner waypoints, the equations continuity of jerk
+    and snap there.
 
     References:
         T. Flash, N. Hogan, "The coordination of arm movements: an experimentally
@@ -35,11 +36,15 @@ class MinimumJerk(PiecewisePolynomial):
     __slots__ = ()
 
     def __init__(self, waypoints: ArrayLike, times: ArrayLike) -> None:
-        """Pass through ``waypoints`` at ``times``.
+        """Set the waypoints.
 
         Args:
             waypoints: At least two points, shape (m, n).
-            times: When to be there, increasing, shape (m,) [s].
+            times: Times of the waypoints, increasing, shape (m,) [s].
+
+        Raises:
+            TrajectoryError: If there are fewer than two waypoints, a shape does not
+                fit, a value is not finite, or the times do not increase.
         """
         x = checks.array(waypoints, "waypoints", (None, None))
         t = checks.waypoint_times(times, len(x))

@@ -1,4 +1,4 @@
-"""A body that turns in time, with its angular velocity and acceleration."""
+"""The abstract trajectory of an orientation in SO(3)."""
 
 from abc import ABC, abstractmethod
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from hsp_control.trajectories.immutable import Immutable
 
 
 class OrientationSample(NamedTuple):
-    """How a body is turned at one instant, and how it turns there."""
+    """R(t), ω(t) and ω'(t): an orientation trajectory at one time."""
 
     rotation: Array
     """R(t), body to world, shape (3, 3)."""
@@ -27,10 +27,13 @@ class OrientationSample(NamedTuple):
 
 
 class OrientationTrajectory(Immutable, ABC):
-    """A body that turns in time; immutable, without memory, defined at every t.
+    """R(t) in SO(3) with ω(t) and ω'(t); immutable, stateless, defined at every t.
 
-    A motion of finite duration holds its first orientation before it and its last one
-    after it.
+    R is body to world, ω is in world axes. A subclass assigns its parameters in
+    ``__init__``, lists them in ``__slots__`` and implements `sample`; it may override
+    `follow`, or derive from `Compiled`, as described in `Trajectory`. A motion of
+    finite duration rests at its first orientation before the start and at its last
+    orientation after the end.
     """
 
     __slots__ = ()
@@ -39,11 +42,11 @@ class OrientationTrajectory(Immutable, ABC):
     def sample(
         self, t: float, out: OrientationSample | None = None
     ) -> OrientationSample:
-        """Return the orientation at time t with its two derivatives.
+        """Return R(t), ω(t) and ω'(t), shapes (3, 3), (3,) and (3,).
 
         Args:
             t: Time [s].
-            out: Where to write; a new sample by default, which shares no memory with
+            out: The sample to write into; None: a new one, which shares no memory with
                 the trajectory.
 
         Returns:
@@ -51,12 +54,12 @@ class OrientationTrajectory(Immutable, ABC):
         """
 
     def follow(self, out: OrientationSample) -> Follower:
-        """Return a function of time that brings ``out`` up to a time.
+        """Return a function of time [s] that writes the sample into ``out``.
 
         See `Trajectory.follow`.
         """
         return follow_by(self.sample, out)
 
     def _output(self, out: OrientationSample | None) -> OrientationSample:
-        """Return ``out``, or a new sample."""
+        """Return ``out``, or a new sample if it is None."""
         return OrientationSample.allocate() if out is None else out

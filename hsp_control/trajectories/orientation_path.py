@@ -1,4 +1,4 @@
-"""Orientations one after the other, by the shortest turns."""
+"""Shortest rotations between waypoints, with a stop at each of them."""
 
 from collections.abc import Sequence
 
@@ -15,14 +15,15 @@ from hsp_control.trajectories.timing import smooth_step
 
 
 class OrientationPath(Compiled, OrientationTrajectory):
-    """R(t) = exp(s a_i) R_i between times t_i and t_{i+1}, s the `smooth_step`.
+    """R(t) = exp(s a_i) R_i from t_i to t_{i+1}, s the `smooth_step`.
 
-    a_i = R_i log(R_iᵀ R_{i+1}) is the shortest turn to the next waypoint, in the world
-    frame (half a turn can go either way round: put a waypoint between). The body comes
-    to rest at each waypoint; the motion is C², and holds before and after.
+    a_i = R_i log(R_iᵀ R_{i+1}) is the shortest rotation to the next waypoint, in the
+    world frame. For an angle of π its sense is not unique: add a waypoint in between.
+    The body rests at each waypoint, before the first and after the last; the motion is
+    C².
 
     Attributes:
-        rotations: R_i, shape (m, 3, 3).
+        rotations: R_i, body to world, shape (m, 3, 3).
         times: t_i, increasing, shape (m,) [s].
     """
 
@@ -31,11 +32,16 @@ class OrientationPath(Compiled, OrientationTrajectory):
     def __init__(
         self, rotations: ArrayLike | Sequence[ArrayLike], times: ArrayLike
     ) -> None:
-        """Pass through ``rotations`` at ``times``.
+        """Set the waypoints.
 
         Args:
-            rotations: At least two rotation matrices, shape (m, 3, 3).
-            times: When to be there, increasing, shape (m,) [s].
+            rotations: At least two rotation matrices R_i, body to world, shape
+                (m, 3, 3).
+            times: Times t_i of the waypoints, increasing, shape (m,) [s].
+
+        Raises:
+            TrajectoryError: If there are fewer than two waypoints, one is not a
+                rotation matrix, a shape does not fit, or the times do not increase.
         """
         R = checks.array(np.asarray(rotations), "rotations", (None, 3, 3))
         for i, rotation in enumerate(R):
@@ -71,7 +77,7 @@ def _path(
     if s < 1.0:
         turn(rotations[i], turns[i], s, rotation)
     else:
-        turn(rotations[i + 1], turns[i], 0.0, rotation)  # not a bit away from it
+        turn(rotations[i + 1], turns[i], 0.0, rotation)  # exactly the waypoint
     for k in range(3):
         velocity[k] = s_dot * turns[i, k]
         acceleration[k] = s_ddot * turns[i, k]

@@ -1,4 +1,4 @@
-"""Polynomials between knots: what lines, splines and minimum jerk are made of."""
+"""Polynomials between knots, the base class of lines, splines and minimum jerk."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,8 +14,8 @@ from hsp_control.trajectories.trajectory import Trajectory
 class PiecewisePolynomial(Compiled, Trajectory):
     """x(t) = Σ_k c_ik u^k with u = (t - t_i) / (t_{i+1} - t_i) between t_i and t_{i+1}.
 
-    Before the first knot and after the last one the point is held exactly; how smooth
-    the motion is there and at the inner knots is up to the coefficients.
+    The motion rests exactly at the first point before the first knot, and at the last
+    point after the last knot. The coefficients decide how smooth it is at the knots.
 
     Attributes:
         times: The m knots, increasing, shape (m,) [s].
@@ -35,8 +35,12 @@ class PiecewisePolynomial(Compiled, Trajectory):
         Args:
             times: The knots, increasing, shape (m,) [s].
             coefficients: c, shape (m - 1, degree + 1, n).
-            end: Where to stay afterwards, shape (n,); by default what the last
-                polynomial gives, which rounding may part from a round number.
+            end: The point after the last knot, shape (n,); None: the end of the last
+                polynomial, with its rounding error.
+
+        Raises:
+            TrajectoryError: If a shape does not fit, a value is not finite, or the
+                knots do not increase.
         """
         c = checks.array(coefficients, "coefficients", (None, None, None))
         last = c[-1].sum(axis=0) if end is None else end
@@ -71,7 +75,7 @@ def _evaluate(
             velocity[j] = 0.0
             acceleration[j] = 0.0
         return
-    i, after = 0, last  # times[i] <= t < times[i + 1] is found by bisection
+    i, after = 0, last  # bisection for times[i] <= t < times[i + 1]
     while after - i > 1:
         middle = (i + after) // 2
         if t < times[middle]:

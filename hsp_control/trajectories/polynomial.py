@@ -1,11 +1,11 @@
-"""Polynomials in u from 0 to 1: evaluation with rates, and the quintic through ends."""
+"""Polynomials in u from 0 to 1: evaluation with rates, and quintics from end values."""
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 
-# Row k gives the coefficient of u^k from (x, x', x'') at u = 0 and then at u = 1.
+# Row k maps (x, x', x'') at u = 0 and (x, x', x'') at u = 1 to the coefficient of u^k.
 QUINTIC: Array = np.array(
     [
         [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -31,15 +31,15 @@ def horner(
     """Write Σ_k c_k u^k and its two time derivatives, where u' = 1 / width.
 
     Args:
-        u: Where in the interval, from 0 to 1.
-        width: The interval's length [s].
+        u: Relative position in the interval, from 0 to 1.
+        width: Length of the interval [s].
         coefficients: c, shape (degree + 1, n).
-        position: The value, shape (n,).
-        velocity: Its rate, shape (n,).
-        acceleration: The rate of that, shape (n,).
+        position: The value, written, shape (n,).
+        velocity: Its first derivative, written, shape (n,) [1/s].
+        acceleration: Its second derivative, written, shape (n,) [1/s²].
     """
     for j in range(position.size):
-        x, x_dot, half_x_ddot = 0.0, 0.0, 0.0  # Horner's scheme, differentiated along
+        x, x_dot, half_x_ddot = 0.0, 0.0, 0.0  # Horner's scheme and its derivatives
         for k in range(coefficients.shape[0] - 1, -1, -1):
             half_x_ddot = half_x_ddot * u + x_dot
             x_dot = x_dot * u + x

@@ -1,4 +1,4 @@
-"""A body that moves and turns in time."""
+"""The abstract trajectory of a pose in SE(3), and one composed of two trajectories."""
 
 from abc import ABC, abstractmethod
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
 class PoseSample(NamedTuple):
-    """Where a body is at one instant, and how it moves there, in the world frame."""
+    """x, x', x'', R, ω and ω': a pose trajectory at one time, in world axes."""
 
     position: TrajectorySample
     """The body's origin, of dimension 3 [m, m/s, m/s²]."""
@@ -26,14 +26,18 @@ class PoseSample(NamedTuple):
 
     @classmethod
     def allocate(cls) -> "PoseSample":
-        """Return a sample at the identity, to be written into."""
+        """Return a sample at the identity and at rest, for `PoseTrajectory.sample`."""
         memory = np.zeros((8, 3))
         memory[3, 0] = memory[4, 1] = memory[5, 2] = 1.0
         return cls.over(memory)
 
     @classmethod
     def over(cls, memory: Array) -> "PoseSample":
-        """Return a sample that is one array of shape (8, 3): x, x', x'', R, ω, ω'."""
+        """Return a sample whose arrays are views of ``memory``.
+
+        Args:
+            memory: Shape (8, 3); its rows are x, x', x'', R (three rows), ω, ω'.
+        """
         return cls(
             TrajectorySample(memory[0], memory[1], memory[2]),
             OrientationSample(memory[3:6], memory[6], memory[7]),
@@ -41,17 +45,22 @@ class PoseSample(NamedTuple):
 
 
 class PoseTrajectory(Immutable, ABC):
-    """A body that moves and turns in time; immutable, defined at every t."""
+    """M(t) = (R(t), x(t)) in SE(3); immutable, stateless, defined at every t.
+
+    Body to world; x is the body's origin [m], all rates are in world axes. A subclass
+    assigns its parameters in ``__init__``, lists them in ``__slots__`` and implements
+    `sample`; it may override `follow`, see `Trajectory.follow`.
+    """
 
     __slots__ = ()
 
     @abstractmethod
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
-        """Return the pose at time t with its two derivatives.
+        """Return the pose at time t with its first two derivatives.
 
         Args:
             t: Time [s].
-            out: Where to write; a new sample by default, which shares no memory with
+            out: The sample to write into; None: a new one, which shares no memory with
                 the trajectory.
 
         Returns:
@@ -59,7 +68,7 @@ class PoseTrajectory(Immutable, ABC):
         """
 
     def follow(self, out: PoseSample) -> Follower:
-        """Return a function of time that brings ``out`` up to a time.
+        """Return a function of time [s] that writes the sample into ``out``.
 
         See `Trajectory.follow`.
         """
@@ -72,7 +81,7 @@ class PoseTrajectory(Immutable, ABC):
 
 
 class ComposedPose(PoseTrajectory):
-    """A pose whose origin and orientation follow a trajectory each.
+    """M(t) = (R(t), x(t)), with x and R given by one trajectory each.
 
     Attributes:
         position: The origin's trajectory, of dimension 3 [m].
@@ -84,15 +93,19 @@ class ComposedPose(PoseTrajectory):
     def __init__(
         self, position: Trajectory, orientation: OrientationTrajectory
     ) -> None:
-        """Join the two.
+        """Compose a pose of a position and an orientation.
+
+        Args:
+            position: x(t), of dimension 3 [m].
+            orientation: R(t), body to world.
 
         Raises:
-            TrajectoryError: If ``position`` is not a trajectory in space.
+            TrajectoryError: If ``position`` does not have dimension 3.
         """
         if position.dimension != 3:
             raise TrajectoryError(
                 f"position has dimension {position.dimension}; "
-                "the origin of a pose moves in dimension 3"
+                "the origin of a pose needs dimension 3"
             )
         self.position = position
         self.orientation = orientation
@@ -106,7 +119,7 @@ class ComposedPose(PoseTrajectory):
         return out
 
     def follow(self, out: PoseSample) -> Follower:
-        """Return a function of time that brings ``out`` up to a time."""
+        """Return a function of time that updates ``out``; see `Trajectory.follow`."""
         return follow_all(
             self.position.follow(out.position),
             self.orientation.follow(out.orientation),

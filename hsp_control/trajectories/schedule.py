@@ -1,4 +1,4 @@
-"""When something is on: intervals of time, with smooth ramps at their ends."""
+"""Time intervals in which something is active, with smooth ramps at their ends."""
 
 from collections.abc import Sequence
 
@@ -8,24 +8,30 @@ from hsp_control.common.exceptions import ScheduleError
 
 
 class Schedule:
-    """A weight from 0 to 1 over time: on within intervals, smooth at their ends.
+    """w(t) in [0, 1]: zero outside the intervals, one inside, with smooth ramps.
 
-    The ramps lie inside the intervals: at an interval's start and end the weight is 0,
-    so that whatever it weighs may appear and vanish there without a jump.
+    The ramps lie inside the intervals: with a ramp the weight is 0 at the start and the
+    end of an interval, so that a task with this weight is added and removed without a
+    jump.
 
     Attributes:
         intervals: (start, end) of each interval [s].
-        ramp: How long each rise and each fall takes [s].
+        ramp: Duration of each rise and each fall [s].
     """
 
     def __init__(
         self, intervals: Sequence[tuple[float, float]], *, ramp: float = 0.0
     ) -> None:
-        """Set the intervals; the first may start at -inf, the last end at inf.
+        """Set the intervals.
+
+        Args:
+            intervals: (start, end) of each interval [s], in order of time. The first
+                may start at -inf, and the last may end at inf.
+            ramp: Duration of each rise and each fall ≥ 0 [s].
 
         Raises:
-            ScheduleError: If an interval does not end after its start, two overlap, or
-                the ramps do not fit into one.
+            ScheduleError: If an interval does not end after its start, two overlap, an
+                interval is shorter than its ramps, or the ramp is negative.
         """
         if not 0.0 <= ramp < np.inf:
             raise ScheduleError(f"ramp is {ramp} s; must be at least 0")
@@ -39,8 +45,8 @@ class Schedule:
                 )
             if start < previous:
                 raise ScheduleError(
-                    f"the interval from {start:g} to {end:g} s begins before the one "
-                    f"before it ends, at {previous:g} s"
+                    f"the interval from {start:g} to {end:g} s overlaps the previous "
+                    f"one, which ends at {previous:g} s"
                 )
             ramps = self.ramp * ((start > -np.inf) + (end < np.inf))
             if end - start < ramps:
@@ -52,7 +58,7 @@ class Schedule:
 
     @classmethod
     def always(cls) -> "Schedule":
-        """Return the schedule of what is on at all times."""
+        """Return the schedule that is always active."""
         return cls([(-np.inf, np.inf)])
 
     def __repr__(self) -> str:
@@ -60,15 +66,15 @@ class Schedule:
 
     @property
     def constant(self) -> bool:
-        """Whether it is on at all times."""
+        """Whether it is always active."""
         return self.intervals == ((-np.inf, np.inf),)
 
     def active(self, t: float) -> bool:
-        """Return whether time t [s] lies in an interval; at its start, not its end."""
+        """Return whether t [s] is in an interval: start ≤ t < end."""
         return any(start <= t < end for start, end in self.intervals)
 
     def weight(self, t: float) -> float:
-        """Return the weight at time t [s], twice continuously differentiable in t."""
+        """Return w(t), t in s; with a ramp it is C² in t."""
         for start, end in self.intervals:
             if start <= t < end:
                 if self.ramp == 0.0:
@@ -78,7 +84,7 @@ class Schedule:
 
 
 def _smooth(s: float) -> float:
-    """Return the step of quintic shape: 0 below 0, 1 above 1."""
+    """Return the quintic step 10 s³ - 15 s⁴ + 6 s⁵; 0 for s < 0, 1 for s > 1."""
     if s >= 1.0:
         return 1.0
     return s**3 * (10.0 - 15.0 * s + 6.0 * s * s) if s > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""From pose to pose along a screw."""
+"""The screw motion from one pose to another."""
 
 import numpy as np
 import pinocchio as pin
@@ -14,15 +14,15 @@ from hsp_control.trajectories.timing import smooth_step
 class ScrewInterpolation(PoseTrajectory):
     """M(t) = M0 exp6(s log6(M0⁻¹ M1)), with s the `smooth_step` from rest to rest.
 
-    The straight line of SE(3): the body turns about one fixed axis and advances along
-    it, so that its origin moves on a helix (`ComposedPose` of a `Line` and an
-    `OrientationPath` moves it straight). C², holds M0 before and M1 after.
+    The body rotates about one fixed axis and moves along it, so that its origin follows
+    a helix. For a straight line of the origin use `ComposedPose` with a `Line` and an
+    `OrientationPath`. C²; it rests at M0 before and at M1 after.
 
     Attributes:
         positions: The origin at start and end, shape (2, 3) [m].
-        rotations: The orientation at start and end, shape (2, 3, 3).
+        rotations: The orientation at start and end, body to world, shape (2, 3, 3).
         duration: T [s].
-        start_time: When it leaves [s].
+        start_time: Start of the motion [s].
     """
 
     __slots__ = ("_screw", "duration", "positions", "rotations", "start_time")
@@ -34,13 +34,17 @@ class ScrewInterpolation(PoseTrajectory):
         duration: float,
         start_time: float = 0.0,
     ) -> None:
-        """Lead from ``start`` to ``end``.
+        """Set the motion.
 
         Args:
             start: M0, body to world.
             end: M1, body to world.
             duration: T > 0 [s].
-            start_time: When it leaves [s].
+            start_time: Start of the motion [s].
+
+        Raises:
+            TrajectoryError: If a rotation is not a rotation matrix, a value is not
+                finite, or the duration is not positive.
         """
         self.positions = checks.array(
             [start.translation, end.translation], "positions", (2, 3)
@@ -73,10 +77,11 @@ class ScrewInterpolation(PoseTrajectory):
 
 
 def _screw(positions: Array, rotations: Array) -> Array:
-    """Return a, b, a x b and a (a·b): the twist of the whole way, in the world frame.
+    """Return a, b, a × b and a (a·b), shape (4, 3), in the world frame.
 
-    The body turns by a; b is the velocity of its origin at the start, were it to go in
-    one second: V(a) b = p1 - p0, with the left Jacobian V(y) = Jexp(-y).
+    (a, b) is the constant twist that moves the body from start to end in one second: a
+    is the rotation vector [rad], b the velocity of the origin at the start [m];
+    V(a) b = p1 - p0, with the left Jacobian V(y) = Jexp(-y).
     """
     body, R, V_inverse = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     compose_back(rotations[0], rotations[1], R)
@@ -104,18 +109,19 @@ def _advance(
 ) -> None:
     """Write the pose exp(s a) R0, p0 + V(s a) s b, and its rates.
 
-    p' = s' f and p'' = s'' f + s'² a x f with f = exp(s a) b.
+    p' = s' f and p'' = s'' f + s'² a × f with f = exp(s a) b. The rows of ``screw`` are
+    those of `_screw`.
     """
     a, b, a_cross_b, along = screw[0], screw[1], screw[2], screw[3]
     a_squared = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
     c0, c1, c2, c3, _, _ = stumpff(s * s * a_squared)
     turn(start_rotation, a, s, rotation)
     for i in range(3):
-        way = s * (c1 * b[i] + s * c2 * a_cross_b[i] + s * s * c3 * along[i])
-        forward = c0 * b[i] + s * c1 * a_cross_b[i] + s * s * c2 * along[i]
-        inward = c0 * a_cross_b[i] + s * c1 * (along[i] - a_squared * b[i])  # a x f
-        position[i] = start_position[i] + way
-        velocity[i] = s_dot * forward
-        acceleration[i] = s_ddot * forward + s_dot * s_dot * inward
+        offset = s * (c1 * b[i] + s * c2 * a_cross_b[i] + s * s * c3 * along[i])
+        f = c0 * b[i] + s * c1 * a_cross_b[i] + s * s * c2 * along[i]
+        a_cross_f = c0 * a_cross_b[i] + s * c1 * (along[i] - a_squared * b[i])
+        position[i] = start_position[i] + offset
+        velocity[i] = s_dot * f
+        acceleration[i] = s_ddot * f + s_dot * s_dot * a_cross_f
         angular_velocity[i] = s_dot * a[i]
         angular_acceleration[i] = s_ddot * a[i]

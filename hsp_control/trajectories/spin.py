@@ -1,4 +1,4 @@
-"""A turn at constant rate."""
+"""A rotation at constant angular velocity."""
 
 from numpy.typing import ArrayLike
 
@@ -11,23 +11,27 @@ from hsp_control.trajectories.orientation import OrientationTrajectory
 
 
 class Spin(Compiled, OrientationTrajectory):
-    """R(t) = exp(t ω) R0 with ω = rate · axis, for all t.
+    """R(t) = exp(t ω) R0 with ω = rate · axis in the world frame, for all t.
 
     Attributes:
-        rotation: R0, the orientation at t = 0, shape (3, 3).
+        rotation: R0, the orientation at t = 0, body to world, shape (3, 3).
         axis: Unit vector in the world frame, shape (3,).
-        rate: Angular rate about it [rad/s].
+        rate: Angular rate about the axis [rad/s].
     """
 
     __slots__ = ("_angular_velocity", "axis", "rate", "rotation")
 
     def __init__(self, rotation: ArrayLike, axis: ArrayLike, rate: float) -> None:
-        """Turn ``rotation`` about ``axis``.
+        """Set the rotation.
 
         Args:
-            rotation: R0, the orientation at t = 0, shape (3, 3).
+            rotation: R0, the orientation at t = 0, body to world, shape (3, 3).
             axis: Direction in the world frame, of any length but zero, shape (3,).
-            rate: Angular rate about it [rad/s].
+            rate: Angular rate about the axis [rad/s].
+
+        Raises:
+            TrajectoryError: If R0 is not a rotation matrix, the axis is zero, or a
+                value is not finite.
         """
         self.rotation = checks.rotation(rotation, "rotation")
         self.axis = checks.direction(axis, "axis")

@@ -12,12 +12,12 @@ from hsp_control.trajectories.piecewise_polynomial import PiecewisePolynomial
 
 
 class Spline(PiecewisePolynomial):
-    """The spline of degree 3, 5 or 7 through waypoints, at rest at both ends.
+    """min ∫ |x⁽ᵏ⁾|² dt through waypoints, k = (degree + 1) / 2, at rest at both ends.
 
-    It is the motion of least acceleration (3, C²), jerk (5, C⁴) or snap (7, C⁶) through
-    the waypoints, with derivatives 1, 1 to 2 or 1 to 3 zero at both ends. Of degree 3
-    the acceleration therefore jumps where the motion meets its holds; the others are
-    C² everywhere. `MinimumJerk` is degree 5 by another way.
+    The spline of degree 3 (C²), 5 (C⁴) or 7 (C⁶) has the minimum acceleration, jerk or
+    snap; its derivatives 1, 1 to 2 or 1 to 3 are zero at both ends. With degree 3 the
+    acceleration therefore jumps at both ends; with 5 and 7 the motion is C² everywhere.
+    `MinimumJerk` computes degree 5 without SciPy.
 
     Attributes:
         degree: 3, 5 or 7.
@@ -26,17 +26,18 @@ class Spline(PiecewisePolynomial):
     __slots__ = ("degree",)
 
     def __init__(self, waypoints: ArrayLike, times: ArrayLike, degree: int = 5) -> None:
-        """Pass through ``waypoints`` at ``times``.
+        """Set the waypoints.
 
         Args:
             waypoints: At least two points, shape (m, n).
-            times: When to be there, increasing, shape (m,) [s].
+            times: Times of the waypoints, increasing, shape (m,) [s].
             degree: 3, 5 or 7.
 
         Raises:
-            TrajectoryError: If the degree is another one.
+            TrajectoryError: If the degree is not 3, 5 or 7, there are fewer than two
+                waypoints, a shape does not fit, or the times do not increase.
         """
-        # 0.2 s that only splines shall cost
+        # This import takes 0.2 s, so only splines import it.
         from scipy.interpolate import make_interp_spline
 
         if degree not in {3, 5, 7}:

@@ -1,4 +1,4 @@
-"""From stop to stop."""
+"""Straight motions between waypoints, with a stop at each of them."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,22 +9,24 @@ from hsp_control.trajectories.polynomial import QUINTIC
 
 
 class Stops(PiecewisePolynomial):
-    """Straight from waypoint to waypoint by quintics, at rest at each of them.
+    """x(t) = x_i + s (x_{i+1} - x_i) from t_i to t_{i+1}, s the `smooth_step`.
 
-    C² throughout. The same waypoint twice is a pause.
+    Straight lines with rest at each waypoint, C² everywhere. For a pause, give the same
+    waypoint twice.
     """
 
     __slots__ = ()
 
     def __init__(self, waypoints: ArrayLike, times: ArrayLike) -> None:
-        """Stop at ``waypoints`` at ``times``.
+        """Set the waypoints.
 
         Args:
-            waypoints: At least two points, shape (m, n).
-            times: When to be there, increasing, shape (m,) [s].
+            waypoints: At least two points x_i, shape (m, n).
+            times: Times t_i of the waypoints, increasing, shape (m,) [s].
 
         Raises:
-            TrajectoryError: If there are fewer, or the times do not increase.
+            TrajectoryError: If there are fewer than two waypoints, a shape does not
+                fit, a value is not finite, or the times do not increase.
         """
         x = checks.array(waypoints, "waypoints", (None, None))
         t = checks.waypoint_times(times, len(x))

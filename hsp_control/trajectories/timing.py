@@ -1,4 +1,4 @@
-"""How far along, and how fast: the smooth step from rest to rest."""
+"""The smooth step from 0 to 1, at rest at both ends."""
 
 from hsp_control.common.kernels import kernel
 
@@ -7,11 +7,11 @@ from hsp_control.common.kernels import kernel
 def smooth_step(
     t: float, start_time: float, duration: float
 ) -> tuple[float, float, float]:
-    """Return s(t) = 10 u³ - 15 u⁴ + 6 u⁵, u = (t - t0) / T, and its two rates.
+    """Return s(t) = 10 u³ - 15 u⁴ + 6 u⁵, u = (t - t0) / T, with s' and s''.
 
-    It leads from 0 to 1 with zero velocity and acceleration at both ends (of all such
-    motions the one of least jerk), is exactly 0 before and exactly 1 after, hence C².
-    Its peak rates are 1.875 / T and 5.77 / T².
+    s goes from 0 to 1 with zero velocity and acceleration at both ends; of all such
+    motions it has the minimum jerk. It is exactly 0 before and exactly 1 after, hence
+    C². The peaks of s' and s'' are 1.875 / T and 5.77 / T².
 
     Args:
         t: Time [s].

@@ -1,4 +1,4 @@
-"""A point of Rⁿ that moves in time, with its velocity and acceleration."""
+"""The abstract trajectory of a point in Rⁿ."""
 
 from abc import ABC, abstractmethod
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from hsp_control.trajectories.immutable import Immutable
 
 
 class TrajectorySample(NamedTuple):
-    """Where a trajectory is at one instant, and how it moves there."""
+    """x(t), x'(t) and x''(t): a trajectory at one time, in its own units."""
 
     position: Array
     """x(t), shape (n,)."""
@@ -23,16 +23,21 @@ class TrajectorySample(NamedTuple):
 
     @classmethod
     def allocate(cls, dimension: int) -> "TrajectorySample":
-        """Return a sample of zeros, to be written into by `Trajectory.sample`."""
+        """Return a sample of zeros with n = ``dimension``, for `Trajectory.sample`."""
         return cls(np.zeros(dimension), np.zeros(dimension), np.zeros(dimension))
 
 
 class Trajectory(Immutable, ABC):
-    """A point of Rⁿ that moves in time; immutable, without memory, defined at every t.
+    """x(t) in Rⁿ with x'(t) and x''(t); immutable, stateless, defined at every t.
 
-    To write a new one: bind its parameters in ``__init__``, name them in ``__slots__``,
-    and give `dimension` and `sample`. A motion of finite duration holds its first point
-    before it and its last point after it.
+    A subclass assigns its parameters in ``__init__``, lists them in ``__slots__`` and
+    implements `dimension` and `sample`. The coordinates may have any unit; a task says
+    which frame and units it needs. A motion of finite duration rests at its first point
+    before the start and at its last point after the end.
+
+    A subclass may override `follow` to make repeated sampling faster. If one kernel
+    computes the sample, derive from `Compiled` first, then from `Trajectory`, and
+    implement `_kernel` instead of `sample`.
     """
 
     __slots__ = ()
@@ -44,30 +49,37 @@ class Trajectory(Immutable, ABC):
 
     @abstractmethod
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
-        """Return the point at time t with its two derivatives.
+        """Return x(t), x'(t) and x''(t), shape (n,) each.
+
+        Start an implementation with ``out = self._output(out)``, write all entries, and
+        return ``out``.
 
         Args:
             t: Time [s].
-            out: Where to write; a new sample by default, which shares no memory with
+            out: The sample to write into; None: a new one, which shares no memory with
                 the trajectory.
 
         Returns:
             ``out``, or the new sample.
+
+        Raises:
+            ShapeError: If ``out`` has another dimension.
         """
 
     def follow(self, out: TrajectorySample) -> Follower:
-        """Return a function of time that brings ``out`` up to a time, as `sample` does.
+        """Return a function of time [s] that writes the sample into ``out``.
 
-        For those who sample again and again: what does not change is decided here.
-        From now on nobody else may write into ``out``.
+        It does what `sample` does, faster, for repeated sampling into the same memory.
+        After this call nothing else may write into ``out``, because a follower may
+        skip entries that do not change.
         """
         return follow_by(self.sample, out)
 
     def _output(self, out: TrajectorySample | None) -> TrajectorySample:
-        """Return ``out`` if it fits, or a new sample.
+        """Return ``out``, or a new sample if it is None.
 
         Raises:
-            ShapeError: If ``out`` has not the trajectory's dimension.
+            ShapeError: If ``out`` has another dimension than the trajectory.
         """
         n = self.dimension
         if out is None:

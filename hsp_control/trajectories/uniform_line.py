@@ -1,4 +1,4 @@
-"""A straight line without end, at constant speed."""
+"""An infinite straight line at constant speed."""
 
 from numpy.typing import ArrayLike
 
@@ -10,17 +10,25 @@ from hsp_control.trajectories.trajectory import Trajectory
 
 
 class UniformLine(Compiled, Trajectory):
-    """x(t) = x0 + t v, for all t; `Line` is the one that starts and stops.
+    """x(t) = x0 + t v, for all t. For a line that starts and stops use `Line`.
 
     Attributes:
-        start: x0, where it is at t = 0, shape (n,).
+        start: x0, the point at t = 0, shape (n,).
         velocity: v, shape (n,) [1/s].
     """
 
     __slots__ = ("start", "velocity")
 
     def __init__(self, start: ArrayLike, velocity: ArrayLike) -> None:
-        """Pass ``start`` at t = 0 with ``velocity``; both of shape (n,)."""
+        """Set the line.
+
+        Args:
+            start: x0, the point at t = 0, shape (n,).
+            velocity: v, shape (n,) [1/s].
+
+        Raises:
+            TrajectoryError: If the shapes differ, or a value is not finite.
+        """
         self.start = checks.array(start, "start", (None,))
         self.velocity = checks.array(velocity, "velocity", self.start.shape)
 

@@ -1,1 +1,1 @@
-"""What is seen: figures of a log, and a robot in the browser."""
+"""Visualization: figures of a log, and a robot in the browser."""

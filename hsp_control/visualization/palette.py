@@ -1,44 +1,44 @@
-"""One palette for plots and viewer: colours by what they stand for, as hex strings.
+"""The palette of plots and viewer: colours by their meaning, as hex strings.
 
-After Okabe and Ito (2008), whose colours stay apart for every kind of colour blindness;
-greys for what is context. Needs no plotting package.
+The colours of Okabe and Ito (2008), which are distinct for every kind of colour
+blindness, and greys for the context. Needs no plotting package.
 """
 
 ACTUAL = "#0072B2"
-"""What was measured (blue)."""
+"""Measured values (blue)."""
 DESIRED = "#E69F00"
-"""What a task asks for (orange)."""
+"""Desired values of a task (orange)."""
 OBSTACLE = "#D55E00"
-"""What must not be touched (vermilion)."""
+"""Obstacles (vermilion)."""
 TASK = "#009E73"
 """A task's frame, its error (bluish green)."""
 FIELD = "#CC79A7"
 """The null-space field, self-motion, e_N (reddish purple)."""
 WARNING = "#882255"
-"""Where the law was bounded, a run that ended early (wine)."""
+"""Damped intervals near a singularity; a run that ended early (wine)."""
 
 LINK = "#8C969F"
 """A robot's links (grey)."""
 JOINT = "#2F363D"
 """A robot's joints (near black)."""
 SHADOW = "#E3E6E9"
-"""What only helps the eye: a shadow on the floor (pale grey)."""
+"""A shadow on the floor, which helps to see depth (pale grey)."""
 WALL = "#F6F7F8"
-"""The walls behind a picture in space."""
+"""The walls behind a three-dimensional plot."""
 
 INK = "#22272B"
 """Text and axes."""
 MUTED = "#6B7680"
-"""Notes, and lines that are not named."""
+"""Notes, and lines without a name in the legend."""
 GRID = "#DFE3E6"
 """Grid lines."""
 PAPER = "#FFFFFF"
 """The background."""
 
 EARLY, LATE = "#C9DCEA", "#0A3A5C"
-"""The two ends of the scale of time, light to dark blue."""
+"""The two ends of the time scale, light to dark blue."""
 OBSTACLE_EARLY = "#F7DCCB"
-"""An obstacle at the early end of that scale."""
+"""An obstacle at the early end of the time scale."""
 
 SERIES = (
     "#0072B2",  # blue
@@ -49,10 +49,10 @@ SERIES = (
     "#D55E00",  # vermilion
     "#22272B",  # ink
 )
-"""Lines of one kind, such as joints; Okabe and Ito's yellow is lost on white."""
+"""Lines of one kind, such as joints; without yellow, which is invisible on white."""
 
 TASKS = (ACTUAL, TASK, "#CC79A7", "#56B4E9", INK)
-"""What was measured of one task, of a second and so on."""
+"""Measured values of the first task, the second and so on."""
 
 
 def blend(start: str, end: str, fraction: float) -> str:
@@ -63,12 +63,12 @@ def blend(start: str, end: str, fraction: float) -> str:
 
 
 def series(index: int) -> str:
-    """Return the colour of line ``index``; after the last comes the first again."""
+    """Return the colour of line ``index``; the colours repeat."""
     return SERIES[index % len(SERIES)]
 
 
 def task(index: int) -> str:
-    """Return the colour of task ``index``."""
+    """Return the colour of task ``index``; the colours repeat."""
     return TASKS[index % len(TASKS)]
 
 

@@ -9,7 +9,7 @@ from types import FrameType
 from typing import Any
 
 from hsp_control.cli import commands, consoles, main
-from hsp_control.cli.interrupts import FirstInterruptWaits
+from hsp_control.cli.interrupts import DeferredInterrupt
 
 LONGEST = 2000
 """Characters of a message: what is longer is no clear error."""
@@ -70,7 +70,7 @@ def _ctrl_c(after: float | None) -> Iterator[None]:
         # Before the run begins `hsp` would simply end; this process must not.
         if isinstance(
             getattr(signal.getsignal(signal.SIGINT), "__self__", None),
-            FirstInterruptWaits,
+            DeferredInterrupt,
         ):
             signal.raise_signal(signal.SIGINT)
 

@@ -49,14 +49,14 @@ def limit_margin(experiment: Experiment, rollout: Rollout) -> float:
     return float(np.minimum(q - lower, upper - q).min())
 
 
-def least_distance(experiment: Experiment, rollout: Rollout) -> float:
+def minimum_distance(experiment: Experiment, rollout: Rollout) -> float:
     """Return the least distance that the configuration's first field watches [m]."""
     field = experiment.controller.field
     if isinstance(field, WeightedSum):
         field = field.terms[0][1]
     state = RobotState(experiment.robot)
     rows = zip(rollout.t, rollout.q, rollout.v, strict=True)
-    return min(field.least_distance(state.update(*row)) for row in rows)
+    return min(field.minimum_distance(state.update(*row)) for row in rows)
 
 
 def least_manipulability(rollout: Rollout) -> float:
@@ -75,7 +75,7 @@ def the_elbow_dodges_the_ball(
     experiment: Experiment, ours: Rollout, other: Rollout
 ) -> None:
     assert ours["distance.obstacle_clearance"].min() > 0.03
-    assert least_distance(experiment, other) < -0.03
+    assert minimum_distance(experiment, other) < -0.03
 
 
 def no_joint_comes_near_its_limits(
@@ -89,7 +89,7 @@ def the_elbow_swings_opposite_the_lantern(
     experiment: Experiment, ours: Rollout, other: Rollout
 ) -> None:
     assert ours["distance.point_distance"].min() > 0.48
-    assert least_distance(experiment, other) < 0.02
+    assert minimum_distance(experiment, other) < 0.02
     settled = ours.t > 2.0
     self_motion = np.linalg.norm(ours.v[settled], axis=1)
     error = np.linalg.norm(ours["null_space_error"][settled], axis=1)
@@ -119,7 +119,7 @@ def the_arms_cross_and_do_not_touch(
     experiment: Experiment, ours: Rollout, other: Rollout
 ) -> None:
     assert ours["distance.self_clearance"].min() > 0.06
-    assert least_distance(experiment, other) < -0.03
+    assert minimum_distance(experiment, other) < -0.03
     crossed = [ours[f"task.{hand}.actual"][:, 1] for hand in ("left", "right")]
     assert (crossed[0] - crossed[1]).max() > 0.3
     assert (crossed[0] - crossed[1]).min() < -0.3
@@ -138,7 +138,7 @@ def the_wrist_stays_off_the_board(
     experiment: Experiment, ours: Rollout, other: Rollout
 ) -> None:
     assert ours["distance.obstacle_clearance"].min() > 0.03
-    assert least_distance(experiment, other) < -0.08
+    assert minimum_distance(experiment, other) < -0.08
 
 
 POINTS: dict[str, Callable[[Experiment, Rollout, Rollout], None]] = {

@@ -19,7 +19,7 @@ from hsp_control.cli.main import _parser
 from hsp_control.config.models.live import LiveModel
 from hsp_control.config.models.view import ShowModel
 from hsp_control.live import EffortInterface, StopSettings, Tolerance, run_loop
-from hsp_control.live.watched_robot import WATCHDOG
+from hsp_control.live.simulated_robot import WATCHDOG
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -86,7 +86,7 @@ def test_the_readme_s_commands_exist() -> None:
         _parser().parse_args(command)
 
 
-def test_the_remedies_of_the_document_are_a_configuration() -> None:
+def test_the_compensators_of_the_document_are_a_configuration() -> None:
     text = (ROOT / "docs" / "robustness.md").read_text(encoding="utf-8")
     (configuration,) = blocks(text, "yaml")
     experiment = load_experiment(

@@ -30,7 +30,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.cli import main, robot_table
-from hsp_control.cli.robot_table import COMPENSATION, FLOATING
+from hsp_control.cli.robot_table import FLOATING, LOAD_OPTIONS
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.resources import bundled_robots
 from hsp_control.robot.description.sources import example_robots
@@ -63,7 +63,7 @@ class Case:
         return "-".join([self.name, *map(str, self.options.values())])
 
     def load(self) -> Robot:
-        return Robot.load(self.name, **COMPENSATION.get(self.name, {}), **self.options)
+        return Robot.load(self.name, **LOAD_OPTIONS.get(self.name, {}), **self.options)
 
 
 CASES = [
@@ -245,7 +245,7 @@ def test_end_effector_is_the_frame_that_a_person_would_name(
 ) -> None:
     if name not in BUNDLED:
         pytest.importorskip("example_robot_data")
-    robot = Robot.load(name, **COMPENSATION.get(name, {}))
+    robot = Robot.load(name, **LOAD_OPTIONS.get(name, {}))
     assert robot.end_effector == frame
     assert frame in robot.frame_names
 
@@ -270,31 +270,31 @@ def test_every_robot_is_driven_or_listed_with_its_reason() -> None:
     rows = {row.name: row for row in robot_table.rows()}
     assert set(rows) == {*ROBOTS, *BUNDLED}
     for name, row in rows.items():
-        assert row.serves == (name in BUNDLED + FIXED), name
-        if row.serves:
+        assert row.usable == (name in BUNDLED + FIXED), name
+        if row.usable:
             assert row.position > 0
             assert row.end_effector
         else:
             assert FLOATING in row.note or name == "cassie"
     assert "no URDF" in rows["cassie"].note
     # What does not load as it is says what it is to be loaded with.
-    for name in COMPENSATION:
+    for name in LOAD_OPTIONS:
         assert "load it with `" in rows[name].note
 
 
-@pytest.mark.parametrize("name", COMPENSATION)
-def test_compensation_are_needed_and_help(name: str) -> None:
+@pytest.mark.parametrize("name", LOAD_OPTIONS)
+def test_load_options_are_needed_and_help(name: str) -> None:
     pytest.importorskip("example_robot_data")
-    cured = Robot.load(name, **COMPENSATION[name])
+    robot = Robot.load(name, **LOAD_OPTIONS[name])
     if name == "icub":
-        robot = Robot.load(name, root="fixed")
-        still = np.zeros(robot.nv)
-        M = robot.state(0.0, robot.home(), still).mass_matrix
+        plain = Robot.load(name, root="fixed")
+        still = np.zeros(plain.nv)
+        M = plain.state(0.0, plain.home(), still).mass_matrix
         assert np.linalg.eigvalsh(M)[0] < 1e-15
     else:
         with pytest.raises(ModelError):
             Robot.load(name)
-    M = cured.state(0.0, cured.home(), np.zeros(cured.nv)).mass_matrix
+    M = robot.state(0.0, robot.home(), np.zeros(robot.nv)).mass_matrix
     assert np.linalg.eigvalsh(M)[0] > 1e-6
 
 

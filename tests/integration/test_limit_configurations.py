@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hsp_control import Limits, Rollout, load_experiment
-from hsp_control.control.actuation import LIMITED
+from hsp_control.control.actuation import Status
 
 EVERY_STEP = "simulation.log_period=0.001"
 UNLIMITED = "limits=null"
@@ -27,7 +27,7 @@ def check_limits(rollout: Rollout, limits: Limits | None) -> None:
     assert (np.abs(np.diff(tau, axis=0)) <= 1e-3 * limits.effort_rate + 1e-9).all()
     assert (np.abs(v) <= limits.velocity).all()
     assert ((limits.lower <= q) & (q <= limits.upper)).all()
-    assert rollout["status"].max() == LIMITED
+    assert rollout["status"].max() == Status.LIMITED
 
 
 def error(rollout: Rollout) -> np.ndarray:
@@ -44,7 +44,7 @@ def test_half_strength() -> None:
     assert limits is not None
     assert (np.abs(free["tau"]) / limits.effort).max() > 1.05  # it is asked for
     assert error(ours).max() < 3e-3
-    limited = ours["status"] == LIMITED
+    limited = ours["status"] == Status.LIMITED
     first = int(np.flatnonzero(limited)[0])
     soon = slice(first, first + 60)
     assert np.abs(error(ours)[soon] - error(free)[soon]).max() < 1e-5

@@ -8,7 +8,7 @@ import yaml
 from places import ROOT
 
 from hsp_control import Rollout, load_experiment
-from hsp_control.control.actuation import LIMITED, RELAXED
+from hsp_control.control.actuation import Status
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
@@ -46,7 +46,7 @@ def test_talos_on_two_feet() -> None:
     assert rms(rollout, "center_of_mass") < 2e-4
     assert rms(rollout, "hand") < 3e-4
     assert rms(rollout, "trunk") < 3e-4
-    assert rollout["status"].max() <= LIMITED
+    assert rollout["status"].max() <= Status.LIMITED
     check_forces(rollout)
 
 
@@ -61,12 +61,12 @@ def test_talos_with_a_weak_arm() -> None:
     limits = load_experiment(f"whole_body/{name}").controller.limits
     assert limits is not None
     used = np.abs(rollout["tau"]) / limits.effort
-    names = rollout.meta["robot"]["freedoms"]
+    names = rollout.meta["robot"]["dofs"]
     elbow = names.index("arm_right_4_joint")
     assert used.max() <= 1.0 + 1e-9
     assert (used[:, elbow] > 0.999).sum() > 50  # it is met, for a while
-    assert rollout["status"].max() == LIMITED
-    assert (rollout["status"] == LIMITED).mean() > 0.3
+    assert rollout["status"].max() == Status.LIMITED
+    assert (rollout["status"] == Status.LIMITED).mean() > 0.3
     mass = np.linalg.norm(rollout["task.center_of_mass.error"], axis=1)
     hand = np.linalg.norm(rollout["task.hand.error"], axis=1)
     assert mass.max() < 5e-4
@@ -88,7 +88,7 @@ def test_solo_lifts_a_foot_and_puts_it_down() -> None:
     assert not rollout["plant.contact.FL_FOOT.force"][up].any()
     assert rollout["plant.contact.FL_FOOT.force"][-1, 2] > 4.0  # bears again
     assert np.isnan(rollout["task.foot.error"][t < 1.5]).all()
-    assert rollout["status"].max() < RELAXED
+    assert rollout["status"].max() < Status.RELAXED
     jumps = np.abs(np.diff(rollout["tau"], axis=0)).max(axis=1)
     assert jumps.max() < 0.35 * np.abs(rollout["tau"]).max()
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hsp_control.law import Problem, Resolution
+from hsp_control.law import Outcome, Problem, Resolution
 from hsp_control.null_space.metrics.metric import IDENTITY, VARYING
 
 Array = NDArray[np.float64]
@@ -88,4 +88,5 @@ def resolve(
     resolution = Resolution(levels or [m], n, form, x.K_N, threshold)
     fill(resolution.problem, x)
     out = resolution.resolve(x.v, controls_null_space=controls)
-    return out.acceleration.copy(), out.null_space_error.copy(), out.damped
+    damped = out.outcome is Outcome.DAMPED
+    return out.acceleration.copy(), out.null_space_error.copy(), damped

@@ -23,7 +23,7 @@ from hsp_control.live import (
     EffortInterface,
     InProcessRobot,
     Measurement,
-    WatchedRobot,
+    SimulatedRobot,
 )
 
 Array = NDArray[np.float64]
@@ -52,9 +52,9 @@ def law(limits: Limits | None = None) -> Controller:
     return Controller(panda(), [task], field, null_space_gain=10.0, limits=limits)
 
 
-def watched(interface: EffortInterface | None = None, **options: Any) -> WatchedRobot:
+def watched(interface: EffortInterface | None = None, **options: Any) -> SimulatedRobot:
     plant = IntegratedPlant(RigidBodyPlant(panda()), SemiImplicitEuler(PERIOD))
-    return WatchedRobot(
+    return SimulatedRobot(
         plant, start(), np.zeros(7), PERIOD, interface=interface, **options
     )
 
@@ -71,7 +71,9 @@ class Rig(InProcessRobot):
     """
 
     def __init__(
-        self, robot: WatchedRobot | None = None, tricks: dict[int, Trick] | None = None
+        self,
+        robot: SimulatedRobot | None = None,
+        tricks: dict[int, Trick] | None = None,
     ) -> None:
         super().__init__(robot or watched())
         self.tricks = tricks or {}

@@ -1,8 +1,12 @@
 """The robots of example-robot-data that cannot be loaded, and what is said of each."""
 
-NO_MASS = "no mass moves with bravo_finger1_joint, bravo_finger2_joint, so that no acc"
+NO_MASS = (
+    "no mass moves with bravo_finger1_joint, bravo_finger2_joint, so that the mass"
+)
 LATE_LEADER = "mimics '.*', which comes after it in the tree, .*; .*mimic=False"
-NO_LEADER = "'Left_index_q2' mimics 'index_q1', which is no moving joint; .*mimic=False"
+NO_LEADER = (
+    "'Left_index_q2' mimics 'index_q1', which is not a moving joint; .*mimic=False"
+)
 REFUSED = {
     "bravo7_gripper": NO_MASS,
     "falcon_bravo7_gripper": NO_MASS,

@@ -29,8 +29,11 @@ from hsp_control.visualization.viewer.export.chromium import (
     headless_browser,
     open_page,
 )
+from hsp_control.visualization.viewer.export.clip_reduction import (
+    ANGLE_BOUND,
+    POSITION_BOUND,
+)
 from hsp_control.visualization.viewer.export.encoding import find_ffmpeg
-from hsp_control.visualization.viewer.export.tracks import ANGLE_BOUND, POSITION_BOUND
 
 sync_api = pytest.importorskip("playwright.sync_api")
 

@@ -105,7 +105,7 @@ def test_salvage_names_what_is_lost(
 
     data, cut = log.read_bytes(), tmp_path / "run.cut.npz"
     cut.write_bytes(data[: 2 * len(data) // 3])
-    with pytest.raises(LogError, match="its motion is whole: hsp salvage"):
+    with pytest.raises(LogError, match="its motion is complete: hsp salvage"):
         Rollout.load(cut)
     assert main(["salvage", str(cut)]) == 0
     printed = capsys.readouterr().out
@@ -117,7 +117,7 @@ def test_salvage_names_what_is_lost(
     )
     cut.write_bytes(data[:100])
     assert main(["salvage", str(cut)]) == 2
-    assert "nothing to salvage: it is cut in 'meta'" in capsys.readouterr().err
+    assert "nothing to salvage: it is truncated in 'meta'" in capsys.readouterr().err
 
 
 def test_a_run_that_cannot_be_saved_is_saved_elsewhere(
@@ -134,7 +134,7 @@ def test_a_run_that_cannot_be_saved_is_saved_elsewhere(
     command = ["run", "paper/2_rest", "--out", str(tmp_path / "out"), *short]
     assert main(command) == 2
     captured = capsys.readouterr()
-    assert "No space left on device; it is in another place" in captured.err
+    assert "No space left on device; the log is saved elsewhere" in captured.err
     (elsewhere,) = tmp_path.glob("hsp-*/2_rest.npz")
     assert f"Log: {elsewhere}" in captured.out
     assert len(Rollout.load(elsewhere)) == 3

@@ -16,13 +16,13 @@ from hsp_control.live.latency import (
     ControlLoop,
     Latency,
     Quantiles,
-    clocked,
     measure,
-    measuring,
+    measure_latency,
     no_garbage_collection,
+    periodic,
     real_time_priority,
 )
-from hsp_control.live.latency.clocked import Record, run_clocked
+from hsp_control.live.latency.periodic import StepTimes, run_periodic
 from hsp_control.visualization.plots import latency_figure
 
 MOVING = "paper/4_moving_obstacle"
@@ -61,8 +61,8 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock(7, [100, 100, 2_500, 100, 100, 100])
-    monkeypatch.setattr(clocked, "perf_counter_ns", clock.read)
-    monkeypatch.setattr(clocked, "sleep", clock.sleep)
+    monkeypatch.setattr(periodic, "perf_counter_ns", clock.read)
+    monkeypatch.setattr(periodic, "sleep", clock.sleep)
     return clock
 
 
@@ -70,8 +70,8 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def test_beginnings_are_fixed_and_a_late_step_is_made_up_for(clock: Clock) -> None:
-    record = Record(1_000, 6)
-    run_clocked(clock.step, clock.idle, record, 6)
+    record = StepTimes(1_000, 6)
+    run_periodic(clock.step, clock.idle, record, 6)
     assert record.steps == 6
     assert record.step.tolist() == [100, 100, 2_500, 100, 100, 100]
     # The third step ends 1507 after its period: the next begin at once, late by what
@@ -80,19 +80,19 @@ def test_beginnings_are_fixed_and_a_late_step_is_made_up_for(clock: Clock) -> No
 
 
 def test_turns_go_on_in_the_same_record(clock: Clock) -> None:
-    record = Record(1_000, 6)
-    run_clocked(clock.step, clock.idle, record, 2)
+    record = StepTimes(1_000, 6)
+    run_periodic(clock.step, clock.idle, record, 2)
     assert (record.steps, record.wake[2]) == (2, -1)
     clock.now += 10**9  # the other loop's turn, which delays nobody
-    run_clocked(clock.step, clock.idle, record, 2)
+    run_periodic(clock.step, clock.idle, record, 2)
     assert record.wake[:4].tolist() == [7, 7, 7, 1_507]
 
 
 def test_what_counts_as_missed(clock: Clock) -> None:
-    control, empty = Record(1_000, 6), Record(1_000, 6)
-    run_clocked(clock.step, clock.idle, control, 6)
+    control, empty = StepTimes(1_000, 6), StepTimes(1_000, 6)
+    run_periodic(clock.step, clock.idle, control, 6)
     clock.oversleep = 1_001
-    run_clocked(clock.idle, clock.idle, empty, 4)
+    run_periodic(clock.idle, clock.idle, empty, 4)
     found = Latency(control, empty, np.array([1e-7]), 0)
     # Too late: the long step itself, and the one after it that began too late.
     assert found.missed == 2
@@ -155,20 +155,20 @@ def test_priority_is_set_and_given_back(monkeypatch: pytest.MonkeyPatch) -> None
     assert calls[1][0] == before
 
 
-def test_the_rehearsal_is_not_real_time(
+def test_the_dry_run_is_not_real_time(
     loop: ControlLoop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     events: list[str] = []
     monkeypatch.setattr(
         os, "sched_setscheduler", lambda _, policy, __: events.append(f"set {policy}")
     )
-    rehearse = measuring.rehearse
+    dry_run = measure_latency.dry_run
     monkeypatch.setattr(
-        measuring, "rehearse", lambda *a: events.append("rehearsed") or rehearse(*a)
+        measure_latency, "dry_run", lambda *a: events.append("dry run") or dry_run(*a)
     )
     measure(loop, 0.002, priority=40)
     real, ordinary = f"set {os.SCHED_FIFO}", f"set {os.sched_getscheduler(0)}"
-    assert events == [real, ordinary, "rehearsed", real, ordinary]
+    assert events == [real, ordinary, "dry run", real, ordinary]
 
 
 def test_priority_that_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,7 +179,7 @@ def test_priority_that_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
-    with pytest.raises(SimulationError, match="not permitted; it takes root, CAP_SYS"):
+    with pytest.raises(SimulationError, match="not permitted; needs root, CAP_SYS"):
         real_time_priority(40).__enter__()
 
 
@@ -210,7 +210,7 @@ def test_the_loop_moves_as_the_simulation_does(loop: ControlLoop) -> None:
 def test_a_measured_loop_did_the_same_steps_twice(
     loop: ControlLoop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(measuring, "TURN", 0.02)
+    monkeypatch.setattr(measure_latency, "TURN", 0.02)
     done: list[float] = []
     found = measure(loop, 0.05, on_progress=done.append)
     assert len(found.step) == len(found.empty) == len(found.back_to_back) == 50
@@ -236,7 +236,7 @@ def test_what_is_compiled_on_the_clock_is_noticed(loop: ControlLoop) -> None:
     def compiling() -> None:
         nonlocal controls
         controls += 1
-        if controls == 15:  # the rehearsal has ten
+        if controls == 15:  # the dry run has ten
             numba.njit(lambda x: x + 1)(2)
         control()
 
@@ -247,7 +247,7 @@ def test_what_is_compiled_on_the_clock_is_noticed(loop: ControlLoop) -> None:
 def test_ctrl_c_keeps_what_was_measured(
     loop: ControlLoop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(measuring, "TURN", 0.01)
+    monkeypatch.setattr(measure_latency, "TURN", 0.01)
 
     def interrupt(done: float) -> None:
         raise KeyboardInterrupt
@@ -304,7 +304,7 @@ def test_run_tells_its_speed_and_its_memory(
     assert "times real time (0.1 s in " in printed
     with np.load(tmp_path / "4_moving_obstacle.npz") as log:
         size = sum(log[name][0].nbytes for name in log.files if name != "meta")
-    assert f"log            {size} bytes a row" in printed
+    assert f"log            {size} bytes per row" in printed
 
 
 # -------------------------------------------------------------------------- the cache

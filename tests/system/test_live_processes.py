@@ -54,7 +54,7 @@ COUNTED = {"late": "stale", "duplicated": "duplicated", "corrupted": "corrupted"
 
 
 def tolerance(**changes: Any) -> Tolerance:
-    return Tolerance(**{"missing": 1000, "age": 5.0, "start": 60.0} | changes)
+    return Tolerance(**{"missing": 1000, "age": 5.0, "start_timeout": 60.0} | changes)
 
 
 def assert_stopped(log: Rollout) -> None:
@@ -111,7 +111,7 @@ def test_a_bad_line_is_seen_counted_and_survived(tmp_path: Path) -> None:
     assert report.ended == "completed", report.reason
     assert (report.phase, report.silent) == (Phase.HOLDING, False)
     assert told is not None
-    assert told["reason"] == "the loop said its end"
+    assert told["reason"] == "the loop closed the connection"
     link = robot.hardware.link
     ends = (link.counts, link.lost, told["injected"]), (
         told["link"], told["link"]["lost"], link.injected
@@ -199,7 +199,7 @@ def test_the_loop_s_process_is_killed(tmp_path: Path) -> None:
     assert wait_for(ended)
     truth, log = Rollout.load(truth_path), Rollout.load(tmp_path / "arm-live.journal")
     assert truth.status == "stopped"
-    assert truth.meta["message"] == "the process that started the robot is gone"
+    assert truth.meta["message"] == "the process that started the robot has ended"
     assert_stopped(truth)
     assert Phase.DAMPING in truth["live.phase"]  # nobody else braked it
     assert log.status == "interrupted"
@@ -225,7 +225,7 @@ def test_ctrl_c_is_the_operator_s_stop(tmp_path: Path) -> None:
             break
     assert process.returncode == 0, error  # what else should end it
     assert "stopped by the operator (SIGINT)" in out
-    assert "The robot: the loop said its end; holding" in out
+    assert "The robot: the loop closed the connection; holding" in out
     log = Rollout.load(tmp_path / "arm-live.npz")
     assert log.status == "interrupted"
     assert log["live.phase"][-1] == Phase.HOLDING

@@ -95,7 +95,7 @@ def panda_fields(said: str) -> None:
 
 def your_robot(said: str) -> None:
     a_field_keeps_clear(said)
-    assert "shelf.yaml: fine" in said
+    assert "shelf.yaml: OK" in said
     assert "did you mean 'gain'?" in said
     assert "malformed XML" in said
 

@@ -19,7 +19,7 @@ from hsp_control.visualization.viewer.clip import (
     Clip,
     Track,
     extend_clip,
-    no_clip,
+    remove_clip,
     set_clip,
 )
 from hsp_control.visualization.viewer.commands import (
@@ -287,7 +287,7 @@ def test_another_clip_can_go_on_where_the_last_one_was(
 
 
 def test_without_a_clip_there_is_nothing_to_play(page: Any, viewer: Viewer) -> None:
-    tell(viewer, no_clip())
+    tell(viewer, remove_clip())
     assert page.locator(".player").is_hidden()
     page.keyboard.press(" ")
     assert player(page, "playing") is False

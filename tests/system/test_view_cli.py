@@ -83,7 +83,7 @@ def test_a_port_in_use_is_said_and_the_run_goes_on(
     out = ["--out", str(tmp_path)]
     assert main(["run", MOVING, "--view", *port, *out, *SHORT]) == 2
     captured = capsys.readouterr()
-    assert f"{message}; the run goes on unseen" in captured.err
+    assert f"{message}; the run continues without a view" in captured.err
     assert "completed" in captured.out
     assert len(Rollout.load(tmp_path / "4_moving_obstacle.npz")) == 21
 
@@ -91,8 +91,8 @@ def test_a_port_in_use_is_said_and_the_run_goes_on(
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (None, "made from Python and does not say how its robot 'planar3r'"),
-        ({"name": "planar4r"}, "robot cannot be found again: .*'planar4r'"),
+        (None, "made from Python: it has no configuration of its robot 'planar3r'"),
+        ({"name": "planar4r"}, "robot cannot be rebuilt: .*'planar4r'"),
     ],
 )
 def test_a_log_without_its_robot_is_said(

@@ -1,1 +1,1 @@
-"""The schema, a file for each part of a configuration."""
+"""The schema, one file for each part of a configuration."""

@@ -1,4 +1,4 @@
-"""What all parts of a configuration share: checked numbers and a strict model."""
+"""Types that all parts of a configuration use: checked numbers and a strict model."""
 
 from typing import Annotated
 
@@ -13,12 +13,12 @@ Gain = Positive | Annotated[list[Positive], Field(min_length=1)] | list[Vector]
 Name = Annotated[
     str, Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$")
 ]
-"""What a user calls a part of the configuration: it becomes part of columns' names."""
+"""The user's name for a part of the configuration; log columns contain it."""
 Weights = NonNegative | list[NonNegative]
 
 
 class Model(BaseModel):
-    """A part of the tree: unknown keys are refused, values never change."""
+    """A part of the schema: unknown keys are errors, values never change."""
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True

@@ -1,4 +1,4 @@
-"""What is done about a world that is not as the model has it."""
+"""Compensators for differences between the real robot and its model."""
 
 from typing import Annotated, Literal
 
@@ -9,79 +9,84 @@ from hsp_control.config.models.plant import Count
 
 
 class VelocityFilterModel(Model):
-    """A low-pass on the measured velocity."""
+    """Butterworth low-pass filter of the measured velocity."""
 
     cutoff: Positive
-    """Where half of the power passes [Hz]."""
+    """Cut-off frequency: half of the power passes [Hz]."""
     order: Literal[1, 2] = 1
-    """Of Butterworth's filter."""
+    """Order of the filter [-]."""
 
 
 class PredictorModel(Model):
-    """The law is shown the state in which its effort will act."""
+    """The law is evaluated for the predicted state in which its effort will act."""
 
     effort_delay: Count = 1
-    """Control periods that an effort takes to act."""
+    """Delay from an effort to its action [control periods]."""
     sensor_delay: Count = 0
-    """Control periods that a measurement is old."""
+    """Age of a measurement [control periods]."""
 
 
 class MomentumObserverModel(Model):
-    """What pushes beside the model is estimated and cancelled."""
+    """The efforts that the model does not explain are estimated and cancelled."""
 
     bandwidth: Positive = 50.0
-    """Rate at which the estimate follows [1/s]; 20 to 50 is usual."""
+    """Rate at which the estimate converges [1/s]; 20 to 50 is usual."""
     clip: Positive | list[Positive] | None = None
-    """Most that is cancelled [N·m or N], of all freedoms or of each; none: any."""
+    """Largest effort that is cancelled [N·m or N], one number or nv; unlimited by
+    default."""
 
 
 class FrictionFeedForwardModel(Model):
-    """Friction is paid for before it is felt."""
+    """Efforts against friction at the desired velocity."""
 
     coulomb: Weights = 0.0
-    """Dry friction [N·m or N]: of all joints, or of each freedom."""
+    """Coulomb friction [N·m or N], one number or nv."""
     viscous: Weights = 0.0
-    """Friction for each unit of speed [N·m·s/rad or N·s/m]: of all, or of each."""
+    """Viscous friction [N·m·s/rad or N·s/m], one number or nv."""
     smoothing: Positive = 0.02
-    """Speed about which dry friction changes sign [rad/s or m/s]."""
+    """Speed scale v_s of the smoothed sign, tanh(v/v_s) [rad/s or m/s]."""
 
 
 class IntegralActionModel(Model):
-    """A task's lasting error is worn away."""
+    """Integral feedback of task errors removes constant errors."""
 
     rate: Positive | None = None
-    """Rate at which it dies [1/s]: Ki = rate · Kp."""
+    """Rate at which a constant error decays [1/s]: Ki = rate · Kp."""
     ki: dict[str, Gain] = {}
-    """Ki by task [1/s³]: a number, one for each row or a matrix."""
+    """Ki by task name [1/s³]: a number, one for each row, or a matrix."""
     tasks: list[str] | None = None
-    """Names of the tasks that have it; all by default."""
+    """Names of the tasks with integral action; all by default."""
     limit: Positive | None = None
-    """Most that it asks for in a row [m/s² or rad/s²]; none: any."""
+    """Largest acceleration from the integral in a row [m/s² or rad/s²]; unlimited by
+    default."""
 
 
 class StartUpRampModel(Model):
-    """From rest to the law without a jump."""
+    """The effort changes smoothly from holding still to the law."""
 
     duration: Positive = 1.0
-    """Until the law has all [s]."""
+    """Time until the law is fully active [s]."""
     natural_frequency: NonNegative = 0.0
-    """Of the spring that holds until then [rad/s]; 0 is gravity compensation."""
+    """Natural frequency of the spring that holds the robot meanwhile [rad/s]; 0 is pure
+    gravity compensation."""
 
 
 class CompensationModel(Model):
-    """Each is off unless it is given; ``null`` turns it off."""
+    """Compensators; each is off unless it is given, and ``null`` turns it off."""
 
     velocity_filter: VelocityFilterModel | None = None
-    """A low-pass on the measured velocity."""
+    """Butterworth low-pass filter of the measured velocity."""
     predictor: PredictorModel | None = None
-    """The law is shown the state in which its effort will act."""
+    """Evaluates the law for the predicted state in which its effort will act."""
     momentum_observer: MomentumObserverModel | None = None
-    """What pushes beside the model is estimated and cancelled."""
+    """Estimates the efforts that the model does not explain, and cancels them."""
     friction_feed_forward: Literal["urdf"] | FrictionFeedForwardModel | None = None
-    """Friction is paid for before it is felt; ``urdf``: that of the robot's file."""
+    """Adds efforts against friction at the desired velocity; ``urdf`` takes the
+    friction from the robot's file."""
     integral_action: IntegralActionModel | None = None
-    """A task's lasting error is worn away."""
+    """Removes constant task errors by integral feedback."""
     effort_rate: Positive | Annotated[list[Positive], Field(min_length=1)] | None = None
-    """Greatest rate of what goes out [N·m/s or N/s], where no limits keep one."""
+    """Maximum rate of the effort that is sent [N·m/s or N/s], one number or nv; for
+    controllers without `limits.effort_rate`."""
     start_up_ramp: StartUpRampModel | None = None
-    """From rest to the law without a jump."""
+    """Changes the effort smoothly from holding still to the law."""

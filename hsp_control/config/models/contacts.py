@@ -1,4 +1,4 @@
-"""Where a robot rests on the world."""
+"""Contacts of the robot with its environment."""
 
 from typing import Annotated, Literal
 
@@ -9,40 +9,40 @@ from hsp_control.config.models.tasks import ScheduleModel
 
 
 class ContactModel(Model):
-    """What all contacts share."""
+    """Settings of all contacts."""
 
     frame: str
-    """The frame that rests."""
+    """Name of the frame in contact."""
     friction: Positive = 0.7
-    """Coulomb's coefficient μ."""
+    """Coulomb friction coefficient μ [-]."""
     normal: Vector3 = [0.0, 0.0, 1.0]
-    """The plane's normal in the world."""
+    """Normal of the contact plane in the world, of any length [-]."""
     damping: Positive = 40.0
-    """How fast what still moves comes to rest [1/s]."""
+    """Rate at which a remaining velocity of the contact decays [1/s]."""
     schedule: ScheduleModel | None = None
-    """When it bears; always by default."""
+    """When the contact is active; always by default."""
 
 
 class SurfaceContactModel(ContactModel):
-    """A flat sole rests: it neither moves nor turns."""
+    """A flat sole in contact: it neither moves nor turns."""
 
     type: Literal["surface"]
     length: Positive | None = None
-    """Of a rectangular sole along the frame's x [m]."""
+    """Length of a rectangular sole along the frame's x axis [m]."""
     width: Positive | None = None
-    """Of a rectangular sole along the frame's y [m]."""
+    """Width of a rectangular sole along the frame's y axis [m]."""
     center: Vector3 = [0.0, 0.0, 0.0]
-    """Its middle in the frame [m]."""
+    """Centre of the rectangular sole in the frame [m]."""
     corners: Annotated[list[Vector3], Field(min_length=3)] | None = None
-    """Instead of length and width: the corners in the frame [m]."""
+    """Corners of the sole in the frame [m], instead of length and width."""
 
 
 class PointContactModel(ContactModel):
-    """A point rests and may turn about itself."""
+    """A point in contact: it does not move, but the frame may turn about it."""
 
     type: Literal["point"]
     point: Vector3 = [0.0, 0.0, 0.0]
-    """The point in the frame [m]."""
+    """The point in the frame's coordinates [m]."""
 
 
 class BallContactModel(ContactModel):
@@ -50,7 +50,7 @@ class BallContactModel(ContactModel):
 
     type: Literal["ball"]
     radius: Positive
-    """Of the ball about the frame's origin [m]."""
+    """Radius of the ball, whose centre is the frame's origin [m]."""
 
 
 AnyContact = Annotated[

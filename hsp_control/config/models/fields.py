@@ -21,57 +21,57 @@ class RestModel(Model):
 
 
 class UncontrolledModel(Model):
-    """Self-motion is left alone: φ_N = 0, the paper's warning."""
+    """Self-motion is not controlled: φ_N = 0. The paper warns against it."""
 
     type: Literal["uncontrolled"]
 
 
 class RampModel(Model):
-    """A weight that goes smoothly from one number to another."""
+    """A weight that changes smoothly from one number to another."""
 
     initial: NonNegative = 0.0
-    """Before."""
+    """Weight before the ramp [-]."""
     final: NonNegative
-    """After."""
+    """Weight after the ramp [-]."""
     start: Number = 0.0
-    """When it begins [s]."""
+    """Time at which the ramp begins [s]."""
     duration: Positive
-    """How long it takes [s]."""
+    """Duration of the ramp [s]."""
 
 
 class CostModel(Model):
-    """What all costs share."""
+    """Settings of all costs."""
 
     weight: NonNegative | RampModel = 1.0
-    """Its weight in the sum, a number or a ramp in time."""
+    """Weight of the cost in the sum [-]: a number, or a ramp in time."""
 
 
 class JointCenteringModel(CostModel):
-    """Joints keep near the middle of their range."""
+    """Joints stay near the middle of their range."""
 
     type: Literal["joint_centering"]
     weights: Weights = 1.0
-    """Weights of the joints, one number or nv."""
+    """Weights of the joints [-], one number or nv."""
 
 
 class LimitBarrierModel(CostModel):
-    """Joints keep off their limits, and are left alone elsewhere."""
+    """Joints stay away from their limits; there is no cost elsewhere."""
 
     type: Literal["limit_barrier"]
     zone: Annotated[float, Field(gt=0.0, le=1.0)] = 0.3
-    """Where it begins, as a fraction of half the range."""
+    """Width of the zone before a limit, as a fraction of half the range [-]."""
     weights: Weights = 1.0
-    """Weights of the joints, one number or nv."""
+    """Weights of the joints [-], one number or nv."""
 
 
 class TargetPostureModel(CostModel):
-    """Joints are drawn to a posture."""
+    """Joints move towards a posture."""
 
     type: Literal["target_posture"]
     target: Literal["start", "home"] | Vector = "start"
-    """Joint positions [rad or m], nv of them; where the robot starts by default."""
+    """Joint positions, nv numbers [rad or m], or ``start`` or ``home``."""
     weights: Weights = 1.0
-    """Weights of the joints, one number or nv."""
+    """Weights of the joints [-], one number or nv."""
 
 
 class EqualJointAnglesModel(CostModel):
@@ -79,11 +79,11 @@ class EqualJointAnglesModel(CostModel):
 
     type: Literal["equal_joint_angles"]
     joints: Annotated[list[str], Field(min_length=2)]
-    """Names of the joints in order."""
+    """Names of the joints, in order."""
 
 
 class PointDistanceModel(CostModel):
-    """Frames keep away from an obstacle's centre: Σ 1/d²."""
+    """Frames stay away from an obstacle's centre: Σ 1/d²."""
 
     type: Literal["point_distance"]
     frames: Annotated[list[str], Field(min_length=1)]
@@ -93,48 +93,49 @@ class PointDistanceModel(CostModel):
 
 
 class JacobianModel(CostModel):
-    """What all costs of a frame's Jacobian share."""
+    """Settings of all costs of a frame's Jacobian."""
 
     frame: str | None = None
     """Name of the frame; the robot's end effector by default."""
     axes: str = "xyz"
-    """World axes of its position rows."""
+    """World axes of the position rows of the Jacobian, such as ``xy``."""
 
 
 class ManipulabilityModel(JacobianModel):
-    """The frame stays able to move every way: det(J Jᵀ), its root or its logarithm."""
+    """Manipulability of the frame: det(J Jᵀ), its root or its logarithm."""
 
     type: Literal["manipulability"]
     form: Literal["determinant", "root", "log"] = "root"
-    """Which function of det(J Jᵀ)."""
+    """Function of det(J Jᵀ): the determinant itself, its square root, or its
+    logarithm."""
     rows: Literal["position", "orientation", "pose"] = "position"
-    """Which rows of its Jacobian."""
+    """Rows of the Jacobian."""
     length: Positive = 1.0
-    """What one radian is worth [m], where rows mix metres and radians."""
+    """Length that is equivalent to one radian [m], for rows of metres and radians."""
 
 
 class InverseConditionModel(JacobianModel):
-    """The frame stays equally able to move every way."""
+    """Isotropy of the frame: the inverse condition number of its Jacobian."""
 
     type: Literal["inverse_condition"]
     rows: Literal["position", "orientation", "pose"] = "position"
-    """Which rows of its Jacobian."""
+    """Rows of the Jacobian."""
     length: Positive = 1.0
-    """What one radian is worth [m], where rows mix metres and radians."""
+    """Length that is equivalent to one radian [m], for rows of metres and radians."""
 
 
 class TransmissionModel(JacobianModel):
-    """The frame stays quick, or strong, along one direction."""
+    """Velocity or force transmission of the frame along one direction."""
 
     type: Literal["transmission"]
     direction: Annotated[list[Number], Field(min_length=1, max_length=3)]
-    """The direction, one number for each of the axes."""
+    """The direction [-], one number for each of the axes."""
     kind: Literal["velocity", "force"] = "velocity"
-    """Whether it shall be quick or strong."""
+    """Transmission of velocity (fast motion) or of force (large force)."""
 
 
 class ObstacleClearanceModel(CostModel):
-    """The links keep clear of obstacles."""
+    """The links stay away from obstacles."""
 
     type: Literal["obstacle_clearance"]
     obstacles: list[str] | None = None
@@ -142,19 +143,19 @@ class ObstacleClearanceModel(CostModel):
     influence: Positive = 0.2
     """Distance at which the cost begins [m]."""
     links: list[str] | None = None
-    """Names of the links; all that move by default."""
+    """Names of the links; all moving links by default."""
     proxy: Literal["capsules", "spheres", "hulls", "meshes"] = "capsules"
-    """What stands for the links."""
+    """Shapes that approximate the links."""
 
 
 class SelfClearanceModel(CostModel):
-    """The links keep clear of each other."""
+    """The links stay away from each other."""
 
     type: Literal["self_clearance"]
     influence: Positive = 0.1
     """Distance at which the cost begins [m]."""
     proxy: Literal["capsules", "spheres", "hulls", "meshes"] = "capsules"
-    """What stands for the links."""
+    """Shapes that approximate the links."""
 
 
 AnyField = Annotated[

@@ -1,4 +1,4 @@
-"""What efforts and motion are kept within."""
+"""Limits on efforts and motion."""
 
 from typing import Annotated, Literal
 
@@ -8,43 +8,43 @@ from hsp_control.config.models.base import Model, NonNegative, Number, Positive,
 
 
 class ScaledModel(Model):
-    """The robot's own limit, times a number."""
+    """The robot's own limit, multiplied by a factor."""
 
     scale: Positive | Annotated[dict[str, Positive], Field(min_length=1)]
-    """The number; 0.5 for a robot of half its strength. Or a number for each of some
-    joints, by name: the others keep their own limits."""
+    """The factor [-]; 0.5 halves the limit. Or factors by joint name; the other joints
+    keep their own limits."""
 
 
-Greatest = Literal["robot", "none"] | ScaledModel | Positive | list[Positive]
+Maximum = Literal["robot", "none"] | ScaledModel | Positive | list[Positive]
 
 
 class PositionRangeModel(Model):
-    """Joint positions in numbers."""
+    """Joint position limits in numbers."""
 
     lower: Vector
-    """Least position of every freedom [rad or m]."""
+    """Lower joint position limits, nv numbers [rad or m]."""
     upper: Vector
-    """Greatest position of every freedom [rad or m]."""
+    """Upper joint position limits, nv numbers [rad or m]."""
 
 
 class ObstacleDistanceModel(Model):
-    """How far links stay from obstacles."""
+    """Minimum distance between links and obstacles."""
 
     type: Literal["obstacles"]
     least: NonNegative = 0.02
-    """The least distance [m]."""
+    """The minimum distance [m]."""
     obstacles: list[str] | None = None
     """Names of the obstacles; all by default."""
     links: list[str] | None = None
-    """Names of the links; all that move by default."""
+    """Names of the links; all moving links by default."""
 
 
 class SelfDistanceModel(Model):
-    """How far links stay from each other."""
+    """Minimum distance between links."""
 
     type: Literal["self"]
     least: NonNegative = 0.01
-    """The least distance [m]."""
+    """The minimum distance [m]."""
 
 
 AnyDistance = Annotated[
@@ -53,32 +53,34 @@ AnyDistance = Annotated[
 
 
 class LimitsModel(Model):
-    """Limits that the controller keeps; the robot's own unless told otherwise."""
+    """Limits that the controller keeps; by default the robot's own."""
 
-    effort: Greatest = "robot"
-    """Greatest effort [N·m or N]."""
+    effort: Maximum = "robot"
+    """Maximum effort [N·m or N]: the robot's own, none, a factor, one number or nv."""
     effort_rate: Positive | list[Positive] | None = None
-    """Greatest rate of effort [N·m/s or N/s]; a Panda's is 1000."""
-    velocity: Greatest = "robot"
-    """Greatest speed [rad/s or m/s]."""
+    """Maximum rate of the effort [N·m/s or N/s], one number or nv; a Panda's is
+    1000."""
+    velocity: Maximum = "robot"
+    """Maximum speed [rad/s or m/s]: the robot's own, none, a factor, one number or
+    nv."""
     acceleration: Positive | list[Positive] | None = None
-    """Greatest acceleration [rad/s² or m/s²]."""
+    """Maximum acceleration [rad/s² or m/s²], one number or nv."""
     position: Literal["robot", "none"] | PositionRangeModel = "robot"
-    """Joint positions [rad or m]."""
+    """Joint position limits [rad or m]: the robot's own, none, or numbers."""
     position_margin: NonNegative = 0.005
-    """How far inside its limits a position is kept [rad or m]."""
+    """Margin inside the position limits [rad or m]."""
     velocity_margin: Annotated[Number, Field(ge=0.0, lt=1.0)] = 0.02
-    """How far inside its limits a speed is kept, as a part of it."""
+    """Margin inside the speed limits, as a fraction of the limit [-]."""
     distances: Annotated[list[AnyDistance], Field(default_factory=list)]
-    """What must keep how far apart."""
+    """Minimum distances."""
     bandwidth: Positive = 10.0
-    """Of the barriers before position and velocity limits [1/s]."""
+    """Bandwidth of the barriers at position and velocity limits [1/s]."""
     static_effort: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
-    """The part of an effort that gravity may take, so that an arm goes only where its
-    motors can hold it; for motors that bear no contact."""
+    """Fraction of the effort limit that gravity may use [-], so that an arm stays where
+    its motors can hold it; for motors that carry no contact. Unlimited by default."""
     null_space_speed: Positive | list[Positive] | None = None
-    """How fast the null space may leave the field, where limits bind, before tasks give
-    way [rad/s or m/s]."""
+    """How fast the null space may leave the field, where limits bind, before the tasks
+    deviate [rad/s or m/s], one number or nv. Unlimited by default."""
     null_space_weight: Annotated[Number, Field(gt=0.0, lt=1.0)] | None = None
-    """What null-space motion costs beside the first task, where limits bind: 1e-6, and
-    1e-8 where tasks have priorities."""
+    """Cost of null-space deviation relative to the first task, where limits bind [-];
+    1e-6 by default, 1e-8 if tasks have priorities."""

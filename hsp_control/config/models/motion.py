@@ -8,94 +8,95 @@ from hsp_control.config.models.base import Model, Number, Positive, Vector, Vect
 
 
 class Moving(Model):
-    """What all trajectories of a point share."""
+    """Settings of all trajectories of a point."""
 
     origin: Literal["world", "start"] = "world"
-    """What points are given relative to: zero, or where the robot starts."""
+    """Origin of the given points: the world's origin, or the robot's start position."""
 
 
 class HoldModel(Moving):
-    """Stand still."""
+    """Hold a point."""
 
     type: Literal["hold"]
     point: Vector | None = None
-    """Where; where the robot starts by default."""
+    """The point [m, or the task's unit]; the robot's start position by default."""
 
 
 class LineModel(Moving):
-    """Move straight from rest to rest, by a quintic."""
+    """Move along a straight line from rest to rest, by a quintic polynomial."""
 
     type: Literal["line"]
     start: Vector | None = None
-    """First point; where the robot starts by default."""
+    """First point [m, or the task's unit]; the robot's start position by default."""
     end: Vector
-    """Last point."""
+    """Last point [m, or the task's unit]."""
     duration: Positive
-    """How long it takes [s]."""
+    """Duration of the motion [s]."""
     start_time: Number = 0.0
-    """When it leaves [s]."""
+    """Time at which the motion begins [s]."""
 
 
 class UniformLineModel(Moving):
-    """Move straight for ever."""
+    """Move along a straight line at constant velocity, without end."""
 
     type: Literal["uniform_line"]
     start: Vector
-    """The point at t = 0."""
+    """The point at t = 0 [m, or the task's unit]."""
     velocity: Vector
-    """Its velocity."""
+    """Its velocity [m/s, or the task's unit per s]."""
 
 
 class CircleModel(Moving):
-    """Go round a circle, in the plane or in space."""
+    """Move along a circle, in the plane or in space."""
 
     type: Literal["circle"]
     center: Vector
-    """Its centre."""
+    """Centre of the circle [m]."""
     radius: Positive
-    """Its radius [m]."""
+    """Radius of the circle [m]."""
     angular_rate: Number
-    """How fast it is gone round [rad/s]."""
+    """Angular rate along the circle [rad/s]."""
     phase: Number = 0.0
-    """Where on it at t = 0 [rad]."""
+    """Angle on the circle at t = 0 [rad]."""
     normal: Vector3 | None = None
-    """In space: the direction that it is seen counter-clockwise from."""
+    """In space: normal of the circle's plane [-]; the motion is right-handed about
+    it."""
     axes: Annotated[list[Vector], Field(min_length=2, max_length=2)] | None = None
-    """In space, instead of the normal: the directions of phase 0 and of a quarter."""
+    """In space, instead of the normal: the directions of angle 0 and of 90° [-]."""
 
 
 class LissajousModel(Moving):
-    """Swing along each axis: center + amplitude · sin(rate t + phase)."""
+    """Oscillate along each axis: center + amplitude · sin(rate t + phase)."""
 
     type: Literal["lissajous"]
     center: Vector
-    """The middle."""
+    """Centre of the oscillation [m, or the task's unit]."""
     amplitudes: Vector
-    """How far along each axis."""
+    """Amplitude along each axis [m, or the task's unit]."""
     rates: Vector
-    """How fast along each axis [rad/s]."""
+    """Angular frequency of each axis [rad/s]."""
     phases: Vector | None = None
     """Phase of each axis at t = 0 [rad]; zero by default."""
 
 
 class MinimumJerkModel(Moving):
-    """Pass through waypoints with the least jerk, from rest to rest."""
+    """Pass through waypoints with minimum jerk, from rest to rest."""
 
     type: Literal["minimum_jerk"]
     waypoints: Annotated[list[Vector], Field(min_length=2)]
-    """The points."""
+    """The waypoints [m, or the task's unit]."""
     times: Vector
-    """When to be there [s]."""
+    """Time at each waypoint [s], increasing."""
 
 
 class StopsModel(Moving):
-    """Move straight from waypoint to waypoint, resting at each."""
+    """Move along straight lines from waypoint to waypoint, with a stop at each."""
 
     type: Literal["stops"]
     waypoints: Annotated[list[Vector], Field(min_length=2)]
-    """The points; one twice is a pause."""
+    """The waypoints [m, or the task's unit]; the same point twice is a pause."""
     times: Vector
-    """When to be there [s]."""
+    """Time at each waypoint [s], increasing."""
 
 
 class SplineModel(Moving):
@@ -103,11 +104,11 @@ class SplineModel(Moving):
 
     type: Literal["spline"]
     waypoints: Annotated[list[Vector], Field(min_length=2)]
-    """The points."""
+    """The waypoints [m, or the task's unit]."""
     times: Vector
-    """When to be there [s]."""
+    """Time at each waypoint [s], increasing."""
     degree: Literal[3, 5, 7] = 5
-    """Degree of the polynomials."""
+    """Degree of the polynomials [-]."""
 
 
 PointTrajectory = Annotated[
@@ -124,11 +125,12 @@ PointTrajectory = Annotated[
 
 
 class HoldOrientationModel(Model):
-    """Keep an orientation."""
+    """Hold an orientation."""
 
     type: Literal["hold"]
     rpy: Vector3 | None = None
-    """Roll, pitch and yaw in the world [rad]; as the robot starts by default."""
+    """Roll, pitch and yaw in the world [rad]; the robot's start orientation by
+    default."""
 
 
 class SpinModel(Model):
@@ -136,21 +138,21 @@ class SpinModel(Model):
 
     type: Literal["spin"]
     axis: Vector3
-    """The axis in the world."""
+    """The axis in the world [-]."""
     rate: Number
-    """How fast [rad/s]."""
+    """Angular rate about the axis [rad/s]."""
     rpy: Vector3 | None = None
-    """Orientation at t = 0 [rad]; as the robot starts by default."""
+    """Roll, pitch and yaw at t = 0 [rad]; the robot's start orientation by default."""
 
 
 class OrientationPathModel(Model):
-    """Turn the shortest way from one orientation to the next, resting at each."""
+    """Turn the shortest way from one orientation to the next, with a stop at each."""
 
     type: Literal["path"]
     rpy: Annotated[list[Vector3], Field(min_length=2)]
     """The orientations, each as roll, pitch and yaw [rad]."""
     times: Vector
-    """When to be there [s]."""
+    """Time at each waypoint [s], increasing."""
 
 
 OrientationModel = Annotated[
@@ -160,27 +162,27 @@ OrientationModel = Annotated[
 
 
 class ComposedPoseModel(Model):
-    """The origin follows one trajectory, the orientation another."""
+    """A pose made of a trajectory of the origin and one of the orientation."""
 
     type: Literal["composed"]
     position: PointTrajectory
-    """The origin's."""
+    """Trajectory of the origin."""
     orientation: OrientationModel = HoldOrientationModel(type="hold")
-    """The orientation's; held by default."""
+    """Trajectory of the orientation; held by default."""
 
 
 class ScrewModel(Model):
-    """Move along a straight screw, from where the robot starts, rest to rest."""
+    """Move along a constant screw from the robot's start pose, from rest to rest."""
 
     type: Literal["screw"]
     position: Vector3
-    """Last position in the world [m]."""
+    """Final position in the world [m]."""
     rpy: Vector3
-    """Last orientation [rad]."""
+    """Final orientation: roll, pitch and yaw [rad]."""
     duration: Positive
-    """How long it takes [s]."""
+    """Duration of the motion [s]."""
     start_time: Number = 0.0
-    """When it leaves [s]."""
+    """Time at which the motion begins [s]."""
 
 
 PoseModel = Annotated[ComposedPoseModel | ScrewModel, Field(discriminator="type")]

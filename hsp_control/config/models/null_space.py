@@ -9,7 +9,7 @@ from hsp_control.config.models.fields import AnyField
 
 
 class IdentityModel(Model):
-    """W = I: every joint's motion counts the same."""
+    """W = I: all joints have the same weight."""
 
     type: Literal["identity"]
 
@@ -19,19 +19,19 @@ class CoordinatesModel(Model):
 
     type: Literal["coordinates"]
     matrix: list[Vector] | None = None
-    """A; as the robot's source defines it by default."""
+    """A [-], nv rows of nv numbers; by default as the robot's source defines it."""
 
 
 class ConstantModel(Model):
-    """W constant."""
+    """A constant W."""
 
     type: Literal["constant"]
     matrix: list[Positive] | list[Vector]
-    """W, or its diagonal."""
+    """W, nv rows of nv numbers, or its diagonal [-]."""
 
 
 class MassMatrixModel(Model):
-    """W = M(q): the kinetic-energy metric, dynamically consistent."""
+    """W = M(q): the kinetic-energy metric (dynamically consistent)."""
 
     type: Literal["mass_matrix"]
 
@@ -43,13 +43,14 @@ AnyMetric = Annotated[
 
 
 class NullSpaceModel(Model):
-    """Where self-motion goes, and how fast."""
+    """The control of self-motion."""
 
     gain: Gain = 10.0
-    """K_N [1/s]: a number, one per freedom, or a matrix."""
+    """Null-space gain K_N [1/s]: a number, nv numbers, or a matrix."""
     metric: AnyMetric = IdentityModel(type="identity")
-    """The joint-space metric."""
+    """The joint-space metric W."""
     fields: list[AnyField] = []
-    """Fields, added up; at rest when there is none."""
+    """Fields; their sum is used. Without fields, self-motion comes to rest."""
     singularity_threshold: Positive = 0.03
-    """Singular value of the tasks' Jacobian below which its inverse is bounded."""
+    """Singular value of the task Jacobian below which its pseudo-inverse is damped
+    [-]."""

@@ -1,4 +1,4 @@
-"""What the effort moves: an engine, and how the world differs from the model."""
+"""The simulated plant: its engine, and its differences from the model."""
 
 from typing import Annotated, Literal
 
@@ -26,144 +26,147 @@ Periods = Annotated[int, Field(ge=0, le=100_000)]
 
 
 class InertiasModel(Model):
-    """How every body differs from the controller's model of it."""
+    """Differences of the bodies from the controller's model."""
 
     mass_factor: Positive = 1.0
-    """Every mass times this; rotational inertias grow with it."""
+    """Factor on every mass [-]; it also scales the rotational inertias."""
     inertia_factor: Positive = 1.0
-    """Every inertia about its centre of mass times this, besides."""
+    """Further factor on every inertia about the centre of mass [-]."""
     com_shift: Vector3 = [0.0, 0.0, 0.0]
-    """Every centre of mass moved by this in its joint's frame [m]."""
+    """Displacement of every centre of mass in its joint's frame [m]."""
     random_mass: Share = 0.0
-    """Largest relative error of a mass, drawn for each body: 0.2 is ±20 %."""
+    """Largest relative error of a mass [-], drawn for each body: 0.2 is ±20 %."""
     random_inertia: Share = 0.0
-    """Largest relative error of a principal second moment, drawn for each body."""
+    """Largest relative error of a principal second moment [-], drawn for each body."""
     random_com: NonNegative = 0.0
     """Largest error of a centre of mass along each axis [m], drawn for each body."""
 
 
 class PayloadModel(Model):
-    """A solid ball in the hand that the controller does not know of."""
+    """A solid ball at a frame, which the controller does not know about."""
 
     frame: str
-    """The frame that it is fixed to."""
+    """Name of the frame that the payload is fixed to."""
     mass: Positive
-    """Its mass [kg]."""
+    """Mass of the payload [kg]."""
     center: Vector3 = [0.0, 0.0, 0.0]
-    """Its centre in the frame [m]."""
+    """Centre of the ball in the frame [m]."""
     radius: NonNegative = 0.0
-    """Its radius [m]; 0 is a point."""
+    """Radius of the ball [m]; 0 is a point mass."""
 
 
 class FrictionModel(Model):
-    """Friction in the joints."""
+    """Friction of the joints."""
 
     coulomb: Weights = 0.0
-    """Dry friction [N·m or N]: of all joints, or of each freedom."""
+    """Coulomb friction [N·m or N], one number or nv."""
     viscous: Weights = 0.0
-    """Friction for each unit of speed [N·m·s/rad or N·s/m]: of all, or of each."""
+    """Viscous friction [N·m·s/rad or N·s/m], one number or nv."""
 
 
 class PushModel(Model):
-    """A wrench from outside, for a while."""
+    """An external wrench on a frame, for a limited time."""
 
     frame: str
-    """The frame whose origin it acts on."""
+    """Name of the frame; the wrench acts at its origin."""
     force: Vector3 = [0.0, 0.0, 0.0]
-    """In the world's axes [N]."""
+    """Force in world axes [N]."""
     moment: Vector3 = [0.0, 0.0, 0.0]
-    """In the world's axes [N·m]."""
+    """Moment in world axes [N·m]."""
     start: Number = 0.0
-    """When it begins [s]."""
+    """Time at which the push begins [s]."""
     duration: Positive = 0.1
-    """How long it lasts [s]."""
+    """Duration of the push [s]."""
 
 
 class SensorsModel(Model):
-    """What the controller is shown, in this order."""
+    """Imperfections of the measurements, applied in this order."""
 
     delay: Periods = 0
-    """Control periods that a measurement is old."""
+    """Delay of the measurements [control periods]."""
     position_noise: Weights = 0.0
-    """Standard deviation of positions [rad or m]: of all joints, or of each freedom."""
+    """Standard deviation of position noise [rad or m], one number or nv."""
     encoder_resolution: Weights = 0.0
-    """One count [rad or m]: of all joints, or of each freedom; 0 is exact."""
+    """Resolution of the encoders [rad or m], one number or nv; 0 is exact."""
     differenced_velocity: bool = False
-    """Whether velocity is the difference of the last two positions."""
+    """Whether the velocity is computed from the last two positions."""
     velocity_noise: Weights = 0.0
-    """Standard deviation of velocities [rad/s or m/s]: of all, or of each."""
+    """Standard deviation of velocity noise [rad/s or m/s], one number or nv."""
 
 
 class DrivesModel(Model):
-    """What becomes of an effort that is commanded, in this order."""
+    """Imperfections of the drives, applied to a commanded effort in this order."""
 
     dropped: Share = 0.0
-    """Probability that an effort is lost, and the last one goes on."""
+    """Probability that an effort is lost and the previous one continues [-]."""
     delay: Periods = 0
-    """Control periods that an effort comes late."""
+    """Delay of the efforts [control periods]."""
     jitter: NonNegative = 0.0
-    """The longest further lateness [s], drawn for each period."""
+    """Maximum additional delay [s], drawn for each period."""
     noise: Weights = 0.0
-    """Standard deviation of the effort [N·m or N]: of all joints, or of each."""
+    """Standard deviation of effort noise [N·m or N], one number or nv."""
     saturation: Literal["model"] | Weights | None = None
-    """Largest effort [N·m or N], ``model`` for the URDF's own; none by default."""
+    """Maximum effort [N·m or N], one number or nv; ``model`` takes it from the URDF.
+    Unlimited by default."""
 
 
 class PlantModel(Model):
-    """What all plants share."""
+    """Settings of all plants."""
 
     robot: LoadModel | None = None
-    """The robot that moves, with the same joints; the controller's by default."""
+    """The simulated robot, with the same joints; the controller's robot by default."""
     inertias: InertiasModel = InertiasModel()
-    """Bodies that are not as the controller thinks."""
+    """Differences of masses and inertias from the controller's model."""
     payload: PayloadModel | None = None
-    """Something in the hand."""
+    """A payload that the controller does not know about."""
     motor_inertia: Weights = 0.0
-    """Rotor inertia times gear ratio squared [kg·m² or kg]: of all, or of each."""
+    """Rotor inertia times gear ratio squared [kg·m² or kg], one number or nv."""
     pushes: list[PushModel] = []
-    """Wrenches from outside."""
+    """External wrenches."""
     sensors: SensorsModel = SensorsModel()
-    """What the controller is shown."""
+    """Imperfections of the measurements."""
     drives: DrivesModel = DrivesModel()
-    """What becomes of its efforts."""
+    """Imperfections of the drives."""
     seed: Count = 0
-    """Of all random numbers."""
+    """Seed of all random numbers [-]."""
 
 
 class FrictionalPlantModel(PlantModel):
-    """A plant whose joints may have friction."""
+    """Settings of plants whose joints may have friction."""
 
     friction: FrictionModel | Literal["urdf"] | None = None
-    """In the joints; ``urdf``: as the robot's file says. None by default."""
+    """Friction of the joints; ``urdf`` takes it from the robot's file. None by
+    default."""
 
 
 class RigidBodyPlantModel(FrictionalPlantModel):
-    """Pinocchio's rigid bodies."""
+    """Pinocchio's rigid-body dynamics."""
 
     type: Literal["rigid_body"]
 
 
 class RigidContactModel(Model):
-    """How the world holds a frame, both ways and without slip."""
+    """A rigid contact that pushes and pulls on a frame, without slip."""
 
     kind: Literal["point", "surface"] = "surface"
-    """Whether its origin is held, or its orientation too."""
+    """Whether only the frame's origin is held, or also its orientation."""
     on: list[Annotated[list[Number], Field(min_length=2, max_length=2)]] | None = None
-    """When it holds, begin and end [s] each; always by default."""
+    """Intervals in which the contact is active: begin and end [s]; always by
+    default."""
 
 
 class ContactPlantModel(PlantModel):
-    """Pinocchio's rigid bodies, held by rigid contacts."""
+    """Pinocchio's rigid-body dynamics with rigid contacts."""
 
     type: Literal["rigid_contacts"]
     contacts: Annotated[dict[str, RigidContactModel], Field(min_length=1)]
-    """What is held, by frame."""
+    """The contacts, by frame name."""
     damping: NonNegative = 100.0
-    """How fast the velocity of a contact dies out [1/s]."""
+    """Rate at which the velocity of a contact decays [1/s]."""
 
 
 class ContactShapeModel(Model):
-    """What of a frame may touch the ground."""
+    """A shape at a frame that may touch the ground."""
 
     shape: (
         Annotated[
@@ -172,20 +175,20 @@ class ContactShapeModel(Model):
         ]
         | None
     ) = None
-    """Its form; made of the link's collision geometry by default."""
+    """The shape; by default made from the link's collision geometry."""
     position: Vector3 = [0.0, 0.0, 0.0]
-    """Where the shape is in the frame [m]."""
+    """Position of the shape in the frame [m]."""
     rpy: Vector3 = [0.0, 0.0, 0.0]
-    """How it is turned in the frame [rad]."""
+    """Roll, pitch and yaw of the shape in the frame [rad]."""
 
 
 class GroundModel(Model):
     """A horizontal floor."""
 
     height: Number = 0.0
-    """Where it is [m]."""
+    """Height of the floor above the world's origin [m]."""
     friction: NonNegative = 0.8
-    """Coulomb's coefficient between it and whatever touches it."""
+    """Coulomb friction coefficient of the floor [-]."""
 
 
 class MujocoPlantModel(FrictionalPlantModel):
@@ -193,15 +196,15 @@ class MujocoPlantModel(FrictionalPlantModel):
 
     type: Literal["mujoco"]
     timestep: Positive = 0.001
-    """MuJoCo's step [s], at most."""
+    """Maximum step of MuJoCo [s]."""
     integrator: Literal["Euler", "RK4", "implicit", "implicitfast"] = "implicitfast"
-    """MuJoCo's integrator."""
+    """Integrator of MuJoCo."""
     joint_limits: bool = True
     """Whether MuJoCo keeps joints within their limits."""
     contacts: dict[str, ContactShapeModel] = {}
-    """What may touch the ground, by frame."""
+    """Shapes that may touch the ground, by frame name."""
     ground: GroundModel = GroundModel()
-    """The ground; it is there if something may touch it."""
+    """The ground; it exists only if `contacts` has entries."""
 
 
 AnyPlant = (

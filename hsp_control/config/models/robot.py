@@ -1,4 +1,4 @@
-"""Which robot, how it stands in the world, and where it starts."""
+"""The robot, its root in the world, and its start."""
 
 from typing import Literal
 
@@ -7,10 +7,10 @@ from hsp_control.robot.description.sources import Root
 
 
 class ToolFrameModel(Model):
-    """A frame fixed to one of the robot's own."""
+    """A frame that is fixed to a frame of the robot."""
 
     parent: str
-    """The frame that it is fixed to."""
+    """Name of the robot's frame that it is fixed to."""
     translation: Vector3 = [0.0, 0.0, 0.0]
     """Its origin in the parent frame [m]."""
     rpy: Vector3 = [0.0, 0.0, 0.0]
@@ -18,48 +18,52 @@ class ToolFrameModel(Model):
 
 
 class LoadModel(Model):
-    """How a robot is loaded."""
+    """How a robot model is loaded."""
 
     name: str | None = None
-    """A bundled name, a name of example-robot-data, or a path to a URDF file."""
+    """Name of a bundled robot or of example-robot-data, or the path of a URDF file."""
     root: Root | None = None
-    """How it stands in the world; as its source says by default."""
+    """Connection of the root to the world; by default as the robot's source defines."""
     locked: dict[str, Number] | None = None
-    """Joints held still, name to value [rad or m]; as its source says by default."""
+    """Locked joints: position [rad or m] by name; by default as the robot's source
+    defines."""
     tool_frames: dict[Name, ToolFrameModel] = {}
     """Frames to add, by name."""
     mimic: bool = True
-    """Whether joints that mimic others follow them, or are free."""
+    """Whether mimic joints follow their leading joints; if not, they move freely."""
 
 
 class PartModel(LoadModel):
-    """One robot among several in the workspace."""
+    """One of several robots."""
 
     position: Vector3 = [0.0, 0.0, 0.0]
-    """Where its root stands in the world [m]."""
+    """Position of its root in the world [m]."""
     rpy: Vector3 = [0.0, 0.0, 0.0]
-    """How its root is turned [rad]."""
+    """Roll, pitch and yaw of its root in the world [rad]."""
 
 
 class RobotModel(LoadModel):
-    """Which robot, and how it stands in the world."""
+    """The robot, and its root in the world."""
 
     parts: dict[Name, PartModel] | None = None
-    """Instead of a name: several robots, whose frames are then ``<part>_<frame>``."""
+    """Instead of `name`: several robots by name; frames are called
+    ``<part>_<frame>``."""
     gravity: Vector3 | None = None
-    """Acceleration of gravity in the world [m/s²]; -9.81 along z by default."""
+    """Gravitational acceleration in the world [m/s²]; [0, 0, -9.81] by default."""
 
 
 class StartModel(Model):
-    """Where the robot starts; at most one way to say it. By default its home."""
+    """The start: one of joints, coordinates and configuration; home by default."""
 
     joints: Vector | dict[str, Number] | None = None
-    """Joint positions [rad or m], all nv of them or some by name, the rest at home."""
+    """Joint positions [rad or m]: nv numbers, or some by name with the others at
+    home."""
     coordinates: Vector | None = None
-    """Joint coordinates theta = A q, where the robot's source defines A."""
+    """Joint coordinates theta = A q [rad or m], where the robot's source defines A."""
     configuration: Vector | None = None
-    """The configuration itself, nq numbers."""
+    """The configuration, nq numbers [rad, m, or unit quaternions]."""
     ground: Number | None = None
-    """Height that the lowest contact is put at, by moving a free-flyer root [m]."""
+    """Height of the lowest contact [m]; a free-flyer root is moved up or down to it."""
     velocity: Literal["rest", "flow"] | Vector = "rest"
-    """At rest, on the flow that the law leads to, or nv numbers [rad/s or m/s]."""
+    """Velocity: ``rest``, ``flow`` (that of the law without errors), or nv numbers
+    [rad/s or m/s]."""

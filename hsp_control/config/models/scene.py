@@ -1,4 +1,4 @@
-"""Obstacles."""
+"""Obstacles and their shapes."""
 
 from typing import Annotated, Literal
 
@@ -16,11 +16,11 @@ from hsp_control.config.models.motion import OrientationModel, PointTrajectory
 
 
 class SphereModel(Model):
-    """A ball; in the plane, a disk."""
+    """A ball; a disk in the plane."""
 
     type: Literal["sphere"]
     radius: NonNegative
-    """Its radius [m]."""
+    """Radius [m]."""
 
 
 class CapsuleModel(Model):
@@ -28,9 +28,9 @@ class CapsuleModel(Model):
 
     type: Literal["capsule"]
     radius: Positive
-    """Its radius [m]."""
+    """Radius [m]."""
     length: NonNegative
-    """Between the centres of its ends [m]."""
+    """Distance between the centres of its ends [m]."""
 
 
 class CylinderModel(Model):
@@ -38,9 +38,9 @@ class CylinderModel(Model):
 
     type: Literal["cylinder"]
     radius: Positive
-    """Its radius [m]."""
+    """Radius [m]."""
     length: Positive
-    """Its height [m]."""
+    """Height [m]."""
 
 
 class BoxModel(Model):
@@ -48,11 +48,11 @@ class BoxModel(Model):
 
     type: Literal["box"]
     size: Annotated[list[Positive], Field(min_length=3, max_length=3)]
-    """Its edges [m]."""
+    """Lengths of its edges along x, y and z [m]."""
 
 
 class PlaneModel(Model):
-    """All below its own x-y plane: a floor, or a wall when it is turned."""
+    """The half-space below its x-y plane: a floor, or a wall if it is turned."""
 
     type: Literal["plane"]
 
@@ -62,11 +62,11 @@ class MeshModel(Model):
 
     type: Literal["mesh"]
     file: str
-    """An STL, OBJ or DAE file, looked up beside the configuration."""
+    """An STL, OBJ or DAE file; relative paths begin at the configuration's folder."""
     scale: Positive = 1.0
-    """What its numbers are worth [m]."""
+    """Length of the file's unit [m]."""
     convex: bool = False
-    """Whether its convex hull stands for it."""
+    """Whether its convex hull is used instead."""
 
 
 class PointCloudModel(Model):
@@ -76,7 +76,7 @@ class PointCloudModel(Model):
     points: Annotated[list[Vector3], Field(min_length=1)]
     """The points [m]."""
     resolution: Positive = 0.02
-    """Edge of the cube that each is grown to [m]."""
+    """Edge of the cube that represents each point [m]."""
 
 
 class HeightFieldModel(Model):
@@ -103,18 +103,18 @@ AnyShape = Annotated[
 
 
 class ObstacleModel(Model):
-    """A shape that stands or moves."""
+    """A fixed or moving shape."""
 
     shape: AnyShape
-    """Its form, centred on its own frame."""
+    """The shape, centred at the obstacle's frame."""
     center: PointTrajectory
-    """Where its frame is in the world, of dimension 3."""
+    """Trajectory of the frame's origin in the world, of dimension 3 [m]."""
     orientation: OrientationModel | None = None
-    """How its frame is turned; along the world's axes by default."""
+    """Orientation of the frame; along the world's axes by default."""
 
 
 class SceneModel(Model):
-    """What stands or moves in the robot's world."""
+    """The obstacles in the robot's environment."""
 
     obstacles: Annotated[dict[Name, ObstacleModel], Field(max_length=1000)] = {}
     """Obstacles by name."""

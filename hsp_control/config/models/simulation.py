@@ -1,4 +1,4 @@
-"""How a run is simulated."""
+"""The simulation of a run."""
 
 from typing import Annotated, Literal
 
@@ -12,9 +12,9 @@ class Dop853Model(Model):
 
     type: Literal["dop853"]
     rtol: Positive = 1e-9
-    """Relative tolerance of a step."""
+    """Relative tolerance of a step [-]."""
     atol: Positive = 1e-9
-    """Absolute tolerance of a step."""
+    """Absolute tolerance of a step [rad, m, rad/s or m/s]."""
 
 
 class Rk4Model(Model):
@@ -22,7 +22,7 @@ class Rk4Model(Model):
 
     type: Literal["rk4"]
     step: Positive = 1e-3
-    """The physics step [s], an integer fraction of the control period."""
+    """Integration step [s]; an integer fraction of the control period."""
 
 
 class SemiImplicitEulerModel(Model):
@@ -30,7 +30,7 @@ class SemiImplicitEulerModel(Model):
 
     type: Literal["semi_implicit_euler"]
     step: Positive = 1e-3
-    """The physics step [s], an integer fraction of the control period."""
+    """Integration step [s]; an integer fraction of the control period."""
 
 
 AnyIntegrator = Annotated[
@@ -39,15 +39,16 @@ AnyIntegrator = Annotated[
 
 
 class SimulationModel(Model):
-    """How long, how finely, and how the law is evaluated."""
+    """Duration, periods and integrator of the simulation."""
 
     duration: Positive = 10.0
     """Length of the run [s]."""
     log_period: Positive = 0.01
     """Time between two rows of the log [s]."""
     control_period: Positive | None = None
-    """How long an effort is held [s]; none: evaluated in the integrator's stages."""
+    """Time for which an effort is held [s]; without it, the law is evaluated in every
+    stage of the integrator."""
     check_rate: bool = True
-    """Whether a loop that is unstable at its control period is refused."""
+    """Whether a loop that is unstable at its control period is an error."""
     integrator: AnyIntegrator = Dop853Model(type="dop853")
-    """How the robot moves on."""
+    """The integrator of the robot's motion."""

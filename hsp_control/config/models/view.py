@@ -1,4 +1,4 @@
-"""How a run is shown."""
+"""The 3-D view of a run."""
 
 from typing import Annotated
 
@@ -10,24 +10,25 @@ Color = Annotated[str, Field(pattern="^#[0-9A-Fa-f]{6}$")]
 
 
 class ShowModel(Model):
-    """What is shown at first; all of it can be switched in the page's scene tree."""
+    """What is shown at first; the page's scene tree can switch each item."""
 
     paths: bool = True
-    """Where the tasks wanted the robot, and where it was."""
+    """The past references of the tasks, and the past motion."""
     targets: bool = True
-    """Where the tasks want it now."""
+    """The present references of the tasks."""
     obstacles: bool = True
     """The obstacles."""
     influence: bool = True
-    """The zones in which obstacles make themselves felt."""
+    """The influence zones of the obstacles."""
     distances: bool = True
-    """The shortest distances that the field watches."""
+    """The shortest distances of the clearance fields."""
     ellipsoid: bool = False
     """The manipulability ellipsoid of the tasks' frames."""
     self_motion: bool = True
-    """Null-space velocity and projected field, where they move the robot most."""
+    """Null-space velocity and projected field, at the joints that self-motion moves
+    most."""
     contacts: bool = True
-    """Contacts and their forces."""
+    """The contacts and their forces."""
     grid: bool = True
     """The grid on the floor."""
 
@@ -36,16 +37,16 @@ class ViewModel(Model):
     """The 3-D view."""
 
     camera: Vector3 | None = None
-    """Where one looks from [m]; chosen to see the whole robot by default."""
+    """Position of the camera [m]; by default the whole robot is visible."""
     target: Vector3 | None = None
-    """Where one looks at [m]."""
+    """Point that the camera looks at [m]; by default the centre of the scene."""
     speed: Positive = 1.0
-    """Seconds of motion shown in one second."""
+    """Playback speed: seconds of motion in one second [-]."""
     loop: bool = False
-    """Whether it is played again and again."""
+    """Whether playback repeats."""
     background: Color = "#FFFFFF"
-    """Colour of the sky, as ``#RRGGBB``; texts are light where it is dark."""
+    """Background colour, as ``#RRGGBB``; text is light on a dark background."""
     light: Positive = 1.0
-    """How strong the light is; 1 is a bright room."""
+    """Brightness of the light [-]; 1 is a bright room."""
     show: ShowModel = ShowModel()
     """What is shown at first."""

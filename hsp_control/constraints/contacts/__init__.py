@@ -1,4 +1,4 @@
-"""Contacts: where a robot stands on the world, and what the world can bear."""
+"""Contacts: where a robot stands, and the forces that can act there."""
 
 from .ball_contact import BallContact as BallContact
 from .contact import Contact as Contact

@@ -1,4 +1,4 @@
-"""A ball that rolls without slipping: three rows, one force below its centre."""
+"""A ball that rolls without slipping: three rows, and one force below its centre."""
 
 from typing import Any
 
@@ -7,18 +7,18 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError
 from hsp_control.constraints.contacts.contact import Contact
-from hsp_control.constraints.contacts.point_contact import move_rows
+from hsp_control.constraints.contacts.point_contact import point_velocity_rows
 from hsp_control.robot import Robot
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks import TaskSample
 
 
 class BallContact(Contact):
-    """A spherical foot rolls on the plane, as the feet of quadrupeds do.
+    """A spherical foot that rolls on the plane, like the feet of quadrupeds.
 
-    The material point that touches, at -r n from the centre, does not slip; the next
-    moment it is another point. Holding the centre still instead costs the null space
-    0.2 rad/s on Solo (theory.md §7).
+    The material point in contact, at -r n from the centre, does not slip; it is another
+    point at the next moment. Holding the centre still instead adds a null-space error
+    of 0.2 rad/s on Solo (theory.md §7).
 
     Attributes:
         radius: r [m].
@@ -29,17 +29,17 @@ class BallContact(Contact):
     def __init__(
         self, robot: Robot, frame: str, *, radius: float, **options: Any
     ) -> None:
-        """Set the contact.
+        """Create the contact.
 
         Args:
             robot: The robot.
             frame: Name of the frame at the ball's centre.
-            radius: Its radius r [m].
-            options: What all contacts share: see `Contact`.
+            radius: The ball's radius r [m].
+            options: The arguments that all contacts have: see `Contact`.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            ContactError: If a number makes no sense.
+            ContactError: If an argument is out of its range.
         """
         if not 0.0 < radius < np.inf:
             raise ContactError(
@@ -50,8 +50,8 @@ class BallContact(Contact):
         self._arm = -self.radius * self.axes[:, 2]
 
     def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
-        """Write the rows of the velocity at the point that touches, -r n."""
-        move_rows(
+        """Write the velocity rows of the material point in contact, at -r n."""
+        point_velocity_rows(
             frame.jacobian,
             frame.jacobian_dot,
             self._arm,
@@ -61,5 +61,5 @@ class BallContact(Contact):
         )
 
     def arms(self, frame: FrameKinematics) -> Array:
-        """Return the point that touches, from the ball's centre."""
+        """Return the position of the contact point from the ball's centre, (1, 3)."""
         return self._arm[None]

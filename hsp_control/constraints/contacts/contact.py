@@ -1,4 +1,4 @@
-"""What a contact is: rows that keep it still, and points where forces may act."""
+"""The base class of contacts: constraint rows, and points where forces may act."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -20,25 +20,25 @@ from hsp_control.trajectories.schedule import Schedule
 class Contact(ABC):
     """A part of the robot that rests on a plane of the world.
 
-    Its rows keep it from moving, J a + J'v = -Kd J v: damping without stiffness, since
-    a stiffness fights the small slip of a real contact (theory.md §7). The world pushes
-    at its points, each within a friction pyramid inscribed in the cone of Coulomb's
-    law, and never pulls.
+    Its rows keep it still, J a + J'v = -Kd J v: damping without stiffness, since
+    stiffness would fight the small slip of a real contact (theory.md §7). Forces act at
+    its points. Each force lies within a friction pyramid inscribed in the Coulomb
+    friction cone, so it pushes and never pulls.
 
     To implement one: call ``super().__init__``, set `rows`, write `constrain` and
     `arms`.
 
     Attributes:
         robot: The robot.
-        frame: The frame that rests.
-        name: What the log calls it.
-        rows: Rows that keep it still.
-        points: Where forces act, shape (k, 3), in the contact's own terms [m].
-        axes: Two tangents and the normal of the plane in the world, shape (3, 3), the
-            columns.
-        friction: μ.
+        frame: Name of the frame that rests on the plane.
+        name: The contact's name in the log.
+        rows: Number of constraint rows.
+        points: Where forces act, shape (k, 3), in the frame of the subclass [m].
+        axes: Two tangents and the normal of the plane as columns, world axes, shape
+            (3, 3).
+        friction: Friction coefficient μ.
         damping: Kd [1/s].
-        schedule: When it bears.
+        schedule: When the contact is active.
     """
 
     rows: int
@@ -55,11 +55,22 @@ class Contact(ABC):
         schedule: Schedule | None = None,
         name: str | None = None,
     ) -> None:
-        """Check and keep what all contacts share.
+        """Check and store what all contacts have in common.
+
+        Args:
+            robot: The robot.
+            frame: Name of the frame that rests on the plane.
+            points: Where forces act, shape (k, 3) [m].
+            friction: Friction coefficient μ > 0.
+            normal: Normal of the plane, world axes, shape (3,), of any length > 0.
+            damping: Kd > 0 [1/s].
+            schedule: When the contact is active; None: always.
+            name: The contact's name; None: the frame's.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            ContactError: If friction, normal or damping make no sense.
+            ContactError: If friction or damping is not positive, or the normal is not a
+                non-zero vector of three finite numbers.
         """
         robot.frame_id(frame)
         self.robot = robot
@@ -72,29 +83,29 @@ class Contact(ABC):
         self.schedule = Schedule.always() if schedule is None else schedule
 
     def compile(self, state: RobotState, out: TaskSample) -> StepPlan:
-        """Return what `evaluate` does with this state and this sample."""
+        """Return the step plan that evaluates this state into this sample."""
         return StepPlan(write=(partial(self.evaluate, state, out),))
 
     def evaluate(self, state: RobotState, out: TaskSample) -> TaskSample:
-        """Write the rows: J, J', and the acceleration that brings it to rest."""
+        """Write the rows: J, J', and the acceleration that damps the motion."""
         self.constrain(state.frame(self.frame), out)
-        come_to_rest(
+        damp_velocity(
             out.jacobian, state.v, self.damping, out.error_rate, out.acceleration
         )
         return out
 
     @abstractmethod
     def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
-        """Write J and J' of what must not move."""
+        """Write J and J' of the constraint, shape (rows, nv) each."""
 
     @abstractmethod
     def arms(self, frame: FrameKinematics) -> Array:
-        """Return where forces act, from the frame's origin, in world axes, (k, 3)."""
+        """Return where forces act, from the frame's origin, world axes, (k, 3) [m]."""
 
 
 @kernel
-def come_to_rest(J: Array, v: Array, damping: float, e_dot: Array, a: Array) -> None:
-    """Write e' = -J v and the acceleration Kd e' that brings it to rest."""
+def damp_velocity(J: Array, v: Array, damping: float, e_dot: Array, a: Array) -> None:
+    """Write e' = -J v and the acceleration Kd e', which damps the contact's motion."""
     for k in range(J.shape[0]):
         total = 0.0
         for i in range(J.shape[1]):
@@ -107,16 +118,17 @@ def plane_axes(normal: Sequence[float], name: str) -> Array:
     """Return two tangents and a unit normal as columns, shape (3, 3).
 
     Raises:
-        ContactError: If the normal is not a direction.
+        ContactError: If the normal is not a non-zero vector of three finite numbers.
     """
     n = np.array(normal, dtype=float)
     length = float(np.linalg.norm(n)) if n.shape == (3,) else 0.0
     if not 0.0 < length < np.inf:
         raise ContactError(
-            f"contact {name!r}: normal {list(normal)} is no direction in space"
+            f"contact {name!r}: normal must be a non-zero vector of three numbers, "
+            f"got {list(normal)}"
         )
     n /= length
-    # The tangent nearest to the world's x, or y where the normal is along x.
+    # The tangent nearest to the world's x axis, or y if the normal is along x.
     along = np.eye(3)[0 if abs(n[0]) < 0.9 else 1]
     tangent = along - (along @ n) * n
     tangent /= np.linalg.norm(tangent)

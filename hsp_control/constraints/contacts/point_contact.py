@@ -1,4 +1,4 @@
-"""A point that rests: three rows, one force."""
+"""A point contact: three rows, and one force."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,7 +15,7 @@ from hsp_control.tasks import TaskSample
 
 
 class PointContact(Contact):
-    """A point of a link rests on the plane and may turn about itself.
+    """A point of a link rests on the plane; the link may turn about it.
 
     Attributes:
         points: The point in the frame, shape (1, 3) [m].
@@ -31,27 +31,30 @@ class PointContact(Contact):
         point: Sequence[float] = (0.0, 0.0, 0.0),
         **options: Any,
     ) -> None:
-        """Set the contact.
+        """Create the contact.
 
         Args:
             robot: The robot.
             frame: Name of the frame.
             point: The point in the frame [m].
-            options: What all contacts share: see `Contact`.
+            options: The arguments that all contacts have: see `Contact`.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            ContactError: If a number makes no sense.
+            ContactError: If an argument is out of its range.
         """
         place = np.array(point, dtype=float)
         if place.shape != (3,) or not np.isfinite(place).all():
-            raise ContactError(f"contact at {frame!r}: point {point!r} is no point")
+            raise ContactError(
+                f"contact at {frame!r}: point must be three finite numbers, got "
+                f"{point!r}"
+            )
         super().__init__(robot, frame, place[None], **options)
 
     def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
-        """Write the rows of the point's velocity."""
+        """Write the velocity rows of the point."""
         arm = frame.rotation @ self.points[0]
-        move_rows(
+        point_velocity_rows(
             frame.jacobian,
             frame.jacobian_dot,
             arm,
@@ -61,17 +64,26 @@ class PointContact(Contact):
         )
 
     def arms(self, frame: FrameKinematics) -> Array:
-        """Return the point, from the frame's origin, in world axes."""
+        """Return the point, from the frame's origin, in world axes, shape (1, 3)."""
         return self.points @ frame.rotation.T
 
 
 @kernel
-def move_rows(
+def point_velocity_rows(
     J: Array, J_dot: Array, arm: Array, arm_dot: Array, out: Array, out_dot: Array
 ) -> None:
-    """Write the velocity rows of a point at ``arm`` from a frame, and their rate.
+    """Write the velocity rows of a point, and their rate, from those of a frame.
 
-    l + w × r, whose rate is l' + w' × r + w × r'.
+    With l and w the frame's linear and angular rows and r the arm: l + w × r, and its
+    rate l' + w' × r + w × r'.
+
+    Args:
+        J: Frame Jacobian, world axes, linear rows first, shape (6, nv).
+        J_dot: Its rate, shape (6, nv).
+        arm: r, from the frame's origin to the point, world axes, shape (3,) [m].
+        arm_dot: r', shape (3,) [m/s].
+        out: The point's rows, shape (3, nv).
+        out_dot: Their rate, shape (3, nv).
     """
     x, y, z = arm[0], arm[1], arm[2]
     u, v, w = arm_dot[0], arm_dot[1], arm_dot[2]

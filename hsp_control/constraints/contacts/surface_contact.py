@@ -1,4 +1,4 @@
-"""A flat sole that rests: six rows, a force at every corner."""
+"""A flat sole: six rows, and a force at every corner."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,9 +16,9 @@ from hsp_control.tasks import TaskSample
 class SurfaceContact(Contact):
     """A flat part of a link rests on the plane.
 
-    Forces act at its corners, so that the pressure stays within the sole and what it
-    bears in yaw follows from friction: separate limits on the centre of pressure and on
-    the yaw moment let feet slide by centimetres (theory.md §7).
+    Forces act at its corners, so that the centre of pressure stays within the sole and
+    the yaw moment is limited by friction. Separate limits on the centre of pressure and
+    on the yaw moment let feet slide by centimetres (theory.md §7).
 
     Attributes:
         points: The corners in the frame, shape (k, 3) [m].
@@ -34,17 +34,18 @@ class SurfaceContact(Contact):
         corners: Sequence[Sequence[float]] | Array,
         **options: Any,
     ) -> None:
-        """Set the contact.
+        """Create the contact.
 
         Args:
             robot: The robot.
             frame: Name of the frame.
-            corners: Three points or more of the sole, in the frame [m].
-            options: What all contacts share: see `Contact`.
+            corners: At least three points of the sole, in the frame, shape (k, 3) [m].
+            options: The arguments that all contacts have: see `Contact`.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            ContactError: If the corners span no surface, or a number makes no sense.
+            ContactError: If the corners span no surface, or an argument is out of its
+                range.
         """
         points = np.array(corners, dtype=float)
         flat = (
@@ -69,16 +70,25 @@ class SurfaceContact(Contact):
         center: Sequence[float] = (0.0, 0.0, 0.0),
         **options: Any,
     ) -> "SurfaceContact":
-        """Return a sole of a length along the frame's x and a width along its y [m]."""
+        """Return a rectangular sole.
+
+        Args:
+            robot: The robot.
+            frame: Name of the frame.
+            length: Length along the frame's x axis [m].
+            width: Width along the frame's y axis [m].
+            center: Centre of the rectangle in the frame [m].
+            options: The arguments that all contacts have: see `Contact`.
+        """
         x, y = 0.5 * length, 0.5 * width
         square = np.array([[x, y, 0.0], [x, -y, 0.0], [-x, y, 0.0], [-x, -y, 0.0]])
         return cls(robot, frame, corners=square + np.array(center), **options)
 
     def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
-        """Write the frame's six rows: it neither moves nor turns."""
+        """Write the six rows of the frame: it neither moves nor turns."""
         out.jacobian[:] = frame.jacobian
         out.jacobian_dot[:] = frame.jacobian_dot
 
     def arms(self, frame: FrameKinematics) -> Array:
-        """Return the corners, from the frame's origin, in world axes."""
+        """Return the corners, from the frame's origin, in world axes, shape (k, 3)."""
         return self.points @ frame.rotation.T

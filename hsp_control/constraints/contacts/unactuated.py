@@ -1,4 +1,4 @@
-"""Rows for the freedoms that neither a motor nor a contact can push."""
+"""Rows for the base motions that neither a motor nor a contact can drive."""
 
 import numpy as np
 
@@ -8,20 +8,27 @@ from hsp_control.tasks import TaskSample
 
 
 class UnactuatedRows:
-    """Uᵀ(M a + N) = 0, with U the base motions that every contact permits.
+    """The rows Uᵀ(M a + N) = 0, with U the base motions that all contacts permit.
 
-    Where contacts leave the base a motion of its own (two point feet: a turn about the
-    line between them; in the air: all six), nothing produces an effort along it, and
-    the law must ask for none. The rows UᵀM are divided by the robot's mass, which makes
-    them comparable with those of tasks.
+    Contacts may leave some base motions free (two point feet: the rotation about the
+    line between them; in the air: all six). Nothing can produce an effort along such a
+    motion, so the law must not require one. The rows UᵀM are divided by the robot's
+    mass, which makes them comparable with those of tasks.
 
     Attributes:
-        name: What messages call it.
-        rows: How many such motions there are.
+        name: Its name in messages.
+        robot: The robot.
+        rows: The number of such motions.
     """
 
     def __init__(self, robot: Robot, base: Indices, count: int) -> None:
-        """Set how many base motions the contacts permit, of the freedoms ``base``."""
+        """Create the rows.
+
+        Args:
+            robot: The robot.
+            base: Indices of the base's degrees of freedom.
+            count: How many base motions the contacts permit.
+        """
         self.name = "unactuated"
         self.robot = robot
         self.rows = count
@@ -31,13 +38,13 @@ class UnactuatedRows:
     def evaluate(
         self, state: RobotState, contacts: TaskSample, out: TaskSample
     ) -> TaskSample:
-        """Write the rows, given those of the contacts, stacked."""
+        """Write the rows, given the stacked rows of the contacts."""
         A = contacts.jacobian[:, self._base]
         A_dot = contacts.jacobian_dot[:, self._base]
         U = np.eye(len(self._base))
         if len(A):
             U = np.linalg.svd(A)[2][len(self._base) - self.rows :].T
-        # A U = 0 at all times: U' = -A⁺A'U, up to what only mixes the rows.
+        # A U = 0 at all times, so U' = -A⁺A'U, up to a change of basis of the rows.
         U_dot = -np.linalg.pinv(A) @ A_dot @ U if len(A) else np.zeros_like(U)
         M, M_dot = state.mass_matrix[self._base], state.mass_matrix_rate[self._base]
         out.jacobian[:] = U.T @ M / self._mass
@@ -48,7 +55,12 @@ class UnactuatedRows:
 
 
 def unactuated_count(jacobian: Array, base: Indices) -> int:
-    """Return how many base motions the contacts' rows permit."""
+    """Return how many base motions the contacts permit.
+
+    Args:
+        jacobian: Stacked rows of the contacts, shape (m, nv).
+        base: Indices of the base's degrees of freedom.
+    """
     if not len(jacobian):
         return len(base)
     values = np.linalg.svd(jacobian[:, base], compute_uv=False)

@@ -1,4 +1,4 @@
-"""Limits: what a robot's motors, joints and surroundings allow."""
+"""Limits of motors, joints and distances."""
 
 from .limits import Limits as Limits
 from .minimum_distance import MinimumDistance as MinimumDistance

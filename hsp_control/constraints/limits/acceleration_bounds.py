@@ -1,18 +1,54 @@
 """Position, velocity and acceleration limits as bounds on the acceleration."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 
 _STEEPER = 4.0
-"""How much steeper the velocity's barrier is beyond the guarded speed. With efforts
-held for 1 ms that change at 1000 N·m/s the acceleration is wrong by M⁻¹·0.5 N·m, half a
+"""How much steeper the velocity barrier is beyond the guarded speed. With efforts held
+for 1 ms that change at 1000 N·m/s the acceleration has an error of M⁻¹·0.5 N·m, half a
 rad/s² on a Panda, for as long as they change: the margin must be enough for it."""
 
 
 MOTION, EFFORT = 1, 2
-"""What may be broken."""
+"""Flags of what is violated: bounds on the acceleration, bounds on the effort."""
+
+
+class MotionLimits(NamedTuple):
+    """The limits that the barriers keep, margins included.
+
+    Attributes:
+        lower: Lower position limit, shape (nv,) [rad or m].
+        upper: Upper position limit, shape (nv,) [rad or m].
+        velocity: Maximum speed, shape (nv,) [rad/s or m/s].
+        acceleration: Maximum acceleration, shape (nv,) [rad/s² or m/s²].
+        bandwidth: α of the barriers [1/s].
+    """
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    acceleration: Array
+    bandwidth: float
+
+
+class Bounds(NamedTuple):
+    """Bounds of one step, shape (nv,) each.
+
+    Attributes:
+        a_lower: Lower bound on the acceleration.
+        a_upper: Upper bound on the acceleration.
+        tau_lower: Lower bound on the effort.
+        tau_upper: Upper bound on the effort.
+    """
+
+    a_lower: Array
+    a_upper: Array
+    tau_lower: Array
+    tau_upper: Array
 
 
 @kernel
@@ -20,31 +56,26 @@ def acceleration_bounds(
     q: Array,
     v: Array,
     where: Indices,
-    lower: Array,
-    upper: Array,
-    velocity: Array,
-    acceleration: Array,
-    bandwidth: float,
-    least: Array,
-    greatest: Array,
+    limits: MotionLimits,
+    a_lower: Array,
+    a_upper: Array,
 ) -> None:
-    """Write the bounds that the barriers of `Limits` put on a.
+    """Write the bounds on the acceleration that the barriers of `Limits` require.
 
-    Where they contradict each other, position goes before velocity before acceleration:
-    each narrows the range that those before it leave, as far as it can.
+    Where they contradict each other, position has priority over velocity, and velocity
+    over acceleration: each narrows the range that the earlier ones leave, as far as it
+    can.
 
     Args:
         q: Configuration, shape (nq,).
         v: Velocity, shape (nv,).
-        where: Where each freedom's coordinate stands in q, -1 for none, shape (nv,).
-        lower: Least position, shape (nv,).
-        upper: Greatest position, shape (nv,).
-        velocity: Greatest speed, shape (nv,).
-        acceleration: Greatest acceleration, shape (nv,).
-        bandwidth: α [1/s].
-        least: Least acceleration, shape (nv,).
-        greatest: Greatest acceleration, shape (nv,).
+        where: Index in q of the coordinate of each degree of freedom, -1 for none,
+            shape (nv,).
+        limits: What the barriers keep.
+        a_lower: Written: lower bound on the acceleration, shape (nv,).
+        a_upper: Written: upper bound on the acceleration, shape (nv,).
     """
+    lower, upper, velocity, acceleration, bandwidth = limits
     for i in range(v.shape[0]):
         low, high = -np.inf, np.inf
         if where[i] >= 0:
@@ -62,52 +93,45 @@ def acceleration_bounds(
             slowing = min(slowing, rising)
         low, high = _narrow(low, high, slowing, rising)
         low, high = _narrow(low, high, -acceleration[i], acceleration[i])
-        least[i], greatest[i] = low, high
+        a_lower[i], a_upper[i] = low, high
 
 
 @kernel
-def keeps_limits(
+def violated_limits(
     q: Array,
     v: Array,
     a: Array,
     tau: Array,
     where: Indices,
-    lower: Array,
-    upper: Array,
-    velocity: Array,
-    acceleration: Array,
-    bandwidth: float,
-    least: Array,
-    greatest: Array,
-    low: Array,
-    high: Array,
+    limits: MotionLimits,
+    bounds: Bounds,
 ) -> int:
-    """Write the bounds, see `acceleration_bounds`; return which a and tau break.
+    """Write the acceleration bounds, and return which bounds a and tau violate.
 
-    None, `MOTION`, `EFFORT`, or the sum of both.
+    See `acceleration_bounds` for the arguments.
+
+    Returns:
+        0 for none, `MOTION`, `EFFORT`, or the sum of both.
     """
-    acceleration_bounds(
-        q, v, where, lower, upper, velocity, acceleration, bandwidth, least, greatest
-    )
-    broken = 0 if within(a, least, greatest) else MOTION
-    return broken if within(tau, low, high) else broken + EFFORT
+    acceleration_bounds(q, v, where, limits, bounds.a_lower, bounds.a_upper)
+    violated = 0 if within(a, bounds.a_lower, bounds.a_upper) else MOTION
+    effort_ok = within(tau, bounds.tau_lower, bounds.tau_upper)
+    return violated if effort_ok else violated + EFFORT
 
 
 @kernel
-def within(x: Array, least: Array, greatest: Array) -> bool:
-    """Return whether every component is within its bounds."""
+def within(x: Array, lower: Array, upper: Array) -> bool:
+    """Return whether every component of x is within its bounds."""
     inside = True
     for i in range(x.shape[0]):
-        inside = inside and least[i] <= x[i] <= greatest[i]
+        inside = inside and lower[i] <= x[i] <= upper[i]
     return inside
 
 
 @kernel
-def _narrow(
-    low: float, high: float, least: float, greatest: float
-) -> tuple[float, float]:
-    """Return the part of [low, high] within [least, greatest], or its nearest point."""
+def _narrow(low: float, high: float, lower: float, upper: float) -> tuple[float, float]:
+    """Return the part of [low, high] within [lower, upper], or its nearest point."""
     return (
-        max(low, min(least, high)),
-        min(high, max(greatest, low)),
+        max(low, min(lower, high)),
+        min(high, max(upper, low)),
     )

@@ -1,4 +1,4 @@
-"""What a robot's motors and joints allow: efforts, their rate, and joint motion."""
+"""Limits on efforts, their rate, joint motion and distances."""
 
 from collections.abc import Sequence
 from typing import Any, Literal
@@ -7,55 +7,60 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LimitError
+from hsp_control.constraints.limits.acceleration_bounds import MotionLimits
 from hsp_control.constraints.limits.minimum_distance import MinimumDistance
 from hsp_control.constraints.limits.static_effort import StaticEffort
 from hsp_control.robot import Robot
 
 Default = Literal["robot"]
-"""The robot's own limit, as its URDF gives it."""
+"""The robot's own limit, from its URDF."""
 
 
 class Limits:
-    """Box limits on effort and joint motion, which the controller then keeps.
+    """Limits on effort, joint motion and distances, which the controller keeps.
 
-    Efforts and their rate are hard. Position, velocity and acceleration become bounds
-    on the acceleration, by barriers that let a limit be approached and not crossed,
-    however near it is (an exponential control barrier function of bandwidth α):
+    The limits on efforts and their rate are hard. Those on position, velocity and
+    acceleration become bounds on the acceleration, by barriers that let the robot
+    approach a limit but not cross it (exponential control barrier functions of
+    bandwidth α):
 
         position        a ≤ α²(q_max - q) - 2α v
         velocity        a ≤ 2α (v_max - v)
         acceleration    a ≤ a_max
 
-    and alike from below, the velocity's four times as steep within its margin.
-    Distances have barriers of their own, see `MinimumDistance`, and so have postures
-    that motors can hold, see `StaticEffort`. Where limits contradict each other, these
-    yield first, acceleration yields to velocity, velocity to position, position to
-    distance, and all of them to the effort.
+    and likewise from below; the velocity barrier is four times as steep within its
+    margin. Distances have their own barriers, see `MinimumDistance`, and so has the
+    effort against gravity, see `StaticEffort`. Where limits contradict each other they
+    are relaxed in this order: static effort, acceleration, velocity, position,
+    distance. Effort limits are never relaxed.
 
-    Where a limit binds the null space gives way first, and then the tasks. How far the
-    null space gives way before the tasks do is bounded, if `null_space_speed` is given:
-    with δ the deviation from the law's acceleration, s this speed and λ the rate of
-    K_N, |(P δ)_j| ≤ λ s_j. Then e_N' = -K_N e_N - P δ stays a stable system with a
-    bounded input, and ‖e_N‖_W ≤ ‖s‖_|W| for ever (docs/limits.md). Of all bounds it is
-    the first to give way.
+    Where a limit binds, the null space deviates from the law first, and then the tasks.
+    If `null_space_speed` is given, the deviation of the null space is bounded: with δ
+    the deviation from the law's acceleration, s this speed and λ the decay rate of K_N,
+    |(P δ)_j| ≤ λ s_j. Then e_N' = -K_N e_N - P δ is a stable system with a bounded
+    input, and ‖e_N‖_W ≤ ‖s‖_|W| at all times (docs/limits.md). This bound is the first
+    of all to be relaxed.
 
     Attributes:
         robot: The robot.
-        effort: Greatest effort, shape (nv,) [N·m or N]; inf where unlimited.
-        effort_rate: Greatest rate of effort, shape (nv,) [N·m/s or N/s].
-        velocity: Greatest speed, shape (nv,) [rad/s or m/s].
-        acceleration: Greatest acceleration, shape (nv,) [rad/s² or m/s²].
-        lower: Least joint position, shape (nv,) [rad or m]; -inf where unlimited.
-        upper: Greatest joint position, shape (nv,) [rad or m].
-        guarded_velocity: The speed that the barriers keep, within its margin.
-        guarded_lower: The position that the barriers keep, within its margin.
-        guarded_upper: The position that the barriers keep, within its margin.
+        effort: Maximum effort, shape (nv,) [N·m or N]; inf where unlimited.
+        effort_rate: Maximum rate of effort, shape (nv,) [N·m/s or N/s].
+        velocity: Maximum speed, shape (nv,) [rad/s or m/s].
+        acceleration: Maximum acceleration, shape (nv,) [rad/s² or m/s²].
+        lower: Lower joint position limit, shape (nv,) [rad or m]; -inf where unlimited.
+        upper: Upper joint position limit, shape (nv,) [rad or m].
+        motion: The same four and α, as a record for kernels.
+        guarded_velocity: The speed that the barriers keep: the limit less its margin.
+        guarded_lower: The lower position that the barriers keep: the limit plus its
+            margin.
+        guarded_upper: The upper position that the barriers keep: the limit less its
+            margin.
         bandwidth: α of the barriers [1/s].
-        distances: What must keep how far apart.
-        static_effort: What keeps postures to those that motors can hold, if anything.
+        distances: The minimum distances.
+        static_effort: The limit on the effort against gravity, if any.
         null_space_speed: s, shape (nv,) [rad/s or m/s]; None: no bound.
-        null_space_weight: What null-space motion costs beside the first task, where
-            limits bind; None: as little as rounding permits.
+        null_space_weight: Cost of null-space deviation relative to the first task,
+            where limits bind; None: as small as rounding permits.
     """
 
     def __init__(
@@ -75,39 +80,40 @@ class Limits:
         null_space_speed: Any | None = None,
         null_space_weight: float | None = None,
     ) -> None:
-        """Set the limits; each is a number, one per freedom, or None for no limit.
+        """Set the limits: each one number, an array of shape (nv,), or None for none.
 
         Args:
             robot: The robot.
-            effort: Greatest effort [N·m or N]; "robot": the URDF's.
-            effort_rate: Greatest rate of effort [N·m/s]; a Panda's is 1000.
-            velocity: Greatest speed [rad/s or m/s]; "robot": the URDF's.
-            acceleration: Greatest acceleration [rad/s² or m/s²].
+            effort: Maximum effort [N·m or N]; "robot": the URDF's.
+            effort_rate: Maximum rate of effort [N·m/s or N/s]; a Panda's is 1000.
+            velocity: Maximum speed [rad/s or m/s]; "robot": the URDF's.
+            acceleration: Maximum acceleration [rad/s² or m/s²].
             position: (lower, upper) joint positions [rad or m]; "robot": the URDF's.
-            position_margin: How far inside its limits a position is kept [rad or m]:
-                with efforts held for a period a barrier lets the motion reach the
-                acceleration's error over α² beyond it.
-            velocity_margin: How far inside its limits a speed is kept, as a part of it.
-            distances: What must keep how far apart.
-            bandwidth: α [1/s]. 5 to 20 is what a motor follows: faster barriers ask at
-                the last moment for more than the effort's rate can give.
-            static_effort: The part of an effort that gravity may take; for motors that
-                bear no contact. None: any.
+            position_margin: Distance that is kept from the position limits [rad or m].
+                With efforts held for a period, a barrier may be crossed by the error of
+                the acceleration over α².
+            velocity_margin: Margin that is kept from the speed limits, as a part of
+                them, in [0, 1).
+            distances: The minimum distances.
+            bandwidth: α [1/s]. Motors can follow 5 to 20: faster barriers act so late
+                that they need more than the effort rate permits.
+            static_effort: The part of an effort that gravity may take, in (0, 1], for
+                motors that carry no contact. None: any.
             null_space_speed: s [rad/s or m/s]: how fast the null space may leave the
-                field, before tasks give way.
-            null_space_weight: What null-space motion costs beside the first task,
+                field, before tasks deviate. None: no bound.
+            null_space_weight: Cost of null-space deviation relative to the first task,
                 between 0 and 1. None: 1e-6, and 1e-8 where tasks have priorities. 1e-3
-                brings to rest a robot that cannot reach its target, at 1e-3 of the
-                null space's deviation in the task's.
+                brings a robot to rest that cannot reach its target; 1e-3 of the
+                null-space deviation then appears in the task.
 
         Raises:
-            LimitError: If a limit is not positive, lower is not below upper, or the
-                shape is not the robot's.
+            LimitError: If a limit is not positive, lower is not below upper, a shape is
+                not (nv,), or an option is out of its range.
         """
         self.robot = robot
         nv = robot.nv
-        self.effort = _greatest(robot, effort, "effort", robot.model.effortLimit)
-        self.velocity = _greatest(
+        self.effort = _symmetric_limit(robot, effort, "effort", robot.model.effortLimit)
+        self.velocity = _symmetric_limit(
             robot, velocity, "velocity", robot.model.velocityLimit
         )
         if not 0.0 <= velocity_margin < 1.0:
@@ -115,8 +121,8 @@ class Limits:
                 f"velocity_margin is {velocity_margin}; must be at least 0, and below 1"
             )
         self.guarded_velocity = (1.0 - velocity_margin) * self.velocity
-        self.effort_rate = _greatest(robot, effort_rate, "effort_rate", None)
-        self.acceleration = _greatest(robot, acceleration, "acceleration", None)
+        self.effort_rate = _symmetric_limit(robot, effort_rate, "effort_rate", None)
+        self.acceleration = _symmetric_limit(robot, acceleration, "acceleration", None)
         if position is None:
             position = (np.full(nv, -np.inf), np.full(nv, np.inf))
         elif isinstance(position, str):
@@ -141,12 +147,19 @@ class Limits:
         rooted = robot.dof_indices < 0
         if np.isfinite(lower[rooted]).any() or np.isfinite(upper[rooted]).any():
             raise LimitError(
-                "position limits on a joint without a coordinate of its own (a root, "
-                "or a continuous joint); leave them infinite"
+                "position limits are given for a joint without a single coordinate (a "
+                "root, or a continuous joint); leave them infinite"
             )
         if not 0.0 < bandwidth < np.inf:
             raise LimitError(f"bandwidth is {bandwidth}; must be positive")
         self.bandwidth = float(bandwidth)
+        self.motion = MotionLimits(
+            self.guarded_lower,
+            self.guarded_upper,
+            self.guarded_velocity,
+            self.acceleration,
+            self.bandwidth,
+        )
         self.static_effort = (
             None
             if static_effort is None
@@ -155,7 +168,7 @@ class Limits:
         self.null_space_speed = (
             None
             if null_space_speed is None
-            else _greatest(robot, null_space_speed, "null_space_speed", None)
+            else _symmetric_limit(robot, null_space_speed, "null_space_speed", None)
         )
         if null_space_weight is not None and not 0.0 < null_space_weight < 1.0:
             raise LimitError(
@@ -164,17 +177,18 @@ class Limits:
         self.null_space_weight = null_space_weight
         self.distances = tuple(distances)
         if any(each.proximity.robot is not robot for each in self.distances):
-            raise LimitError("a least distance was built for another robot object")
+            raise LimitError("a minimum distance was built for another robot object")
 
     def check_start(self, q: Array, v: Array) -> None:
-        """Refuse a start outside the limits; distances are at t = 0.
+        """Check that a start is within the limits; distances are those at t = 0.
 
         Args:
             q: Configuration, shape (nq,).
             v: Velocity, shape (nv,).
 
         Raises:
-            LimitError: Names the joint, its position or speed, and the limit.
+            LimitError: Names the joint, its position or speed, and the limit; or the
+                pair of shapes and its distance.
         """
         names = self.robot.dof_names
         positions = self.robot.joint_positions(q)
@@ -196,7 +210,7 @@ class Limits:
             )
 
 
-def _greatest(robot: Robot, value: Any, what: str, own: Array | None) -> Array:
+def _symmetric_limit(robot: Robot, value: Any, what: str, own: Array | None) -> Array:
     """Return a symmetric limit of shape (nv,), inf where there is none."""
     if value is None:
         return np.full(robot.nv, np.inf)
@@ -204,7 +218,7 @@ def _greatest(robot: Robot, value: Any, what: str, own: Array | None) -> Array:
         _check_word(value, what, known=own is not None)
         limit = np.array(own, dtype=float)
         limit[list(robot.unactuated)] = np.inf
-        # URDFs write 0, or the largest number there is, where they know no limit.
+        # URDFs have 0 or the largest float where there is no limit.
         limit[(limit <= 0.0) | (limit >= np.finfo(np.float32).max)] = np.inf
         return limit
     limit = _array(robot, value, what)
@@ -225,7 +239,7 @@ def _array(robot: Robot, value: Any, what: str) -> Array:
             f"{what} has shape {array.shape}; needs one number or {robot.nv}"
         )
     if np.isnan(array).any():
-        raise LimitError(f"{what} holds a NaN")
+        raise LimitError(f"{what} contains NaN")
     return array
 
 

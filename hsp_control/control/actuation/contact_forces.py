@@ -1,4 +1,4 @@
-"""What contact forces push, and the least of them that hold a base: as kernels."""
+"""Kernels: the map of contact forces, their minimum-norm solution, and their cones."""
 
 import numpy as np
 
@@ -6,30 +6,30 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import multiply, multiply_transposed, orthogonalise_rows
 
-_KEPT = 1e-10
-"""Part of the greatest eigenvalue below which a direction counts as without support."""
+_NEGLIGIBLE = 1e-10
+"""Eigenvalue, relative to the largest, below which a direction has no support."""
 
 
 @kernel
-def push_map(
-    J: Array, position: Array, arms: Array, axes: Array, places: Array, out: Array
+def force_map(
+    J: Array, position: Array, arms: Array, axes: Array, positions: Array, out: Array
 ) -> None:
-    """Write where the points are, and the generalised forces of unit forces there.
+    """Write the positions of the points, and the generalised forces of unit forces.
 
-    A force s at an arm r pushes with (s, r × s): column Jᵀ(s, r × s).
+    A force s at an arm r has the wrench (s, r × s): column Jᵀ(s, r × s).
 
     Args:
-        J: Of the contact's frame, world axes, shape (6, nv).
-        position: Of its origin [m].
-        arms: From there to the points, world axes, shape (k, 3) [m].
+        J: Jacobian of the contact's frame, world axes, shape (6, nv).
+        position: Position of the frame's origin, shape (3,) [m].
+        arms: From the origin to the points, world axes, shape (k, 3) [m].
         axes: Tangents and normal as columns, world axes, shape (3, 3).
-        places: The points in the world, shape (k, 3) [m].
-        out: One column an axis, point after point, shape (nv, 3 k).
+        positions: Written: the points in the world, shape (k, 3) [m].
+        out: Written: one column per axis, point after point, shape (nv, 3 k).
     """
     for p in range(arms.shape[0]):
         x, y, z = arms[p, 0], arms[p, 1], arms[p, 2]
         for i in range(3):
-            places[p, i] = position[i] + arms[p, i]
+            positions[p, i] = position[i] + arms[p, i]
         for axis in range(3):
             a, b, c = axes[0, axis], axes[1, axis], axes[2, axis]
             d, e, f = y * c - z * b, z * a - x * c, x * b - y * a
@@ -41,10 +41,10 @@ def push_map(
 
 
 @kernel
-def least_forces(
-    push: Array,
+def minimum_norm_forces(
+    F: Array,
     base: Indices,
-    ease: Array,
+    inverse_cost: Array,
     wanted: Array,
     A: Array,
     G: Array,
@@ -53,62 +53,71 @@ def least_forces(
     forces: Array,
     tau: Array,
 ) -> None:
-    """Write the forces of least Σ f²/ease that push the base as wanted, and the rest.
+    """Write the forces of minimum Σ f²/e on the base, and the remaining effort.
 
-    f = E Aᵀ(A E Aᵀ)⁺ w, A the base's rows of the map. What is wanted lies in the range
-    of A: directions without support are left out.
+    f = E Aᵀ(A E Aᵀ)⁺ w with A the base's rows of F, E = diag(e), and w the base's
+    rows of the wanted effort. w lies in the range of A: directions without support are
+    left out.
 
     Args:
-        push: Generalised forces of unit forces, shape (nv, size).
-        base: The freedoms that no motor moves.
-        ease: How readily each force is used, shape (size,).
-        wanted: The effort without contacts, shape (nv,).
+        F: Generalised forces of unit forces, shape (nv, size).
+        base: Indices of the degrees of freedom without a motor.
+        inverse_cost: e, shape (size,).
+        wanted: The effort without contacts, shape (nv,) [N·m or N].
         A: Scratch, shape (len(base), size).
         G: Scratch, shape (len(base), len(base)).
         U: Scratch, shape (len(base), len(base)).
         scratch: Scratch, shape (2, len(base)).
-        forces: Shape (size,) [N].
-        tau: The effort that is left to the motors, shape (nv,).
+        forces: Written: f, shape (size,) [N].
+        tau: Written: the effort that remains for the motors, shape (nv,) [N·m or N].
     """
-    n, size = base.shape[0], ease.shape[0]
-    w, pushed = scratch[0], scratch[1]
+    n, size = base.shape[0], inverse_cost.shape[0]
+    w, scaled = scratch[0], scratch[1]
     for i in range(n):
         w[i] = wanted[base[i]]
         for k in range(size):
-            A[i, k] = push[base[i], k]
+            A[i, k] = F[base[i], k]
     for i in range(n):
         for j in range(i + 1):
             total = 0.0
             for k in range(size):
-                total += A[i, k] * ease[k] * A[j, k]
+                total += A[i, k] * inverse_cost[k] * A[j, k]
             G[i, j] = G[j, i] = total
-    # G is symmetric and not negative: its rows' lengths become its eigenvalues.
+    # G is symmetric and positive semidefinite: the lengths of the orthogonalised rows
+    # are its eigenvalues.
     orthogonalise_rows(G, U)
-    greatest = 0.0
+    largest = 0.0
     for r in range(n):
         square = 0.0
         for i in range(n):
             square += G[r, i] * G[r, i]
         G[r, 0] = np.sqrt(square)
-        greatest = max(greatest, G[r, 0])
-    multiply(U, w, pushed)
+        largest = max(largest, G[r, 0])
+    multiply(U, w, scaled)
     for r in range(n):
-        pushed[r] = pushed[r] / G[r, 0] if G[r, 0] > _KEPT * greatest else 0.0
-    multiply_transposed(U, pushed, w)
+        scaled[r] = scaled[r] / G[r, 0] if G[r, 0] > _NEGLIGIBLE * largest else 0.0
+    multiply_transposed(U, scaled, w)
     multiply_transposed(A, w, forces)
     for k in range(size):
-        forces[k] *= ease[k]
-    multiply(push, forces, tau)
+        forces[k] *= inverse_cost[k]
+    multiply(F, forces, tau)
     for i in range(tau.shape[0]):
         tau[i] = wanted[i] - tau[i]
 
 
 @kernel
-def bears(cone: Array, forces: Array, least: Array, greatest: Array) -> bool:
-    """Return whether forces are within cones, cone f ≥ 0, and bounds."""
+def within_cones(cone: Array, forces: Array, lower: Array, upper: Array) -> bool:
+    """Return whether forces are within friction cones, cone f ≥ 0, and bounds.
+
+    Args:
+        cone: Four rows per point, shape (4 size/3, size).
+        forces: f, shape (size,) [N].
+        lower: Lower bounds, shape (size,) [N].
+        upper: Upper bounds, shape (size,) [N].
+    """
     inside = True
     for k in range(forces.shape[0]):
-        inside = inside and least[k] <= forces[k] <= greatest[k]
+        inside = inside and lower[k] <= forces[k] <= upper[k]
     for r in range(cone.shape[0]):
         total = 0.0
         point = r // 4

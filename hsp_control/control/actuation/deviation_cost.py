@@ -1,4 +1,4 @@
-"""How the law gives way: in which order, and how far the null space goes first."""
+"""Cost of deviations from the law's acceleration; bound on their null-space part."""
 
 from typing import NamedTuple
 
@@ -17,17 +17,19 @@ from hsp_control.law import Resolution
 from hsp_control.law.pseudo_inverse import whiten
 from hsp_control.null_space.metrics.metric import IDENTITY
 
-_SINGLE, _SEVERAL = 1e-6, 1e-8
-"""Cost of null-space motion beside the first level's. The smaller, the nearer to strict
-order; 1e-6 leaves 1e-3 m/s² of the task (theory.md §6)."""
+_ONE_LEVEL, _SEVERAL_LEVELS = 1e-6, 1e-8
+"""Cost of null-space deviation relative to the first level, with one level and with
+several. The smaller it is, the stricter the priorities; at 1e-6 an error of 1e-3 m/s²
+remains in the task (theory.md §6)."""
 
 
 class DeviationCost(NamedTuple):
-    """What a deviation δ from the law's acceleration costs, and its null-space part.
+    """The cost ½ δᵀH δ of a deviation δ from the law's acceleration.
 
     Attributes:
         metric: H, shape (nv, nv).
-        projector: P, shape (nv, nv): P δ is the part in the last null space.
+        projector: P, shape (nv, nv): P δ is the part of δ in the null space of all
+            tasks.
     """
 
     metric: Array
@@ -37,13 +39,14 @@ class DeviationCost(NamedTuple):
 def deviation_cost(
     resolution: Resolution, supported: bool, weight: float | None = None
 ) -> DeviationCost:
-    """Return what deviations cost.
+    """Return the cost of deviations from the law's acceleration.
 
     Args:
-        resolution: Whose levels yield.
-        supported: Whether its first level is that of the contacts, whose rows are
-            kept by constraints and not by cost.
-        weight: Cost of null-space motion beside the first level's; None: the least.
+        resolution: The resolved law, with its levels and its metric.
+        supported: Whether the first level is that of the contacts, whose rows are kept
+            by constraints and not by cost.
+        weight: Cost of null-space deviation relative to the first level; None: the
+            default, `_ONE_LEVEL` or `_SEVERAL_LEVELS`.
     """
     J = resolution.problem.task.jacobian
     L, form = resolution.problem.metric.L, resolution.form
@@ -55,7 +58,7 @@ def deviation_cost(
     )
     N, of_level = N[:count], of_level[:count]
     levels = len(resolution.ends) - supported
-    whole = weight or (_SINGLE if levels <= 1 else _SEVERAL)
+    whole = weight or (_ONE_LEVEL if levels <= 1 else _SEVERAL_LEVELS)
     ratio = whole ** (1.0 / max(levels, 1))
     costs = ratio ** np.maximum(of_level - supported, 0)
     one = np.eye(n)
@@ -86,14 +89,14 @@ def _directions(
         L: Cholesky factor of the metric, shape (nv, nv).
         form: The metric's form.
         ends: Where each level's rows end in the stack.
-        threshold: Singular value below which a direction is nobody's.
+        threshold: Singular value below which a direction belongs to no level.
         wide: Scratch, shape (2, m, nv).
         X: Scratch, shape (m, m).
-        N: The directions, shape (nv, nv).
-        of_level: Whose each is, shape (nv,).
+        N: Written: the directions, shape (nv, nv).
+        of_level: Written: the level of each direction, shape (nv,).
 
     Returns:
-        How many there are.
+        The number of directions.
     """
     n = J.shape[1]
     count = start = 0
@@ -113,7 +116,8 @@ def _directions(
                     share += N[d, i] * B[k, i]
                 for i in range(n):
                     B[k, i] -= share * N[d, i]
-        # Where no singular value is small any orthonormal rows do, and cost a tenth.
+        # If no singular value is small, any orthonormal rows will do, at a tenth of the
+        # cost.
         regular = orthonormalise_rows(B, Q, U) >= threshold
         if not regular:
             orthogonalise_rows(B, U[:, :0])
@@ -135,13 +139,13 @@ def _directions(
 def null_space_rows(
     resolution: Resolution, projector: Array, speed: Array, width: int
 ) -> Rows:
-    """Return |(P δ)_j| ≤ λ s_j, on the first of x = (δ, f), which leaves e_N bounded.
+    """Return the rows |(P δ)_j| ≤ λ s_j on x = (δ, f), which keep e_N bounded.
 
-    e_N' = -K_N e_N - P δ, up to what the law's correction takes care of, so that
-    d/dt ‖e_N‖_W ≤ -λ ‖e_N‖_W + ‖P δ‖_W. δ = 0 is always within.
+    e_N' = -K_N e_N - P δ, up to terms that the law's correction cancels, so that
+    d/dt ‖e_N‖_W ≤ -λ ‖e_N‖_W + ‖P δ‖_W. δ = 0 always satisfies the rows.
 
     Args:
-        resolution: Whose null space it is.
+        resolution: The resolved law, with its gain and its metric.
         projector: P, shape (nv, nv).
         speed: s, shape (nv,) [rad/s or m/s].
         width: Length of x.
@@ -150,12 +154,17 @@ def null_space_rows(
     A = np.zeros((len(bounded), width))
     A[:, : len(speed)] = projector[bounded]
     rate = decay_rate(resolution.problem.gain, resolution.problem.metric.L)
-    most = rate * speed[bounded]
-    return Rows(A, -most, most)
+    limit = rate * speed[bounded]
+    return Rows(A, -limit, limit)
 
 
 def decay_rate(gain: Array, L: Array) -> float:
-    """Return λ, the least rate at which K_N lets ‖e_N‖_W decay [1/s], W = L Lᵀ."""
+    """Return λ, the slowest rate at which ‖e_N‖_W decays [1/s], W = L Lᵀ.
+
+    Args:
+        gain: K_N, shape (nv, nv) [1/s].
+        L: Cholesky factor of the metric, shape (nv, nv).
+    """
     first = float(gain[0, 0])
     if (gain == first * np.eye(len(gain))).all():
         return first

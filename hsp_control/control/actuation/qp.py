@@ -1,4 +1,4 @@
-"""Quadratic programmes, row by row, and their solver."""
+"""Quadratic programs (QPs): their constraint rows and their solver."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ _TOLERANCE = 1e-9
 
 
 class Rows(NamedTuple):
-    """Rows lower ≤ A x ≤ upper of a programme.
+    """Rows lower ≤ A x ≤ upper of a QP.
 
     Attributes:
         A: Shape (k, n).
@@ -26,9 +26,17 @@ class Rows(NamedTuple):
 
 
 def solve(H: Array, f: Array, rows: Rows) -> Array | None:
-    """Return the x of least ½ xᵀH x + fᵀx with lower ≤ A x ≤ upper; None if none is.
+    """Minimise ½ xᵀH x + fᵀx subject to lower ≤ A x ≤ upper.
 
-    By DAQP, a dual active-set method (Arnström, Bemporad, Axehill 2022).
+    Solved by DAQP, a dual active-set method (Arnström, Bemporad, Axehill 2022).
+
+    Args:
+        H: Positive definite, shape (n, n).
+        f: Shape (n,).
+        rows: The constraints; those with lower = upper are equalities.
+
+    Returns:
+        x, shape (n,), or None if the solver finds none.
     """
     lower, upper = rows.lower, rows.upper
     sense = np.where(upper - lower < 1e-12, _EQUALITY, _INEQUALITY).astype(np.int32)
@@ -47,6 +55,6 @@ def solve(H: Array, f: Array, rows: Rows) -> Array | None:
 
 
 def stacked(*rows: Rows) -> Rows:
-    """Return rows below each other."""
+    """Return all rows stacked in one `Rows`; empty ones are left out."""
     some = [each for each in rows if len(each.lower)] or rows[:1]
     return Rows(*(np.concatenate(parts) for parts in zip(*some, strict=True)))

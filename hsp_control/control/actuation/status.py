@@ -1,10 +1,16 @@
-"""How much of the law a step could deliver."""
+"""The status of a step: how much of the law the actuation delivers."""
 
-EXACT = 0
-"""The law's acceleration, with contact forces of least norm."""
-REDISTRIBUTED = 1
-"""The law's acceleration, with contact forces chosen by a programme."""
-LIMITED = 2
-"""As near to the law as the limits permit; all of them are kept."""
-RELAXED = 3
-"""The limits contradict each other: the least violation, in their stated order."""
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """How much of the law's acceleration is delivered within the limits."""
+
+    EXACT = 0
+    """All of it, with contact forces of minimum norm."""
+    REDISTRIBUTED = 1
+    """All of it, with contact forces chosen by a QP."""
+    LIMITED = 2
+    """The nearest acceleration within the limits; all of them are kept."""
+    RELAXED = 3
+    """The limits contradict each other: they are relaxed as little as possible."""

@@ -1,4 +1,4 @@
-"""What the contacts that bear now can do: their forces, cones and where they act."""
+"""Contact forces of the active contacts: their map, cones, bounds and points."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -6,50 +6,62 @@ from itertools import pairwise
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.constraints.contacts import Contact
-from hsp_control.control.actuation.contact_forces import bears, least_forces, push_map
+from hsp_control.control.actuation.contact_forces import (
+    force_map,
+    minimum_norm_forces,
+    within_cones,
+)
 from hsp_control.robot import RobotState
 
-_HEAVIEST = 3.0
-"""What one contact may bear at most, in robot weights, when fully on."""
+_MAX_FORCE = 3.0
+"""Maximum normal force at a point of a scheduled contact when fully active, in robot
+weights."""
 
 
 class Support:
     """Forces f at the points of some contacts, in the axes (tangents, normal) of each.
 
     Attributes:
-        contacts: The contacts that bear.
-        size: Numbers in f, three a point.
-        map: What f pushes: the generalised force is ``map @ f``, shape (nv, size).
-        arms: Where the points are in the world, shape (size/3, 3) [m].
-        cone: Rows with cone f ≥ 0, four a point, shape (4 size/3, size).
-        least: Least force, shape (size,) [N].
-        greatest: Greatest force, shape (size,) [N].
-        carrying: Freedoms between the root and a contact, whose efforts depend on
-            forces.
-        ease: How readily each force is used, shape (size,): the norm that the closed
-            form makes least is Σ f²/ease.
+        contacts: The active contacts.
+        size: Length of f: three per point.
+        map: The generalised force of f is ``map @ f``, shape (nv, size).
+        points: Where the points of each contact are in arrays of points.
+        positions: Positions of the points in the world, shape (size/3, 3) [m].
+        cone: Rows with cone f ≥ 0, four per point, shape (4 size/3, size).
+        lower: Lower bounds of the forces, shape (size,) [N].
+        upper: Upper bounds of the forces, shape (size,) [N].
+        supporting_dofs: Degrees of freedom between the root and a contact, whose
+            efforts depend on the forces.
+        inverse_cost: e, shape (size,): the closed form minimises Σ f²/e.
     """
 
     def __init__(self, contacts: Sequence[Contact], nv: int, weight: float) -> None:
-        """Allocate for contacts of a robot of nv freedoms and a weight [N]."""
+        """Allocate for contacts of a robot.
+
+        Args:
+            contacts: The active contacts.
+            nv: The robot's degrees of freedom.
+            weight: The robot's weight [N].
+        """
         self.contacts = tuple(contacts)
         counts = [len(contact.points) for contact in contacts]
         points = sum(counts)
         self.size = 3 * points
         self.map: Array = np.zeros((nv, self.size))
-        self.places: Array = np.zeros((points, 3))
+        self.positions: Array = np.zeros((points, 3))
         self.cone: Array = np.zeros((4 * points, self.size))
-        self.least = np.full(self.size, -np.inf)
-        self.greatest = np.full(self.size, np.inf)
-        self.least[2::3] = 0.0
-        self.ease = np.ones(self.size)
+        self.lower = np.full(self.size, -np.inf)
+        self.upper = np.full(self.size, np.inf)
+        self.lower[2::3] = 0.0
+        self.inverse_cost = np.ones(self.size)
         self._weight = weight
-        self.carrying = _carrying(contacts)
+        self.supporting_dofs = _supporting_dofs(contacts)
         ends = np.cumsum([0, *counts])
         self.points = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         for contact, where in zip(self.contacts, self.points, strict=True):
-            side = contact.friction / np.sqrt(2.0)  # the square inscribed in the cone
+            side = contact.friction / np.sqrt(2.0)  # pyramid inscribed in the cone
             for k in range(where.start, where.stop):
                 for row, (axis, sign) in enumerate(
                     ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0))
@@ -57,65 +69,60 @@ class Support:
                     self.cone[4 * k + row, 3 * k + axis] = sign
                     self.cone[4 * k + row, 3 * k + 2] = side
 
-        self._pushing: list[tuple[Contact, Array, Array, slice, Array]] = []
+        self._parts: list[tuple[Contact, Array, Array, slice, Array]] = []
         for contact, where in zip(self.contacts, self.points, strict=True):
             columns = slice(3 * where.start, 3 * where.stop)
             friction = contact.friction
-            easy = np.tile([friction**2, friction**2, 1.0], where.stop - where.start)
-            self.ease[columns] = easy
-            places, pushes = self.places[where], self.map[:, columns]
-            self._pushing.append((contact, places, pushes, columns, easy))
+            full = np.tile([friction**2, friction**2, 1.0], where.stop - where.start)
+            self.inverse_cost[columns] = full
+            positions, part = self.positions[where], self.map[:, columns]
+            self._parts.append((contact, positions, part, columns, full))
         self._tau, self._forces = np.zeros(nv), np.zeros(self.size)
-        self._solver: tuple[Indices, tuple[Array, Array, Array, Array]] | None = None
+        self._scratch = IdentityCache(self._allocate)
 
     def update(self, state: RobotState) -> None:
-        """Compute the map, the places, and what the schedules let each contact bear."""
-        for contact, places, pushes, columns, easy in self._pushing:
+        """Compute the map, the positions, and the bounds that the schedules set."""
+        for contact, positions, part, columns, full in self._parts:
             frame = state.frame(contact.frame)
-            arms = contact.arms(frame)
-            push_map(frame.jacobian, frame.position, arms, contact.axes, places, pushes)
+            arms, axes = contact.arms(frame), contact.axes
+            force_map(frame.jacobian, frame.position, arms, axes, positions, part)
             if not contact.schedule.constant or contact.schedule.ramp:
                 on = max(contact.schedule.weight(state.t), 1e-6)
-                self.greatest[columns][2::3] = on * _HEAVIEST * self._weight
-                self.ease[columns] = on * easy
+                self.upper[columns][2::3] = on * _MAX_FORCE * self._weight
+                self.inverse_cost[columns] = on * full
 
-    def least_forces(self, base: Indices, wanted: Array) -> tuple[Array, Array]:
-        """Return the forces of least Σ f²/ease that hold the base, and what they leave.
+    def minimum_norm_forces(self, base: Indices, wanted: Array) -> tuple[Array, Array]:
+        """Return the forces of minimum Σ f²/e on the base, and the remaining effort.
 
         Args:
-            base: The freedoms that no motor moves.
-            wanted: The effort without contacts, shape (nv,).
+            base: Indices of the degrees of freedom without a motor.
+            wanted: The effort without contacts, shape (nv,) [N·m or N].
 
         Returns:
-            The forces, shape (size,), and the effort that is left to the motors, shape
-            (nv,): overwritten by the next call.
+            The forces, shape (size,) [N], and the effort that remains for the motors,
+            shape (nv,) [N·m or N]; both are overwritten by the next call.
         """
-        if self._solver is None or self._solver[0] is not base:
-            n = len(base)
-            scratch = (
-                np.zeros((n, self.size)),
-                np.zeros((n, n)),
-                np.zeros((n, n)),
-                np.zeros((2, n)),
-            )
-            self._solver = base, scratch
-        least_forces(
+        minimum_norm_forces(
             self.map,
             base,
-            self.ease,
+            self.inverse_cost,
             wanted,
-            *self._solver[1],
+            *self._scratch(base),
             self._forces,
             self._tau,
         )
         return self._forces, self._tau
 
-    def bears(self, forces: Array) -> bool:
-        """Return whether forces are within cones and bounds."""
-        return bears(self.cone, forces, self.least, self.greatest)
+    def _allocate(self, base: Indices) -> tuple[Array, Array, Array, Array]:
+        n, zeros = len(base), np.zeros
+        return zeros((n, self.size)), zeros((n, n)), zeros((n, n)), zeros((2, n))
+
+    def permits(self, forces: Array) -> bool:
+        """Return whether forces, shape (size,), are within cones and bounds."""
+        return within_cones(self.cone, forces, self.lower, self.upper)
 
     def in_world(self, forces: Array) -> Array:
-        """Return the forces in world axes, shape (points, 3) [N]."""
+        """Return the forces in world axes, shape (size/3, 3) [N]."""
         out = np.zeros((self.size // 3, 3))
         for contact, where in zip(self.contacts, self.points, strict=True):
             local = forces.reshape(-1, 3)[where]
@@ -123,8 +130,8 @@ class Support:
         return out
 
 
-def _carrying(contacts: Sequence[Contact]) -> Indices:
-    """Return the freedoms that move a contact."""
+def _supporting_dofs(contacts: Sequence[Contact]) -> Indices:
+    """Return the degrees of freedom between the root and a contact."""
     found: set[int] = set()
     for contact in contacts:
         model = contact.robot.model

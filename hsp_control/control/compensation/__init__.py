@@ -1,4 +1,4 @@
-"""Compensation: what is done about a world that is not as the model has it."""
+"""Compensation: compensators for the differences between the robot and its model."""
 
 from .command import Command as Command
 from .compensation import Compensation as Compensation

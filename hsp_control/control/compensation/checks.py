@@ -1,4 +1,4 @@
-"""What settings of all compensation have in common."""
+"""Checks of settings that the compensators share."""
 
 from typing import Any
 
@@ -10,10 +10,10 @@ from hsp_control.robot import Robot
 
 
 def positive(value: Any, what: str) -> float:
-    """Return a setting that is greater than zero, inf included.
+    """Return a setting as a number greater than zero, inf included.
 
     Raises:
-        CompensationError: If it is not.
+        CompensationError: If it is not such a number.
     """
     try:
         number = float(value)
@@ -25,7 +25,7 @@ def positive(value: Any, what: str) -> float:
 
 
 def per_dof(robot: Robot, value: Any, what: str) -> Array:
-    """Return a setting greater than zero for each freedom, shape (nv,).
+    """Return a setting greater than zero for each degree of freedom, shape (nv,).
 
     Raises:
         CompensationError: If a number is not positive, or their count is not nv.
@@ -37,21 +37,21 @@ def per_dof(robot: Robot, value: Any, what: str) -> Array:
     if array.shape not in ((), (robot.nv,)):
         raise CompensationError(
             f"{what} has shape {array.shape}; needs one number, or one for each of the "
-            f"{robot.nv} freedoms of {robot.name}"
+            f"{robot.nv} degrees of freedom of {robot.name}"
         )
     if not (array > 0.0).all():
         raise CompensationError(f"{what} is {array.tolist()}; must be greater than 0")
     return np.broadcast_to(array, (robot.nv,)).copy()
 
 
-def refuse_floating_base(robot: Robot, what: str) -> None:
-    """Refuse a robot with a root that no motor moves.
+def check_fixed_base(robot: Robot, what: str) -> None:
+    """Check that a motor moves every degree of freedom of the robot.
 
     Raises:
-        CompensationError: If it has one.
+        CompensationError: If the robot has a free-flyer root.
     """
     if robot.unactuated:
         raise CompensationError(
-            f"{what}: {robot.name} has a free-flyer root, and the forces of its "
-            "contacts are not measured; only robots on a fixed base can have one"
+            f"{what}: {robot.name} has a free-flyer root, and its contact forces are "
+            f"not measured; {what} needs a robot with a fixed base"
         )

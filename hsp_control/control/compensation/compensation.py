@@ -1,4 +1,4 @@
-"""Which compensation are on."""
+"""The set of compensators around the law."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -20,18 +20,19 @@ from hsp_control.tasks import Task
 
 @dataclass(frozen=True)
 class Compensation:
-    """What is done about a world that is not as the model has it; each may be None.
+    """Compensators for the differences between the robot and its model.
 
-    They remember: one set serves one `Command` at a time.
+    Each may be None. They have memory: use one set in one `Command` at a time.
 
     Attributes:
-        velocity_filter: A low-pass on the measured velocity.
-        predictor: The law is shown the state in which its effort will act.
-        momentum_observer: What pushes beside the model is estimated and cancelled.
-        friction_feed_forward: Friction is paid for before it is felt.
-        integral_action: A task's lasting error is worn away.
-        effort_rate: The effort that goes out changes no faster than a drive accepts.
-        start_up_ramp: From rest to the law without a jump.
+        velocity_filter: Filters the measured velocity.
+        predictor: Predicts the state at which the effort will act.
+        momentum_observer: Estimates and cancels efforts that the model does not
+            explain.
+        friction_feed_forward: Adds the friction effort at the desired velocity.
+        integral_action: Removes steady-state errors of tasks.
+        effort_rate: Limits the rate of the effort that is sent.
+        start_up_ramp: Blends from holding still into the law.
     """
 
     velocity_filter: VelocityFilter | None = None
@@ -44,17 +45,17 @@ class Compensation:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of those that are on."""
+        """The names of the compensators that are not None."""
         return tuple(f.name for f in fields(self) if getattr(self, f.name) is not None)
 
     def check(
         self, robot: Robot, tasks: Sequence[Task], limits: Limits | None = None
     ) -> None:
-        """Refuse what does not fit a robot, its tasks and its limits.
+        """Check that the compensators fit a robot, its tasks and its limits.
 
         Raises:
-            CompensationError: Names the compensator, the setting, and what is right.
-            GainError: If integral action would not decay.
+            CompensationError: Names the compensator, the setting, and what it must be.
+            GainError: If errors would not decay with the integral action.
         """
         for part in (
             self.predictor,
@@ -73,6 +74,6 @@ class Compensation:
             and np.isfinite(limits.effort_rate).any()
         ):
             raise CompensationError(
-                "effort_rate: limits.effort_rate keeps the rate already, and better; "
-                "leave one of the two away"
+                "effort_rate: limits.effort_rate keeps the rate already, and deviates "
+                "in the null space first; remove one of the two"
             )

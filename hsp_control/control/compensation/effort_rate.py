@@ -1,4 +1,4 @@
-"""Efforts that change no faster than a drive accepts."""
+"""A limit on the effort rate, for drives that accept no faster change."""
 
 from typing import Any
 
@@ -10,46 +10,49 @@ from hsp_control.robot import Robot
 
 
 class EffortRateClip:
-    """What goes out is cut to within a step of what went out last.
+    """Clips each effort to within rate · period of the last one.
 
-    For robots without `Limits`, whose programme keeps the rate by giving up the null
-    space first; this one asks nobody, and the law suffers where it cuts.
+    For robots without `Limits`. Prefer `Limits`, whose QP keeps the rate by deviating
+    in the null space first; clipping disturbs the tasks as well.
 
     Attributes:
-        rate: The greatest rate, a number or shape (nv,) [N·m/s or N/s].
+        rate: Maximum rate, a number or shape (nv,) [N·m/s or N/s].
     """
 
     def __init__(self, rate: Any) -> None:
-        """Set the greatest rate, of all freedoms or of each; a Panda's is 1000."""
+        """Set the maximum rate, a number or shape (nv,); a Panda's is 1000 N·m/s."""
         self.rate = rate
 
     def check(self, robot: Robot) -> None:
-        """Refuse what does not fit the robot.
+        """Check that the rate fits the robot.
 
         Raises:
-            CompensationError: If a rate is not positive, or their count is not nv.
+            CompensationError: If a rate is not positive, or there are not nv of them.
         """
         per_dof(robot, self.rate, "effort_rate")
 
     def restart(self, robot: Robot) -> None:
-        """Let the first effort be any."""
-        self._most = per_dof(robot, self.rate, "effort_rate")
+        """Forget the last effort: the first one is not clipped."""
+        self._rate = per_dof(robot, self.rate, "effort_rate")
         self._last: Array | None = None
 
     def apply(self, tau: Array, period: float) -> bool:
-        """Cut an effort, in place; return whether it was.
+        """Clip an effort in place.
 
         Args:
-            tau: Effort, shape (nv,).
-            period: Time since the last one [s].
+            tau: Effort, shape (nv,) [N·m or N].
+            period: Time since the last effort [s].
+
+        Returns:
+            Whether the effort was changed.
         """
-        cut = False
+        clipped = False
         if self._last is None:
             self._last = tau.copy()
         else:
-            step = self._most * period
-            wanted = self._last.copy()
-            np.clip(tau, self._last - step, self._last + step, out=wanted)
-            cut = not np.array_equal(wanted, tau)
-            tau[:] = self._last[:] = wanted
-        return cut
+            step = self._rate * period
+            permitted = self._last.copy()
+            np.clip(tau, self._last - step, self._last + step, out=permitted)
+            clipped = not np.array_equal(permitted, tau)
+            tau[:] = self._last[:] = permitted
+        return clipped

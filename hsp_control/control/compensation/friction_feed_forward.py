@@ -1,4 +1,4 @@
-"""Friction, paid for before it is felt."""
+"""Feed-forward of joint friction."""
 
 from typing import Any
 
@@ -15,13 +15,14 @@ from hsp_control.robot.friction import JointFriction
 
 
 class FrictionFeedForward:
-    """What friction takes at the velocity that the law is after.
+    """Adds the friction effort at the desired velocity.
 
-    That velocity is v_d = J# x_d' + P g, what the law makes of the robot once both
-    errors have died (law.md §2); measured noise cancels in it, and a joint that sticks
-    is pushed where it is to go. The dry part is smoothed about rest,
+    The desired velocity is v_d = J# x_d' + P g, the velocity of the robot once both
+    errors of the law are zero (law.md §2). Measurement noise cancels in it, and a
+    sticking joint is pushed in the desired direction. The Coulomb part is smoothed near
+    zero velocity:
 
-        tau = c tanh(v_d / v_s) + D v_d.
+        tau = c tanh(v_d / v_s) + D v_d
 
     Attributes:
         coulomb: c, a number or shape (nv,) [N·m or N].
@@ -32,12 +33,13 @@ class FrictionFeedForward:
     def __init__(
         self, coulomb: Any = 0.0, viscous: Any = 0.0, smoothing: float = 0.02
     ) -> None:
-        """Set what is known of the friction; too little is better than too much.
+        """Set the friction coefficients; too small is better than too large.
 
         Args:
-            coulomb: Dry friction, of all joints or of each freedom [N·m or N].
-            viscous: Friction for each unit of speed, of all or of each.
-            smoothing: Speed at which three quarters of the dry friction are paid for.
+            coulomb: Coulomb friction c, a number or shape (nv,) [N·m or N].
+            viscous: Viscous friction D, a number or shape (nv,) [N·m·s/rad or N·s/m].
+            smoothing: v_s > 0, the speed at which three quarters of c are compensated
+                [rad/s or m/s].
 
         Raises:
             CompensationError: If the smoothing is not positive.
@@ -47,23 +49,28 @@ class FrictionFeedForward:
         self.smoothing = positive(smoothing, "smoothing")
 
     def check(self, robot: Robot) -> None:
-        """Refuse what does not fit the robot.
+        """Check that the coefficients fit the robot.
 
         Raises:
-            CompensationError: If a number is negative, or their count is not nv.
+            CompensationError: If a coefficient is negative, or their number is not nv.
         """
         self._friction(robot)
 
     def restart(self, robot: Robot) -> None:
-        """Take the robot's joints."""
-        self._own = self._friction(robot)
+        """Compute the coefficients of the robot's degrees of freedom."""
+        self._coefficients = self._friction(robot)
 
-    def effort(self, state: RobotState, mode: ActiveStack) -> Array:
-        """Return the effort, shape (nv,), after the law was resolved at a state."""
-        v = wanted_velocity(state, mode)
-        own = self._own
-        dry = own.coulomb * np.tanh(v / self.smoothing)
-        return np.asarray(dry + own.viscous * v)
+    def effort(self, state: RobotState, active: ActiveStack) -> Array:
+        """Return the friction effort, shape (nv,) [N·m or N].
+
+        Args:
+            state: The robot's state.
+            active: The active stack, resolved at this state.
+        """
+        v = desired_velocity(state, active)
+        friction = self._coefficients
+        coulomb = friction.coulomb * np.tanh(v / self.smoothing)
+        return np.asarray(coulomb + friction.viscous * v)
 
     def _friction(self, robot: Robot) -> JointFriction:
         try:
@@ -72,29 +79,34 @@ class FrictionFeedForward:
             raise CompensationError(f"friction_feed_forward: {error}") from None
 
 
-def wanted_velocity(state: RobotState, mode: ActiveStack) -> Array:
+def desired_velocity(state: RobotState, active: ActiveStack) -> Array:
     """Return v_d = J# x_d' + P g = v + e_N + J#(x_d' - J v), shape (nv,).
 
-    J# is the law's own, bounded near singularities by the law's threshold. Rows of a
-    floating base that nothing pushes ask for nothing.
+    J# is that of the law, bounded near singularities by the law's threshold. The rows
+    of unactuated base motions have no desired rate.
+
+    Args:
+        state: The robot's state.
+        active: The active stack, resolved at this state.
     """
-    resolution, v = mode.resolution, state.v
+    resolution, v = active.resolution, state.v
     task, metric = resolution.problem.task, resolution.problem.metric
-    missing = -task.jacobian @ v
-    missing[sum(contact.rows for contact in mode.contacts) : mode.first_task_row] = 0.0
-    for level in mode.levels:
+    rate_error = -task.jacobian @ v
+    contact_rows = sum(contact.rows for contact in active.contacts)
+    rate_error[contact_rows : active.first_task_row] = 0.0
+    for level in active.levels:
         for each in level:
-            missing[mode.task_rows[each.name]] += each.reference_rate(state)
+            rate_error[active.task_rows[each.name]] += each.reference_rate(state)
     m, n = task.jacobian.shape
-    if m > n:  # levels in conflict: the least squares of them all
+    if m > n:  # conflicting levels: least squares over all of them
         B = np.linalg.solve(metric.L, task.jacobian.T)
-        least = np.linalg.pinv(B.T, rcond=resolution.threshold) @ missing
-        raised = np.linalg.solve(metric.L.T, least)
+        minimal = np.linalg.pinv(B.T, rcond=resolution.threshold) @ rate_error
+        raised = np.linalg.solve(metric.L.T, minimal)
         return np.asarray(v + resolution.null_space_error + raised)
     B, Q, X = np.zeros((m, n)), np.zeros((m, n)), np.zeros((m, m))
     weighted_pseudo_inverse(
         task.jacobian, metric.L, VARYING, resolution.threshold, B, Q, X
     )
-    least = np.zeros(n)
-    apply_pseudo_inverse(Q, X, metric.L, VARYING, missing, np.zeros(m), least)
-    return np.asarray(v + resolution.null_space_error + least)
+    motion = np.zeros(n)
+    apply_pseudo_inverse(Q, X, metric.L, VARYING, rate_error, np.zeros(m), motion)
+    return np.asarray(v + resolution.null_space_error + motion)

@@ -14,21 +14,22 @@ from hsp_control.tasks.gains import as_gain, as_matrix
 
 
 class IntegralAction:
-    """A lasting error is worn away; the null space is not touched.
+    """Removes the steady-state errors of tasks; it has no effect in the null space.
 
-    While the law is not delivered as it is (a limit binds, a singularity bounds it, the
-    effort's rate is cut, the start-up ramp runs), the integral only unwinds.
+    Anti-windup: while the law is not delivered exactly (a limit binds, a singularity
+    bounds the law, the effort rate is clipped, the start-up ramp is active), the
+    integral may only decrease.
 
-    A robot that is heavier than its model does but a part β of what the law asks for:
-    e'' + β (Kv e' + Kp e + Ki ∫e) = d, whose error grows where β < Ki/(Kv Kp) (Routh).
-    `check_rate` says so beforehand.
+    A robot heavier than its model performs only a part β of the acceleration that the
+    law requires: e'' + β (Kv e' + Kp e + Ki ∫e) = d. Its error grows if β < Ki/(Kv Kp)
+    (Routh). `check_rate` reports this in advance.
 
     Attributes:
-        rate: Ki = rate · Kp, the rate at which a lasting error dies [1/s], for tasks
-            that ``ki`` does not name; None: only those.
-        ki: Ki by task: a number, one per row or a matrix [1/s³].
-        tasks: Names of the tasks that have it; None: all.
-        limit: The most that Ki ∫e may ask for in a row [m/s² or rad/s²].
+        rate: The rate at which a constant error decays, Ki = rate · Kp [1/s], for tasks
+            that ``ki`` does not name; None: only those in ``ki`` have integral action.
+        ki: Ki by task: a number, shape (m,) or (m, m) [1/s³].
+        tasks: Names of the tasks with integral action; None: all.
+        limit: Upper limit of every component of Ki ∫e [m/s² or rad/s²].
     """
 
     def __init__(
@@ -39,11 +40,11 @@ class IntegralAction:
         tasks: Sequence[str] | None = None,
         limit: float = np.inf,
     ) -> None:
-        """Set the action; see the attributes.
+        """Set the integral action; see the attributes.
 
         Raises:
-            CompensationError: If neither a rate nor a gain is given, or a number is not
-                positive.
+            CompensationError: If neither a rate nor a gain is given, or the rate or the
+                limit is not positive.
         """
         self.ki = dict(ki or {})
         if rate is None and not self.ki:
@@ -53,17 +54,22 @@ class IntegralAction:
         self.limit = positive(limit, "limit")
 
     def check(self, tasks: Sequence[Task]) -> None:
-        """Refuse gains with which an error would not die.
+        """Check that the gains fit the tasks, and that errors decay.
 
         Raises:
-            CompensationError: If a task does not exist or cannot have it.
+            CompensationError: If a task does not exist, or cannot have integral action.
             GainError: If a gain does not fit its task, or e''' + Kv e'' + Kp e' + Ki e
-                = 0 has a mode that does not decay (for numbers: if Ki ≥ Kv Kp).
+                = 0 has a mode that does not decay (for scalars: if Ki ≥ Kv Kp).
         """
         self.gains(tasks)
 
     def gains(self, tasks: Sequence[Task]) -> dict[str, Array]:
-        """Return Ki of each task that has it, shape (m, m); raises as `check` does."""
+        """Return Ki, shape (m, m), of each task that has integral action.
+
+        Raises:
+            CompensationError: As `check` does.
+            GainError: As `check` does.
+        """
         names = [task.name for task in tasks]
         for name in (*self.ki, *(self.tasks or ())):
             if name not in names:
@@ -84,15 +90,15 @@ class IntegralAction:
                 continue
             if isinstance(task, AngularMomentum):
                 raise CompensationError(
-                    f"integral_action: task {task.name!r} has an error equation of "
-                    "first order; name the others in tasks"
+                    f"integral_action: task {task.name!r} has a first-order error "
+                    "equation; list the other tasks in tasks"
                 )
             _check_decay(task, Ki)
             gains[task.name] = Ki
         return gains
 
     def restart(self, tasks: Sequence[Task]) -> None:
-        """Begin with no integral."""
+        """Set all integrals to zero."""
         self._gains = self.gains(tasks)
         self._tasks = [task for task in tasks if task.name in self._gains]
         self.integrals: dict[str, Array] = {
@@ -100,27 +106,27 @@ class IntegralAction:
         }
 
     def advance(
-        self, errors: Mapping[str, Array | None], period: float, bound: bool
+        self, errors: Mapping[str, Array | None], period: float, saturated: bool
     ) -> None:
-        """Add a period's error; the next effort is the first to show it.
+        """Integrate the errors over one period, for the next effort.
 
         Args:
-            errors: e by task, shape (m,); None: the task does not count.
-            period: How long it stands for [s].
-            bound: Whether the law was not delivered as it is.
+            errors: e by task, shape (m,); None: the task is not fully active.
+            period: The period [s].
+            saturated: Whether the law was not delivered exactly.
         """
         for task in self._tasks:
             integral, e = self.integrals[task.name], errors.get(task.name)
             if e is None:
                 continue
-            grows = e * integral >= 0.0 if bound else False
+            grows = e * integral >= 0.0 if saturated else False
             integral += np.where(grows, 0.0, e) * period
-            asked = self._gains[task.name] @ integral
-            most = float(np.abs(asked).max(initial=0.0))
-            if most > self.limit:
-                integral *= self.limit / most
-                asked *= self.limit / most
-            task.offset[:] = asked
+            action = self._gains[task.name] @ integral
+            largest = float(np.abs(action).max(initial=0.0))
+            if largest > self.limit:
+                integral *= self.limit / largest
+                action *= self.limit / largest
+            task.offset[:] = action
 
 
 def _check_decay(task: Task, Ki: Array) -> None:
@@ -131,11 +137,11 @@ def _check_decay(task: Task, Ki: Array) -> None:
     )
     slowest = float(np.linalg.eigvals(companion).real.max())
     if slowest >= 0.0:
-        # For each row by itself (Routh): Ki < Kv Kp.
-        most = float((np.diag(task.Kv) * np.diag(task.Kp)).min())
+        # For each row separately (Routh): Ki < Kv Kp.
+        bound = float((np.diag(task.Kv) * np.diag(task.Kp)).min())
         raise GainError(
             f"integral action of task {task.name!r} does not decay: e'' + Kv e' + "
             f"Kp e + Ki ∫e = 0 has a mode with real part {slowest:.3g} 1/s; Ki must be "
-            f"below Kv Kp = {most:.4g} 1/s³ (a rate below Kv = "
+            f"below Kv Kp = {bound:.4g} 1/s³ (a rate below Kv = "
             f"{np.diag(task.Kv).min():.4g} 1/s)"
         )

@@ -1,4 +1,4 @@
-"""The sampled loop of one linear mode: what a period of it makes of its state."""
+"""The sampled control loop of a linear error: its transition over one period."""
 
 from dataclasses import dataclass, field
 
@@ -10,23 +10,23 @@ from hsp_control.control.compensation.compensation import Compensation
 
 @dataclass(frozen=True)
 class LinearLoop:
-    """x'' = u held over a period h, u = -Kp x - Kv x' - Ki ∫x, and all that is between.
+    """The loop x'' = u, held over a period h, with u = -Kp x - Kv x' - Ki ∫x.
 
-    That is a task's error, and the null space with Kp = K_N A, Kv = K_N + A for a field
-    g of slope -A: `Command` is followed link by link, on a model that is exact, or of
-    whose accelerations the robot does a part.
+    x is the error of a task, or that of the null space, with Kp = K_N A, Kv = K_N + A
+    for a field g of slope -A. The loop includes delays and compensators, in the order
+    of `Command`. The robot is as its model, or performs a part of each acceleration.
 
     Attributes:
         kp: Kp, shape (m, m) [1/s²].
         kv: Kv, shape (m, m) [1/s].
         ki: Ki, shape (m, m) [1/s³].
         period: h [s].
-        effort_delay: Periods that an effort comes late.
-        sensor_delay: Periods that a measurement is old.
-        compensation: What of it acts on a linear mode: the velocity filter, the
-            predictor and the momentum observer.
-        share: The part of u that the robot does: below 1 where it is heavier than its
-            model.
+        effort_delay: Delay of efforts, in periods.
+        sensor_delay: Delay of measurements, in periods.
+        compensation: The compensators. Those that act on a linear loop are the velocity
+            filter, the predictor and the momentum observer; integral action is ``ki``.
+        share: The part of u that the robot performs: below 1 where it is heavier than
+            its model.
     """
 
     kp: Array
@@ -39,11 +39,11 @@ class LinearLoop:
     share: float = 1.0
 
     def transition(self) -> Array:
-        """Return the matrix of one period, on everything that is remembered."""
+        """Return the transition matrix over one period, of the robot and all memory."""
         m, own = len(self.kp), self.compensation
         ahead = 0 if own.predictor is None else own.predictor.periods
-        # x, v; ∫x, r, the last momentum; the filter's past; what was sent, for the
-        # observer and the predictor; what is still in the drives and in the sensors.
+        # x, v; ∫x, r, the last momentum; the filter's memory; the efforts sent, for the
+        # observer and the predictor; the efforts and measurements under way.
         counts = [2, 3, 4, 1 + ahead, self.effort_delay, 2 * self.sensor_delay]
         size = m * sum(counts)
         basis = np.eye(size).reshape(-1, m, size)
@@ -52,7 +52,7 @@ class LinearLoop:
         return np.concatenate(after).reshape(size, size)
 
     def radius(self) -> float:
-        """Return the spectral radius: below 1 all dies, above it something grows."""
+        """Return the spectral radius: the loop is stable if it is below 1."""
         return float(np.abs(np.linalg.eigvals(_coupled(self.transition()))).max())
 
     def _step(
@@ -64,7 +64,7 @@ class LinearLoop:
         drives: list[Array],
         sensors: list[Array],
     ) -> list[Array]:
-        """Return everything after a period, in the order of the arguments."""
+        """Return all states one period later, in the order of the arguments."""
         (x, v), (z, r, momentum), h, own = plant, memory, self.period, self.compensation
         sensors = [*sensors, x, v]
         x_seen, v_seen, sensors = sensors[0], sensors[1], sensors[2:]
@@ -95,10 +95,10 @@ def _moved(x: Array, v: Array, u: Array, h: float) -> tuple[Array, Array]:
 
 
 def _coupled(A: Array) -> Array:
-    """Return a matrix without what is never written or never read.
+    """Return the matrix without states that are never written or never read.
 
-    Its eigenvalues are 0, and those of the rest are the others: a loop without
-    compensation and delays uses a sixth of what it could remember.
+    Such states only add eigenvalues of 0. A loop without compensators and delays uses a
+    sixth of all states.
     """
     while not (used := A.any(axis=0) & A.any(axis=1)).all():
         A = A[np.ix_(used, used)]

@@ -1,4 +1,4 @@
-"""Where the robot will be when an effort arrives."""
+"""Prediction of the state at which an effort will act."""
 
 from collections.abc import Iterable
 
@@ -6,26 +6,26 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.control.compensation.checks import refuse_floating_base
+from hsp_control.control.compensation.checks import check_fixed_base
 from hsp_control.robot import Robot
 from hsp_control.robot.integrators import Rk4
 
 
 class Predictor:
-    """The model, carried through a delay by the efforts in flight.
+    """Integrates the model over the known delays, with the efforts under way.
 
-    The law is then evaluated for the state and the time at which its effort will act.
+    The law is then evaluated at the state and the time at which its effort will act.
 
     Attributes:
-        effort_delay: Whole control periods that an effort takes to act.
-        sensor_delay: Whole control periods that a measurement is old.
+        effort_delay: Delay of efforts, in whole control periods.
+        sensor_delay: Delay of measurements, in whole control periods.
     """
 
     def __init__(self, effort_delay: int = 1, sensor_delay: int = 0) -> None:
-        """Set the delay that is known.
+        """Set the known delays.
 
         Raises:
-            CompensationError: If a delay is no number of periods, or there is none.
+            CompensationError: If a delay is not an integer ≥ 0, or both are 0.
         """
         for what, delay in (
             ("effort_delay", effort_delay),
@@ -44,18 +44,18 @@ class Predictor:
 
     @property
     def periods(self) -> int:
-        """Control periods from a measurement until the effort made of it acts."""
+        """The total delay from a measurement to its effort, in control periods."""
         return self.effort_delay + self.sensor_delay
 
     def check(self, robot: Robot) -> None:
-        """Refuse a robot whose motion its efforts alone do not tell.
+        """Check that the efforts alone determine the robot's motion.
 
         Raises:
-            CompensationError: If it has a free-flyer root.
+            CompensationError: If the robot has a free-flyer root.
         """
-        refuse_floating_base(robot, "predictor")
+        check_fixed_base(robot, "predictor")
 
-    def ahead(
+    def predict(
         self,
         robot: Robot,
         q: Array,
@@ -63,25 +63,30 @@ class Predictor:
         efforts: Iterable[Array],
         period: float,
     ) -> tuple[Array, Array]:
-        """Return (q, v) after efforts have acted for a period each.
+        """Return (q, v) after the efforts have acted, each for one period.
 
         Args:
             robot: The model.
             q: Configuration as measured, shape (nq,).
             v: Velocity as measured, shape (nv,).
-            efforts: What acts on the model, one after the other, shape (nv,) each.
-            period: How long each acts [s].
+            efforts: The efforts on the model in order of time, shape (nv,) each.
+            period: How long each effort acts [s].
         """
         integrator = Rk4(period)
         for tau in efforts:
             q, v = integrator.advance(
-                robot, _Held(robot, tau), 0.0, period, np.asarray(q), np.asarray(v)
+                robot,
+                _ConstantEffort(robot, tau),
+                0.0,
+                period,
+                np.asarray(q),
+                np.asarray(v),
             )
         return q, v
 
 
-class _Held:
-    """The model's motion under an effort that is held."""
+class _ConstantEffort:
+    """The model's acceleration under a constant effort."""
 
     def __init__(self, robot: Robot, tau: Array) -> None:
         self._robot, self._tau = robot, tau

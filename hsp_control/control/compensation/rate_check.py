@@ -1,8 +1,8 @@
-"""Whether a loop is stable at its rate, said before anything moves.
+"""Checks before a run whether the control loop is stable at its rate.
 
-The law makes each task's error, and the null space, a linear system: sampled, delayed
-and filtered it has a spectral radius, which is exact where the model is, and which the
-nonlinear robot follows closely (theory.md §8; ``docs/robustness.md``).
+The law makes each task's error, and the null space, a linear system. Sampled, delayed
+and filtered, this system has a spectral radius. It is exact for an exact model, and the
+nonlinear robot agrees closely with it (theory.md §8; ``docs/robustness.md``).
 """
 
 from collections.abc import Callable
@@ -24,26 +24,28 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import AngularMomentum
 
 RULE = 0.2
-"""Greatest K_N h, and ω0 h without a delay, of a loop that is to be like the law."""
+"""Recommended maximum of K_N h, and of ω0 h without delay: up to it the loop is close
+to the law."""
 RULE_DELAYED = 0.1
-"""Greatest ω0 h with a delay that nothing predicts."""
+"""Recommended maximum of ω0 h with a delay and no predictor."""
 RULE_HEAVY = 5.0
-"""How many times as heavy at its task as its model a robot may be before integral
-action makes the error grow; without other compensation that is a rate of Kv/5."""
+"""How many times heavier at a task than its model a robot shall be able to be before
+integral action makes the error grow. Without other compensators: a rate of Kv/5."""
 _ROUNDING = 1e-7
-"""Of the eigenvalues: self-motion without a field keeps its place, which is a 1."""
+"""Tolerance of the radius: self-motion without a field has eigenvalues of 1."""
 _STEP = 1e-5
-"""Of the differences of the field [rad or m]."""
+"""Step of the differences of the field [rad or m]."""
 
 
 class RateFinding(NamedTuple):
-    """What is to be said about one of the loop's parts.
+    """A problem of one task, or of the null space, at the control rate.
 
     Attributes:
-        path: Where a configuration has the gain.
-        message: What is wrong, and the numbers that would do.
+        path: Key path of the gain in a configuration.
+        message: The problem, and values that solve it.
         radius: The spectral radius.
-        unstable: Whether it grows; else it only misses the rule of design.
+        unstable: Whether the loop is unstable; otherwise it only violates a design
+            rule.
     """
 
     path: tuple[str, ...]
@@ -61,12 +63,16 @@ def check_rate(
     effort_delay: int | None = None,
     sensor_delay: int | None = None,
 ) -> list[RateFinding]:
-    """Refuse a loop that is unstable at its rate; return what misses the rule.
+    """Check that the loop is stable at its rate.
 
     The arguments are those of `rate_findings`.
 
+    Returns:
+        The violations of the design rules.
+
     Raises:
-        UnstableRateError: With the number that is too large, and those that would do.
+        UnstableRateError: If the loop is unstable; with the gain that is too large, and
+            values that make the loop stable.
     """
     found = rate_findings(
         controller,
@@ -91,15 +97,15 @@ def rate_findings(
     effort_delay: int | None = None,
     sensor_delay: int | None = None,
 ) -> list[RateFinding]:
-    """Return what is to be said of each task and of the null space.
+    """Return the problems of each task and of the null space at a control rate.
 
     Args:
         controller: The controller.
-        q: Where the field's slope is taken, shape (nq,): the start.
+        q: Configuration at which the field's slope is computed, shape (nq,).
         period: The control period h [s].
-        compensation: What is around the law.
-        effort_delay: Periods that efforts come late; None: what the predictor says.
-        sensor_delay: Periods that measurements are old; None: the same.
+        compensation: The compensators; None: none.
+        effort_delay: Delay of efforts, in periods; None: the predictor's setting.
+        sensor_delay: Delay of measurements, in periods; None: the predictor's setting.
     """
     compensation = Compensation() if compensation is None else compensation
     known = compensation.predictor
@@ -132,39 +138,39 @@ def _task_findings(
             loop = LinearLoop(
                 zero, task.rate * np.eye(task.rows), zero, period, *delays
             )
-            words = f"K of task {task.name!r}", task.rate
+            label = f"K of task {task.name!r}", task.rate
             path: tuple[str, ...] = ("tasks", task.name)
         else:
             loop = LinearLoop(task.Kp, task.Kv, Ki, period, *delays)
             frequency = float(np.sqrt(np.abs(np.linalg.eigvals(task.Kp)).max()))
-            words = f"ω0 of task {task.name!r}", frequency
+            label = f"ω0 of task {task.name!r}", frequency
             path = ("tasks", task.name, "gains")
         delayed = delays[0] + delays[1] > 0 and delays[2].predictor is None
         rule = RULE_DELAYED if delayed else RULE
-        found.append(_finding(path, loop, words, rule, ""))
+        found.append(_finding(path, loop, label, rule, ""))
         if task.name in integral:
             found.append(_integral_finding(task.name, loop))
     return found
 
 
 def _integral_finding(name: str, loop: LinearLoop) -> RateFinding | None:
-    """Return what is to be said of integral action on a robot unlike its model."""
+    """Return the problem of integral action on a robot heavier than its model."""
     heavy = replace(loop, share=1.0 / RULE_HEAVY)
     if heavy.radius() <= 1.0 + _ROUNDING:
         return None
     times = _largest(
         lambda s: replace(loop, share=1.0 / (s * RULE_HEAVY)), 1.0 / RULE_HEAVY
     )
-    if times is None:  # with its model, too: that has been said
+    if times is None:  # unstable with the exact model, too: already reported
         return None
     scale = _largest(lambda s: replace(heavy, ki=s * heavy.ki))
     less = "" if scale is None else f" Ki of at most {_rounded(scale)} times this, or"
     faster = "" if loop.compensation.momentum_observer is None else " faster"
     return RateFinding(
         ("compensation", "integral_action"),
-        f"where the robot is {times * RULE_HEAVY:.3g} times as heavy at task {name!r} "
-        f"as its model, as with a payload, the error grows; design for {RULE_HEAVY:g}:"
-        f"{less} a{faster} momentum observer",
+        f"if the robot is {times * RULE_HEAVY:.3g} times as heavy at task {name!r} as "
+        "its model, for example with a payload, the error grows; design for a factor "
+        f"of {RULE_HEAVY:g}: use{less} a{faster} momentum observer",
         loop.radius(),
         False,
     )
@@ -179,19 +185,19 @@ def _null_space_findings(
     stiffness = float(np.linalg.eigvalsh(A).max())
     gain = float(np.abs(np.linalg.eigvals(K)).max())
     loop = LinearLoop(K @ A, K + A, np.zeros_like(K), period, *delays)
-    beside = "" if stiffness < 1e-3 * gain else (
+    extra = "" if stiffness < 1e-3 * gain else (
         f", with a field of stiffness {stiffness:.4g} 1/s"
     )  # fmt: skip
-    words = "K_N", gain
-    found = [_finding(("null_space", "gain"), loop, words, RULE, beside, (K, A))]
+    label = "K_N", gain
+    found = [_finding(("null_space", "gain"), loop, label, RULE, extra, (K, A))]
     if found[0] is None and stiffness * period > RULE:
         found = [
             RateFinding(
                 ("null_space", "fields"),
                 f"the field's stiffness times the period is {stiffness * period:.3g} "
-                f"at the start; design at no more than {RULE:g}: weights of at most "
-                f"{RULE / stiffness / period:.3g} times these, or a control_period of "
-                f"at most {RULE / stiffness:.3g} s",
+                f"at the start; at most {RULE:g} is recommended: use weights of at "
+                f"most {RULE / stiffness / period:.3g} times these, or a "
+                f"control_period of at most {RULE / stiffness:.3g} s",
                 loop.radius(),
                 False,
             )
@@ -202,18 +208,19 @@ def _null_space_findings(
 def null_space_rates(controller: Controller, state: RobotState) -> tuple[Array, Array]:
     """Return K_N and the field's slope A ≥ 0 in the null space, shape (k, k) each.
 
-    In coordinates orthonormal in the metric. A is the symmetric part of -∂g/∂q, by
-    central differences; where the field drives away from something (a saddle of its
-    cost) it is taken for flat: no rate makes that stable, and none needs to.
+    Both are in coordinates that are orthonormal in the metric. A is the symmetric part
+    of -∂g/∂q, by central differences. Negative eigenvalues of A are set to 0: there the
+    field drives the robot away from a point (a saddle of its cost), which is intended,
+    and no control rate changes it.
     """
     nothing = np.zeros((0, 0))
     if not controller.field.controls:
         return nothing, nothing
     J = controller.stack(state).jacobian
-    L = controller.mode.resolution.problem.metric.L
+    L = controller.active_stack.resolution.problem.metric.L
     across = np.linalg.solve(L, J.T).T  # J L⁻ᵀ
     _, values, Vt = np.linalg.svd(across)
-    rank = int((values > controller.mode.resolution.threshold).sum())
+    rank = int((values > controller.active_stack.resolution.threshold).sum())
     Z = Vt[rank:].T
     if not Z.size:
         return nothing, nothing
@@ -243,33 +250,34 @@ def field_slope(controller: Controller, state: RobotState) -> Array:
 def _finding(
     path: tuple[str, ...],
     loop: LinearLoop,
-    words: tuple[str, float],
+    label: tuple[str, float],
     rule: float,
-    beside: str,
+    extra: str,
     null_space: tuple[Array, Array] | None = None,
 ) -> RateFinding | None:
-    radius, (what, gain), h = loop.radius(), words, loop.period
-    known = f"{what} times the period is {gain * h:.3g}{beside}"
+    radius, (what, gain), h = loop.radius(), label, loop.period
+    product = f"{what} times the period is {gain * h:.3g}{extra}"
     if radius > 1.0 + _ROUNDING:
-        choices = _what_would_do(loop, what, gain, null_space)
-        would = (
-            f"{' or '.join(choices)} would do"
+        choices = _stabilising_changes(loop, what, gain, null_space)
+        solution = (
+            f"use {' or '.join(choices)}"
             if choices
-            else "no rate would do: lower the integral gain or the filter's lag"
+            else "no control rate is stable: reduce the integral gain or the filter's "
+            "delay"
         )
         late = loop.effort_delay + loop.sensor_delay
-        delay = f", {late} period{'s' * (late > 1)} late" if late else ""
+        delay = f", {late} period{'s' * (late > 1)} of delay" if late else ""
         return RateFinding(
             path,
-            f"unstable at this rate: {known}{delay} (a period multiplies the motion by "
-            f"up to {radius:.4g}): {would}",
+            f"unstable at this rate: {product}{delay} (motion grows by a factor "
+            f"of up to {radius:.4g} per period); {solution}",
             radius,
             True,
         )
     if gain * h > rule * (1.0 + 1e-9):
         return RateFinding(
             path,
-            f"{known}; design at no more than {rule:g}: {what} of at most "
+            f"{product}; at most {rule:g} is recommended: use {what} of at most "
             f"{rule / h:.3g} 1/s, or a control_period of at most {rule / gain:.3g} s",
             radius,
             False,
@@ -277,13 +285,13 @@ def _finding(
     return None
 
 
-def _what_would_do(
+def _stabilising_changes(
     loop: LinearLoop,
     what: str,
     gain: float,
     null_space: tuple[Array, Array] | None,
 ) -> list[str]:
-    """Return the settings that would each make the loop stable, all else as it is."""
+    """Return changes of single settings, each of which makes the loop stable."""
 
     def gains(s: float) -> LinearLoop:
         if null_space is None:
@@ -322,7 +330,7 @@ def _what_would_do(
             other = VelocityFilter(filter_.cutoff / s, filter_.order)
             return replace(loop, compensation=replace(own, velocity_filter=other))
 
-        # Up to 0.45 of the rate: there a filter does next to nothing.
+        # Up to 0.45 of the rate, where the filter has almost no effect.
         if (s := _largest(wider, filter_.cutoff * loop.period / 0.45)) is not None:
             choices.append(
                 f"velocity_filter.cutoff of at least {filter_.cutoff / s * 1.01:.3g} Hz"
@@ -331,11 +339,11 @@ def _what_would_do(
 
 
 def _largest(
-    of_scale: Callable[[float], LinearLoop], least: float = 1e-3
+    of_scale: Callable[[float], LinearLoop], smallest: float = 1e-3
 ) -> float | None:
-    """Return the largest scale below 1 at which a loop is stable, if there is one.
+    """Return the largest scale below 1 at which a loop is stable, or None.
 
-    Stable at ``least``, too, and in between: a gap would be no advice.
+    The loop is also stable at all scales tried between ``smallest`` and the result.
     """
 
     def stable(s: float) -> bool:
@@ -344,20 +352,20 @@ def _largest(
         except CompensationError:  # a filter beyond half of the rate
             return False
 
-    tried = np.geomspace(1.0, min(least, 1.0), 31)
-    good = [stable(float(s)) for s in tried]
-    if not good[-1]:
+    tried = np.geomspace(1.0, min(smallest, 1.0), 31)
+    results = [stable(float(s)) for s in tried]
+    if not results[-1]:
         return None
-    first = max(k for k, fine in enumerate(good) if not fine) + 1
+    first = max(k for k, is_stable in enumerate(results) if not is_stable) + 1
     low, high = float(tried[first]), float(tried[first - 1])
-    for _ in range(14):  # to 1e-5 of it
+    for _ in range(14):  # to a relative precision of 1e-5
         middle = np.sqrt(low * high)
         low, high = (middle, high) if stable(middle) else (low, middle)
     return low
 
 
 def _rounded(value: float) -> str:
-    """Return three digits, rounded down: what is advised must do."""
+    """Return a number rounded down to three digits, so that the advice is safe."""
     exponent = int(np.floor(np.log10(value))) - 2
     unit = 10.0**exponent
     return f"{np.floor(value / unit + 1e-6) * unit:.10g}"

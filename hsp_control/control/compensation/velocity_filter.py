@@ -1,4 +1,4 @@
-"""A low-pass on the measured velocity."""
+"""A low-pass filter of the measured velocity."""
 
 from math import exp, pi, sqrt, tan
 
@@ -10,13 +10,14 @@ from hsp_control.control.compensation.checks import positive
 
 
 class VelocityFilter:
-    """Butterworth's low-pass of first or second order, on each freedom's velocity.
+    """A Butterworth low-pass of first or second order, for each degree of freedom.
 
-    What passes is late by 1/(2π f) at the first order and √2 times that at the second:
-    the check of the rate counts it. It begins in balance with the first measurement.
+    It delays slow motion by 1/(2π f) at first order, and by √2 times that at second
+    order; `check_rate` takes this into account. Its initial state is the steady state
+    for the first measurement.
 
     Attributes:
-        cutoff: Where half of the power passes [Hz].
+        cutoff: Cut-off frequency f, at which half of the power passes [Hz].
         order: 1 or 2.
     """
 
@@ -28,7 +29,8 @@ class VelocityFilter:
             order: 1 or 2.
 
         Raises:
-            CompensationError: If the cut-off is not positive, or the order another.
+            CompensationError: If the cut-off is not positive, or the order is neither 1
+                nor 2.
         """
         self.cutoff = positive(cutoff, "cutoff")
         if order not in (1, 2):
@@ -36,39 +38,42 @@ class VelocityFilter:
         self.order = int(order)
 
     @property
-    def lateness(self) -> float:
-        """By how much slow motion comes late [s]."""
+    def delay(self) -> float:
+        """The delay of slow motion [s]."""
         return (1.0 if self.order == 1 else sqrt(2.0)) / (2.0 * pi * self.cutoff)
 
     def restart(self) -> None:
-        """Forget what was measured."""
+        """Forget all measurements."""
         self._past: tuple[Array, ...] | None = None
 
     def apply(self, v: Array, period: float) -> Array:
-        """Return what passes of a velocity, shape (nv,), in an array of its own.
+        """Return the filtered velocity, a new array of shape (nv,).
 
         Args:
-            v: As measured, shape (nv,).
+            v: Measured velocity, shape (nv,).
             period: Time since the last measurement [s].
 
         Raises:
-            CompensationError: If the sampling is too slow for the filter.
+            CompensationError: If the cut-off is too high for the sampling rate.
         """
         if self._past is None:
             self._past = tuple(v.copy() for _ in range(4))
             return v.copy()
-        passed, self._past = self.step(v, self._past, period)
-        return passed.copy()
+        filtered, self._past = self.step(v, self._past, period)
+        return filtered.copy()
 
     def step(
         self, v: Array, past: tuple[Array, ...], period: float
     ) -> tuple[Array, tuple[Array, ...]]:
-        """Return what passes, and the past that the next step is to be given.
+        """Compute one step of the filter.
 
         Args:
             v: Input, of any shape.
             past: The last two inputs and the last two outputs, each the latest first.
             period: Time since the last input [s].
+
+        Returns:
+            The output, and ``past`` for the next step.
         """
         b, a = self.coefficients(period)
         in1, in2, out1, out2 = past
@@ -80,19 +85,20 @@ class VelocityFilter:
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Return b_0..b_2 and a_1, a_2 of y_k = Σ b_i v_(k-i) - Σ a_i y_(k-i).
 
-        The first order is exact for a velocity that is held; the second is the bilinear
-        transform of 1/(1 + √2 s + s²), with the cut-off where it was.
+        The first order is exact for a piecewise constant velocity. The second is the
+        bilinear transform of 1/(1 + √2 s + s²), prewarped to keep the cut-off.
 
         Raises:
-            CompensationError: If a cut-off of second order is not below half the rate.
+            CompensationError: If the order is 2, and the cut-off is not below half the
+                sampling rate.
         """
         if self.order == 1:
-            kept = exp(-2.0 * pi * self.cutoff * period)
-            return (1.0 - kept, 0.0, 0.0), (-kept, 0.0)
+            pole = exp(-2.0 * pi * self.cutoff * period)
+            return (1.0 - pole, 0.0, 0.0), (-pole, 0.0)
         if self.cutoff * period >= 0.5:
             raise CompensationError(
-                f"cutoff is {self.cutoff:g} Hz; at a period of {period:g} s a filter "
-                f"of second order needs less than {0.5 / period:g} Hz, half of the rate"
+                f"cutoff is {self.cutoff:g} Hz; at a period of {period:g} s a second-"
+                f"order filter needs less than {0.5 / period:g} Hz, half of the rate"
             )
         w = tan(pi * self.cutoff * period)
         scale = 1.0 + sqrt(2.0) * w + w * w

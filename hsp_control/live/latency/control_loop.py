@@ -1,4 +1,4 @@
-"""A controller and a robot to control, one period at a time."""
+"""A controller and a simulated robot, one period at a time."""
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
@@ -15,7 +15,7 @@ from hsp_control.simulation.plants import (
 
 
 class ControlLoop:
-    """What runs in a period: `control` on the clock, `move` in the robot's place.
+    """The work of a period: `control` is timed, `move` simulates the robot.
 
     Attributes:
         period: Length of a period [s].
@@ -33,22 +33,27 @@ class ControlLoop:
         period: float,
         plant: Plant | None = None,
     ) -> None:
-        """Stand at the start.
+        """Set controller and plant to the start.
 
         Args:
             controller: The controller.
             q0: Start configuration, shape (nq,).
             v0: Start velocity, shape (nv,).
             period: Length of a period [s].
-            plant: What the effort moves; None: the controller's own model. A continuous
-                one takes one semi-implicit step a period.
+            plant: The plant; None: the controller's own model. A continuous one is
+                integrated with one semi-implicit Euler step a period.
+
+        Raises:
+            SimulationError: If the plant is neither continuous nor sampled.
         """
         self._controller = controller
         plant = RigidBodyPlant(controller.robot) if plant is None else plant
         if isinstance(plant, ContinuousPlant):
             plant = IntegratedPlant(plant, SemiImplicitEuler(period))
         if not isinstance(plant, SampledPlant):
-            raise SimulationError(f"{type(plant).__name__} is no plant that can move")
+            raise SimulationError(
+                f"{type(plant).__name__} is neither a continuous nor a sampled plant"
+            )
         self._plant = plant
         self._state = RobotState(controller.robot)
         self._start = q0.copy(), v0.copy()
@@ -56,7 +61,7 @@ class ControlLoop:
         self.restart()
 
     def restart(self) -> None:
-        """Stand at the start again."""
+        """Set controller and plant back to the start."""
         self.periods = 0
         self.t = 0.0
         self.q, self.v = (part.copy() for part in self._start)
@@ -67,12 +72,12 @@ class ControlLoop:
         ).tau
 
     def control(self) -> None:
-        """Compute the effort: all that a user's loop would do, but for its I/O."""
+        """Update the state and compute the effort: a user's period without its I/O."""
         state = self._state.update(self.t, self.q, self.v)
         self.tau = self._controller.compute(state).tau
 
     def move(self) -> None:
-        """Let the effort act for a period, in one step."""
+        """Apply the effort to the plant for a period."""
         end = (self.periods + 1) * self.period
         self._controller.applied(self.tau, self.period)
         self.q, self.v = self._plant.advance(self.t, end, self.tau)

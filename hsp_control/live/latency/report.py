@@ -1,21 +1,21 @@
-"""What was measured, in the numbers that matter to a loop."""
+"""The measured latencies of a control loop."""
 
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.live.latency.clocked import Nanoseconds, Record
+from hsp_control.live.latency.periodic import Nanoseconds, StepTimes
 
 
 class Quantiles(NamedTuple):
-    """A distribution of times [s].
+    """Quantiles of a distribution of times [s].
 
     Attributes:
-        median: As often exceeded as not.
-        p99: Exceeded by one of a hundred.
-        p999: Exceeded by one of a thousand.
-        worst: Never exceeded.
+        median: 50 % quantile.
+        p99: 99 % quantile.
+        p999: 99.9 % quantile.
+        worst: Maximum.
     """
 
     median: float
@@ -25,27 +25,32 @@ class Quantiles(NamedTuple):
 
     @classmethod
     def of(cls, times: Array) -> Self:
-        """Return those of times [s], shape (N,): each is one that was measured."""
+        """Return the quantiles of times [s], shape (N,); each is one of the times."""
         found = np.quantile(times, [0.5, 0.99, 0.999, 1.0], method="higher")
         return cls(*map(float, found))
 
 
 class Latency:
-    """Times of a controlling loop and of an empty one, measured in turns.
+    """Times of a control loop and of an empty loop, measured in turns.
 
     Attributes:
         period: Length of a period [s].
-        step: How long state update and law took, shape (N,) [s].
-        wake: How long after its period's beginning the loop was awake, shape (N,) [s].
-        empty: The same of the loop that does nothing, shape (M,) [s].
-        back_to_back: How long steps took in the rehearsal, without sleep between [s].
-        compilations: How many kernels were compiled on the clock: none should be.
+        step: Execution time of state update and controller, shape (N,) [s].
+        wake: Wake-up latency, from the period's beginning, shape (N,) [s].
+        empty: Wake-up latency of the empty loop, shape (M,) [s].
+        back_to_back: Execution time of the steps in the dry run, without sleep between
+            them, shape (N,) [s].
+        compilations: Number of kernels that were compiled in real time: should be 0.
     """
 
     def __init__(
-        self, control: Record, empty: Record, back_to_back: Array, compilations: int
+        self,
+        control: StepTimes,
+        empty: StepTimes,
+        back_to_back: Array,
+        compilations: int,
     ) -> None:
-        """Take what whole periods say."""
+        """Convert the recorded times to seconds."""
         self.period = control.period * 1e-9
         self.step = _seconds(control.step[: control.steps])
         self.wake = _seconds(control.wake[: control.steps])
@@ -55,17 +60,17 @@ class Latency:
 
     @property
     def response(self) -> Array:
-        """From each period's beginning to its effort, shape (N,) [s]."""
+        """Response times, from period begin to effort, shape (N,) [s]."""
         return self.wake + self.step
 
     @property
     def missed(self) -> int:
-        """How many efforts came after the end of their period."""
+        """Number of deadline misses: efforts after the end of their period."""
         return int((self.response > self.period).sum())
 
     @property
     def empty_missed(self) -> int:
-        """How many periods the empty loop slept through: the machine's own share."""
+        """Number of deadline misses of the empty loop: caused by the machine alone."""
         return int((self.empty > self.period).sum())
 
 

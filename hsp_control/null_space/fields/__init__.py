@@ -1,4 +1,4 @@
-"""Null-space fields and costs: what self-motion shall do."""
+"""Null-space fields and costs: the goals of self-motion."""
 
 from .clearance import Clearance as Clearance
 from .clearance import ObstacleClearance as ObstacleClearance

@@ -1,4 +1,4 @@
-"""Isotropy: keep the frame equally able to move every way."""
+"""The inverse condition number of a frame's Jacobian, a cost for isotropic motion."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,8 +14,9 @@ from hsp_control.robot import Robot
 class InverseCondition(CompiledJacobianCost):
     """f = -k²/(tr G · tr G⁻¹), G = J Jᵀ of k rows: minus the inverse condition number.
 
-    In the Frobenius norm, squared: 1 where all singular values agree, 0 at a
-    singularity, and smooth everywhere, which σ_min/σ_max is not where two meet.
+    -f is the square of the inverse condition number in the Frobenius norm: 1 where all
+    singular values are equal, 0 at a singularity. It is smooth everywhere, whereas
+    σ_min/σ_max is not smooth where two singular values are equal.
     """
 
     def __init__(
@@ -28,7 +29,7 @@ class InverseCondition(CompiledJacobianCost):
         length: float = 1.0,
         name: str = "inverse_condition",
     ) -> None:
-        """Set the cost; see `JacobianCost` for the arguments."""
+        """Set the cost; see `JacobianCost` for the arguments and errors."""
         super().__init__(robot, frame, rows=rows, axes=axes, length=length, name=name)
 
     def _kernel(self) -> tuple[Callable[..., float], tuple[Any, ...]]:
@@ -44,9 +45,9 @@ def _inverse_condition(
     slope_rate: Array,
     scratch: Array,
 ) -> float:
-    """Write 2φ(J/tr G - G⁻²J/tr G⁻¹) with φ = -f and its rate, and return f.
+    """Write ∂f/∂J = 2φ(J/tr G - G⁻²J/tr G⁻¹) with φ = -f, and its rate; return f.
 
-    With Y = G⁻¹J and Z = G⁻¹Y, so that Z' = G⁻¹(Y' - G'Z), Y' = G⁻¹(J' - G'Y).
+    Y = G⁻¹J and Z = G⁻¹Y = G⁻²J, hence Y' = G⁻¹(J' - G'Y) and Z' = G⁻¹(Y' - G'Z).
     """
     k, n = J.shape
     Y, Y_dot, Z, Z_dot = scratch[0], scratch[1], scratch[2], scratch[3]

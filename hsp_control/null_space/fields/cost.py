@@ -1,13 +1,15 @@
-"""Costs f(q, t): their field is the gradient raised with the metric, g = -W⁻¹∇f."""
+"""The abstract cost f(q, t), whose field is g = -W⁻¹∇f, and the cost of a function."""
 
 from abc import abstractmethod
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
+from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.null_space.differences import gradient, rate_along_flow
@@ -18,18 +20,29 @@ from hsp_control.robot import Robot, RobotState
 
 
 class Cost(NullSpaceField):
-    """A scalar cost f(q, t) ≥ or ≤ anything, descended along g = -W⁻¹∇f.
+    """g = -W⁻¹∇f: the gradient descent of a cost f(q, t), of any sign.
 
-    With the end effector held, q converges to the constrained local minimum
-    (Proposition 3), in every metric. To implement one, write `value`; write `gradient`
-    where it has a closed form, and `gradient_rate` where that is short. What is left
-    out is computed by differences, exact to about 1e-9.
+    While the end effector is at rest, q converges to a local minimum of f under the
+    constraint of the task, with any metric (Proposition 3).
+
+    A subclass calls ``super().__init__(robot, name)`` and implements `value`. It may
+    override these methods, which by default use differences (error about 1e-9):
+
+    * `gradient` returns ∇f in the tangent space, shape (nv,).
+    * `gradient_rate` returns (∇f)' = ∇²f v + ∂∇f/∂t, shape (nv,).
+    * `differentiate` writes both, where one computation gives both.
+
+    f and ∇f depend on q and t only, not on v. The unit of f is chosen such that
+    -W⁻¹∇f is in rad/s and m/s. `CompiledCost` is the base class for costs whose
+    derivatives come from kernels.
     """
 
-    _bound: tuple[MetricSample, int, FieldSample, Callable[[], bool]] | None = None
-
     def __init_subclass__(cls, **arguments: Any) -> None:
-        """Let a gradient or a rate that is overridden count, also of a ready cost."""
+        """Reset `differentiate` and `compile` if a subclass overrides what they use.
+
+        Otherwise a subclass of a concrete cost would inherit a method that ignores its
+        gradient or its gradient rate.
+        """
         super().__init_subclass__(**arguments)
         own = vars(cls)
         if "differentiate" not in own and {"gradient", "gradient_rate"} & own.keys():
@@ -40,21 +53,26 @@ class Cost(NullSpaceField):
 
     @abstractmethod
     def value(self, state: RobotState) -> float:
-        """Return f(q, t); it may not depend on the velocity."""
+        """Return f(q, t), which must not depend on v."""
 
     def gradient(self, state: RobotState) -> Array:
-        """Return ∇f in the tangent space, shape (nv,)."""
+        """Return ∇f in the tangent space, shape (nv,); by default by differences."""
         return gradient(self.value, state)
 
     def gradient_rate(self, state: RobotState) -> Array:
-        """Return (∇f)' = ∇²f v + ∂∇f/∂t, shape (nv,)."""
+        """Return (∇f)' = ∇²f v + ∂∇f/∂t, shape (nv,); by default by differences."""
         return rate_along_flow(self.gradient, state)
 
     def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
-        """Write ∇f and (∇f)', shape (nv,) each, where both are wanted.
+        """Write ∇f and (∇f)'; by default it calls `gradient` and `gradient_rate`.
+
+        Args:
+            state: The robot's state.
+            gradient: ∇f, written, shape (nv,).
+            rate: (∇f)', written, shape (nv,).
 
         Raises:
-            FieldError: If either is not nv numbers.
+            FieldError: If either is not numeric or does not have shape (nv,).
         """
         gradient[:] = self._tangent(self.gradient(state), "gradient")
         rate[:] = self._tangent(self.gradient_rate(state), "gradient rate")
@@ -68,20 +86,7 @@ class Cost(NullSpaceField):
             FieldError: If the gradient or its rate is not nv finite numbers.
         """
         self.differentiate(state, out.g, out.g_dot)
-        bound = self._bound
-        if (
-            bound is None
-            or bound[0] is not metric
-            or bound[1] != form
-            or bound[2] is not out
-        ):
-            self._bound = bound = (
-                metric,
-                form,
-                out,
-                bind(descend, metric.L, metric.W_dot, form, *out),
-            )
-        if not bound[3]():
+        if not self._descent(metric, form, out)():
             raise FieldError(
                 f"cost {self.name!r} has the gradient {self.gradient(state)!r} and the "
                 f"gradient rate {self.gradient_rate(state)!r} at t = {state.t:.6g} s; "
@@ -89,9 +94,10 @@ class Cost(NullSpaceField):
             )
         return out
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Return all but what is bound to another's memory."""
-        return self.__dict__ | {"_bound": None}
+    @cached_property
+    def _descent(self) -> IdentityCache[Callable[[], bool]]:
+        """The call that turns (∇f, (∇f)') into (g, g'), in place."""
+        return IdentityCache(_compile_descent)
 
     def _tangent(self, value: Array, what: str) -> Array:
         try:
@@ -109,7 +115,7 @@ class Cost(NullSpaceField):
 
 
 class FunctionCost(Cost):
-    """A user's own cost, given as a Python function of the state."""
+    """f = function(state): a cost given as a Python function."""
 
     def __init__(
         self,
@@ -124,10 +130,12 @@ class FunctionCost(Cost):
 
         Args:
             robot: The robot.
-            function: f of a state; it reads q, t and frames, not v.
-            gradient: ∇f of a state in the tangent space, shape (nv,), if known.
-            gradient_rate: (∇f)' of a state, shape (nv,), if known.
-            name: What the log calls it.
+            function: f of a state, one number; it may use q, t and frames, but not v.
+            gradient: ∇f of a state in the tangent space, shape (nv,); None: by
+                differences.
+            gradient_rate: (∇f)' = ∇²f v + ∂∇f/∂t of a state, shape (nv,); None: by
+                differences.
+            name: Name of the field in the log.
         """
         super().__init__(robot, name)
         self._function = function
@@ -135,10 +143,10 @@ class FunctionCost(Cost):
         self._gradient_rate = gradient_rate
 
     def value(self, state: RobotState) -> float:
-        """Return the function's value.
+        """Return f.
 
         Raises:
-            FieldError: If it is not one finite number.
+            FieldError: If the function does not return one finite number.
         """
         value = self._function(state)
         try:
@@ -153,21 +161,30 @@ class FunctionCost(Cost):
         return number
 
     def gradient(self, state: RobotState) -> Array:
-        """Return the given gradient, or differences."""
+        """Return ∇f from the given function, or by differences."""
         if self._gradient is None:
             return super().gradient(state)
         return self._gradient(state)
 
     def gradient_rate(self, state: RobotState) -> Array:
-        """Return the given rate, or differences along the flow."""
+        """Return (∇f)' from the given function, or by differences along the flow."""
         if self._gradient_rate is None:
             return super().gradient_rate(state)
         return self._gradient_rate(state)
 
 
+def _compile_descent(
+    metric: MetricSample, form: int, out: FieldSample
+) -> Callable[[], bool]:
+    return bind(descend, metric.L, metric.W_dot, form, *out)
+
+
 @kernel
 def descend(L: Array, W_dot: Array, form: int, g: Array, g_dot: Array) -> bool:
-    """Overwrite (∇f, (∇f)') by (-W⁻¹∇f, -W⁻¹((∇f)' + W'g)); return if finite."""
+    """Overwrite (∇f, (∇f)') by g = -W⁻¹∇f and g' = -W⁻¹((∇f)' + W'g).
+
+    Return whether all entries are finite.
+    """
     raise_covector(g, L, form)
     total = 0.0
     for i in range(g.shape[0]):

@@ -1,4 +1,4 @@
-"""The paper's posture cost: neighbouring joints bend by the same angle."""
+"""The paper's posture cost: neighbouring joints have equal angles."""
 
 from collections.abc import Sequence
 from math import pi
@@ -15,11 +15,14 @@ from hsp_control.robot.configuration_space import joint_displacements
 
 
 class EqualJointAngles(CompiledCost):
-    """f = weight · Σ (q_{k+1} - q_k)² over consecutive named joints.
+    """f = weight · Σ (q_{k+1} - q_k)² over consecutive joints of a list.
 
-    The paper's third simulation has weight 5 and the planar arm's joints 2 and 3,
-    whose positions are its relative angles θ̃2 and θ̃3. Differences are taken round the
-    circle, so continuous joints may wind.
+    The paper's third simulation has weight 5 and the joints 2 and 3 of the planar arm,
+    whose positions are the paper's relative angles θ̃2 and θ̃3. Differences are
+    wrapped to [-π, π), so that full turns of continuous joints do not count.
+
+    Attributes:
+        weight: The weight [1/s].
     """
 
     def __init__(
@@ -34,23 +37,27 @@ class EqualJointAngles(CompiledCost):
 
         Args:
             robot: The robot.
-            joints: Two or more revolute joints, in order.
+            joints: Names of two or more revolute joints, in order.
             weight: Weight ≥ 0 [1/s].
-            name: What the log calls it.
+            name: Name of the field in the log.
 
         Raises:
             JointNotFoundError: If a joint does not exist.
-            FieldError: If there are fewer than two joints, one has several freedoms,
-                or the weight is negative.
+            FieldError: If there are fewer than two joints, a joint has several degrees
+                of freedom, or the weight is negative or not finite.
         """
         super().__init__(robot, name)
         if len(joints) < 2:
-            raise FieldError(f"field {name!r} needs two joints or more: {list(joints)}")
+            raise FieldError(
+                f"field {name!r} needs at least two joints; got {list(joints)}"
+            )
         if not 0.0 <= weight < np.inf:
             raise FieldError(f"field {name!r}: weight {weight} must be at least 0")
         slices = [robot.velocity_index(joint) for joint in joints]
         if any(where.stop - where.start != 1 for where in slices):
-            raise FieldError(f"field {name!r}: each joint needs exactly one freedom")
+            raise FieldError(
+                f"field {name!r}: each joint needs exactly one degree of freedom"
+            )
         indices = [where.start for where in slices]
         self._chain: Indices = np.array(indices, dtype=np.int64)
         self.weight = float(weight)
@@ -62,7 +69,7 @@ class EqualJointAngles(CompiledCost):
             state.q,
             state.v,
             robot.neutral(),
-            robot.single_joints,
+            robot.single_dof_joints,
             self._chain,
             self.weight,
             np.zeros(robot.nv),
@@ -76,15 +83,15 @@ def _equal_angles(
     q: Array,
     v: Array,
     neutral: Array,
-    single_joints: Indices,
+    single_dof_joints: Indices,
     chain: Indices,
     weight: float,
     angles: Array,
     gradient: Array,
     rate: Array,
 ) -> float:
-    """Write ∇f and (∇f)' for d_k = q_{k+1} - q_k within ±π, and return f."""
-    joint_displacements(q, neutral, single_joints, angles)
+    """Write ∇f and (∇f)' with d_k = q_{k+1} - q_k in [-π, π), and return f."""
+    joint_displacements(q, neutral, single_dof_joints, angles)
     for i in range(v.shape[0]):
         gradient[i] = rate[i] = 0.0
     f = 0.0

@@ -1,4 +1,4 @@
-"""What a null-space field is: a joint velocity g(q, t) for self-motion to reach."""
+"""The abstract null-space field, and weighted sums of fields."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -10,6 +10,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
+from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
@@ -19,11 +20,11 @@ from hsp_control.robot import Robot, RobotState
 
 
 class FieldSample(NamedTuple):
-    """A field at one state.
+    """g and g' = ∂g/∂q·v + ∂g/∂t: a field at one state.
 
     Attributes:
-        g: The field, shape (nv,) [rad/s, m/s].
-        g_dot: Its total time derivative ∂g/∂q·v + ∂g/∂t, shape (nv,).
+        g: The field, a desired joint velocity, shape (nv,) [rad/s, m/s].
+        g_dot: g', its total time derivative, shape (nv,) [rad/s², m/s²].
     """
 
     g: Array
@@ -31,32 +32,45 @@ class FieldSample(NamedTuple):
 
     @classmethod
     def allocate(cls, nv: int) -> "FieldSample":
-        """Return a sample of zeros."""
+        """Return a sample of zeros, shape (nv,) each."""
         return cls(np.zeros(nv), np.zeros(nv))
 
 
 class NullSpaceField(ABC):
-    """A vector field g(q, t) on the configuration space, in tangent coordinates.
+    """g(q, t): a desired joint velocity, of which the null space keeps P g.
 
-    The null-space velocity converges to its projection P g (Proposition 2). Two kinds
-    exist: a `Cost`, whose field is -W⁻¹∇f, and a `VectorField`, given as it is.
-    Fields add and scale: ``2.0 * centering + obstacle``.
+    The null-space velocity converges exponentially to P g (Proposition 2). g is in the
+    tangent space, shape (nv,) [rad/s, m/s]. Fields can be added and scaled:
+    ``2.0 * centering + obstacle``.
+
+    Most fields derive from `Cost` (g = -W⁻¹∇f) or from `VectorField` (g as given). A
+    direct subclass calls ``super().__init__`` and implements two methods:
+
+    * `evaluate` writes g and its exact total time derivative g'.
+    * `value` returns one number to plot.
+
+    It may override `compile` to make a step faster (by default the step plan calls
+    `evaluate` at every step), and `minimum_distance` if the field measures distances.
 
     Attributes:
         robot: The robot.
-        name: What the log calls it.
-        controls: False for φ_N = 0, which leaves self-motion alone; see `Uncontrolled`.
+        name: Name of the field in the log.
+        controls: False only for `Uncontrolled`, which sets φ_N = 0.
     """
 
     controls: bool = True
 
     def __init__(self, robot: Robot, name: str) -> None:
-        """Keep the robot and the name."""
+        """Set the robot, and the name of the field in the log."""
         self.robot = robot
         self.name = name
 
     def __init_subclass__(cls, **arguments: Any) -> None:
-        """Let an `evaluate` that is overridden count, also of a ready field."""
+        """Reset `compile` if a subclass overrides `evaluate` only.
+
+        Otherwise a subclass of a concrete field would inherit a step plan that ignores
+        its `evaluate`.
+        """
         super().__init_subclass__(**arguments)
         if "evaluate" in vars(cls) and "compile" not in vars(cls):
             cls.compile = NullSpaceField.compile  # type: ignore[method-assign]
@@ -64,28 +78,35 @@ class NullSpaceField(ABC):
     def compile(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> StepPlan:
-        """Return what `evaluate` does with this state and these samples."""
+        """Return the step plan that does what `evaluate` does; may be overridden.
+
+        Args:
+            state: The state that every step reads. Its values change between steps.
+            metric: The metric's sample, written before the field's calls.
+            form: The metric's form, see `Metric`.
+            out: The sample that every step writes.
+        """
         return StepPlan(write=(partial(self.evaluate, state, metric, form, out),))
 
     @abstractmethod
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
-        """Write g and its exact total rate into ``out`` and return it.
+        """Write g and g' = ∂g/∂q·v + ∂g/∂t into ``out``, and return ``out``.
 
         Args:
-            state: The robot's state.
-            metric: The joint-space metric there.
-            form: The metric's form, see `hsp_control.null_space.metrics`.
-            out: Where to write.
+            state: The robot's state: t, q, v and the kinematics.
+            metric: The joint-space metric at this state.
+            form: The metric's form, see `Metric`.
+            out: The sample to write into, shape (nv,) each.
         """
 
     @abstractmethod
     def value(self, state: RobotState) -> float:
-        """Return the number to plot: a cost's value f(q, t), or a field's norm."""
+        """Return one number to plot: f(q, t) of a cost, or the norm of a field."""
 
-    def least_distance(self, state: RobotState) -> float | None:
-        """Return the least distance that the field watches [m], if it watches any."""
+    def minimum_distance(self, state: RobotState) -> float | None:
+        """Return the minimum distance that the field measures [m], or None."""
         return None
 
     def __add__(self, other: "NullSpaceField") -> "WeightedSum":
@@ -104,22 +125,25 @@ class WeightedSum(NullSpaceField):
 
     Attributes:
         terms: The (weight, field) pairs.
-        samples: What each term contributed at the last `evaluate`, weighted.
+        samples: The weighted sample of each term at the last step.
     """
 
     def __init__(self, terms: Sequence[tuple[Weight | float, NullSpaceField]]) -> None:
         """Add fields of one robot.
 
+        Args:
+            terms: (weight, field) pairs; a weight is a number ≥ 0 or a `Weight`.
+
         Raises:
-            FieldError: If there is no term, a weight is negative or not finite, or the
-                fields belong to different robots.
+            FieldError: If there is no term, a weight is negative or not finite, a term
+                is `Uncontrolled`, or the fields belong to different robots.
         """
         if not terms:
             raise FieldError("a sum of fields needs at least one term")
         flat: list[tuple[Weight, NullSpaceField]] = []
         for weight, field in terms:
             try:
-                flat.extend(_flattened(as_weight(weight), field))
+                flat.extend(_flatten(as_weight(weight), field))
             except FieldError as error:
                 raise FieldError(f"field {field.name!r}: {error}") from error
         robot = flat[0][1].robot
@@ -130,35 +154,32 @@ class WeightedSum(NullSpaceField):
         super().__init__(robot, " + ".join(field.name for _, field in flat))
         self.terms: tuple[tuple[Weight, NullSpaceField], ...] = tuple(flat)
         self.samples = tuple(FieldSample.allocate(robot.nv) for _ in flat)
-        self._bound: tuple[FieldSample, list[_Term]] | None = None
+        self._compiled = IdentityCache(self._compile)
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
-        """Write the weighted sums of g and g'."""
-        bound = self._bound
-        if bound is None or bound[0] is not out:
-            self._bound = bound = out, self._compile(out)
-        for weight, field, sample, weigh, add in bound[1]:
+        """Write the weighted sums of g and g'; see `NullSpaceField.evaluate`."""
+        for weight, field, sample, weights, add in self._compiled(out):
             field.evaluate(state, metric, form, sample)
-            weigh[:] = weight.sample(state)
+            weights[:] = weight.sample(state)
             add()
         return out
 
     def compile(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> StepPlan:
-        """Return what `evaluate` does; see `NullSpaceField.bind`."""
+        """Return the step plan; see `NullSpaceField.compile`."""
         follow: list[Callable[[float], object]] = []
         write: list[Callable[[], object]] = []
-        for weight, field, sample, weigh, add in self._compile(out):
+        for weight, field, sample, weights, add in self._compile(out):
             term = field.compile(state, metric, form, sample)
             follow += term.follow
             write += term.write
             if weight.constant:
-                weigh[:] = weight.sample(state)
+                weights[:] = weight.sample(state)
             else:
-                write.append(partial(_weigh, weight, state, weigh))
+                write.append(partial(_update, weight, state, weights))
             write.append(add)
         return StepPlan(tuple(follow), tuple(write))
 
@@ -167,41 +188,37 @@ class WeightedSum(NullSpaceField):
         for k, ((weight, field), sample) in enumerate(
             zip(self.terms, self.samples, strict=True)
         ):
-            weigh = np.zeros(2)
-            add = bind(_add, k == 0, weigh, *sample, *out)
-            terms.append((weight, field, sample, weigh, add))
+            weights = np.zeros(2)
+            add = bind(_add, k == 0, weights, *sample, *out)
+            terms.append((weight, field, sample, weights, add))
         return terms
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Return all but what is bound to another's memory."""
-        return self.__dict__ | {"_bound": None}
-
     def value(self, state: RobotState) -> float:
-        """Return the weighted sum of the terms' values."""
+        """Return Σ w_k value_k."""
         return sum(
             weight.sample(state)[0] * field.value(state) for weight, field in self.terms
         )
 
 
 _Term = tuple[Weight, NullSpaceField, FieldSample, Array, Callable[[], object]]
-"""A weight, its field and what it writes; w and w', and what then adds to the sum."""
+"""A weight, its field, the field's sample, (w, w'), and a call that adds to the sum."""
 
 
-def _weigh(weight: Weight, state: RobotState, weigh: Array) -> None:
-    weigh[:] = weight.sample(state)
+def _update(weight: Weight, state: RobotState, weights: Array) -> None:
+    weights[:] = weight.sample(state)
 
 
 @kernel
 def _add(
     first: bool,
-    weigh: Array,
+    weights: Array,
     g: Array,
     g_dot: Array,
     sum_g: Array,
     sum_g_dot: Array,
 ) -> None:
-    """Weight a sample by w and w', and add it to the sum, begun by the first one."""
-    w, w_dot = weigh[0], weigh[1]
+    """Scale a sample by w and w', and add it to the sum; ``first`` starts the sum."""
+    w, w_dot = weights[0], weights[1]
     for i in range(g.shape[0]):
         g_dot[i] = w * g_dot[i] + w_dot * g[i]
         g[i] *= w
@@ -209,7 +226,7 @@ def _add(
         sum_g_dot[i] = g_dot[i] if first else sum_g_dot[i] + g_dot[i]
 
 
-def _flattened(
+def _flatten(
     weight: Weight, field: NullSpaceField
 ) -> list[tuple[Weight, NullSpaceField]]:
     if not isinstance(field, WeightedSum):

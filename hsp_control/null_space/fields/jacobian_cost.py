@@ -1,17 +1,18 @@
-"""Costs of a frame's Jacobian: exact gradients and rates from running sums.
+"""The abstract cost of a frame's Jacobian, with exact gradient and rate.
 
-For joints i and j on the way to a frame, with world columns J_j = (l_j, w_j) at the
-frame's origin, moving joint i changes J_j by
+Let i and j be degrees of freedom of the chain to a frame, and J_j = (l_j, w_j) their
+columns in world axes at the frame's origin. A motion of i changes J_j by
 
-    w_i × (l_j, w_j)   if i carries j, or is of the same joint,
-    (w_j × l_i, 0)     if j carries i,
+    w_i × (l_j, w_j)   if i comes before j in the chain, or both belong to one joint,
+    (w_j × l_i, 0)     if j comes before i,
 
-for revolute and prismatic joints and floating roots alike. A function φ(J) with
+for revolute joints, prismatic joints and floating roots. A function φ(J) with
 ∂φ/∂J = B, columns (b_j, c_j), therefore has the gradient
 
     w_i · Σ_{j from i on} (l_j × b_j + w_j × c_j) + l_i · Σ_{j before i} (b_j × w_j)
 
-in O(n), without the kinematic Hessian; and since J' is known exactly, so is the rate.
+which running sums give in O(n), without the kinematic Hessian. Its rate is exact too,
+because J' is known exactly.
 """
 
 from abc import abstractmethod
@@ -33,12 +34,12 @@ _ROWS = {"position": "xyz", "orientation": "rpq", "pose": "xyzrpq"}
 
 
 class JacobianTerms(NamedTuple):
-    """φ and its derivatives at one state, for the selected and scaled rows.
+    """φ(J), ∂φ/∂J and its rate at one state, for the k selected and scaled rows.
 
     Attributes:
         value: φ(J).
         slope: B = ∂φ/∂J, shape (k, nv).
-        slope_rate: B', shape (k, nv).
+        slope_rate: B', the time derivative of B along v, shape (k, nv).
     """
 
     value: float
@@ -47,11 +48,15 @@ class JacobianTerms(NamedTuple):
 
 
 class JacobianCost(CompiledCost):
-    """f = φ(J) for rows of one frame's Jacobian; write `terms`.
+    """f = φ(J) of k rows of a frame's Jacobian, in world axes at the frame's origin.
+
+    A subclass calls ``super().__init__`` and implements `terms`, which returns φ, ∂φ/∂J
+    and the rate of ∂φ/∂J. Value, gradient and gradient rate follow exactly. If one
+    kernel computes the terms, derive from `CompiledJacobianCost` instead.
 
     Attributes:
-        frame: The frame's name.
-        rows: Which rows, ``position``, ``orientation`` or ``pose``.
+        frame: Name of the frame.
+        rows: The rows: ``position``, ``orientation`` or ``pose``.
     """
 
     def __init__(
@@ -64,28 +69,33 @@ class JacobianCost(CompiledCost):
         length: float = 1.0,
         name: str,
     ) -> None:
-        """Select rows.
+        """Select the rows.
 
         Args:
             robot: The robot.
             frame: Name of the frame.
             rows: ``position``, ``orientation`` or ``pose``.
-            axes: World axes of the position rows: ``"xy"`` for a planar arm.
-            length: What one radian is worth [m], where rows mix metres and radians.
-            name: What the log calls it.
+            axes: World axes of the position rows, for example ``"xy"`` for a planar
+                arm. The rows are always in the order x, y, z.
+            length: Characteristic length > 0 [m/rad] that scales the orientation rows
+                of a ``pose``.
+            name: Name of the field in the log.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            FieldError: If rows or axes are unknown, or too many for the frame's joints.
+            FieldError: If rows, axes or length are wrong, there are more rows than
+                degrees of freedom that move the frame, or a mimic joint moves it.
         """
         super().__init__(robot, name)
         robot.frame_id(frame)
         if rows not in _ROWS:
             raise FieldError(
-                f"field {name!r}: rows {rows!r}; choose among {list(_ROWS)}"
+                f"field {name!r}: unknown rows {rows!r}; choose one of {list(_ROWS)}"
             )
         if not axes or set(axes) - set("xyz") or len(set(axes)) < len(axes):
-            raise FieldError(f"field {name!r}: axes {axes!r}; name axes among x, y, z")
+            raise FieldError(
+                f"field {name!r}: axes {axes!r} must be distinct letters of x, y and z"
+            )
         if not 0.0 < length < np.inf:
             raise FieldError(f"field {name!r}: length {length} must be positive")
         kept = [i for i, axis in enumerate("xyz") if axis in axes]
@@ -99,17 +109,23 @@ class JacobianCost(CompiledCost):
         if len(kept) > len(self._dofs):
             raise FieldError(
                 f"field {name!r}: {len(kept)} rows of frame {frame!r}, which only "
-                f"{len(self._dofs)} freedoms move; they are singular everywhere"
+                f"{len(self._dofs)} degrees of freedom move; these rows are singular "
+                "everywhere"
             )
 
     @abstractmethod
     def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
-        """Return φ, ∂φ/∂J and its rate for the selected rows, shape (k, nv)."""
+        """Return φ, ∂φ/∂J and its rate for the k selected rows.
+
+        Args:
+            J: The selected rows, orientation rows scaled, shape (k, nv).
+            J_dot: Their time derivative, shape (k, nv).
+        """
 
     def _compile_terms(
         self, J: Array, J_dot: Array, slope: Array, slope_rate: Array
     ) -> Derivatives:
-        """Return what writes ∂φ/∂J and its rate and returns φ."""
+        """Return a call that writes ∂φ/∂J and its rate, and returns φ."""
 
         def write() -> float:
             value, slope[:], slope_rate[:] = self.terms(J, J_dot)
@@ -141,18 +157,22 @@ class JacobianCost(CompiledCost):
 
 
 class CompiledJacobianCost(JacobianCost):
-    """A Jacobian's cost whose terms come from one kernel: write `_kernel`."""
+    """f = φ(J) with φ, ∂φ/∂J and its rate from one kernel.
+
+    A subclass implements `_kernel` instead of `terms`.
+    """
 
     @abstractmethod
     def _kernel(self) -> tuple[Callable[..., float], tuple[Any, ...]]:
         """Return the kernel and its first arguments.
 
-        The others are J, J', ∂φ/∂J and its rate, all of the shape (k, nv), and scratch
-        of the shape (8, k, nv).
+        The further arguments are J, J', ∂φ/∂J and its rate, shape (k, nv) each, and a
+        scratch array of shape (8, k, nv). The kernel writes ∂φ/∂J and its rate, and
+        returns φ.
         """
 
     def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
-        """Return f, its slope and rate."""
+        """Return φ, ∂φ/∂J and its rate; see `JacobianCost.terms`."""
         slope, slope_rate = np.zeros_like(J), np.zeros_like(J)
         value = self._compile_terms(J, J_dot, slope, slope_rate)()
         return JacobianTerms(value, slope, slope_rate)
@@ -174,7 +194,7 @@ def _select(
     J: Array,
     J_dot: Array,
 ) -> None:
-    """Write the selected rows, scaled."""
+    """Write the selected rows of J and J', scaled."""
     for k in range(J.shape[0]):
         for j in range(J.shape[1]):
             J[k, j] = scale[k] * J_frame[selected[k], j]
@@ -196,7 +216,7 @@ def _raise_slope(
     gradient: Array,
     rate: Array,
 ) -> None:
-    """Write the gradient and its rate from the slope of the selected, scaled rows."""
+    """Write ∇f and (∇f)' from ∂φ/∂J of the selected, scaled rows."""
     for k in range(slope.shape[0]):
         for j in range(slope.shape[1]):
             B[0, selected[k], j] = scale[k] * slope[k, j]
@@ -218,18 +238,20 @@ def chain_gradient(
     gradient: Array,
     rate: Array,
 ) -> None:
-    """Write the gradient of φ(J) and its rate from B = ∂φ/∂J; see the module.
+    """Write the gradient of φ(J) and its rate from B = ∂φ/∂J, as the module describes.
 
     Args:
-        J: World-aligned Jacobian of the frame, shape (6, nv).
-        J_dot: Its rate, shape (6, nv).
+        J: Jacobian of the frame, in world axes at its origin, shape (6, nv).
+        J_dot: J', shape (6, nv).
         B: ∂φ/∂J, shape (6, nv).
-        B_dot: Its rate, shape (6, nv).
-        dofs: The k degrees of freedom that move the frame, from the root on.
-        first: For each of them, where its joint begins in that list.
+        B_dot: B', shape (6, nv).
+        dofs: The k degrees of freedom that move the frame, from the root on, shape
+            (k,).
+        first: For each of them, the position in ``dofs`` of the first degree of freedom
+            of its joint, shape (k,).
         sums: Scratch, shape (4, k + 1, 3).
-        gradient: ∂φ/∂q, shape (nv,); entries of other dofs are left alone.
-        rate: Its time derivative, shape (nv,).
+        gradient: ∂φ/∂q, shape (nv,); only the entries ``dofs`` are written.
+        rate: Its time derivative, shape (nv,); only the entries ``dofs`` are written.
     """
     k = dofs.shape[0]
     carried, carried_dot, before, before_dot = sums[0], sums[1], sums[2], sums[3]
@@ -275,11 +297,11 @@ def chain_gradient(
 
 
 def _chain(robot: Robot, frame: str) -> tuple[Indices, Indices]:
-    """Return the freedoms that move a frame, and where each one's joint begins.
+    """Return ``dofs`` and ``first`` of `chain_gradient`, shape (k,) each.
 
     Raises:
-        FieldError: If a joint on the way mimics another: its freedom stands twice on
-            the chain, which the running sums do not know.
+        FieldError: If a joint of the chain mimics another one: its degree of freedom is
+            then in the chain twice, which the running sums do not support.
     """
     model = robot.model
     dofs: list[int] = []

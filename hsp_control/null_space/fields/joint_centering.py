@@ -1,4 +1,4 @@
-"""Keep the joints near the middle of their range."""
+"""The cost of joints far from the middle of their range."""
 
 from typing import Any
 
@@ -13,10 +13,10 @@ from hsp_control.robot import Robot, RobotState
 
 
 class JointCentering(CompiledCost):
-    """f = ½ Σ w_i ((q_i - m_i)/r_i)², m_i and r_i the middle and half of the range.
+    """f = ½ Σ w_i ((q_i - m_i)/r_i)², m_i the middle and r_i half of the range.
 
-    Joints without limits, continuous ones and a floating root are left free. After
-    Liégeois (1977), equation (11), normalised to 1 at a limit.
+    Joints without limits, continuous joints and a floating root do not count. After
+    Liégeois (1977), equation (11), scaled such that (q_i - m_i)/r_i is ±1 at a limit.
     """
 
     def __init__(
@@ -26,11 +26,11 @@ class JointCentering(CompiledCost):
 
         Args:
             robot: The robot.
-            weights: w_i ≥ 0, one number or one per freedom, shape (nv,).
-            name: What the log calls it.
+            weights: w_i ≥ 0, one number or one per degree of freedom, shape (nv,).
+            name: Name of the field in the log.
 
         Raises:
-            FieldError: If a weight is negative or no joint has limits.
+            FieldError: If a weight is negative or not finite, or no joint has limits.
         """
         super().__init__(robot, name)
         w = check_weights(weights, robot.nv, name)
@@ -38,8 +38,8 @@ class JointCentering(CompiledCost):
         self._limited = limited_joints(robot)
         if not self._limited.size:
             raise FieldError(
-                f"field {name!r}: no joint of {robot.name} has limits, so none has a "
-                "middle; use a target posture instead"
+                f"field {name!r}: no joint of {robot.name} has limits, so no range has "
+                "a middle; use a target posture instead"
             )
         dofs = self._limited[:, 0]
         low, high = lower[dofs], upper[dofs]
@@ -60,10 +60,10 @@ class JointCentering(CompiledCost):
 
 
 def limited_joints(robot: Robot) -> Indices:
-    """Return each limited joint's place in a velocity and in q, shape (k, 2)."""
+    """Return the indices into v and q of the k joints with limits, shape (k, 2)."""
     lower, upper = robot.position_limits()
     limited = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
-    return robot.single_joints[limited[robot.single_joints[:, 0]], :2].copy()
+    return robot.single_dof_joints[limited[robot.single_dof_joints[:, 0]], :2].copy()
 
 
 @kernel
@@ -76,7 +76,7 @@ def _centering(
     gradient: Array,
     rate: Array,
 ) -> float:
-    """Write k_i (q_i - m_i) and k_i v_i, and return f; k_i = w_i/r_i²."""
+    """Write ∇f = k_i (q_i - m_i) and (∇f)' = k_i v_i, and return f; k_i = w_i/r_i²."""
     for i in range(v.shape[0]):
         gradient[i] = rate[i] = 0.0
     f = 0.0
@@ -93,7 +93,7 @@ def check_weights(weights: Any, size: int, name: str) -> Array:
     """Return weights as an array of shape (size,).
 
     Raises:
-        FieldError: If there are not as many, or one is negative or not finite.
+        FieldError: If they have another size, or one is negative or not finite.
     """
     array = np.array(weights, dtype=float)
     if array.ndim == 0:

@@ -1,4 +1,4 @@
-"""Keep the joints off their limits, and leave them alone elsewhere."""
+"""The cost of joints near their limits, zero in the middle of the range."""
 
 from typing import Any
 
@@ -13,11 +13,11 @@ from hsp_control.robot import Robot, RobotState
 
 
 class LimitBarrier(CompiledCost):
-    """f = Σ w_i (b(q_i - lower_i) + b(upper_i - q_i)), zero in the middle of the range.
+    """f = Σ w_i (b((q_i - lower_i)/u_i) + b((upper_i - q_i)/u_i)).
 
-    b is the barrier of `fields.barrier`; it begins at a fraction of half the range
-    from a limit. Joints without limits, continuous ones and a floating root
-    are left free.
+    u_i is ``zone`` times half the range, and b the function `barrier_at`: a joint adds
+    to f only within the distance u_i of a limit. Joints without limits, continuous
+    joints and a floating root do not count.
     """
 
     def __init__(
@@ -32,13 +32,14 @@ class LimitBarrier(CompiledCost):
 
         Args:
             robot: The robot.
-            zone: Where it begins, as a fraction of half the range, within (0, 1].
-            weights: w_i ≥ 0, one number or one per freedom, shape (nv,).
-            name: What the log calls it.
+            zone: Distance from a limit at which the cost begins, as a fraction of half
+                the range, within (0, 1].
+            weights: w_i ≥ 0, one number or one per degree of freedom, shape (nv,).
+            name: Name of the field in the log.
 
         Raises:
-            FieldError: If the zone is out of range, a weight negative, or no joint has
-                limits.
+            FieldError: If the zone is out of range, a weight is negative or not finite,
+                or no joint has limits.
         """
         super().__init__(robot, name)
         if not 0.0 < zone <= 1.0:
@@ -51,7 +52,7 @@ class LimitBarrier(CompiledCost):
         dofs = self._limited[:, 0]
         self._weights = w[dofs]
         self._lower, self._upper = lower[dofs], upper[dofs]
-        # Distances are measured in units of the zone: the barrier begins at 1.
+        # u_i, the width of the zone: the barrier begins at a distance of 1 unit.
         self._unit = 0.5 * zone * (self._upper - self._lower)
 
     def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
@@ -81,16 +82,16 @@ def _limit_barrier(
     gradient: Array,
     rate: Array,
 ) -> float:
-    """Write ∇f and ∇²f v, and return f."""
+    """Write ∇f and (∇f)' = ∇²f v, and return f."""
     for i in range(v.shape[0]):
         gradient[i] = rate[i] = 0.0
     f = 0.0
     for k in range(limited.shape[0]):
         i, at = limited[k, 0], limited[k, 1]
-        below, slope_below, bend_below = barrier_at((q[at] - lower[k]) / unit[k])
-        above, slope_above, bend_above = barrier_at((upper[k] - q[at]) / unit[k])
-        f += weights[k] * (below + above)
-        gradient[i] = weights[k] * (slope_below - slope_above) / unit[k]
-        bend = (bend_below + bend_above) / (unit[k] * unit[k])
-        rate[i] = weights[k] * bend * v[i]
+        b_lower, slope_lower, curvature_lower = barrier_at((q[at] - lower[k]) / unit[k])
+        b_upper, slope_upper, curvature_upper = barrier_at((upper[k] - q[at]) / unit[k])
+        f += weights[k] * (b_lower + b_upper)
+        gradient[i] = weights[k] * (slope_lower - slope_upper) / unit[k]
+        curvature = (curvature_lower + curvature_upper) / (unit[k] * unit[k])
+        rate[i] = weights[k] * curvature * v[i]
     return f

@@ -1,4 +1,4 @@
-"""Yoshikawa's manipulability: keep the frame able to move every way."""
+"""Yoshikawa's manipulability of a frame, as a cost."""
 
 from collections.abc import Callable
 from math import exp, log
@@ -16,14 +16,17 @@ from hsp_control.robot import Robot
 Form = Literal["determinant", "root", "log"]
 
 FLOOR = 1e-6
-"""Added in squares to every singular value, so that no state has an infinite slope."""
+"""Its square is added to the squared singular values, so that all slopes are finite."""
 
 
 class Manipulability(CompiledJacobianCost):
     """f = -det(G), -√det(G) or -½ log det(G), with G = J W⁻¹ Jᵀ of a frame's rows.
 
-    Yoshikawa (1985) maximises √det(J Jᵀ). The logarithm's slope grows towards a
-    singularity, the determinant's vanishes there. W is a constant metric.
+    Yoshikawa (1985) maximises √det(J Jᵀ). Towards a singularity the slope of the
+    logarithm grows, and the slope of the determinant vanishes. W is a constant metric.
+
+    Attributes:
+        form: ``determinant``, ``root`` or ``log``.
     """
 
     def __init__(
@@ -46,12 +49,14 @@ class Manipulability(CompiledJacobianCost):
             form: ``determinant``, ``root`` or ``log``.
             rows: ``position``, ``orientation`` or ``pose``.
             axes: World axes of the position rows.
-            length: What one radian is worth [m], where rows mix metres and radians.
+            length: Characteristic length [m/rad] that scales the orientation rows of a
+                ``pose``.
             metric: A constant metric W, shape (nv, nv); None: the identity.
-            name: What the log calls it.
+            name: Name of the field in the log.
 
         Raises:
-            FieldError: If the form is unknown, or W is not positive definite.
+            FieldError: If the form is unknown, W is not symmetric and positive
+                definite, or an argument does not fit; see `JacobianCost`.
             FrameNotFoundError: If the robot has no such frame.
         """
         super().__init__(robot, frame, rows=rows, axes=axes, length=length, name=name)
@@ -62,7 +67,7 @@ class Manipulability(CompiledJacobianCost):
         self.form = form
         self._weighted = metric is not None
         self._W_inv = _inverse(metric, robot.nv) if self._weighted else np.eye(robot.nv)
-        # More where the metric's numbers are small: it must stand above G's rounding.
+        # Larger if the entries of W are small: it must exceed the rounding error of G.
         self._floor = FLOOR**2 * max(1.0, 0.1 * float(np.trace(self._W_inv)) / robot.nv)
 
     def _kernel(self) -> tuple[Callable[..., float], tuple[Any, ...]]:
@@ -108,7 +113,7 @@ def _manipulability(
             for p in range(k):
                 slope_rate[i, j] -= G_dot[i, p] * slope[p, j]
     solve_columns(L, slope_rate)
-    # -φ itself, or f = -exp(power φ) with ∂f = power f ∂φ and f' = power f φ'
+    # f = -φ, or f = -exp(power φ) with ∂f = power f ∂φ and f' = power f φ'
     value, outer, outer_rate = -half_log, -1.0, 0.0
     if power > 0:
         value = -exp(power * half_log)

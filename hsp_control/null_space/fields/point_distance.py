@@ -1,4 +1,4 @@
-"""The paper's obstacle cost: frames keep away from an obstacle's centre."""
+"""The paper's obstacle cost: the distance of frames from an obstacle's centre."""
 
 from collections.abc import Sequence
 
@@ -17,8 +17,13 @@ from hsp_control.trajectories import TrajectorySample
 class PointDistance(CompiledCost):
     """f = weight · Σ 1/d_k², d_k from the origin of frame k to the obstacle's centre.
 
-    The paper's fourth simulation: joints two and three of the planar arm and a moving
-    disk. The centre's motion enters through ∂∇f/∂t.
+    The paper's fourth simulation uses joints two and three of the planar arm and a
+    moving disk. (∇f)' contains the motion of the centre.
+
+    Attributes:
+        frames: Names of the frames.
+        obstacle: The obstacle.
+        weight: The weight [m²/s].
     """
 
     def __init__(
@@ -34,14 +39,14 @@ class PointDistance(CompiledCost):
 
         Args:
             robot: The robot.
-            frames: Names of the frames that keep away.
-            obstacle: What they keep away from.
-            weight: Weight ≥ 0 [m² /s].
-            name: What the log calls it.
+            frames: Names of the frames that move away from the obstacle.
+            obstacle: The obstacle, of which only the centre counts.
+            weight: Weight ≥ 0 [m²/s].
+            name: Name of the field in the log.
 
         Raises:
             FrameNotFoundError: If a frame does not exist.
-            FieldError: If no frame is named or the weight is negative.
+            FieldError: If there is no frame, or the weight is negative or not finite.
         """
         super().__init__(robot, name)
         if not frames:
@@ -55,8 +60,8 @@ class PointDistance(CompiledCost):
         self.weight = float(weight)
         self._center = TrajectorySample.allocate(3)
 
-    def least_distance(self, state: RobotState) -> float:
-        """Return the least distance from a frame to the obstacle's centre [m]."""
+    def minimum_distance(self, state: RobotState) -> float:
+        """Return the minimum distance from a frame to the obstacle's centre [m]."""
         c = self.obstacle.center.sample(state.t, self._center).position
         return min(
             float(np.linalg.norm(state.position(frame) - c)) for frame in self.frames
@@ -113,10 +118,10 @@ def _push(
     gradient: Array,
     rate: Array,
 ) -> float:
-    """Add one frame's part to ∇f and (∇f)', and return d².
+    """Add the terms of one frame to ∇f and (∇f)', and return d².
 
-    With r from the centre to the frame and r' = J v - c' they are -2 weight Jᵀr/d⁴ and
-    -2 weight (J'ᵀr + Jᵀr' - 4 (r·r'/d²) Jᵀr)/d⁴.
+    With r from the centre to the frame and r' = J v - c' the terms are
+    -2 weight Jᵀr/d⁴ and -2 weight (J'ᵀr + Jᵀr' - 4 (r·r'/d²) Jᵀr)/d⁴.
     """
     square = nearing = 0.0
     for a in range(3):
@@ -129,7 +134,7 @@ def _push(
     for i in range(gradient.shape[0]):
         for a in range(3):
             r, r_dot = position[a] - center[a], velocity[a] - center_velocity[a]
-            bent = r_dot - 4.0 * nearing / square * r
+            inner = r_dot - 4.0 * nearing / square * r
             gradient[i] += scale * J[a, i] * r
-            rate[i] += scale * (J_dot[a, i] * r + J[a, i] * bent)
+            rate[i] += scale * (J_dot[a, i] * r + J[a, i] * inner)
     return square

@@ -1,4 +1,4 @@
-"""Fields that ask for nothing: self-motion comes to rest, or is left alone."""
+"""Fields without a goal: self-motion comes to rest, or is not controlled."""
 
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.null_space.fields.field import FieldSample, NullSpaceField
@@ -7,16 +7,16 @@ from hsp_control.robot import Robot, RobotState
 
 
 class Rest(NullSpaceField):
-    """g = 0: the paper's second simulation."""
+    """g = 0: self-motion comes to rest. The paper's second simulation."""
 
     def __init__(self, robot: Robot, name: str = "rest") -> None:
-        """Set the field."""
+        """Set the robot, and the name of the field in the log."""
         super().__init__(robot, name)
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
-        """Write zeros."""
+        """Write g = 0 and g' = 0; see `NullSpaceField.evaluate`."""
         out.g[:] = 0.0
         out.g_dot[:] = 0.0
         return out
@@ -24,7 +24,7 @@ class Rest(NullSpaceField):
     def compile(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> StepPlan:
-        """Write zeros, which nothing changes, and return nothing to do."""
+        """Write zeros once, and return an empty step plan."""
         self.evaluate(state, metric, form, out)
         return StepPlan()
 
@@ -34,14 +34,14 @@ class Rest(NullSpaceField):
 
 
 class Uncontrolled(Rest):
-    """φ_N = 0: the paper's first simulation, and its warning.
+    """φ_N = 0: self-motion is not controlled. The paper's first simulation.
 
-    The task is tracked all the same, but nothing holds the self-motion: the joints run
-    away, unseen by the task. To see, not to use.
+    Only for demonstration. The task is tracked, but nothing damps the self-motion, and
+    the joints drift away while the task error shows nothing.
     """
 
     controls = False
 
     def __init__(self, robot: Robot, name: str = "uncontrolled") -> None:
-        """Set the field."""
+        """Set the robot, and the name of the field in the log."""
         super().__init__(robot, name)

@@ -1,4 +1,4 @@
-"""Directional manipulability: keep the frame quick, or strong, along one direction."""
+"""Directional manipulability: velocity or force of a frame along one direction."""
 
 from collections.abc import Callable, Sequence
 from math import sqrt
@@ -25,9 +25,13 @@ from hsp_control.robot import Robot
 class Transmission(CompiledJacobianCost):
     """f = -(uᵀG⁻¹u)^(-1/2) for velocity, -(uᵀGu)^(-1/2) for force, G = J Jᵀ.
 
-    The transmission ratio along the world direction u, the ellipsoid's radius there
-    (Chiu 1988): how fast the frame moves, or how hard it pushes, for unit joint rates
-    or efforts.
+    -f is the transmission ratio along the world direction u, the radius of the
+    manipulability ellipsoid in that direction (Chiu 1988): the velocity or force of the
+    frame for joint velocities or efforts of norm 1.
+
+    Attributes:
+        kind: ``velocity`` or ``force``.
+        direction: u of length 1, one number per axis in the order x, y, z.
     """
 
     def __init__(
@@ -45,14 +49,15 @@ class Transmission(CompiledJacobianCost):
         Args:
             robot: The robot.
             frame: Name of the frame.
-            direction: u in the world, one number for each of the axes in the order that
-                they are named in; normalised here.
+            direction: u in world axes, of any length but zero, one number per letter of
+                ``axes``, in the same order.
             kind: ``velocity`` or ``force``.
             axes: World axes of the position rows.
-            name: What the log calls it.
+            name: Name of the field in the log.
 
         Raises:
-            FieldError: If the direction or the kind is none.
+            FieldError: If the direction has another size, is zero or not finite, the
+                kind is unknown, or an argument does not fit; see `JacobianCost`.
             FrameNotFoundError: If the robot has no such frame.
         """
         super().__init__(robot, frame, rows="position", axes=axes, name=name)
@@ -60,7 +65,7 @@ class Transmission(CompiledJacobianCost):
         if u.shape != (len(axes),) or not 0.0 < np.linalg.norm(u) < np.inf:
             raise FieldError(
                 f"field {name!r}: direction {list(direction)} needs {len(axes)} "
-                "numbers, not all zero"
+                "finite numbers, not all zero"
             )
         if kind not in ("velocity", "force"):
             raise FieldError(f"field {name!r}: kind {kind!r}; choose velocity or force")
@@ -85,10 +90,10 @@ def _transmission(
     """Write ∂f/∂J and its rate, and return f = -s^(-1/2).
 
     Force: s = uᵀGu, ∂s/∂J = 2 u (Jᵀu)ᵀ. Velocity: s = uᵀG⁻¹u, ∂s/∂J = -2 y (Jᵀy)ᵀ with
-    y = G⁻¹u. Both are ±2 y zᵀ with z = Jᵀy.
+    y = G⁻¹u. Both are ±2 y zᵀ with z = Jᵀy, where y = u for force.
     """
     k, n = J.shape
-    y, y_dot, z, z_dot, bent = (
+    y, y_dot, z, z_dot, term = (
         scratch[0, 0, :k],
         scratch[1, 0, :k],
         scratch[2, 0],
@@ -113,10 +118,10 @@ def _transmission(
             y_dot[i] = -y_dot[i]
     multiply_transposed(J, y, z)
     multiply_transposed(J, y_dot, z_dot)
-    multiply_transposed(J_dot, y, bent)
+    multiply_transposed(J_dot, y, term)
     s = floor if force else 0.0
     for j in range(n):
-        z_dot[j] += bent[j]
+        z_dot[j] += term[j]
         if force:
             s += z[j] * z[j]
     if not force:

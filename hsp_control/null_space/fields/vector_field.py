@@ -1,4 +1,4 @@
-"""Fields given as vectors, among them a user's own Python function."""
+"""The abstract vector field g(q, t), and vector fields given as functions."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -14,20 +14,25 @@ from hsp_control.robot import Robot, RobotState
 
 
 class VectorField(NullSpaceField):
-    """A field given as it is: write `vector`, and `rate` if it has a closed form."""
+    """g(q, t) = vector(state): a field that does not depend on a metric.
+
+    A subclass calls ``super().__init__(robot, name)`` and implements `vector`. It may
+    override `rate`, which by default uses differences along the flow (error about
+    1e-9), and `value`.
+    """
 
     @abstractmethod
     def vector(self, state: RobotState) -> Array:
-        """Return g(q, t), shape (nv,); it may not depend on the velocity."""
+        """Return g(q, t), shape (nv,) [rad/s, m/s], which must not depend on v."""
 
     def rate(self, state: RobotState) -> Array:
-        """Return g' = ∂g/∂q·v + ∂g/∂t, by default by differences along the flow."""
+        """Return g' = ∂g/∂q·v + ∂g/∂t, shape (nv,); by default by differences."""
         return rate_along_flow(self.vector, state)
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
-        """Write the vector and its rate.
+        """Write g and g'; see `NullSpaceField.evaluate`.
 
         Raises:
             FieldError: If either is not an array of nv finite numbers.
@@ -50,12 +55,12 @@ class VectorField(NullSpaceField):
         return array
 
     def value(self, state: RobotState) -> float:
-        """Return ‖g‖."""
+        """Return ‖g‖, the Euclidean norm."""
         return float(np.linalg.norm(self.vector(state)))
 
 
 class FunctionField(VectorField):
-    """A user's own vector field."""
+    """g = function(state): a vector field given as a Python function."""
 
     def __init__(
         self,
@@ -69,18 +74,19 @@ class FunctionField(VectorField):
 
         Args:
             robot: The robot.
-            function: g of a state, shape (nv,); it reads q, t and frames, not v.
-            rate: Its exact total rate of a state, if known.
-            name: What the log calls it.
+            function: g of a state, shape (nv,) [rad/s, m/s]; it may use q, t and
+                frames, but not v.
+            rate: g' = ∂g/∂q·v + ∂g/∂t of a state, shape (nv,); None: by differences.
+            name: Name of the field in the log.
         """
         super().__init__(robot, name)
         self._function = function
         self._rate = rate
 
     def vector(self, state: RobotState) -> Array:
-        """Return the function's value."""
+        """Return g."""
         return self._function(state)
 
     def rate(self, state: RobotState) -> Array:
-        """Return the given rate, or differences along the flow."""
+        """Return g' from the given function, or by differences along the flow."""
         return super().rate(state) if self._rate is None else self._rate(state)

@@ -1,4 +1,4 @@
-"""Joint-space metrics."""
+"""Joint-space metrics W(q)."""
 
 from .constant import ConstantMetric as ConstantMetric
 from .identity import IdentityMetric as IdentityMetric

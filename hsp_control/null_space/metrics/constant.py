@@ -1,4 +1,4 @@
-"""A constant metric: weighted joints, or the paper's law in coordinates theta = A q."""
+"""A constant metric: weighted joints, or the paper's law in coordinates θ = A q."""
 
 from typing import Any, ClassVar, Self
 
@@ -11,10 +11,13 @@ from hsp_control.robot import RobotState
 
 
 class ConstantMetric(Metric):
-    """W constant, symmetric positive definite.
+    """W = const, symmetric positive definite.
 
-    With W = AᵀA the law is the paper's in the coordinates theta = A q, since a
-    pseudo-inverse is not invariant under a change of coordinates (law.md §2).
+    With W = AᵀA the law equals the paper's law in the coordinates θ = A q, because a
+    pseudo-inverse changes with the coordinates (docs/law.md).
+
+    Attributes:
+        W: The matrix, shape (nv, nv).
     """
 
     form: ClassVar[int] = CONSTANT
@@ -26,7 +29,7 @@ class ConstantMetric(Metric):
             W: A matrix of shape (nv, nv), or its diagonal, shape (nv,).
 
         Raises:
-            MetricError: If W is not square, symmetric and positive definite.
+            MetricError: If W is not finite, square, symmetric and positive definite.
         """
         matrix = np.asarray(W, dtype=float)
         if matrix.ndim == 1:
@@ -34,13 +37,13 @@ class ConstantMetric(Metric):
         if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
             raise MetricError(f"metric has shape {matrix.shape}; needs (nv, nv)")
         if not np.isfinite(matrix).all():
-            raise MetricError("metric holds a NaN or an infinity")
+            raise MetricError("metric contains NaN or inf")
         if np.abs(matrix - matrix.T).max() > 1e-12 * np.abs(matrix).max():
             raise MetricError("metric is not symmetric")
         values = np.linalg.eigvalsh(matrix)
-        if values[0] <= 1e-12 * values[-1]:  # rounding lifts a 0 to about 1e-16
+        if values[0] <= 1e-12 * values[-1]:  # a zero may be computed as about 1e-16
             raise MetricError(
-                "metric is not positive definite: its least eigenvalue is "
+                "metric is not positive definite: its smallest eigenvalue is "
                 f"{values[0]:.3g}, its largest {values[-1]:.3g}"
             )
         self.W = matrix.copy()
@@ -48,7 +51,7 @@ class ConstantMetric(Metric):
 
     @classmethod
     def from_coordinates(cls, A: Any) -> Self:
-        """Return W = AᵀA, Euclidean in the coordinates theta = A q.
+        """Return the metric W = AᵀA, Euclidean in the coordinates θ = A q.
 
         Args:
             A: An invertible matrix of shape (nv, nv).
@@ -62,19 +65,23 @@ class ConstantMetric(Metric):
         return cls(matrix.T @ matrix)
 
     def check(self, nv: int) -> None:
-        """Raise MetricError if W is not of the robot's size."""
+        """Check that W has shape (nv, nv).
+
+        Raises:
+            MetricError: If it has another shape.
+        """
         if self.W.shape[0] != nv:
             raise MetricError(
                 f"metric has shape {self.W.shape}; the robot needs ({nv}, {nv})"
             )
 
     def compile(self, state: RobotState, out: MetricSample) -> StepPlan:
-        """Write W and its factor, which stay, and return nothing to do."""
+        """Write the constant W and L once, and return an empty step plan."""
         self.evaluate(state, out)
         return StepPlan()
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
-        """Write W and its factor; W' stays zero."""
+        """Write W and L; W' stays zero. See `Metric.evaluate`."""
         out.W[:] = self.W
         out.L[:] = self._factor
         return out

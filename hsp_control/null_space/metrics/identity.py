@@ -1,4 +1,4 @@
-"""The Euclidean metric of the joints: the paper's own."""
+"""The Euclidean metric of the joints, used by the paper."""
 
 from typing import ClassVar
 
@@ -8,14 +8,14 @@ from hsp_control.robot import RobotState
 
 
 class IdentityMetric(Metric):
-    """W = I: every joint's motion counts the same. The sane default."""
+    """W = I: the motions of all joints count the same. The default."""
 
     form: ClassVar[int] = IDENTITY
 
     def compile(self, state: RobotState, out: MetricSample) -> StepPlan:
-        """Return nothing to do."""
+        """Return an empty step plan: ``out`` is the identity already."""
         return StepPlan()
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
-        """Leave ``out`` as `MetricSample.allocate` made it: the identity."""
+        """Return ``out`` unchanged: `MetricSample.allocate` returns the identity."""
         return out

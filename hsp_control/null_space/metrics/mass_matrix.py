@@ -1,4 +1,4 @@
-"""The kinetic-energy metric: Khatib's dynamically consistent inverse."""
+"""The kinetic-energy metric, of Khatib's dynamically consistent inverse."""
 
 from functools import partial
 from typing import ClassVar
@@ -16,29 +16,35 @@ from hsp_control.robot import RobotState
 
 
 class MassMatrixMetric(Metric):
-    """W = M(q), W' = C + Cᵀ: null-space motion that does no work on the task.
+    """W = M(q), W' = C + Cᵀ: the kinetic energy is ½ vᵀWv.
 
-    M is badly conditioned on real robots (4e2 on a Panda, 1e5 on a humanoid): the
-    light wrists then do the task's work (theory.md §3).
+    Null-space efforts do not accelerate the task (dynamically consistent). M is badly
+    conditioned on real robots (condition number 4e2 on a Panda, 1e5 on a humanoid):
+    light joints, such as wrists, then do most of the task's motion.
     """
 
     form: ClassVar[int] = VARYING
 
     def compile(self, state: RobotState, out: MetricSample) -> StepPlan:
-        """Return what `evaluate` does with this state and this sample.
+        """Return the step plan that does what `evaluate` does; see `Metric.compile`.
 
-        Where M is singular L is NaN, so that the step is refused.
+        Where M is singular it writes NaN into L, so that the law reports that the step
+        is not finite.
         """
         if state.robot.mimics:
             return super().compile(state, out)
         matrices = state.mass_matrix, state.coriolis_matrix
-        bring = [
+        update = [
             partial(getattr, state, name) for name in ("mass_matrix", "coriolis_matrix")
         ]
-        return StepPlan((), (*bring, bind(_write, *matrices, *out)))
+        return StepPlan((), (*update, bind(_write, *matrices, *out)))
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
-        """Write M, its factor and its rate."""
+        """Write W = M, L and W' = M'; see `Metric.evaluate`.
+
+        Raises:
+            MetricError: If M is singular.
+        """
         out.W[:] = state.mass_matrix
         if not cholesky(out.W, out.L):
             raise MetricError(f"the mass matrix is singular at q = {state.q.tolist()}")
@@ -48,7 +54,7 @@ class MassMatrixMetric(Metric):
 
 @kernel
 def _write(M: Array, C: Array, W: Array, L: Array, W_dot: Array) -> None:
-    """Write W = M, its factor and W' = C + Cᵀ."""
+    """Write W = M, its factor L and W' = C + Cᵀ; L is NaN if M is singular."""
     n = M.shape[0]
     for i in range(n):
         for j in range(n):

@@ -1,4 +1,4 @@
-"""What a joint-space metric is: a positive definite W(q) that measures velocities."""
+"""The abstract joint-space metric."""
 
 from abc import ABC, abstractmethod
 from functools import partial
@@ -13,16 +13,16 @@ from hsp_control.common.step_plan import StepPlan
 from hsp_control.robot import RobotState
 
 IDENTITY, CONSTANT, VARYING = 0, 1, 2
-"""How much work a metric asks for: no solve; solves; solves and terms in W'."""
+"""Form of a metric: W = I (no solves); W' = 0 (solves); any W (solves, terms in W')."""
 
 
 class MetricSample(NamedTuple):
-    """A metric at one state.
+    """W = L Lᵀ and W': a metric at one state.
 
     Attributes:
-        W: The metric, shape (nv, nv).
-        L: Its Cholesky factor, W = L Lᵀ, lower triangular, shape (nv, nv).
-        W_dot: Its time derivative along v, shape (nv, nv).
+        W: The metric, symmetric positive definite, shape (nv, nv).
+        L: Its Cholesky factor, lower triangular, shape (nv, nv).
+        W_dot: W', its time derivative along v, shape (nv, nv) [unit of W per s].
     """
 
     W: Array
@@ -31,42 +31,71 @@ class MetricSample(NamedTuple):
 
     @classmethod
     def allocate(cls, nv: int) -> "MetricSample":
-        """Return the identity metric of nv freedoms."""
+        """Return the identity metric of nv degrees of freedom, with W' = 0."""
         return cls(np.eye(nv), np.eye(nv), np.zeros((nv, nv)))
 
 
 class Metric(ABC):
-    """A joint-space metric W(q): symmetric, positive definite.
+    """‖v‖²_W = vᵀ W(q) v: a joint-space metric, W symmetric positive definite.
 
-    It decides what "the smallest joint motion" is: the pseudo-inverse is
-    J# = W⁻¹Jᵀ(JW⁻¹Jᵀ)⁻¹, the projector P = I - J#J, and a cost's field -W⁻¹∇f.
+    The law minimises joint motion in this norm: the pseudo-inverse is
+    J# = W⁻¹Jᵀ(JW⁻¹Jᵀ)⁻¹, the null-space projector P = I - J#J, and the field of a cost
+    -W⁻¹∇f. W acts on the tangent space: v has shape (nv,) and is in rad/s and m/s.
 
-    To implement one, set `form` to CONSTANT or VARYING and write `evaluate`.
+    A subclass sets `form` to CONSTANT or VARYING and implements `evaluate`. It may
+    override `check`, and `compile` to make a step faster; by default the step plan
+    calls `evaluate` at every step.
+
+    Attributes:
+        form: IDENTITY, CONSTANT or VARYING, by which the law skips terms that are zero.
     """
 
     form: ClassVar[int]
 
     def check(self, nv: int) -> None:  # noqa: B027 (most metrics fit every robot)
-        """Raise MetricError if the metric does not fit a robot of nv freedoms."""
+        """Check that the metric fits a robot of nv degrees of freedom.
+
+        By default every robot fits.
+
+        Raises:
+            MetricError: If it does not fit.
+        """
 
     def __init_subclass__(cls, **arguments: Any) -> None:
-        """Let an `evaluate` that is overridden count, also of a ready metric."""
+        """Reset `compile` if a subclass overrides `evaluate` only.
+
+        Otherwise a subclass of a concrete metric would inherit a step plan that ignores
+        its `evaluate`.
+        """
         super().__init_subclass__(**arguments)
         if "evaluate" in vars(cls) and "compile" not in vars(cls):
             cls.compile = Metric.compile  # type: ignore[method-assign]
 
     def compile(self, state: RobotState, out: MetricSample) -> StepPlan:
-        """Return what `evaluate` does with this state and this sample."""
+        """Return the step plan that does what `evaluate` does; may be overridden.
+
+        Args:
+            state: The state that every step reads. Its values change between steps.
+            out: The sample that every step writes.
+        """
         return StepPlan(write=(partial(self.evaluate, state, out),))
 
     @abstractmethod
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
-        """Write W, L and W' at a state into ``out`` and return it."""
+        """Write W = L Lᵀ and W' at a state into ``out`` and return ``out``.
+
+        ``out`` is the identity with W' = 0 before the first call; entries that never
+        change from that need not be written.
+
+        Args:
+            state: The robot's state: t, q, v and the kinematics.
+            out: The sample to write into, shapes (nv, nv).
+        """
 
 
 @kernel
 def raise_covector(covector: Array, L: Array, form: int) -> None:
-    """Overwrite a covector by W⁻¹ covector."""
+    """Overwrite a covector, shape (nv,), by W⁻¹ covector, with W = L Lᵀ."""
     if form != IDENTITY:
         solve_lower(L, covector)
         solve_lower_transposed(L, covector)

@@ -1,1 +1,1 @@
-"""From a name or a URDF to a model: found, read with care, checked."""
+"""Find a robot by name or path, check its URDF and build its Pinocchio model."""

@@ -1,8 +1,8 @@
-"""Which files may be read on a stranger's word.
+"""Which files may be read when an untrusted file names them.
 
-A configuration, a URDF, a mesh or a log names other files. Told to be strict, we read
-only those that lie in folders which the user allowed. Paths are compared as the file
-system resolves them: neither ``..`` nor a link leads out.
+A configuration, a URDF, a mesh or a log names other files. Strict reading opens only
+files in folders that the user allowed. Paths are compared after ``..`` and symbolic
+links have been resolved, so neither leads out of these folders.
 """
 
 from collections.abc import Iterable
@@ -19,18 +19,18 @@ class Access:
     """Which files may be read.
 
     Attributes:
-        folders: Where they may lie, as the file system resolves them; None: anywhere.
+        folders: Resolved paths of the allowed folders; None: every file is allowed.
     """
 
     folders: tuple[Path, ...] | None = None
 
     @property
     def strict(self) -> bool:
-        """Whether anything is forbidden."""
+        """Whether only files in ``folders`` are allowed."""
         return self.folders is not None
 
     def allows(self, path: Path) -> bool:
-        """Say whether a file, or everything in a folder, may be read."""
+        """Return whether a file, or everything in a folder, may be read."""
         if self.folders is None:
             return True
         real = _resolved(path)
@@ -39,32 +39,33 @@ class Access:
         )
 
     def check(self, path: Path, what: str) -> None:
-        """Refuse a path that is not allowed.
+        """Check that a path is allowed.
 
         Args:
-            path: The file, relative to the working folder if to anything.
-            what: What names it, for the message: ``robot`` or ``link 'hand': mesh``.
+            path: The file; a relative path is relative to the working folder.
+            what: What names the file, for the message: ``robot`` or
+                ``link 'hand': mesh``.
 
         Raises:
-            AccessError: If the path leads outside the folders that are allowed.
+            AccessError: If the file is outside the allowed folders.
         """
         if self.allows(path):
             return
         real = _resolved(path)
         if real is None:
-            raise AccessError(f"{what} {str(path)!r}: no path that can be resolved")
+            raise AccessError(f"{what} {str(path)!r}: cannot resolve this path")
         raise AccessError(
-            f"{what} {str(path)!r} leads to {real}, outside the folders that strict "
-            f"reading allows; if you trust it: --allow {real.parent}"
+            f"{what} {str(path)!r} resolves to {real}, outside the folders that strict "
+            f"reading allows; if you trust it, add --allow {real.parent}"
         )
 
 
 ANYWHERE = Access()
-"""What is read where nobody asked to be strict."""
+"""Every file may be read: the default, without strict reading."""
 
 
 def only_within(folders: Iterable[str | PathLike[str]]) -> Access:
-    """Return access to some folders and to the bundled robots and configurations."""
+    """Return access to these folders and to the bundled robots and configurations."""
     allowed = [*map(Path, folders), bundled("robots"), bundled("configs")]
     return Access(tuple(folder.expanduser().resolve() for folder in allowed))
 
@@ -72,5 +73,5 @@ def only_within(folders: Iterable[str | PathLike[str]]) -> Access:
 def _resolved(path: Path) -> Path | None:
     try:
         return path.resolve()
-    except (OSError, ValueError, RuntimeError):  # a null byte, a loop of links
+    except (OSError, ValueError, RuntimeError):  # a null byte or a loop of links
         return None

@@ -1,7 +1,8 @@
-"""Several robots in one workspace, as one model.
+"""Combine several robots in one workspace into one model.
 
-Their Jacobians do not mix, so each follows the law as if alone, and each is to the
-other an obstacle that moves with its true velocity.
+Their Jacobians are decoupled, so each robot follows the control law as if it were
+alone. For collision avoidance each robot is an obstacle for the others, and its true
+velocity is known.
 """
 
 from collections.abc import Sequence
@@ -16,12 +17,12 @@ from hsp_control.robot.description.sources import RobotSource
 
 @dataclass(frozen=True)
 class Part:
-    """One robot among several.
+    """One robot of a combined robot.
 
     Attributes:
-        prefix: What its joints' and frames' names begin with, ``left_``.
-        source: Where it comes from.
-        placement: Where it stands in the world.
+        prefix: The names of its joints and frames begin with this, e.g. ``left_``.
+        source: Where the robot comes from.
+        placement: Placement of its root in the world.
     """
 
     prefix: str
@@ -30,32 +31,33 @@ class Part:
 
 
 def combine(parts: Sequence[tuple[Part, pin.Model]]) -> pin.Model:
-    """Return one model of all robots.
+    """Return one model that contains all robots.
 
     Args:
-        parts: Each robot's part and its own model.
+        parts: For each robot its part and its own model.
 
     Raises:
-        ModelError: If there are fewer than two, prefixes repeat, one consists of
-            several already, their gravity differs, or a joint mimics another
-            (Pinocchio cannot append it).
+        ModelError: If there are fewer than two robots, two have the same prefix, one is
+            already a combination, their gravity differs, or one has mimic joints
+            (Pinocchio cannot append those).
     """
     prefixes = [part.prefix for part, _ in parts]
     if len(parts) < 2 or len(set(prefixes)) < len(prefixes):
         raise ModelError(
-            f"robots to combine need different names, two or more: got {prefixes}"
+            "robots to combine must be two or more, with different names; got prefixes "
+            f"{prefixes}"
         )
     whole = pin.Model()
     for part, model in parts:
         if part.source.origin == "combined":
             raise ModelError(
-                f"{part.prefix}{part.source.name}: is combined already; "
-                "combine all robots at once"
+                f"{part.prefix}{part.source.name} is already a combined robot; "
+                "combine all robots in one call"
             )
         if model.nvExtended != model.nv:
             raise ModelError(
-                f"{part.prefix}{part.source.name}: joints that mimic others cannot be "
-                "combined; lock them, or load with mimic: false"
+                f"{part.prefix}{part.source.name}: a robot with mimic joints cannot be "
+                "combined; lock these joints, or load the robot with mimic=False"
             )
         own = model.copy()
         for index in range(1, own.njoints):
@@ -64,7 +66,7 @@ def combine(parts: Sequence[tuple[Part, pin.Model]]) -> pin.Model:
             own.frames[index].name = part.prefix + own.frames[index].name
         whole = pin.appendModel(whole, own, 0, part.placement)
     if any(model.gravity != parts[0][1].gravity for _, model in parts):
-        raise ModelError("robots to combine differ in gravity; load them with the same")
+        raise ModelError("robots to combine differ in gravity; load all with one value")
     whole.gravity = parts[0][1].gravity
     return whole
 

@@ -1,4 +1,4 @@
-"""Parse a robot's URDF into the Pinocchio model that is asked for, without meshes."""
+"""Build the Pinocchio model of a robot from its URDF, without meshes."""
 
 import os
 import re
@@ -21,7 +21,7 @@ from hsp_control.common.exceptions import (
     ShapeError,
 )
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.robot.description.mesh_files import check_named
+from hsp_control.robot.description.mesh_files import check_mesh_name
 from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.description.urdf_checks import named_files, read_urdf
 
@@ -33,10 +33,10 @@ _ROOT_JOINTS = {
 
 @dataclass(frozen=True)
 class ToolFrame:
-    """A frame added to the model, fixed to one of its frames.
+    """A frame to add to the model, fixed to one of its frames.
 
     Attributes:
-        parent: The frame that it is fixed to.
+        parent: Name of the frame that it is fixed to.
         translation: Its origin in the parent frame [m], shape (3,).
         rpy: Its roll, pitch and yaw in the parent frame [rad], as in a URDF.
     """
@@ -55,25 +55,30 @@ def load_model(
     gravity: Sequence[float] | None = None,
     mimic: bool = True,
 ) -> pin.Model:
-    """Parse the URDF and return the Pinocchio model of the robot that is asked for.
+    """Return the Pinocchio model of a robot, built from its URDF.
 
     Args:
         source: Where the robot comes from.
-        root: ``fixed``, ``planar`` (x, y, yaw) or ``free_flyer``; None: the source's.
-        locked: Joints to lock, name to value [rad or m]; None: the source's. Joints
-            that mimic a locked joint are locked with it.
+        root: ``fixed``, ``planar`` (x, y, yaw) or ``free_flyer``; None: as the source
+            says.
+        locked: Joints to lock, name to value [rad or m]; None: as the source says.
+            Joints that mimic a locked joint are locked with it.
         tool_frames: Frames to add, by name.
         gravity: Acceleration of gravity in the world [m/s²], shape (3,); None: -9.81
             along z.
-        mimic: Honour ``<mimic>`` (the joint follows its leader and has no freedom of
-            its own) or load such joints as free ones.
+        mimic: Whether a joint with ``<mimic>`` follows its leader and has no degree of
+            freedom of its own. False: it is an independent joint.
 
     Raises:
-        ModelError: If the URDF does not parse, has a joint whose limits are reversed,
-            or gives a singular mass matrix.
-        AccessError: If it names a file that the source's access does not allow.
+        ModelError: If the URDF is invalid, the root is unknown, a joint cannot be
+            locked, a tool frame's name exists already, a joint's limits are reversed,
+            or the mass matrix is singular.
+        RobotNotFoundError: If the URDF cannot be read.
+        AccessError: If the URDF names a file that the source's access does not allow.
         JointNotFoundError: If a joint to lock does not exist.
         FrameNotFoundError: If a tool frame's parent does not exist.
+        ShapeError: If gravity or a tool frame's placement is not 3 numbers.
+        NonFiniteError: If one of these, or a locked joint's value, is NaN or inf.
     """
     model = _parse(source, root or source.root, mimic=mimic)
     locks = source.locked if locked is None else locked
@@ -83,25 +88,29 @@ def load_model(
         _add_frame(model, name, tool)
     if gravity is not None:
         model.gravity.linear = _vector3(gravity, "gravity")
-    _refuse_reversed_limits(model, source)
-    _refuse_singular_mass_matrix(model, source)
+    _check_limits(model, source)
+    _check_mass_matrix(model, source)
     return model
 
 
 def moving_joints(model: pin.Model) -> dict[str, Any]:
-    """Return the joints that have freedoms, by name, in the order of velocities."""
-    named = list(zip(model.names, model.joints, strict=True))[1:]  # not the universe
+    """Return the joints with degrees of freedom, by name, in the order of v."""
+    named = list(zip(model.names, model.joints, strict=True))[
+        1:
+    ]  # without the universe
     return {name: joint for name, joint in named if joint.nv > 0}
 
 
-def standing(model: pin.Model, source: RobotSource) -> tuple[float, ...] | None:
-    """Return the posture that a source's SRDF has its robot stand in, shape (nv,).
+def reference_posture(
+    model: pin.Model, source: RobotSource
+) -> tuple[float, ...] | None:
+    """Return the reference posture of the source's SRDF, from neutral, shape (nv,).
 
-    None where there is none, or where the model has other joints than the SRDF means.
+    None if the SRDF has none, or if the model has other joints than the SRDF describes.
     """
     if source.srdf is None or source.posture is None:
         return None
-    model = model.copy()  # the postures are stored in the model
+    model = model.copy()  # Pinocchio stores the postures in the model
     pin.loadReferenceConfigurations(model, str(source.srdf), False)
     postures = {pair.key(): pair.data() for pair in model.referenceConfigurations}
     q = postures.get(source.posture)
@@ -111,22 +120,23 @@ def standing(model: pin.Model, source: RobotSource) -> tuple[float, ...] | None:
 
 
 def end_effector_frame(model: pin.Model) -> str:
-    """Return the frame that is most likely the hand, judged by the tree of joints.
+    """Return the frame that is most likely the hand, found from the kinematic tree.
 
-    It is the last link that moves with the end of the longest chain of joints, the last
-    chain of equals. Where that chain forks in its second half, what follows is taken
-    for fingers, and its end is the link that they spring from.
+    It is the last link on the last joint of the longest chain of joints (of the last
+    such chain if several are equally long). If this chain branches in its second half,
+    the branches are taken for fingers, and the chain ends at the joint where it
+    branches first.
     """
     chains: list[list[int]] = [[]]
     for joint in range(1, model.njoints):
         chains.append([*chains[model.parents[joint]], joint])
     longest = max(reversed(chains), key=len)
-    forks = [
+    branching = [
         joint
         for depth, joint in enumerate(longest, start=1)
         if 2 * depth >= len(longest) and len(model.children[joint]) > 1
     ]
-    end = forks[0] if forks else longest[-1]
+    end = branching[0] if branching else longest[-1]
     links = [
         frame.name
         for frame in model.frames
@@ -141,52 +151,52 @@ def _parse(source: RobotSource, root: Root, *, mimic: bool) -> pin.Model:
     xml = read_urdf(urdf)
     if source.access.strict:
         for name, where in named_files(xml):
-            check_named(source, name, f"{urdf}: {where}", source.access)
+            check_mesh_name(source, name, f"{urdf}: {where}", source.access)
     if root not in get_args(Root):
         roots = get_args(Root)
         raise ModelError(
             f"root {root!r} is not one of {listing(roots)}{did_you_mean(root, roots)}"
         )
-    said: list[str] = []
+    parser_errors: list[str] = []
     try:
-        with _errors_said(said):
+        with _collect_parser_errors(parser_errors):
             if root == "fixed":
                 return pin.buildModelFromUrdf(str(urdf), mimic=mimic)
             joint = _ROOT_JOINTS[root]()
             return pin.buildModelFromUrdf(str(urdf), joint, "root_joint", mimic=mimic)
     except (ValueError, RuntimeError) as error:
         reason = str(error).strip().splitlines()[-1].removeprefix("hint: ")
-        reason = said[0] if said else reason
+        reason = parser_errors[0] if parser_errors else reason
         if mimic and "mimic" in reason:
             reason = _explain_mimic(urdf) or reason
-            reason += "; load its mimic joints as free ones: mimic=False"
-        raise ModelError(f"{urdf}: not a robot that can be built: {reason}") from error
+            reason += "; load its mimic joints as independent joints with mimic=False"
+        raise ModelError(f"{urdf}: Pinocchio cannot build a model: {reason}") from error
 
 
 @contextmanager
-def _errors_said(said: list[str]) -> Iterator[None]:
-    """Collect the parser's "Error:" lines, which it writes to the process's stderr.
+def _collect_parser_errors(errors: list[str]) -> Iterator[None]:
+    """Collect the "Error:" lines that the URDF parser writes to the process's stderr.
 
-    Its exceptions say only that a URDF is not valid; these lines say why.
+    Its exceptions say only that a URDF is invalid; these lines say why.
     """
     sys.stderr.flush()
-    kept = os.dup(2)
+    own_stderr = os.dup(2)
     with tempfile.TemporaryFile() as file:
         os.dup2(file.fileno(), 2)
         try:
             yield
         finally:
-            os.dup2(kept, 2)
-            os.close(kept)
+            os.dup2(own_stderr, 2)
+            os.close(own_stderr)
             file.seek(0)
             lines = file.read().decode(errors="replace").splitlines()
-            said.extend(
+            errors.extend(
                 line.split("Error:", 1)[1].strip() for line in lines if "Error:" in line
             )
 
 
 def _explain_mimic(urdf: Path) -> str:
-    """Name the joint that Pinocchio cannot let follow another, and say why."""
+    """Return which mimic joint Pinocchio cannot handle, and why; empty if unknown."""
     order = list(pin.buildModelFromUrdf(str(urdf), mimic=False).names)
     for joint in read_urdf(urdf).iter("joint"):
         mimic, follower = joint.find("mimic"), joint.get("name")
@@ -194,11 +204,11 @@ def _explain_mimic(urdf: Path) -> str:
             continue
         leader = mimic.get("joint")
         if leader not in order:
-            return f"joint {follower!r} mimics {leader!r}, which is no moving joint"
+            return f"joint {follower!r} mimics {leader!r}, which is not a moving joint"
         if order.index(leader) > order.index(follower):
             return (
                 f"joint {follower!r} mimics {leader!r}, which comes after it in the "
-                "tree, and Pinocchio wants the leader first"
+                "tree, but Pinocchio needs the leader first"
             )
     return ""
 
@@ -214,7 +224,9 @@ def _lock(model: pin.Model, locks: Mapping[str, float]) -> pin.Model:
                 f"(the model has {listing(names)})"
             )
         if not np.isfinite(value):
-            raise NonFiniteError(f"cannot lock joint {name!r} at {value}")
+            raise NonFiniteError(
+                f"cannot lock joint {name!r} at {value}; needs a finite number"
+            )
         index = model.getJointId(name)
         joint = model.joints[index]
         ids.add(index)
@@ -224,9 +236,10 @@ def _lock(model: pin.Model, locks: Mapping[str, float]) -> pin.Model:
             reference[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
         elif joint.nq > 2:
             raise ModelError(
-                f"cannot lock {name!r}: it has {joint.nv} freedoms; choose root: fixed"
+                f"cannot lock {name!r}: it has {joint.nv} degrees of freedom, only "
+                "joints with one can be locked; for a fixed base use root: fixed"
             )
-    _refuse_contradictory_locks(model, locks)
+    _check_mimic_locks(model, locks)
     ids |= {
         index
         for index, joint in enumerate(model.joints)
@@ -234,12 +247,12 @@ def _lock(model: pin.Model, locks: Mapping[str, float]) -> pin.Model:
         and any(model.joints[leader].idx_q == joint.idx_q for leader in ids)
     }
     if len(ids) == len(names):
-        raise ModelError("every joint is locked: no freedom is left to control")
+        raise ModelError("every joint is locked; at least one must be left to control")
     return pin.buildReducedModel(model, sorted(ids), reference)
 
 
-def _refuse_contradictory_locks(model: pin.Model, locks: Mapping[str, float]) -> None:
-    """A mimic joint is where its leader puts it: it cannot be locked elsewhere."""
+def _check_mimic_locks(model: pin.Model, locks: Mapping[str, float]) -> None:
+    """Check that a locked mimic joint has the value that its leader gives it."""
     leaders = {
         joint.idx_q: name
         for name, joint in zip(model.names, model.joints, strict=True)
@@ -251,7 +264,9 @@ def _refuse_contradictory_locks(model: pin.Model, locks: Mapping[str, float]) ->
             continue
         leader, follower = leaders[joint.idx_q], joint.extract()
         if leader not in locks:
-            raise ModelError(f"cannot lock {name!r}: it mimics {leader!r}; lock that")
+            raise ModelError(
+                f"cannot lock {name!r}: it mimics {leader!r}; lock {leader!r} instead"
+            )
         value = follower.scaling * locks[leader] + follower.offset
         if abs(value - locks[name]) > 1e-6:
             raise ModelError(
@@ -263,7 +278,9 @@ def _refuse_contradictory_locks(model: pin.Model, locks: Mapping[str, float]) ->
 def _add_frame(model: pin.Model, name: str, tool: ToolFrame) -> None:
     names = [frame.name for frame in model.frames]
     if name in names:
-        raise ModelError(f"cannot add tool frame {name!r}: a frame has that name")
+        raise ModelError(
+            f"cannot add tool frame {name!r}: the model has a frame with this name"
+        )
     if tool.parent not in names:
         raise FrameNotFoundError(
             f"tool frame {name!r}: no parent frame {tool.parent!r}"
@@ -283,7 +300,7 @@ def _add_frame(model: pin.Model, name: str, tool: ToolFrame) -> None:
     )
 
 
-def _refuse_reversed_limits(model: pin.Model, source: RobotSource) -> None:
+def _check_limits(model: pin.Model, source: RobotSource) -> None:
     for name, joint in moving_joints(model).items():
         if joint.nq == joint.nv == 1:
             lower = model.lowerPositionLimit[joint.idx_q]
@@ -295,11 +312,11 @@ def _refuse_reversed_limits(model: pin.Model, source: RobotSource) -> None:
                 )
 
 
-def _refuse_singular_mass_matrix(model: pin.Model, source: RobotSource) -> None:
-    """Refuse a model with joints that move no mass, and name them.
+def _check_mass_matrix(model: pin.Model, source: RobotSource) -> None:
+    """Check that every joint moves some mass, so that M is not singular.
 
-    Tried at a generic configuration, where only joints (or a combination of joints)
-    that never move any mass make M singular.
+    M is computed at a generic configuration: there it is singular only if a joint, or a
+    combination of joints, moves no mass at any configuration.
     """
     if model.nv == 0:
         raise ModelError(f"{source.urdf}: the robot has no moving joint")
@@ -310,19 +327,19 @@ def _refuse_singular_mass_matrix(model: pin.Model, source: RobotSource) -> None:
     if values[0] > 1e-12 * values[-1]:
         return
     idle = np.diag(mass_matrix) <= 1e-12 * values[-1]
-    if not idle.any():  # only together: name the one that moves most
+    if not idle.any():  # a combination of joints: name the one that moves most
         idle[np.argmax(np.abs(vectors[:, 0]))] = True
-    culprits = {
+    massless = {
         name: joint.nv
         for name, joint in moving_joints(model).items()
         if idle[joint.idx_v : joint.idx_v + joint.nv].any()
     }
-    single = set(culprits.values()) == {1}
-    locks = ", ".join(f"{name}: 0.0" for name in culprits)
+    single = set(massless.values()) == {1}
+    locks = ", ".join(f"{name}: 0.0" for name in massless)
     raise ModelError(
-        f"{source.urdf}: no mass moves with {listing(culprits)}, so that no "
-        f"acceleration is defined there (the mass matrix is singular: {values[0]:.1e} "
-        f"of {values[-1]:.1e}); give the links an inertia, or "
+        f"{source.urdf}: no mass moves with {listing(massless)}, so that the mass "
+        f"matrix is singular (smallest eigenvalue {values[0]:.1e}, largest "
+        f"{values[-1]:.1e}); give the links an inertia, or "
         + (f"lock the joints: locked: {{{locks}}}" if single else "root: fixed")
     )
 

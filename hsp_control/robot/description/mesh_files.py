@@ -1,6 +1,7 @@
-"""Files of triangles that a URDF or a configuration names: found, bounded, checked.
+"""Find and check mesh files that a URDF or a configuration names.
 
-They go to Assimp (distances) and to the page (views), which know no bounds.
+The files are passed to Assimp (distances) and to the browser (views), which do not
+limit their size.
 """
 
 import os
@@ -12,27 +13,30 @@ from urllib.parse import unquote
 from hsp_control.common.exceptions import AccessError
 from hsp_control.robot.description.access import Access
 from hsp_control.robot.description.sources import RobotSource
-from hsp_control.robot.description.xml_files import XmlError, refuse_document_type
+from hsp_control.robot.description.xml_files import XmlError, check_no_document_type
 
 MAX_SIZE = 100_000_000
-"""Bytes of a mesh file; the largest of example-robot-data has 13 MB."""
+"""Maximum size of a mesh file [bytes]; example-robot-data has up to 13 MB."""
 CHECKED = {".stl", ".obj", ".dae"}
-"""Formats whose references to other files we know: strict reading takes no other."""
+"""Formats whose references to other files are checked.
+
+Strict reading allows no other formats.
+"""
 
 _PICTURE = re.compile(rb"<init_from[^>]*>([^<]*)<")
 _LIBRARY = re.compile(rb"^[ \t]*mtllib[ \t]+(.+)$", re.M)
 
 
-def complaint(file: Path) -> str:
-    """Return why a mesh file cannot be passed on, or nothing."""
-    if not file.is_file():  # a pipe would wait for ever
+def find_problem(file: Path) -> str:
+    """Return why a mesh file cannot be used, or an empty string."""
+    if not file.is_file():  # reading a pipe would block
         return "no such file"
     try:
         size = file.stat().st_size
         if size > MAX_SIZE:
-            return f"{size / 1e6:.0f} MB; at most {MAX_SIZE // 1_000_000}"
+            return f"{size / 1e6:.0f} MB; at most {MAX_SIZE // 1_000_000} MB"
         if file.suffix.lower() == ".dae":
-            refuse_document_type(file.read_bytes())
+            check_no_document_type(file.read_bytes())
     except XmlError as error:
         return f"line {error.line}: {error.message}"
     except OSError as error:
@@ -41,9 +45,9 @@ def complaint(file: Path) -> str:
 
 
 def candidates(source: RobotSource, name: str) -> list[Path]:
-    """Return where the file that a URDF names may lie; the first that exists is it.
+    """Return the paths that a file name in a URDF may mean; the first existing wins.
 
-    A superset of the places where Pinocchio and the view look.
+    These include all paths that Pinocchio and the viewer try.
     """
     scheme, _, rest = name.rpartition("://")
     if scheme in ("package", "model"):
@@ -62,36 +66,44 @@ def candidates(source: RobotSource, name: str) -> list[Path]:
     return [source.urdf.parent / rest, *([Path(rest)] if scheme != "file" else [])]
 
 
-def check_named(source: RobotSource, name: str, what: str, access: Access) -> None:
-    """Refuse what a URDF's mesh names, if it is not allowed, and what that names.
+def check_mesh_name(source: RobotSource, name: str, what: str, access: Access) -> None:
+    """Check that a file that a URDF names may be read, and the files it refers to.
+
+    Args:
+        source: The robot.
+        name: The file name in the URDF, a path or a URL (``package://``, ...).
+        what: What names the file, for messages.
+        access: Which files may be read.
 
     Raises:
-        AccessError: If a file lies outside, or its format may name others unseen.
+        AccessError: If a file is outside the allowed folders, or its format can refer
+            to other files in a way that is not checked.
     """
     if not access.strict:
         return
     places = candidates(source, name)
     found = [place for place in places if _exists(place)]
     named_outside = name.rpartition("://")[0] not in ("package", "model")
-    # What does not exist is missed later; but no answer says what exists elsewhere.
+    # A missing file is reported later. But a path outside the allowed folders is an
+    # error in any case, so that the message does not reveal which files exist there.
     for place in found or (places[:1] if named_outside or ".." in name else []):
         access.check(place, what)
     for place in found:
-        check_inside(place, what, access)
+        check_references(place, what, access)
 
 
-def check_inside(file: Path, what: str, access: Access) -> None:
-    """Refuse a mesh that names files which may not be read, or may do so unseen.
+def check_references(file: Path, what: str, access: Access) -> None:
+    """Check that all files that a mesh file refers to may be read.
 
     Raises:
-        AccessError: If it does.
+        AccessError: If one may not, or if the references of this format are not known.
     """
     if not access.strict:
         return
     if file.suffix.lower() not in CHECKED:
         raise AccessError(
-            f"{what} {str(file)!r}: strict reading takes meshes in "
-            f"{', '.join(sorted(CHECKED))} only"
+            f"{what} {str(file)!r}: strict reading allows only meshes in "
+            f"{', '.join(sorted(CHECKED))}"
         )
     for name in _references(file):
         access.check(file.parent / name, f"{what} {file.name!r}: its reference")
@@ -99,7 +111,7 @@ def check_inside(file: Path, what: str, access: Access) -> None:
 
 def _references(file: Path) -> Iterator[str]:
     pattern = {".dae": _PICTURE, ".obj": _LIBRARY}.get(file.suffix.lower())
-    if pattern is None or complaint(file):
+    if pattern is None or find_problem(file):
         return
     for match in pattern.finditer(file.read_bytes()):
         text = match[1].decode("utf-8", "replace").strip().removeprefix("file://")

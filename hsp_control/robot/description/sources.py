@@ -1,4 +1,4 @@
-"""Find a robot by bundled name, name of example-robot-data, or path to a URDF."""
+"""Find a robot by its name or by the path to its URDF."""
 
 import importlib.util
 import os
@@ -17,8 +17,8 @@ from hsp_control.robot.description.access import ANYWHERE, Access
 
 Root = Literal["fixed", "planar", "free_flyer"]
 
-# What example-robot-data does not say, and the tree alone does not show: a lone jaw
-# looks like one more joint of the arm, a sensor like a tool.
+# Robots of example-robot-data for which `end_effector_frame` would be wrong: a single
+# gripper jaw looks like one more joint of the arm, a sensor looks like a tool.
 _END_EFFECTORS = {
     "b1_z1": "gripperStator",
     "baxter": "right_gripper",
@@ -32,21 +32,21 @@ _END_EFFECTORS = {
 
 @dataclass(frozen=True)
 class RobotSource:
-    """Where a robot comes from, and what its folder says of it.
+    """Where a robot comes from, and the settings that its folder gives.
 
     Attributes:
-        name: The name that it was asked for by, or the URDF file's stem.
+        name: Name of a known robot, or the URDF file's name without ``.urdf``.
         urdf: The URDF file.
         srdf: The SRDF file (reference postures, disabled collision pairs), if any.
-        root: How the robot stands in the world unless told otherwise.
-        package_dirs: Folders that ``package://`` is looked up in.
-        origin: ``bundled``, ``example-robot-data`` or ``file``.
-        locked: Joints locked unless told otherwise, name to value [rad or m].
+        root: The default root: ``fixed``, ``planar`` or ``free_flyer``.
+        package_dirs: Folders in which ``package://`` is looked up.
+        origin: ``bundled``, ``example-robot-data``, ``file`` or ``combined``.
+        locked: Joints that are locked by default, name to value [rad or m].
         end_effector: The frame that tasks use by default, if known.
-        home: Joint values of a good start posture, shape (nv,), if known.
-        posture: The SRDF's name of a posture to stand in, if known.
-        joint_coordinates: The matrix A of coordinates theta = A q that the literature
-            uses for this robot (``absolute`` for the planar arm), if any.
+        home: Joint values of a good start posture, shape (nv,) [rad or m], if known.
+        posture: Name of the reference posture in the SRDF, if known.
+        joint_coordinates: Which coordinates theta = A q the literature uses for this
+            robot (``absolute`` for the planar arm), if not q.
         access: Which files its URDF may name.
     """
 
@@ -65,14 +65,15 @@ class RobotSource:
 
 
 def find_robot(name: str | Path, access: Access = ANYWHERE) -> RobotSource:
-    """Find a robot by bundled name, name of example-robot-data, or path to a URDF.
+    """Find a bundled robot, one of example-robot-data, or a URDF file.
 
     Args:
-        name: For example ``"panda"``, ``"talos_arm"`` or ``"my_arm/arm.urdf"``.
-        access: Where a URDF that is named by path, and its meshes, may lie.
+        name: For example ``"panda"``, ``"talos_arm"`` or ``"my_arm/arm.urdf"``. A name
+            with a path separator, or ending in ``.urdf`` or ``.xml``, is a path.
+        access: Which files may be read: a URDF given by path, and its meshes.
 
     Raises:
-        RobotNotFoundError: If there is no such robot; the message names the nearest.
+        RobotNotFoundError: If there is no such robot; the message suggests the nearest.
         AccessError: If the path is not allowed.
     """
     text = os.fspath(name)
@@ -86,13 +87,18 @@ def find_robot(name: str | Path, access: Access = ANYWHERE) -> RobotSource:
         return others[text]
     if text in examples_without_urdf():
         raise RobotNotFoundError(
-            f"robot {text!r} of example-robot-data has no URDF; nothing else is read"
+            f"robot {text!r} of example-robot-data has no URDF; robots can only be "
+            "loaded from a URDF"
         )
-    known = sorted({*bundled, *others})
-    hint = "" if others else "; more with: pip install example-robot-data-loaders"
+    known = [*bundled, *sorted(set(others) - set(bundled))]
+    hint = (
+        "list all with: hsp robots"
+        if others
+        else "for 70 more: pip install example-robot-data-loaders"
+    )
     raise RobotNotFoundError(
         f"no robot {text!r}{did_you_mean(text, known)} "
-        f"(a path to a .urdf file, or one of: {listing(known)}){hint}"
+        f"(give a path to a .urdf file, or one of: {listing(known)}); {hint}"
     )
 
 
@@ -122,13 +128,13 @@ def example_robots() -> dict[str, RobotSource]:
 
 
 def examples_without_urdf() -> tuple[str, ...]:
-    """Return the names of example-robot-data that stand for no URDF."""
+    """Return the names of robots in example-robot-data that have no URDF."""
     found = example_robots()
     return tuple(name for name in _example_loaders() if name not in found)
 
 
 def packaged_folders() -> list[Path]:
-    """Return the folders of the robots that can be loaded by name."""
+    """Return the folder of example-robot-data, or nothing if it is not installed."""
     if importlib.util.find_spec("example_robot_data") is None:
         return []
     with suppress(RobotNotFoundError):  # installed without its data
@@ -138,16 +144,22 @@ def packaged_folders() -> list[Path]:
 
 def _from_path(path: Path, access: Access) -> RobotSource:
     if "\0" in str(path):
-        raise RobotNotFoundError(f"{str(path)!r}: no path has a null character")
-    with suppress(RuntimeError):  # a user that nobody knows: then it is no such file
+        raise RobotNotFoundError(
+            f"{str(path)!r}: a path cannot contain a null character"
+        )
+    with suppress(RuntimeError):  # an unknown user: reported below as "no such file"
         path = path.expanduser()
     access.check(path, "robot")
     if path.is_dir():
-        raise RobotNotFoundError(f"{path}: is a folder; name the .urdf file in it")
+        inside = listing(sorted(file.name for file in path.glob("*.urdf")))
+        raise RobotNotFoundError(
+            f"{path} is a folder; give a .urdf file in it"
+            + (f" (it contains {inside})" if inside else " (it contains none)")
+        )
     if not path.is_file():
         near = sorted(file.name for file in path.parent.glob("*.urdf"))
         raise RobotNotFoundError(f"{path}: no such file{did_you_mean(path.name, near)}")
-    # `package://<folder>/...` names a folder somewhere above the URDF.
+    # The folder of `package://<folder>/...` is usually one above the URDF.
     above = tuple(path.resolve().parents)[:5]
     ros = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
     packages = (*above, *(Path(folder) for folder in ros if folder))
@@ -192,8 +204,8 @@ def _example_loaders() -> dict[str, Any]:
 def _example_robot_data_folder() -> Path:
     """Return ``<prefix>/share/example-robot-data`` of the installed package.
 
-    The package's own constant names the folder that it was built in; its ``share``
-    stands beside the ``lib`` that its Python modules are in.
+    The package's own constant contains the path of its build machine, so the folder is
+    found from the path of its Python modules: ``share`` is next to their ``lib``.
     """
     spec = importlib.util.find_spec("example_robot_data")
     origin = spec.origin if spec is not None else None
@@ -202,6 +214,6 @@ def _example_robot_data_folder() -> Path:
         if folder.is_dir():
             return folder
     raise RobotNotFoundError(
-        "example-robot-data is installed without its data; "
+        "example-robot-data is installed without its robots; "
         "reinstall it with: pip install --force-reinstall example-robot-data"
     )

@@ -1,8 +1,9 @@
-"""Read XML that a stranger may have written: bounded in size, and without entities.
+"""Read untrusted XML: limited in size, and without a document type.
 
-A document type is what entities are declared in: the billion laughs, files of the
-reader's machine, addresses that are called. No URDF, SRDF or Collada file needs one, so
-it is refused before anything in it is looked at.
+A document type (``<!DOCTYPE>``) can declare entities, which allow attacks: text that
+grows exponentially (billion laughs), and access to local files and to network
+addresses. No URDF, SRDF or Collada file needs one, so a file that has one is an error
+before its content is read.
 """
 
 from pathlib import Path
@@ -11,23 +12,23 @@ from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
 MAX_SIZE = 20_000_000
-"""Bytes of a URDF or SRDF; the largest robot of example-robot-data has 0.3 MB."""
+"""Maximum size of a URDF or SRDF [bytes]; example-robot-data has up to 0.3 MB."""
 MAX_ELEMENTS = 200_000
-"""Elements of a URDF or SRDF."""
+"""Maximum number of elements in a URDF or SRDF."""
 MAX_DEPTH = 100
-"""Levels of nesting: parsers that recurse have an end."""
+"""Maximum depth of nesting, since parsers recurse."""
 
 
 class XmlError(Exception):
-    """XML that is not read.
+    """XML that is not allowed.
 
     Attributes:
-        line: Where, counted from 1; 0 if it concerns the file as a whole.
+        line: Line number, from 1; 0 if the whole file is meant.
         message: What is wrong.
     """
 
     def __init__(self, line: int, message: str) -> None:
-        """Keep the two apart: the caller knows how to name the file."""
+        """Store both; the caller adds the name of the file."""
         super().__init__(line, message)
         self.line = line
         self.message = message
@@ -37,7 +38,7 @@ def read_xml(path: Path) -> Element:
     """Return the top element of an XML file.
 
     Raises:
-        XmlError: If it is too large or too deep, or has a document type.
+        XmlError: If the file is too large or too deeply nested, or has a document type.
         ElementTree.ParseError: If it is malformed.
         OSError: If it cannot be read.
         LookupError, ValueError: If its encoding is unknown.
@@ -50,31 +51,31 @@ def read_xml(path: Path) -> Element:
 
 
 def parse_xml(data: bytes) -> Element:
-    """Return the top element of an XML text; see `read_xml` for what is raised."""
-    _Guard(MAX_ELEMENTS, MAX_DEPTH).look_at(data)
+    """Return the top element of an XML text; raises what `read_xml` raises."""
+    _Limits(MAX_ELEMENTS, MAX_DEPTH).check(data)
     return ElementTree.fromstring(data)
 
 
-def refuse_document_type(data: bytes) -> None:
-    """Refuse an XML text of any size if it has a document type.
+def check_no_document_type(data: bytes) -> None:
+    """Check that an XML text of any size has no document type.
 
-    It can stand before the top element only, so what comes after is not looked at.
+    Only the text before the top element is read: a document type can be only there.
 
     Raises:
-        XmlError: If it has one.
+        XmlError: If the text has a document type.
     """
-    _Guard(1, MAX_DEPTH).look_at(data, only_prolog=True)
+    _Limits(1, MAX_DEPTH).check(data, only_prolog=True)
 
 
 class _EndOfPrologError(Exception):
-    """The top element begins."""
+    """The top element begins: ends the parse of the prolog."""
 
 
-class _Guard:
-    """Expat's events, counted; what is malformed is left to the parser proper."""
+class _Limits:
+    """Counts Expat's events; malformed XML is left to the parser that follows."""
 
-    def __init__(self, elements: int, depth: int) -> None:
-        self._most, self._deepest = elements, depth
+    def __init__(self, max_elements: int, max_depth: int) -> None:
+        self._max_elements, self._max_depth = max_elements, max_depth
         self._elements = self._depth = 0
         self._only_prolog = False
         self._parser = expat.ParserCreate()
@@ -82,7 +83,7 @@ class _Guard:
         self._parser.StartElementHandler = self._start
         self._parser.EndElementHandler = self._end
 
-    def look_at(self, data: bytes, *, only_prolog: bool = False) -> None:
+    def check(self, data: bytes, *, only_prolog: bool = False) -> None:
         self._only_prolog = only_prolog
         try:
             self._parser.Parse(data, True)
@@ -92,8 +93,8 @@ class _Guard:
     def _doctype(self, *_: object) -> None:
         raise XmlError(
             self._parser.CurrentLineNumber,
-            "a document type (<!DOCTYPE>), which is where entities are declared, is "
-            "not read; delete it",
+            "a document type (<!DOCTYPE>) is not allowed, because it can declare "
+            "entities; delete it",
         )
 
     def _start(self, name: str, attributes: object) -> None:
@@ -101,13 +102,13 @@ class _Guard:
             raise _EndOfPrologError
         self._elements += 1
         self._depth += 1
-        if self._elements > self._most:
-            self._refuse(f"more than {self._most} elements")
-        if self._depth > self._deepest:
-            self._refuse(f"nested deeper than {self._deepest} levels")
+        if self._elements > self._max_elements:
+            self._fail(f"more than {self._max_elements} elements")
+        if self._depth > self._max_depth:
+            self._fail(f"nested deeper than {self._max_depth} levels")
 
     def _end(self, name: str) -> None:
         self._depth -= 1
 
-    def _refuse(self, message: str) -> None:
+    def _fail(self, message: str) -> None:
         raise XmlError(self._parser.CurrentLineNumber, message)

@@ -1,4 +1,4 @@
-"""Contact forces as a plant's readings."""
+"""Contact forces as log channels of a plant."""
 
 from collections.abc import Mapping
 
@@ -10,13 +10,13 @@ def contact_channels(wrenches: Mapping[str, Array]) -> dict[str, LogChannel]:
     """Return ``plant.contact.<name>.force`` and ``.moment`` for each contact.
 
     Args:
-        wrenches: Of the world on the robot, in the world's axes, the moment about the
-            origin of the contact's frame, shape (6,) each, by name.
+        wrenches: Wrench of the world on the robot by contact, shape (6,): force and
+            moment in world axes, the moment about the origin of the contact's frame.
     """
-    log_channels: dict[str, LogChannel] = {}
+    channels: dict[str, LogChannel] = {}
     for name, wrench in wrenches.items():
         force = LogChannel(wrench[:3], "N", "of the world on the robot, in world axes")
-        moment = LogChannel(wrench[3:], "N·m", "the same, about the frame's origin")
-        log_channels[f"plant.contact.{name}.force"] = force
-        log_channels[f"plant.contact.{name}.moment"] = moment
-    return log_channels
+        moment = LogChannel(wrench[3:], "N·m", "on the robot, about the frame's origin")
+        channels[f"plant.contact.{name}.force"] = force
+        channels[f"plant.contact.{name}.moment"] = moment
+    return channels

@@ -1,4 +1,4 @@
-"""What a plant is: the world's answer to an effort."""
+"""The interfaces of plants: simulated robots that an effort moves."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from hsp_control.robot import Robot
 
 
 class Plant:
-    """A robot as the world has it, which need not be the controller's model.
+    """A simulated robot, which may differ from the controller's model.
 
     A plant is either a `ContinuousPlant` or a `SampledPlant`.
 
@@ -28,21 +28,28 @@ class Plant:
     def log_channels(
         self, t: float, q: Array, v: Array, tau: Array
     ) -> Mapping[str, LogChannel]:
-        """Return what to log of the plant at its true state under an effort, by name.
+        """Return what to log of the plant, by name of the column.
 
-        Contact forces go by ``plant.contact.<name>.force``.
+        Contact forces are named ``plant.contact.<name>.force``.
+
+        Args:
+            t: Time [s].
+            q: True configuration, shape (nq,).
+            v: True velocity, shape (nv,).
+            tau: Effort, shape (nv,).
         """
         return {}
 
     def describe(self) -> dict[str, Any]:
-        """Return its kind and settings as JSON data, for the log."""
+        """Return the type and the settings as JSON data, for the log."""
         return {"type": type(self).__name__}
 
 
 class ContinuousPlant(Plant, ABC):
     """A plant without memory: v' is a function of time, state and effort.
 
-    `simulate` integrates it, with the law in the integrator's stages or efforts held.
+    `simulate` integrates it, with the law in the integrator's stages or with held
+    efforts.
     """
 
     @abstractmethod
@@ -51,19 +58,19 @@ class ContinuousPlant(Plant, ABC):
 
 
 class SampledPlant(Plant, ABC):
-    """A plant with a state of its own, that moves on under an effort that is held.
+    """A plant with a state of its own, which moves on under an effort that is held.
 
-    That is what an engine with its own integrator, a joint that sticks, a drive with a
-    delay and a robot at the end of a cable have in common. A run is one `reset`, then
-    for every control period one `measure` and one `advance`.
+    Examples are an engine with its own integrator, joints with stiction, drives with
+    delays, and a real robot. A run is one `reset`, then one `measure` and one `advance`
+    per control period.
     """
 
     @abstractmethod
     def reset(self, t: float, q: Array, v: Array) -> None:
-        """Put it at time t [s] into the state q, shape (nq,), and v, shape (nv,).
+        """Set the state at time t [s]: q, shape (nq,), and v, shape (nv,).
 
-        Whatever it remembers is forgotten, and its random numbers begin anew: the same
-        run can be repeated.
+        All memory is cleared and random numbers start again, so that a run can be
+        repeated exactly.
         """
 
     @abstractmethod
@@ -75,39 +82,39 @@ class SampledPlant(Plant, ABC):
         """
 
     def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Return what the controller is shown of the true (q, v); here the truth.
+        """Return the measured (q, v) for the true (q, v); here the true ones.
 
-        It is called once a control period, in order of time: sensors may remember.
+        It is called once per control period, in order of time: sensors may have memory.
         """
         return q, v
 
 
 def differing_bodies(plant: Plant, robot: Robot) -> dict[str, Any]:
-    """Return the plant's inertias as JSON data, if they are not the model's.
+    """Return the plant's inertias as JSON data, {} if they are those of the robot.
 
     By joint: ``mass`` [kg], ``com`` [m] and ``inertia`` (xx, xy, xz, yy, yz, zz) about
-    it [kg·m²] in the joint's frame, and ``armature`` of each freedom.
+    it [kg·m²] in the joint's frame, and ``armature`` of each degree of freedom.
     """
     ours, theirs = robot.model, plant.robot.model
     pairs = zip(ours.inertias, theirs.inertias, strict=True)
     same = np.array_equal(ours.armature, theirs.armature)
-    if same and all(mine == other for mine, other in pairs):
+    if same and all(our == their for our, their in pairs):
         return {}
     bodies = {}
     for index in range(1, theirs.njoints):
         body, joint = theirs.inertias[index], theirs.joints[index]
-        own = theirs.armature[joint.idx_v : joint.idx_v + joint.nv]
+        armature = theirs.armature[joint.idx_v : joint.idx_v + joint.nv]
         bodies[str(theirs.names[index])] = {
             "mass": body.mass,
             "com": body.lever.tolist(),
             "inertia": body.inertia[np.triu_indices(3)].tolist(),
-            "armature": own.tolist(),
+            "armature": armature.tolist(),
         }
     return {"bodies": bodies}
 
 
 def check_plant(plant: Plant, robot: Robot) -> None:
-    """Refuse a plant whose joints are not those of the controller's robot.
+    """Check that a plant has the joints of the controller's robot.
 
     Raises:
         SimulationError: If their names, order or kinds differ.

@@ -1,4 +1,4 @@
-"""Pushes: wrenches from outside, of stated size, place and time."""
+"""Pushes: external wrenches of given size, frame and time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from hsp_control.robot.matrix_view import matrix_view
 
 @dataclass(frozen=True)
 class Push:
-    """A constant wrench on a frame, for a while.
+    """A constant external wrench on a frame during an interval.
 
     Attributes:
         frame: The frame whose origin it acts on.
@@ -31,7 +31,7 @@ class Push:
     duration: float = 0.1
 
     def __post_init__(self) -> None:
-        """Refuse what is no wrench, or lasts no time."""
+        """Check that the wrench is finite and the duration positive."""
         for name, vector in (("force", self.force), ("moment", self.moment)):
             if np.shape(vector) != (3,) or not np.isfinite(vector).all():
                 raise SimulationError(
@@ -43,27 +43,27 @@ class Push:
                 "the duration must be positive"
             )
 
-    def acts(self, t: float) -> bool:
-        """Return whether it acts at a time [s]."""
+    def is_active(self, t: float) -> bool:
+        """Return whether it acts at time t [s]."""
         return self.start <= t < self.start + self.duration
 
 
 class Pushes:
-    """All pushes on a robot, as an effort."""
+    """All pushes on a robot, as a generalised effort."""
 
     def __init__(self, robot: Robot, pushes: Sequence[Push] = ()) -> None:
-        """Find the frames.
+        """Set the robot and the pushes.
 
         Raises:
-            FrameNotFoundError: If the robot lacks one.
+            FrameNotFoundError: If the robot lacks a frame.
         """
         self.robot = robot
         self.pushes = tuple(pushes)
         self._frames = {push.frame: robot.frame_id(push.frame) for push in pushes}
         self._data = robot.model.createData() if pushes else None
 
-    def act(self, t: float, end: float) -> bool:
-        """Return whether one acts at some time from t to ``end`` [s]."""
+    def any_active(self, t: float, end: float) -> bool:
+        """Return whether a push acts at some time from t to ``end`` [s]."""
         return any(
             push.start <= end and t < push.start + push.duration for push in self.pushes
         )
@@ -72,7 +72,7 @@ class Pushes:
         """Return Σ Jᵀ wrench of the pushes that act at time t [s], shape (nv,)."""
         total = np.zeros(self.robot.nv)
         for push in self.pushes:
-            if push.acts(t):
+            if push.is_active(t):
                 J = pin.computeFrameJacobian(
                     self.robot.model,
                     self._data,

@@ -1,4 +1,4 @@
-"""Figures of a run, drawn from its log alone."""
+"""Figures of a run, drawn from its log only."""
 
 from hsp_control.simulation.log_series import chosen_rows as chosen_rows
 

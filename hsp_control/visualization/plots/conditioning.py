@@ -1,4 +1,4 @@
-"""How far the tasks are from a singularity: manipulability and singular values."""
+"""Distance from singularities: manipulability and singular values."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +11,7 @@ from hsp_control.visualization.plots.lines import (
     draw_lines,
     log_scale,
     mark_damped,
-    single,
+    point_marker,
     time_axis,
 )
 
@@ -21,11 +21,11 @@ _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 def draw_manipulability(axes: Axes, rollout: Rollout) -> None:
     """Draw det(J W⁻¹ Jᵀ), the square of Yoshikawa's measure, and mark its minimum."""
     t, values = rollout.t, rollout["manipulability"]
-    axes.plot(t, values, color=palette.TASK, marker=single(t))
-    least = int(np.argmin(values))
+    axes.plot(t, values, color=palette.TASK, marker=point_marker(t))
+    minimum = int(np.argmin(values))
     axes.plot(
-        t[least],
-        values[least],
+        t[minimum],
+        values[minimum],
         linestyle="none",
         marker="o",
         markersize=6.5,
@@ -34,11 +34,11 @@ def draw_manipulability(axes: Axes, rollout: Rollout) -> None:
         markeredgewidth=1.6,
         clip_on=False,
         zorder=3,
-        label=f"minimum {values[least]:.3g} at {t[least]:.2f} s",
+        label=f"minimum {values[minimum]:.3g} at {t[minimum]:.2f} s",
     )
     mark_damped(axes, rollout)
-    highest = float(values[np.isfinite(values)].max(initial=1e-12))
-    axes.set_ylim(0.0, 1.08 * highest)
+    maximum = float(values[np.isfinite(values)].max(initial=1e-12))
+    axes.set_ylim(0.0, 1.08 * maximum)
     unit = column_unit(rollout, "manipulability")
     axes.set_ylabel(rf"$\det(J\,W^{{-1}}J^{{\mathsf{{T}}}})$ [{unit}]")
     time_axis(axes, t)
@@ -46,7 +46,7 @@ def draw_manipulability(axes: Axes, rollout: Rollout) -> None:
 
 
 def draw_singular_values(axes: Axes, rollout: Rollout) -> None:
-    """Draw the singular values of all tasks' Jacobian in the metric."""
+    """Draw the singular values of the stacked task Jacobian in the metric W = L Lᵀ."""
     values = rollout["singular_values"]
     names = [f"σ{k + 1}".translate(_SUBSCRIPTS) for k in range(values.shape[1])]
     draw_lines(axes, rollout.t, values, names)

@@ -1,4 +1,4 @@
-"""Whole figures: the paper's five panels, and what explains a run."""
+"""Whole figures: the paper's five panels, and diagnostics of a run."""
 
 import textwrap
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from hsp_control.visualization.plots.frames import (
     draw_superimposed,
 )
 from hsp_control.visualization.plots.joints import draw_efforts, draw_joint_positions
-from hsp_control.visualization.plots.legends import plain
+from hsp_control.visualization.plots.legends import literal_text
 from hsp_control.visualization.plots.lines import mark_frames
 from hsp_control.visualization.plots.null_space import (
     draw_distances,
@@ -43,29 +43,29 @@ def paper_figure(
     times: Sequence[float] | None = None,
     title: str | None = None,
 ) -> Figure:
-    """Return the paper's five panels of one run.
+    """Return a figure of one run with the paper's five panels.
 
-    (a) the end effector's path, (b) the joints, (c) manipulability, (d) selected frames
-    and (e) the frames together. The frames are numbered, and their numbers stand above
-    (b) and (c) at their times.
+    (a) the end effector's path, (b) the joints, (c) manipulability, (d) the robot at
+    selected times (frames) and (e) these frames in one plot. The frames are numbered;
+    the numbers mark their times above (b) and (c).
 
     Args:
         rollout: The log.
         absolute: Draw absolute angles where the literature on the robot does.
-        frames: How many frames, evenly over the run.
-        times: When to take frames [s], instead.
-        title: What to write above; None: the run's own title.
+        frames: Number of frames, evenly over the run.
+        times: Times of the frames [s], instead.
+        title: The title; None: the run's own.
 
     Raises:
-        PlotError: If the log has no row, or no frame is asked for.
+        PlotError: If the log has no row, or no frame is requested.
     """
     _check(rollout)
     rows = chosen_rows(rollout, frames, times)
     if not rows:
-        raise PlotError("no frames are asked for; needs at least 1")
+        raise PlotError("no frame is requested; needs at least 1")
     with styled():
         figure = new_figure(11.0, 7.6)
-        _entitle(figure, rollout, title)
+        _add_title(figure, rollout, title)
         halves = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.05))
         upper, lower = halves.ravel()
         grid = upper.add_gridspec(1, 3, width_ratios=(0.85, 1.0, 1.0))
@@ -86,17 +86,18 @@ def paper_figure(
         e.set_anchor("N")
         together.suptitle("(e)  Frames together", **_HEADING)
         titles = ["End effector", "Joints", "Manipulability"]
-        _letter([a, b, c], titles, pad=18.0)  # room for the frames' numbers
+        _letter_titles([a, b, c], titles, pad=18.0)  # space for the frames' numbers
         for over_time in (b, c):
             mark_frames(over_time, rollout.t[rows])
     return figure
 
 
 def diagnostics_figure(rollout: Rollout) -> Figure:
-    """Return panels that tell whether a run did what the law promises.
+    """Return a figure that compares a run with the law's predictions.
 
-    Task errors, null-space error, field, efforts, singular values, manipulability; and
-    where the log has them, distances to obstacles and the shares of the field's terms.
+    Task errors, null-space error, field, efforts, singular values, manipulability; and,
+    if the log has them, distances to obstacles and the contributions of the field's
+    terms.
 
     Raises:
         PlotError: If the log has no row.
@@ -117,36 +118,38 @@ def diagnostics_figure(rollout: Rollout) -> Figure:
             panels.append((draw_field_terms, "The field's terms"))
         columns = -(-len(panels) // 2)
         figure = new_figure(3.6 * columns, 6.8)
-        _entitle(figure, rollout)
+        _add_title(figure, rollout)
         axes = figure.subplots(2, columns).ravel().tolist()
         for one, (draw, _) in zip(axes, panels, strict=False):
             draw(one, rollout)
-        for left_over in axes[len(panels) :]:
-            left_over.set_axis_off()
-        _letter(axes, [title for _, title in panels])
+        for unused in axes[len(panels) :]:
+            unused.set_axis_off()
+        _letter_titles(axes, [title for _, title in panels])
     return figure
 
 
-def _letter(axes: list[Axes], titles: list[str], pad: float | None = None) -> None:
-    y = None if pad is None else 1.0  # else titles give way to ticks, each by itself
+def _letter_titles(
+    axes: list[Axes], titles: list[str], pad: float | None = None
+) -> None:
+    y = None if pad is None else 1.0  # None: each title moves above its own ticks
     for letter, one, title in zip("abcdefgh", axes, titles, strict=False):
         one.set_title(f"({letter})  {title}", y=y, pad=pad)
 
 
-def _entitle(figure: Figure, rollout: Rollout, title: str | None = None) -> None:
-    """Write the title, and what the run was, at the foot."""
+def _add_title(figure: Figure, rollout: Rollout, title: str | None = None) -> None:
+    """Add the title, and the facts of the run at the foot."""
     meta, config = rollout.meta, rollout.config or {}
     robot, field = meta["robot"]["name"], meta.get("field", "")
     named = (title, config.get("title"), meta.get("title"), meta.get("name"))
     shown = next(filter(None, named), f"{robot}, field: {field}")
-    figure.suptitle(plain(textwrap.fill(str(shown), 100)))
+    figure.suptitle(literal_text(textwrap.fill(str(shown), 100)))
     version = meta.get("versions", {}).get("hsp_control", "")
     parts = [f"robot {robot}", f"field {field}", f"metric {meta.get('metric', '')}"]
     parts += [f"hsp_control {version}"] if version else []
     if rollout.status != "completed":
         parts.insert(0, f"{rollout.status}: {meta.get('message', '')}")
     figure.supxlabel(
-        plain(textwrap.fill("  ·  ".join(parts), 180)),
+        literal_text(textwrap.fill("  ·  ".join(parts), 180)),
         fontsize=7.5,
         color=palette.MUTED if rollout.status == "completed" else palette.WARNING,
         x=0.01,

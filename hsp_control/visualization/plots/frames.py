@@ -1,4 +1,4 @@
-"""The robot at selected times: one picture each, or all in one."""
+"""The robot at selected times (frames): one plot each, or all in one plot."""
 
 from collections.abc import Sequence
 from typing import NamedTuple, Self
@@ -12,53 +12,54 @@ from matplotlib.patheffects import withStroke
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.bodies import bodies
-from hsp_control.visualization.plots.things import (
-    draw_arm,
-    draw_body,
-    draw_directions,
-    draw_shadow,
-)
-from hsp_control.visualization.plots.views import View, fit, view_of
-from hsp_control.visualization.plots.world import (
-    centers,
-    everything,
+from hsp_control.visualization.plots.logged_geometry import (
+    center_points,
+    enclosing_points,
     parents,
     task_paths,
 )
+from hsp_control.visualization.plots.obstacles import logged_obstacles
+from hsp_control.visualization.plots.views import View, fit, view_of
+from hsp_control.visualization.plots.world_drawing import (
+    draw_axis_directions,
+    draw_obstacle,
+    draw_shadow,
+    draw_skeleton,
+)
 
-MOST_TICKS = 10
-"""More frames than that are not all named at the scale of time."""
+MAX_TICKS = 10
+"""With more frames, their times are not the ticks of the time scale."""
 
 
 def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> None:
-    """Draw the robot at one row, with obstacles there and the tasks' whole paths.
+    """Draw the robot and the obstacles at one row, and the tasks' whole desired paths.
 
-    A robot in a plane is drawn in it, one in space from a slant, with its shadow.
+    Planar motion is drawn in its plane, spatial motion in an oblique view with a shadow
+    on the floor.
 
     Args:
         axes: The axes.
         rollout: The log.
         row: The row.
-        key: From a slant, show which way the world's axes point, and a length.
+        key: In an oblique view, draw the directions of the world's axes and a scale.
     """
     scene = _Scene.of(rollout)
     skeleton, tree = rollout["skeleton"][row], parents(rollout)
     if not scene.view.names:
         draw_shadow(axes, scene.view, skeleton, tree, scene.floor)
     _draw_paths(axes, scene.view, rollout, 1.6)
-    for body in bodies(rollout):
-        draw_body(axes, scene.view, body, row)
-    draw_arm(axes, scene.view, skeleton, tree)
+    for obstacle in logged_obstacles(rollout):
+        draw_obstacle(axes, scene.view, obstacle, row)
+    draw_skeleton(axes, scene.view, skeleton, tree)
     scene.finish(axes, shadows=True, key=key)
-    axes.locator_params(nbins=3)  # a frame is small
+    axes.locator_params(nbins=3)  # a frame has little space
     axes.set_title(
         f"t = {rollout.t[row]:.2f} s", fontsize=8.5, fontweight="normal", pad=3.0
     )
 
 
 def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> None:
-    """Draw a strip of numbered frames; axes that are left over are switched off.
+    """Draw numbered frames side by side; unused axes are switched off.
 
     Args:
         axes: One for each row, in reading order.
@@ -76,13 +77,13 @@ def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> 
 def draw_superimposed(
     axes: Axes, rollout: Rollout, rows: Sequence[int], *, numbered: bool = True
 ) -> None:
-    """Draw the robot at all rows in one picture, the later the darker.
+    """Draw the robot at all rows in one plot; later rows are darker.
 
     Args:
         axes: The axes.
         rollout: The log.
         rows: The rows.
-        numbered: Number them at their ends; not where all ends are at one place.
+        numbered: Write the frames' numbers at the robot's end.
     """
     scene, tree = _Scene.of(rollout), parents(rollout)
     _draw_paths(axes, scene.view, rollout, 2.2)
@@ -91,14 +92,16 @@ def draw_superimposed(
     for place, row in enumerate(rows):
         age = float(rollout.t[row] - start) / (end - start) if end > start else 1.0
         pale = palette.blend(palette.OBSTACLE_EARLY, palette.OBSTACLE, age)
-        for body in bodies(rollout):
-            if body.moves or place == len(rows) - 1:
-                draw_body(axes, scene.view, body, row, color=pale, zorder=1.9)
+        for obstacle in logged_obstacles(rollout):
+            if obstacle.moves or place == len(rows) - 1:
+                draw_obstacle(axes, scene.view, obstacle, row, color=pale, zorder=1.9)
         link = palette.blend(palette.EARLY, palette.LATE, age)
         joint = palette.blend(link, palette.INK, 0.4)
         points = rollout["skeleton"][row]
         zorder = 3.0 + 0.2 * place
-        draw_arm(axes, scene.view, points, tree, link=link, joint=joint, zorder=zorder)
+        draw_skeleton(
+            axes, scene.view, points, tree, link=link, joint=joint, zorder=zorder
+        )
         if numbered:
             _number(axes, scene.view, points, tree, place + 1)
     scene.finish(axes, shadows=False, key=True)
@@ -107,12 +110,12 @@ def draw_superimposed(
 
 
 def columns_for(rollout: Rollout, count: int, width: float, height: float) -> int:
-    """Return how many frames to put beside each other so that they come out largest.
+    """Return the number of columns for which the frames are largest.
 
     Args:
         rollout: The log.
-        count: How many frames there are.
-        width: Width of the space for them, in any unit.
+        count: Number of frames.
+        width: Width of the available space, in any unit.
         height: Its height, in the same unit.
     """
     scene = _Scene.of(rollout)
@@ -128,12 +131,12 @@ def columns_for(rollout: Rollout, count: int, width: float, height: float) -> in
 
 
 class _Scene(NamedTuple):
-    """What all frames of a log share.
+    """View, extent and floor that all frames of a log share.
 
     Attributes:
         view: The view.
-        points: Points that enclose all that is ever to be seen, shape (K, 3) [m].
-        floor: Height of the floor [m]: of the world's origin, or of what lies lower.
+        points: Points that enclose robot, paths and obstacles [m], shape (K, 3).
+        floor: Height of the floor [m]: 0, or that of the lowest point below it.
     """
 
     view: View
@@ -142,41 +145,41 @@ class _Scene(NamedTuple):
 
     @classmethod
     def of(cls, rollout: Rollout) -> Self:
-        points = everything(rollout)
-        view = view_of(centers(rollout))
+        points = enclosing_points(rollout)
+        view = view_of(center_points(rollout))
         return cls(view, points, min(0.0, float(points[:, 2].min())))
 
     def shown(self, *, shadows: bool) -> Array:
-        """Return the points, and where they fall on the floor, shape (K, 3) [m]."""
+        """Return the points, and their projections on the floor [m], shape (K, 3)."""
         if self.view.names or not shadows:
             return self.points
-        fallen = self.points.copy()
-        fallen[:, 2] = self.floor
-        return np.concatenate([self.points, fallen])
+        projected = self.points.copy()
+        projected[:, 2] = self.floor
+        return np.concatenate([self.points, projected])
 
     def finish(self, axes: Axes, *, shadows: bool, key: bool) -> None:
-        """Set limits and labels, or show directions where there are none."""
+        """Set limits and labels; in an oblique view draw axis directions instead."""
         points = self.shown(shadows=shadows)
         if not self.view.names:
             axes.set_axis_off()
             if key:
                 points = np.concatenate([points, self._draw_key(axes, points)])
-        fit(axes, self.view, points, least=1e-3)
+        fit(axes, self.view, points, min_width=1e-3)
 
     def _draw_key(self, axes: Axes, points: Array) -> Array:
-        """Show directions under the points, at the left; return what they take up."""
+        """Draw axis directions at the lower left; return points that enclose them."""
         x, y = self.view.project(points)
         length = 0.2 * max(float(np.ptp(x)), float(np.ptp(y)))
         corner = np.array([float(x.min()), float(y.min()) - 1.5 * length])
         origin = self.view.rows.T @ corner
-        draw_directions(axes, self.view, origin, length)
+        draw_axis_directions(axes, self.view, origin, length)
         return np.array([origin, origin - 0.3 * length * self.view.rows[1]])
 
 
 def _number(
     axes: Axes, view: View, points: Array, tree: Sequence[int], number: int
 ) -> None:
-    """Write a frame's number beyond the last point, along the link that leads there."""
+    """Write a frame's number beyond the last point, in the direction of its link."""
     (x, y), (x0, y0) = (view.project(points[k]) for k in (-1, tree[-1]))
     along = np.array([float(x - x0), float(y - y0)])
     length = float(np.linalg.norm(along))
@@ -209,6 +212,6 @@ def _time_bar(axes: Axes, start: float, end: float, ticks: list[float]) -> None:
     beside = axes.inset_axes((1.04, 0.0, 0.035, 1.0))
     bar = figure.colorbar(ScalarMappable(Normalize(start, end), scale), cax=beside)
     bar.set_label("time [s]")
-    if len(ticks) <= MOST_TICKS:
+    if len(ticks) <= MAX_TICKS:
         bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
     bar.outline.set_visible(False)

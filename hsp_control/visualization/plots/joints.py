@@ -1,4 +1,4 @@
-"""Joints over time: their positions and their efforts."""
+"""Joint positions and joint efforts over time."""
 
 from matplotlib.axes import Axes
 
@@ -16,13 +16,13 @@ from hsp_control.visualization.plots.lines import draw_lines, time_axis
 def draw_joint_positions(
     axes: Axes, rollout: Rollout, *, absolute: bool = True
 ) -> None:
-    """Draw the joints' positions, unwound: a joint that runs away is seen to.
+    """Draw the joint positions, unwrapped: not limited to one turn.
 
     Args:
         axes: The axes.
         rollout: The log.
         absolute: Draw absolute angles theta = A q where the literature on the robot
-            does; False: always the joints' own.
+            does; False: always the joint angles q.
     """
     positions, what = joint_positions(rollout, absolute=absolute)
     draw_lines(axes, rollout.t, positions, joint_names(rollout))

@@ -1,4 +1,4 @@
-"""How late a loop was: how often by how much, and when."""
+"""Latency of a control loop: its distribution, and its course over time."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -7,31 +7,38 @@ from matplotlib.figure import Figure
 from hsp_control.common.arrays import Array
 from hsp_control.live.latency import Latency
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.legends import legend_below, plain
+from hsp_control.visualization.plots.legends import legend_below, literal_text
 from hsp_control.visualization.plots.style import new_figure, styled
 
 
 def latency_figure(latency: Latency, title: str) -> Figure:
-    """Return two panels: (a) how often a time was exceeded, (b) the times in order.
+    """Return a figure of the loop's times.
+
+    (a) the share of periods that took longer than a time, (b) the times in order.
 
     Args:
-        latency: What was measured.
-        title: The figure's heading.
+        latency: The measurement.
+        title: The figure's title.
     """
     with styled():
         figure = new_figure(10.0, 4.2)
-        figure.suptitle(plain(title))
-        often, when = figure.subplots(1, 2)
-        _draw_exceedance(often, latency)
-        _draw_course(when, latency)
+        figure.suptitle(literal_text(title))
+        distribution, course = figure.subplots(1, 2)
+        _draw_exceedance(distribution, latency)
+        _draw_course(course, latency)
     return figure
 
 
 def _draw_exceedance(axes: Axes, latency: Latency) -> None:
     curves = [
         ("step: state and law", latency.step, palette.ACTUAL, "-"),
-        ("back to back, off the clock", latency.back_to_back, palette.ACTUAL, ":"),
-        ("beginning to effort", latency.response, palette.OBSTACLE, "-"),
+        (
+            "step, back to back without a clock",
+            latency.back_to_back,
+            palette.ACTUAL,
+            ":",
+        ),
+        ("start of period to effort", latency.response, palette.OBSTACLE, "-"),
         ("wake-up, empty loop", latency.empty, palette.MUTED, "-"),
     ]
     for name, times, color, dashes in curves:
@@ -39,34 +46,36 @@ def _draw_exceedance(axes: Axes, latency: Latency) -> None:
         share = np.arange(1, len(ordered) + 1) / len(ordered)
         axes.plot(ordered, share, dashes, color=color, label=name)
     axes.axvline(
-        latency.period * 1e6, color=palette.WARNING, linestyle="--", label="the period"
+        latency.period * 1e6, color=palette.WARNING, linestyle="--", label="period"
     )
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("time [µs]")
     axes.set_ylabel("share of periods that took longer")
-    axes.set_title("(a)  How often")
+    axes.set_title("(a)  Distribution")
     legend_below(axes)
 
 
 def _draw_course(axes: Axes, latency: Latency) -> None:
     for name, times, color in (
-        ("beginning to effort", latency.response, palette.OBSTACLE),
+        ("start of period to effort", latency.response, palette.OBSTACLE),
         ("wake-up, empty loop", latency.empty, palette.MUTED),
     ):
-        _draw_worst(axes, times, latency.period, color, name)
+        _draw_groups(axes, times, latency.period, color, name)
     axes.axhline(
-        latency.period * 1e6, color=palette.WARNING, linestyle="--", label="the period"
+        latency.period * 1e6, color=palette.WARNING, linestyle="--", label="period"
     )
     axes.set_yscale("log")
     axes.set_xlabel("time in the loop [s]")
     axes.set_ylabel("time [µs]")
-    axes.set_title("(b)  When: median and worst of neighbours")
+    axes.set_title("(b)  Over time: median and maximum of groups")
     legend_below(axes)
 
 
-def _draw_worst(axes: Axes, times: Array, period: float, color: str, name: str) -> None:
-    """Draw median and worst of groups of neighbours, as all would be a band."""
+def _draw_groups(
+    axes: Axes, times: Array, period: float, color: str, name: str
+) -> None:
+    """Draw median and maximum of groups of periods; all values would overlap."""
     groups = np.array_split(times * 1e6, min(len(times), 200))
     ends = np.cumsum([len(group) for group in groups]) * period
     axes.plot(ends, [np.median(group) for group in groups], color=color, label=name)

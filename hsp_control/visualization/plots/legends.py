@@ -1,4 +1,4 @@
-"""Legends under the axes, where they hide nothing, and remarks in them."""
+"""Legends below the axes, where they cover nothing, and notes in them."""
 
 from collections.abc import Sequence
 
@@ -6,21 +6,23 @@ from matplotlib.axes import Axes
 from matplotlib.transforms import ScaledTranslation
 
 _HANDLE, _GAP, _LETTER = 2.2, 1.3, 0.55
-"""Widths in a legend in units of its font size: handle, gap of columns, mean letter."""
+"""Widths in a legend over its font size: handle, gap of columns, mean letter."""
 
 
 def legend_below(axes: Axes, columns: int | None = None) -> None:
-    """Put a legend of all that has a label under the axes.
+    """Add a legend of all labelled artists below the axes.
 
     Args:
-        axes: The axes; nothing happens where nothing has a label.
-        columns: Entries beside each other; None: as many as fit.
+        axes: The axes; without labelled artists no legend is added.
+        columns: Number of columns; None: as many as fit.
     """
     handles, labels = axes.get_legend_handles_labels()
     if not handles:
         return
     figure = axes.get_figure(root=False)
-    drop = 32.0 if axes.axison else 22.0  # what stands under the axes [pt]
+    drop = (
+        32.0 if axes.axison else 22.0
+    )  # height of the tick labels below the axes [pt]
     below = ScaledTranslation(0.0, -drop / 72.0, figure.dpi_scale_trans)  # type: ignore[union-attr]
     axes.legend(
         handles,
@@ -33,22 +35,22 @@ def legend_below(axes: Axes, columns: int | None = None) -> None:
 
 
 def note(axes: Axes, text: str) -> None:
-    """Add a remark to the legend to be."""
+    """Add a note to the legend; call it before `legend_below`."""
     axes.plot([], [], linestyle="none", label=text)
 
 
-def plain(name: str) -> str:
-    """Return a name from the log such that matplotlib shows it as it is.
+def literal_text(name: str) -> str:
+    """Return a text that matplotlib shows literally.
 
-    It would read dollar signs as formulas, and leave names that begin with an
-    underscore out of legends.
+    Dollar signs are escaped, as they begin a formula. A leading underscore is preceded
+    by a space, as matplotlib leaves such names out of legends.
     """
     shown = name.replace("$", r"\$")
     return f" {shown}" if shown.startswith("_") else shown
 
 
 def _fitting(axes: Axes, labels: Sequence[str]) -> int:
-    """Return how many columns fit under the axes; entries run down the columns."""
+    """Return how many columns fit below the axes; entries run down the columns."""
     figure = axes.get_figure(root=True)
     assert figure is not None
     width = axes.get_window_extent().width / figure.dpi * 72.0 / 8.0 * 1.1

@@ -1,4 +1,4 @@
-"""Curves over time: colours and names of many lines, log scales, marked intervals."""
+"""Curves over time: colours and names of lines, log scales, marked intervals."""
 
 from collections.abc import Sequence
 
@@ -8,15 +8,15 @@ from matplotlib.axes import Axes
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.legends import note, plain
+from hsp_control.visualization.plots.legends import literal_text, note
 
-MOST, NAMED = 14, 7
+MAX_NAMED, SELECTED = 14, 7
 """Of more than 14 lines, only the 7 that vary most get a colour and a name."""
 _DASHES = ("-", "--")
 
 
 def draw_lines(axes: Axes, t: Array, values: Array, names: Sequence[str]) -> None:
-    """Draw one line a column, and name them.
+    """Draw one line per column, with names in the legend.
 
     Args:
         axes: The axes.
@@ -25,9 +25,9 @@ def draw_lines(axes: Axes, t: Array, values: Array, names: Sequence[str]) -> Non
         names: The columns' names.
     """
     named = list(range(len(names)))
-    if len(names) > MOST:
+    if len(names) > MAX_NAMED:
         spread = np.ptp(np.nan_to_num(values, posinf=0.0, neginf=0.0), axis=0)
-        named = sorted(np.argsort(-spread, kind="stable")[:NAMED].tolist())
+        named = sorted(np.argsort(-spread, kind="stable")[:SELECTED].tolist())
         others = [k for k in range(len(names)) if k not in named]
         for k in others:
             axes.plot(t, values[:, k], color=palette.MUTED, linewidth=0.6, alpha=0.5)
@@ -35,22 +35,22 @@ def draw_lines(axes: Axes, t: Array, values: Array, names: Sequence[str]) -> Non
         axes.plot(
             t,
             values[:, k],
-            marker=single(t),
+            marker=point_marker(t),
             color=palette.series(place),
             linestyle=_DASHES[place // len(palette.SERIES) % len(_DASHES)],
-            label=plain(names[k]),
+            label=literal_text(names[k]),
         )
     if len(names) > len(named):
         note(axes, f"{len(names) - len(named)} others (grey)")
 
 
-def single(t: Array) -> str:
-    """Return the marker of a line over ``t``: a lone point needs one to be seen."""
+def point_marker(t: Array) -> str:
+    """Return the marker of a line over ``t``: a single point is invisible without."""
     return "o" if len(t) == 1 else ""
 
 
 def time_axis(axes: Axes, t: Array) -> None:
-    """Label the axis of time and fit it to the log."""
+    """Label the time axis and fit it to the log."""
     axes.set_xlabel("time [s]")
     if t[-1] > t[0]:
         axes.set_xlim(float(t[0]), float(t[-1]))
@@ -59,24 +59,24 @@ def time_axis(axes: Axes, t: Array) -> None:
 def log_scale(
     axes: Axes, values: Array, *, floor: float = 1e-17, top: float = 0.0
 ) -> None:
-    """Make the y axis logarithmic, around those values that such an axis can show.
+    """Make the y axis logarithmic, with limits around the positive finite values.
 
     Args:
         axes: The axes.
-        values: What is drawn.
-        floor: What counts as rounding and is not worth an axis.
-        top: What the axis reaches at least, so that rounding does not fill it.
+        values: The drawn values.
+        floor: Values up to it are rounding errors and do not extend the axis.
+        top: Minimum upper end of the axis, so that rounding errors do not fill it.
     """
     shown = values[np.isfinite(values) & (values > floor)]
     highest = max(float(shown.max(initial=floor)), top)
-    # A norm that crosses zero dips at single rows; the axis need not follow.
+    # A norm that crosses zero has dips at single rows; the axis ignores them.
     lowest = float(np.quantile(shown, 0.005)) if shown.size else highest
     axes.set_ylim(max(0.4 * lowest, floor), 3.0 * max(highest, 10.0 * floor))
-    axes.set_yscale("log")  # after the limits: there may be nothing to find them by
+    axes.set_yscale("log")  # after the limits: there may be no positive value
 
 
 def mark_damped(axes: Axes, rollout: Rollout) -> None:
-    """Shade the times at which a singularity made the law bounded, not exact."""
+    """Shade the times at which the law is damped near a singularity, not exact."""
     t, damped = rollout.t, rollout["damped"] > 0.0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], damped, [False]])))
     for start, stop in edges.reshape(-1, 2).tolist():
@@ -86,19 +86,19 @@ def mark_damped(axes: Axes, rollout: Rollout) -> None:
             color=palette.WARNING,
             alpha=0.15,
             linewidth=0.8,
-            label="law bounded near a singularity" if start == edges[0] else None,
+            label="damped near a singularity" if start == edges[0] else None,
         )
 
 
 def mark_frames(axes: Axes, times: Array) -> None:
-    """Number the times of frames, 1 and on, along the upper edge of curves over time.
+    """Mark the times of frames with their numbers, from 1, at the upper edge.
 
     Args:
-        axes: The axes.
-        times: When the frames were taken [s].
+        axes: The axes, of curves over time.
+        times: The frames' times [s].
     """
     upper = axes.secondary_xaxis("top")
-    few = len(times) <= MOST
+    few = len(times) <= MAX_NAMED
     upper.set_xticks(
         times, labels=[str(k + 1) if few else "" for k in range(len(times))]
     )

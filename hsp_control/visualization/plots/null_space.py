@@ -1,4 +1,4 @@
-"""Self-motion: its error e_N against the decay that the law promises, and the field."""
+"""Self-motion: the error e_N and its predicted decay, and the field."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,18 +12,18 @@ from hsp_control.simulation.log_series import (
     position_unit,
 )
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.legends import legend_below, note, plain
+from hsp_control.visualization.plots.legends import legend_below, literal_text, note
 from hsp_control.visualization.plots.lines import (
     draw_lines,
     log_scale,
     mark_damped,
-    single,
+    point_marker,
     time_axis,
 )
 
 
 def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
-    """Draw ‖e_N‖_W and its predicted decay, on a logarithmic scale."""
+    """Draw ‖e_N‖_W and its predicted decay, with a logarithmic axis."""
     t, norm = rollout.t, rollout["null_space_norm"]
     decay = predicted_decay(rollout)
     slowest, fastest = decay.gains
@@ -52,7 +52,7 @@ def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
         t,
         norm,
         color=palette.FIELD,
-        marker=single(t),
+        marker=point_marker(t),
         label=r"actual $\Vert e_N \Vert_W$",
     )
     if decay.why_not:
@@ -65,43 +65,43 @@ def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
 
 
 def draw_field_value(axes: Axes, rollout: Rollout) -> None:
-    """Draw the cost that the field descends, or the norm of a vector field."""
+    """Draw the field's value: its cost, or the norm of a vector field."""
     t = rollout.t
-    name = plain(str(rollout.meta.get("field", "field")))
+    name = literal_text(str(rollout.meta.get("field", "field")))
     values = rollout["field.value"]
-    axes.plot(t, values, color=palette.FIELD, marker=single(t), label=name)
+    axes.plot(t, values, color=palette.FIELD, marker=point_marker(t), label=name)
     if float(np.ptp(values)) == 0.0:
         axes.set_ylim(float(values[0]) - 0.5, float(values[0]) + 0.5)
     unit = column_unit(rollout, "field.value")
-    axes.set_ylabel(f"value of the field [{unit}]")
+    axes.set_ylabel(f"field value [{unit}]")
     time_axis(axes, t)
     legend_below(axes)
 
 
 def draw_field_terms(axes: Axes, rollout: Rollout) -> None:
-    """Draw the norm of every term's share of g, which shows what rules when."""
+    """Draw the norm of every term's contribution to g: which term dominates when."""
     names = field_terms(rollout)
-    shares = [np.linalg.norm(rollout[f"field.{name}.g"], axis=1) for name in names]
-    draw_lines(axes, rollout.t, np.column_stack(shares), names)
+    norms = [np.linalg.norm(rollout[f"field.{name}.g"], axis=1) for name in names]
+    draw_lines(axes, rollout.t, np.column_stack(norms), names)
     axes.set_ylim(bottom=0.0)
-    axes.set_ylabel(rf"share $\Vert g_k \Vert$ [{_rate_unit(rollout)}]")
+    axes.set_ylabel(rf"contribution $\Vert g_k \Vert$ [{_rate_unit(rollout)}]")
     time_axis(axes, rollout.t)
     legend_below(axes)
 
 
 def draw_distances(axes: Axes, rollout: Rollout) -> None:
-    """Draw the least distance that each field watches; below zero is contact."""
+    """Draw the minimum distance of each clearance field; below zero is contact."""
     names = distances(rollout)
     values = np.column_stack([rollout[f"distance.{name}"] for name in names])
     draw_lines(axes, rollout.t, values, names)
     axes.axhline(0.0, color=palette.OBSTACLE, linewidth=1.0, zorder=1.0)
-    axes.set_ylabel("least distance [m]")
+    axes.set_ylabel("minimum distance [m]")
     time_axis(axes, rollout.t)
     legend_below(axes)
 
 
 def _norm_unit(rollout: Rollout) -> str:
-    """Return the norm's unit; in the mass matrix it is the root of twice an energy."""
+    """Return the norm's unit; with the mass matrix: the root of twice an energy."""
     if rollout.meta.get("metric") == "MassMatrixMetric":
         return "√J"
     return _rate_unit(rollout)

@@ -1,4 +1,4 @@
-"""The path of the end effector in the world, as it was asked for and as it was."""
+"""Desired and actual path of the end effector."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -6,55 +6,59 @@ from matplotlib.axes import Axes
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.bodies import bodies
-from hsp_control.visualization.plots.box import corners, draw_box
-from hsp_control.visualization.plots.legends import legend_below, note, plain
-from hsp_control.visualization.plots.things import draw_body
+from hsp_control.visualization.plots.box_axes import corners, draw_box
+from hsp_control.visualization.plots.legends import legend_below, literal_text, note
+from hsp_control.visualization.plots.logged_geometry import (
+    center_points,
+    enclosing_points,
+    end_points,
+    task_paths,
+)
+from hsp_control.visualization.plots.obstacles import logged_obstacles
 from hsp_control.visualization.plots.views import (
     View,
     best_plane,
     fit,
     is_flat,
+    oblique,
     plane,
-    slant,
 )
-from hsp_control.visualization.plots.world import (
-    centers,
-    end_points,
-    everything,
-    task_paths,
-)
+from hsp_control.visualization.plots.world_drawing import draw_obstacle
 
 NEARLY_FLAT = 0.05
-"""Depth over width below which one view of a path is enough."""
+"""Depth over width below which a path is drawn in one plane."""
 
 
 def path_view(rollout: Rollout) -> View:
-    """Return the view in which the end effector's path reads best.
+    """Return the best view of the end effector's path.
 
-    The robot's plane if it moves in one; the plane that the tasks track if they track
-    two axes; the plane of paths and obstacles if they are nearly flat; else a slant.
+    The robot's plane if its motion is planar; the plane that the tasks track if they
+    track two axes; the plane of paths and obstacles if they are nearly flat; else an
+    oblique view.
     """
-    if is_flat(whole := centers(rollout)):
+    if is_flat(whole := center_points(rollout)):
         return plane(best_plane(whole))
     tracked = {"".join(sorted(path.axes)) for path in task_paths(rollout)}
     if len(tracked) == 1 and len(only := tracked.pop()) == 2:
         return plane(only)
-    middles = [body.center for body in bodies(rollout) if not body.vast]
-    seen = np.concatenate([_led(rollout), *middles])
-    return plane(best_plane(seen)) if is_flat(seen, NEARLY_FLAT) else slant()
+    middles = [
+        obstacle.center
+        for obstacle in logged_obstacles(rollout)
+        if not obstacle.oversized
+    ]
+    seen = np.concatenate([_path_points(rollout), *middles])
+    return plane(best_plane(seen)) if is_flat(seen, NEARLY_FLAT) else oblique()
 
 
 def draw_end_effector(axes: Axes, rollout: Rollout, *, names: str = "") -> None:
-    """Draw desired and actual path of every point that a task leads, and obstacles.
+    """Draw desired and actual path of every point that a task controls, and obstacles.
 
-    Obstacles are drawn where they are at the end, and dashed where they were at the
-    start.
+    Obstacles are drawn at the end of the run, and dashed at its start.
 
     Args:
         axes: The axes.
         rollout: The log.
-        names: Two world axes to draw, such as ``"xz"``; empty: see `path_view`.
+        names: Two world axes to draw, such as ``"xz"``; "": see `path_view`.
     """
     view = plane(names) if names else path_view(rollout)
     paths = task_paths(rollout)
@@ -71,23 +75,29 @@ def draw_end_effector(axes: Axes, rollout: Rollout, *, names: str = "") -> None:
             label=_desired_label(path.axes, view) if place == 0 else None,
         )
     for place, path in enumerate(paths):
-        who = path.name if len(paths) > 1 else ""
-        _draw_track(axes, view, path.actual, place, plain(f"{who} actual".strip()))
+        name = path.name if len(paths) > 1 else ""
+        _draw_track(
+            axes, view, path.actual, place, literal_text(f"{name} actual".strip())
+        )
     if not paths:
         ends = end_points(rollout)
         for k in range(ends.shape[1]):
             label = "end of the robot" if k == 0 else None
             _draw_track(axes, view, ends[:, k], k, label)
-        note(axes, "no task leads a point")
+        note(axes, "no task controls a point")
     _draw_obstacles(axes, view, rollout)
-    least = 0.02 * float(np.ptp(everything(rollout), axis=0).max())
-    around = [body.enclosed() for body in bodies(rollout) if not body.vast]
-    seen = np.concatenate([_led(rollout), *around])
+    min_width = 0.02 * float(np.ptp(enclosing_points(rollout), axis=0).max())
+    around = [
+        obstacle.enclosing_points()
+        for obstacle in logged_obstacles(rollout)
+        if not obstacle.oversized
+    ]
+    seen = np.concatenate([_path_points(rollout), *around])
     if view.names:
-        fit(axes, view, seen, least)
+        fit(axes, view, seen, min_width)
     else:
         middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-        half = np.maximum(0.53 * np.ptp(seen, axis=0), 0.5 * least)
+        half = np.maximum(0.53 * np.ptp(seen, axis=0), 0.5 * min_width)
         draw_box(axes, view, middle - half, middle + half)
         fit(axes, view, corners(middle - half, middle + half), margin=0.01)
     legend_below(axes)
@@ -112,23 +122,23 @@ def _draw_track(
 
 
 def _draw_obstacles(axes: Axes, view: View, rollout: Rollout) -> None:
-    found = bodies(rollout)
+    found = logged_obstacles(rollout)
     label = "obstacle" if len(found) == 1 else "obstacles"
-    for place, body in enumerate(found):
-        draw_body(axes, view, body, -1, label=label if place == 0 else None)
-        if body.moves:
-            draw_body(axes, view, body, 0, filled=False)
-            page = view.project(body.center)
+    for place, obstacle in enumerate(found):
+        draw_obstacle(axes, view, obstacle, -1, label=label if place == 0 else None)
+        if obstacle.moves:
+            draw_obstacle(axes, view, obstacle, 0, filled=False)
+            page = view.project(obstacle.center)
             axes.plot(*page, color=palette.OBSTACLE, linewidth=1.1, linestyle=":")
 
 
 def _desired_label(axes: str, view: View) -> str:
-    """Return the label; with the tracked axes if some in the view are not tracked."""
+    """Return the label, with the tracked axes if the view has others, too."""
     return f"desired ({axes})" if set(view.names or "xyz") - set(axes) else "desired"
 
 
-def _led(rollout: Rollout) -> Array:
-    """Return the points of all paths, or those of the robot's ends, (K, 3) [m]."""
+def _path_points(rollout: Rollout) -> Array:
+    """Return the points of all paths, or of the robot's ends [m], shape (K, 3)."""
     paths = task_paths(rollout)
     if not paths:
         return end_points(rollout).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Write a log's figures to files."""
+"""Writes figures to files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,8 +24,8 @@ def save_figures(
 
     Args:
         rollout: The log.
-        folder: Where to; made if need be.
-        stem: What the files' names begin with.
+        folder: The folder; created if necessary.
+        stem: The beginning of the files' names.
         formats: Such as ``png``, ``pdf`` or ``svg``.
         absolute: Draw absolute angles where the literature on the robot does.
 
@@ -33,7 +33,7 @@ def save_figures(
         The files.
 
     Raises:
-        PlotError: If a format is not known, or a file cannot be written.
+        PlotError: If a format is unknown, or a file cannot be written.
     """
     figures = {
         "paper": paper_figure(rollout, absolute=absolute),
@@ -52,7 +52,7 @@ def save_figure(figure: Figure, path: Path, suffix: str) -> None:
     """Write one figure in one format.
 
     Raises:
-        PlotError: If the format is not known, or the file cannot be written.
+        PlotError: If the format is unknown, or the file cannot be written.
     """
     known = figure.canvas.get_supported_filetypes()
     if suffix not in known:

@@ -1,6 +1,6 @@
-"""How figures look: a style that holds in its context alone, and empty figures in it.
+"""The style of figures, as a context, and empty figures with that style.
 
-Nothing here needs a display: figures own an Agg canvas and pyplot is never imported.
+No display is needed: figures have an Agg canvas, and pyplot is not imported.
 """
 
 from collections.abc import Iterator
@@ -68,36 +68,36 @@ STYLE: dict[str, Any] = {
 }
 
 NOTEBOOK_DPI = 100.0
-"""Dots per inch of pictures in notebooks; they are stored there as text."""
+"""Dots per inch of figures in notebooks, which store them as text."""
 
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Hold matplotlib's parameters at `STYLE` within the context, and only there."""
+    """Set matplotlib's parameters to `STYLE` within the context."""
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # any str may be a key
         yield
 
 
 def use_style() -> None:
-    """Make `STYLE` matplotlib's own from here on: for a notebook's or script's top.
+    """Set matplotlib's parameters to `STYLE` permanently, in a notebook or script.
 
-    Figures made with pyplot then look like the package's.
+    Figures made with pyplot then look like those of this package.
     """
     mpl.rcParams.update(STYLE)  # type: ignore[arg-type]  # any str may be a key
 
 
 class StyledFigure(Figure):
-    """A figure that is drawn in the style, wherever it is saved or shown.
+    """A figure that is always drawn in the style, also outside of `styled`.
 
-    Matplotlib makes ticks when they are first drawn, with the parameters of then.
-    In a notebook it shows itself as the value of a cell.
+    Matplotlib creates ticks at the first drawing, with the parameters of that time.
+    In a notebook, the figure is displayed as the value of a cell.
     """
 
     def _repr_png_(self) -> bytes:
-        """Return the picture: how a notebook shows what pyplot does not know of."""
-        picture = BytesIO()
-        self.savefig(picture, format="png", dpi=NOTEBOOK_DPI)
-        return picture.getvalue()
+        """Return the figure as PNG, for notebooks."""
+        image = BytesIO()
+        self.savefig(image, format="png", dpi=NOTEBOOK_DPI)
+        return image.getvalue()
 
     def draw(self, renderer: RendererBase) -> None:
         """Draw in the style."""

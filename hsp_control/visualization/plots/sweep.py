@@ -1,4 +1,4 @@
-"""What a sweep found: every result over every parameter, tinted by its influence."""
+"""Figure of a sweep: every result over every parameter, tinted by its influence."""
 
 import textwrap
 from collections.abc import Sequence
@@ -15,13 +15,13 @@ from hsp_control.common.exceptions import PlotError
 from hsp_control.sweeps import Sensitivity, Sweep, sensitivity
 from hsp_control.sweeps.sensitivity import has_order
 from hsp_control.visualization import palette
-from hsp_control.visualization.plots.legends import plain
+from hsp_control.visualization.plots.legends import literal_text
 from hsp_control.visualization.plots.saving import save_figure
 from hsp_control.visualization.plots.style import new_figure, styled
 
-MOST_PARAMETERS, MOST_OUTCOMES = 8, 6
-_DECADES = 30.0  # a ratio of largest to least beyond which an axis is logarithmic
-_BINS = 9  # of the running median, where there are more values
+MAX_PARAMETERS, MAX_OUTCOMES = 8, 6
+_LOG_RATIO = 30.0  # largest over smallest value, above which an axis is logarithmic
+_BINS = 9  # bins of the median, if there are more values
 _GROWS, _FALLS, _EITHER = palette.ACTUAL, palette.DESIRED, palette.FIELD
 
 
@@ -47,11 +47,11 @@ def save_sweep_figure(
 
 
 def sweep_figure(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Figure:
-    """Return a panel for every result over every parameter.
+    """Return a figure with a panel for every result over every parameter.
 
-    A panel's tint is the influence: blue where the result grows with the parameter,
-    orange where it falls, purple where it depends on it otherwise; its strength is the
-    share of the variance (of ranks) that the parameter explains alone.
+    A panel's tint shows the influence: blue if the result increases with the parameter,
+    orange if it decreases, purple for other dependence. Its strength is the share of
+    the variance (of ranks) that the parameter alone explains.
 
     Args:
         sweep: The sweep.
@@ -63,29 +63,29 @@ def sweep_figure(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Figure:
         PlotError: If no parameter varies.
     """
     found = sensitivity(sweep, outcomes)
-    rows = range(min(len(found.outcomes), MOST_OUTCOMES))
-    # Where they do not all fit, the most influential parameters are shown.
+    rows = range(min(len(found.outcomes), MAX_OUTCOMES))
+    # If not all parameters fit, the most influential ones are shown.
     order = np.argsort(
         -np.nan_to_num(found.share).max(axis=1, initial=0.0), kind="stable"
     )
-    columns = sorted(order[:MOST_PARAMETERS].tolist())
+    columns = sorted(order[:MAX_PARAMETERS].tolist())
     if not columns or not rows:
         raise PlotError("no parameter of this sweep varies: there is nothing to draw")
     with styled():
         figure = new_figure(1.6 + 2.2 * len(columns), 1.1 + 1.65 * len(rows))
-        _entitle(figure, sweep, found)
+        _add_title(figure, sweep, found)
         grid = figure.subplots(
             len(rows), len(columns), squeeze=False, sharex="col", sharey="row"
         )
         for j in rows:
             for k, i in enumerate(columns):
                 _draw_panel(grid[j, k], sweep, found, i, j)
-            told = sweep.meta["metrics"][found.outcomes[j]]
-            label = textwrap.fill(f"{told['meaning']} [{told['unit']}]", 22)
-            grid[j, 0].set_ylabel(plain(label))
+            metric = sweep.meta["metrics"][found.outcomes[j]]
+            label = textwrap.fill(f"{metric['meaning']} [{metric['unit']}]", 22)
+            grid[j, 0].set_ylabel(literal_text(label))
             grid[j, 0].yaxis.set_label_coords(-0.32, 0.5)
         for k, i in enumerate(columns):
-            grid[-1, k].set_xlabel(plain(_wrapped(found.parameters[i])))
+            grid[-1, k].set_xlabel(literal_text(_wrapped(found.parameters[i])))
     return figure
 
 
@@ -93,7 +93,7 @@ def _draw_panel(axes: Axes, sweep: Sweep, found: Sensitivity, i: int, j: int) ->
     parameter, outcome = found.parameters[i], found.outcomes[j]
     chosen = sweep.completed
     values, y = sweep[parameter], sweep[outcome].astype(float)
-    x = _places(axes, sweep, parameter)
+    x = _axis_positions(axes, sweep, parameter)
     count = int(chosen.sum())
     axes.plot(
         x[chosen],
@@ -109,10 +109,10 @@ def _draw_panel(axes: Axes, sweep: Sweep, found: Sensitivity, i: int, j: int) ->
     middle_x, middle_y = _medians(x[known], y[known])
     line = "-" if has_order(values) else "none"
     axes.plot(middle_x, middle_y, color=palette.WARNING, linestyle=line, marker="_")
-    if _wide(y[known]):
+    if _needs_log_axis(y[known]):
         axes.set_yscale("log")
         _label_decades(axes.yaxis, y[known])
-    if (~chosen).any():  # at the foot, whatever the axis
+    if (~chosen).any():  # at the lower edge, for any y axis
         axes.plot(
             x[~chosen],
             np.full(int((~chosen).sum()), 0.02),
@@ -126,18 +126,18 @@ def _draw_panel(axes: Axes, sweep: Sweep, found: Sensitivity, i: int, j: int) ->
 
 
 def _tint(axes: Axes, correlation: float, share: float, noise: float) -> None:
-    """Colour a panel by the influence, and write it into its corner."""
+    """Colour a panel by the influence, and write the influence above it."""
     share = 0.0 if np.isnan(share) else share
     monotone = not np.isnan(correlation) and abs(correlation) >= noise
     hue = _EITHER
-    # What grows and falls again has a share, and hardly a correlation.
+    # A result that increases and decreases has a share but little correlation.
     if monotone and correlation**2 > 0.4 * share:
         hue = _GROWS if correlation > 0.0 else _FALLS
     axes.set_facecolor(palette.blend(palette.PAPER, hue, 0.45 * share))
     words = [f"ρ {correlation:+.2f}"] if monotone else []
     words += [f"{share:.0%}"] if share >= 0.005 else []
     axes.set_title(
-        "  ".join(words) or "no influence seen",
+        "  ".join(words) or "no influence",
         fontsize=8.0,
         fontweight="normal" if share < 0.1 else "bold",
         color=palette.INK if words else palette.MUTED,
@@ -145,8 +145,8 @@ def _tint(axes: Axes, correlation: float, share: float, noise: float) -> None:
     )
 
 
-def _places(axes: Axes, sweep: Sweep, parameter: str) -> Array:
-    """Return where a parameter's values stand on the axis, and set the axis up."""
+def _axis_positions(axes: Axes, sweep: Sweep, parameter: str) -> Array:
+    """Return a parameter's values as positions on the x axis; set the axis up."""
     values = sweep[parameter]
     if has_order(values):
         numbers = values.astype(float)
@@ -155,13 +155,13 @@ def _places(axes: Axes, sweep: Sweep, parameter: str) -> Array:
             _label_decades(axes.xaxis, numbers)
         return np.asarray(numbers)
     names, places = np.unique(values.astype(str), return_inverse=True)
-    axes.set_xticks(range(len(names)), [plain(name[:14]) for name in names])
+    axes.set_xticks(range(len(names)), [literal_text(name[:14]) for name in names])
     axes.set_xlim(-0.6, len(names) - 0.4)
     return places.astype(float)
 
 
 def _is_logarithmic(sweep: Sweep, parameter: str) -> bool:
-    """Return whether the values were spread evenly in their logarithm."""
+    """Return whether the values were chosen evenly on a logarithmic scale."""
     for factor in sweep.meta["identity"]["factors"]:
         if factor["key"] == parameter:
             if factor["type"] == "Choices":
@@ -173,15 +173,15 @@ def _is_logarithmic(sweep: Sweep, parameter: str) -> bool:
     return False
 
 
-def _wide(values: Array) -> bool:
-    """Return whether values span decades, or single ones would flatten all others."""
-    least, most = float(values.min()), float(values.max())
+def _needs_log_axis(values: Array) -> bool:
+    """Return whether values span decades, or outliers would flatten the others."""
+    smallest, largest = float(values.min()), float(values.max())
     usual = float(np.quantile(values, 0.95))
-    return least > 0.0 and (most > _DECADES * least or most > 3.0 * usual)
+    return smallest > 0.0 and (largest > _LOG_RATIO * smallest or largest > 3.0 * usual)
 
 
 def _label_decades(axis: Axis, values: Array) -> None:
-    """Name the decades on a logarithmic axis, and 2 and 5 where these are few."""
+    """Label the decades of a logarithmic axis; with few decades also 2 and 5."""
     decades = np.log10(float(values.max()) / float(values.min()))
     axis.set_major_locator(
         LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.5 else (1.0,))
@@ -191,7 +191,7 @@ def _label_decades(axis: Axis, values: Array) -> None:
 
 
 def _medians(x: Array, y: Array) -> tuple[Array, Array]:
-    """Return the median of y at every value of x, or in bins of as many runs each."""
+    """Return the median of y at every value of x, or in bins of equally many runs."""
     levels = np.unique(x)
     if len(levels) <= _BINS:
         bins = [np.flatnonzero(x == level) for level in levels]
@@ -201,20 +201,24 @@ def _medians(x: Array, y: Array) -> tuple[Array, Array]:
     return np.array([m[0] for m in middle]), np.array([m[1] for m in middle])
 
 
-def _entitle(figure: Figure, sweep: Sweep, found: Sensitivity) -> None:
+def _add_title(figure: Figure, sweep: Sweep, found: Sensitivity) -> None:
     identity = sweep.meta["identity"]
     named = identity["configuration"].get("title") or Path(sweep.meta["name"]).stem
-    figure.suptitle(plain(textwrap.fill(str(named), 24 + 22 * len(found.parameters))))
+    figure.suptitle(
+        literal_text(textwrap.fill(str(named), 24 + 22 * len(found.parameters)))
+    )
     failed = len(sweep) - found.runs
     parts = [
         f"{len(sweep)} runs, {identity['design'].replace('_', ' ')}",
         f"seed {identity['seed']}",
-        *([f"{failed} not completed (| at the foot)"] if failed else []),
-        "tint: share of variance explained; blue grows, orange falls, purple other",
+        *([f"{failed} not completed (| at the lower edge)"] if failed else []),
+        "tint: share of variance explained; blue rises, orange falls, purple other",
         f"hsp_control {identity['versions']['hsp_control']}",
     ]
     figure.supxlabel(
-        plain(textwrap.fill("  ·  ".join(parts), 30 + 42 * len(found.parameters))),
+        literal_text(
+            textwrap.fill("  ·  ".join(parts), 30 + 42 * len(found.parameters))
+        ),
         fontsize=7.5,
         color=palette.MUTED,
         x=0.01,
@@ -223,7 +227,7 @@ def _entitle(figure: Figure, sweep: Sweep, found: Sensitivity) -> None:
 
 
 def _wrapped(key: str, width: int = 26) -> str:
-    """Return a key path in lines that break after dots."""
+    """Return a key path, wrapped after dots."""
     lines = [""]
     for part in key.replace(".", ".\0").split("\0"):
         if lines[-1] and len(lines[-1]) + len(part) > width:

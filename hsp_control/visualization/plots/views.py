@@ -1,4 +1,4 @@
-"""From which side the world is drawn: along one of its axes, or from a slant."""
+"""Views of the world: along one of its axes, or oblique."""
 
 from math import cos, radians, sin
 from typing import NamedTuple
@@ -9,24 +9,24 @@ from matplotlib.axes import Axes
 from hsp_control.common.arrays import Array
 
 FLAT = 1e-6
-"""Depth over width below which motion is said to lie in a plane."""
+"""Depth over width below which motion counts as planar."""
 AZIMUTH, ELEVATION = -60.0, 22.0
-"""Where the eye of a slant view stands [deg]."""
+"""Direction of the eye in an oblique view [deg]."""
 
 
 class View(NamedTuple):
-    """A parallel projection onto the page.
+    """A parallel projection onto the figure's plane.
 
     Attributes:
-        rows: What a point is multiplied with, shape (2, 3).
-        names: The world axes that the page's axes are, ``"xy"``; none for a slant view.
+        rows: The projection matrix, shape (2, 3).
+        names: The world axes of the plane, such as ``"xy"``; "" for an oblique view.
     """
 
     rows: Array
     names: str
 
     def project(self, points: Array) -> tuple[Array, Array]:
-        """Return x and y on the page, each of the shape of ``points[..., 0]``."""
+        """Return x and y in the figure's plane, each of shape ``points.shape[:-1]``."""
         page = points @ self.rows.T
         return page[..., 0], page[..., 1]
 
@@ -36,8 +36,8 @@ def plane(names: str) -> View:
     return View(np.eye(3)[["xyz".index(name) for name in names]], names)
 
 
-def slant() -> View:
-    """Return the view from above the front of the scene, z upwards."""
+def oblique() -> View:
+    """Return the oblique view from the front and above, z upwards."""
     a, e = radians(AZIMUTH), radians(ELEVATION)
     right = (-sin(a), cos(a), 0.0)
     up = (-sin(e) * cos(a), -sin(e) * sin(a), cos(e))
@@ -45,53 +45,55 @@ def slant() -> View:
 
 
 def best_plane(points: Array) -> str:
-    """Return the two world axes along which points spread most, such as ``"xy"``.
+    """Return the two world axes with the largest spread of points, such as ``"xy"``.
 
     Args:
         points: Shape (K, 3).
     """
     spread = np.ptp(points, axis=0)
-    depth = 2 - int(np.argmin(spread[::-1]))  # the last axis where several spread least
+    depth = 2 - int(
+        np.argmin(spread[::-1])
+    )  # the last axis of those with the smallest spread
     return "xyz".replace("xyz"[depth], "")
 
 
 def is_flat(points: Array, depth: float = FLAT) -> bool:
-    """Say whether points lie in a plane across a world axis.
+    """Return whether points lie in a plane normal to a world axis.
 
     Args:
         points: Shape (K, 3).
-        depth: Their depth over their width that still counts as flat.
+        depth: Maximum depth over width of flat points.
     """
     spread = np.ptp(points, axis=0)
     return bool(spread.min() <= depth * spread.max())
 
 
 def view_of(points: Array) -> View:
-    """Return the view onto the plane that points lie in, or from a slant.
+    """Return the view onto the plane of flat points, or else the oblique view.
 
     Args:
         points: Shape (K, 3).
     """
-    return plane(best_plane(points)) if is_flat(points) else slant()
+    return plane(best_plane(points)) if is_flat(points) else oblique()
 
 
 def fit(
-    axes: Axes, view: View, points: Array, least: float = 0.0, margin: float = 0.06
+    axes: Axes, view: View, points: Array, min_width: float = 0.0, margin: float = 0.06
 ) -> None:
-    """Set limits around points, equal scales, and labels if there are world axes.
+    """Set the limits around points, equal scales, and labels of world axes.
 
     Args:
         axes: The axes.
         view: The view.
-        points: What is to be seen, shape (K, 3).
-        least: Width that is shown at least [m], so as not to magnify rounding.
-        margin: Room around them, relative to the greater width.
+        points: The points to show [m], shape (K, 3).
+        min_width: Minimum width [m], so that rounding errors are not magnified.
+        margin: Margin around the points, over the larger width.
     """
     x, y = view.project(points)
-    widest = max(float(np.ptp(x)), float(np.ptp(y)), least, 1e-6)
+    widest = max(float(np.ptp(x)), float(np.ptp(y)), min_width, 1e-6)
     for set_limits, coordinate in ((axes.set_xlim, x), (axes.set_ylim, y)):
         middle = 0.5 * float(coordinate.min() + coordinate.max())
-        half = 0.5 * max(float(np.ptp(coordinate)), least) + margin * widest
+        half = 0.5 * max(float(np.ptp(coordinate)), min_width) + margin * widest
         set_limits(middle - half, middle + half)
     axes.set_aspect("equal")
     axes.locator_params(nbins=6)

@@ -1,6 +1,6 @@
-"""Watch a robot in a browser: live, or a run again."""
+"""Show a robot in a browser: during a run, or from a log."""
 
-from .comparison import Act as Act
+from .comparison import ComparedRun as ComparedRun
 from .export import FilmStyle as FilmStyle
 from .export import export_film as export_film
 from .export import export_html as export_html

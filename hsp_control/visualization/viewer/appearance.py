@@ -1,4 +1,4 @@
-"""How the view looks: what each thing is coloured, and how thick things are."""
+"""Colours, opacities and sizes of the objects in the view."""
 
 from hsp_control.visualization import palette
 
@@ -6,26 +6,26 @@ ACTUAL, DESIRED = palette.ACTUAL, palette.DESIRED
 OBSTACLE = palette.OBSTACLE
 LINK, JOINT = palette.LINK, palette.JOINT
 AXES = (palette.OBSTACLE, palette.TASK, palette.ACTUAL)
-"""x, y and z of a target: as near to red, green and blue as all eyes tell apart."""
+"""x, y and z axis of a target: like red, green, blue, but safe for colour blindness."""
 
 HAZE = 0.19
-"""How much darker the horizon is than the sky: the share of grey."""
+"""Share of grey in the background's colour at the horizon."""
 GRID = "#8794A1"
 
 PATH_RADIUS = 0.0045
-"""Of the actual path, over the size of the scene."""
+"""Radius of the actual path, over the size of the scene."""
 DESIRED_WIDENING = 2.0
-"""How much thicker the desired path is: a sleeve, in which the actual one lies."""
+"""Radius of the desired path over that of the actual path, which it encloses."""
 GHOST_NARROWING = 0.8
-"""How much thinner a ghost's path is: it lies within the path of the run."""
+"""Radius of a ghost's path over that of the run, which encloses it."""
 OBSTACLE_OPACITY = 0.75
 ZONE_OPACITY = 0.13
 INK, CHALK = palette.INK, palette.WALL
-"""What is drawn on a light background, and on a dark one."""
+"""Colour of lines on a light and on a dark background."""
 BAR_RADIUS = 0.003
-"""Of a distance, over the size of the scene."""
+"""Radius of a distance bar, over the size of the scene."""
 ELLIPSOID, ELLIPSOID_OPACITY = palette.TASK, 0.3
 FIELD, FIELD_OPACITY = palette.FIELD, 0.4
 ARROW_RADIUS = 0.007
-"""Of an arrow's shaft, over the robot's size."""
+"""Radius of an arrow's shaft, over the robot's size."""
 CONTACT = palette.WARNING

@@ -1,4 +1,4 @@
-"""Arrows and bars: drawn once with length 1, then turned and scaled."""
+"""Arrows and bars: drawn once with length 1, then rotated and scaled."""
 
 from collections.abc import Iterator
 
@@ -10,52 +10,54 @@ from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Json
 from hsp_control.visualization.viewer.poses import quaternions_along
 
-_FULL = 12.0
-"""From this length on, over its radius, an arrow is as thick as it will be."""
+_FULL_WIDTH = 12.0
+"""Length over radius from which an arrow has its full radius."""
 
 
 def unit_arrow(surface: Json, radius: float) -> Json:
-    """Return an arrow along z of length 1, its shaft of a radius [m]."""
+    """Return an arrow along z of length 1 with the given shaft radius [m]."""
     profile = np.array([(0, 0), (1, 0), (1, 0.72), (2.5, 0.72), (0, 1)])
-    thing = threejs.mesh(threejs.turned(profile * [radius, 1.0]), surface, shadow=False)
-    thing["object"]["renderOrder"] = 1  # after what it shines through
+    thing = threejs.mesh(threejs.lathe(profile * [radius, 1.0]), surface, shadow=False)
+    thing["object"]["renderOrder"] = (
+        1  # draw it after the objects that it is seen through
+    )
     return threejs.group([thing])
 
 
 def unit_bar(surface: Json, radius: float) -> Json:
-    """Return a bar along z of length 1 and a radius [m]."""
-    solid = threejs.turned(np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * [radius, 1.0])
+    """Return a bar along z of length 1 with the given radius [m]."""
+    solid = threejs.lathe(np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * [radius, 1.0])
     return threejs.group([threejs.mesh(solid, surface, shadow=False)])
 
 
 def arrow_tracks(
     path: str, times: Array, origins: Array, vectors: Array, radius: float
 ) -> Iterator[Track]:
-    """Yield how a unit arrow becomes arrows; short ones are thin.
+    """Yield the tracks that turn a unit arrow into vectors; short arrows are thinner.
 
     Args:
-        path: Its node.
-        times: When [s], shape (N,).
-        origins: Where they begin [m], shape (N, 3).
-        vectors: From there to where they end [m], shape (N, 3); of length 0: none.
-        radius: Of the unit arrow's shaft [m].
+        path: The arrow's node.
+        times: Times [s], shape (N,).
+        origins: Start points [m], shape (N, 3).
+        vectors: From start to end [m], shape (N, 3); length 0 hides the arrow.
+        radius: The unit arrow's shaft radius [m].
     """
     lengths = np.linalg.norm(vectors, axis=1)
-    widths = np.minimum(lengths / (_FULL * radius), 1.0)
+    widths = np.minimum(lengths / (_FULL_WIDTH * radius), 1.0)
     yield from _tracks(path, times, origins, vectors, np.c_[widths, widths, lengths])
 
 
 def bar_tracks(
     path: str, times: Array, starts: Array, ends: Array, shown: Array
 ) -> Iterator[Track]:
-    """Yield how a unit bar joins two points.
+    """Yield the tracks with which a unit bar connects two points.
 
     Args:
-        path: Its node.
-        times: When [s], shape (N,).
-        starts: From where [m], shape (N, 3).
-        ends: To where [m], shape (N, 3).
-        shown: Whether it is to be seen, shape (N,).
+        path: The bar's node.
+        times: Times [s], shape (N,).
+        starts: Start points [m], shape (N, 3).
+        ends: End points [m], shape (N, 3).
+        shown: Whether the bar is visible, shape (N,).
     """
     vectors = ends - starts
     ones = np.ones(len(times))

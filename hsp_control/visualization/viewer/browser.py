@@ -1,4 +1,4 @@
-"""Opens the user's browser, without waiting for it."""
+"""Opens the user's browser without waiting for it."""
 
 import logging
 import os
@@ -10,19 +10,20 @@ _log = logging.getLogger(__name__)
 
 
 def open_browser(url: str) -> bool:
-    """Open a page in the user's browser, if there is one; return whether it was tried.
+    """Open a page in the user's browser; return whether there is one.
 
-    A line in the log says so if there is none.
+    Logs a warning if there is none.
     """
-    missing = _what_is_missing()
-    if missing is not None:
-        _log.warning("%s; the view is at %s", missing, url)
+    reason = _why_not()
+    if reason is not None:
+        _log.warning("%s; the view is at %s", reason, url)
         return False
     threading.Thread(target=webbrowser.open, args=(url, 2), daemon=True).start()
     return True
 
 
-def _what_is_missing() -> str | None:
+def _why_not() -> str | None:
+    """Return why no browser can be opened; None if one can."""
     chosen = "BROWSER" in os.environ
     display = os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}
     if sys.platform.startswith("linux") and not (display or chosen):

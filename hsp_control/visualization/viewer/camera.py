@@ -1,4 +1,4 @@
-"""From where the scene is seen: as told, or so that all of it is in sight."""
+"""The camera: as configured, or placed so that the whole scene is visible."""
 
 from collections.abc import Sequence
 
@@ -12,12 +12,12 @@ from hsp_control.visualization.viewer.commands import Command, set_camera
 from hsp_control.visualization.viewer.stage import scene_size
 
 FIELD_OF_VIEW = 32.0
-"""Height of the picture [deg]: a narrow one, in which straight arms look straight."""
+"""Vertical field of view [deg]: narrow, for little perspective distortion."""
 _THICKNESS = 0.11
-"""Of what is about the points, over their distance from their middle."""
-_SLANT = np.array([1.0, -1.35, 0.62])
-_STEEP = np.cos(np.radians(30.0))
-_MOST_POINTS = 300
+"""Radius of the balls around the points, over the size of the scene."""
+_DEFAULT_DIRECTION = np.array([1.0, -1.35, 0.62])
+_COS_STEEP = np.cos(np.radians(30.0))
+_MAX_POINTS = 300
 
 
 def look_at(
@@ -30,28 +30,28 @@ def look_at(
 ) -> Command:
     """Return the command that places the camera.
 
-    A planar arm is seen along its axes, any other robot from above its front. Where one
-    looks down or up steeply, y is up in the picture, else z.
+    A planar arm is seen along its joint axes, any other robot from its front and above.
+    If the camera looks down or up steeply, y is up in the picture, else z.
 
     Args:
         robot: The robot.
-        points: What is to be in sight [m], shape (K, 3).
-        eye: Where one looks from [m]; None: far enough to see all points.
-        target: Where one looks at [m]; None: the points' middle.
-        fit: Only look from the same side, but see all points.
+        points: The points that must be visible [m], shape (K, 3).
+        eye: The camera's position [m]; None: far enough to see all points.
+        target: The point that it looks at [m]; None: the middle of the points.
+        fit: Keep only the direction of ``eye``, and move away to see all points.
     """
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     center = middle if target is None or fit else np.asarray(target, float)
-    direction = from_where(robot, eye, center if target is None else target)
+    direction = viewing_direction(robot, eye, center if target is None else target)
     view: dict[str, object] = {}
     if eye is not None and not fit:
         view["eye"] = [float(x) for x in eye]
     else:
-        stride = max(1, len(points) // _MOST_POINTS)
+        stride = max(1, len(points) // _MAX_POINTS)
         view["direction"] = direction.tolist()
         view["points"] = points[::stride].tolist()
         view["radius"] = _THICKNESS * scene_size(points)
-    steep = abs(direction[2]) > _STEEP * np.linalg.norm(direction)
+    steep = abs(direction[2]) > _COS_STEEP * np.linalg.norm(direction)
     return set_camera(
         **view,
         target=center.tolist(),
@@ -60,40 +60,40 @@ def look_at(
     )
 
 
-def from_where(
+def viewing_direction(
     robot: Robot, eye: Sequence[float] | None, target: Array | Sequence[float] | None
 ) -> Array:
-    """Return the direction towards the eye, of any length.
+    """Return the direction from the target to the eye, shape (3,), not normalised.
 
     Args:
         robot: The robot.
-        eye: Where one looks from [m]; None: from where the robot is seen well.
-        target: Where one looks at [m]; None: the origin.
+        eye: The camera's position [m]; None: the robot's default direction.
+        target: The point that it looks at [m]; None: the origin.
     """
     if eye is not None:
         return np.subtract(eye, np.zeros(3) if target is None else target)
     normal = plane_normal(robot)
-    return _SLANT if normal is None else normal
+    return _DEFAULT_DIRECTION if normal is None else normal
 
 
-def to_the_right(
+def right_direction(
     robot: Robot, eye: Sequence[float] | None, target: Sequence[float] | None
 ) -> Array:
-    """Return the level direction to the right in the picture, a unit vector.
+    """Return the horizontal direction to the right in the picture, a unit vector.
 
     Args:
         robot: The robot.
-        eye: See `from_where`.
-        target: See `from_where`.
+        eye: See `viewing_direction`.
+        target: See `viewing_direction`.
     """
-    direction = from_where(robot, eye, target)
+    direction = viewing_direction(robot, eye, target)
     right = np.array([-direction[1], direction[0], 0.0])
     length = float(np.linalg.norm(right))
     return right / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
 
 
 def plane_normal(robot: Robot) -> Array | None:
-    """Return the side from which a planar arm is seen, a unit vector, else None."""
+    """Return the normal of a planar arm's plane, towards the eye; None if spatial."""
     if any(joint.nv != 1 for joint in list(robot.model.joints)[1:]):
         return None
     data = robot.model.createData()
@@ -106,6 +106,6 @@ def plane_normal(robot: Robot) -> Array | None:
     across = np.abs(normal @ J[:3, ~turns]) < 1e-9
     if not (parallel.all() and across.all()):
         return None
-    # From above; of upright planes: so that x or y goes to the right.
+    # Seen from above; if the plane is vertical, with x or y to the right.
     towards = normal @ np.array([0.1, -1.0, 10.0])
     return np.asarray(normal if towards > 0.0 else -normal)

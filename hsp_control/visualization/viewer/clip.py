@@ -1,4 +1,4 @@
-"""A clip: what the nodes of the scene do in time, for the page's player to play."""
+"""A clip: an animation of the scene's nodes, played by the page's player."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -16,14 +16,14 @@ from hsp_control.visualization.viewer.commands import (
 
 
 class Track(NamedTuple):
-    """What one property of one node does.
+    """The animation of one property of one node.
 
     Attributes:
         path: The node.
         property: ``position`` [m], ``quaternion`` (x, y, z, w), ``scale``, ``color``,
             ``opacity``, ``visible`` or ``length``; see ``page/player.js``.
-        times: When [s], ascending, shape (n,).
-        values: What, a row a time, shape (n, k).
+        times: Times [s], ascending, shape (n,).
+        values: One row per time, shape (n, k).
     """
 
     path: str
@@ -33,13 +33,13 @@ class Track(NamedTuple):
 
 
 class Clip(NamedTuple):
-    """What the scene does from a start to an end.
+    """The animation of the scene from a start to an end.
 
     Attributes:
         start: First time that can be shown [s].
         end: Last time that can be shown [s].
-        tracks: What moves.
-        horizon: Where the clip will end when it is whole [s]; None: at ``end``.
+        tracks: The animated properties.
+        horizon: The end of the complete clip [s]; None: ``end``.
     """
 
     start: float
@@ -49,7 +49,7 @@ class Clip(NamedTuple):
 
     @property
     def open(self) -> bool:
-        """Whether more of it is to come."""
+        """Whether an extension is expected."""
         return self.horizon is not None and self.horizon > self.end
 
 
@@ -61,14 +61,14 @@ def set_clip(
     speed: float = 1.0,
     keep: bool = False,
 ) -> list[Command]:
-    """Return the commands that show a clip in place of the last one.
+    """Return the commands that replace the current clip.
 
     Args:
         clip: The clip.
-        play: Begin to play at once.
-        loop: Play it again and again.
-        speed: Seconds of the clip in one second.
-        keep: If another clip is shown, go on at its time, as it was played.
+        play: Start playing at once.
+        loop: Repeat the clip.
+        speed: Seconds of the clip per second of real time.
+        keep: Keep the time, speed and state of the clip that is shown now, if any.
     """
     begin = clip_command(
         "clip",
@@ -83,17 +83,17 @@ def set_clip(
     return [forget_clip(), begin]
 
 
-def no_clip() -> list[Command]:
-    """Return the commands that take the clip away: others move the scene from now."""
+def remove_clip() -> list[Command]:
+    """Return the commands that remove the clip; then commands move the scene."""
     return [forget_clip(), clip_command("still", "begin")]
 
 
 def extend_clip(clip: Clip, number: int) -> Command:
-    """Return the command that adds what comes after the last clip's end.
+    """Return the command that appends a clip to the current one.
 
     Args:
-        clip: What comes.
-        number: How many came before it since `set_clip`.
+        clip: The part to append.
+        number: The number of this part, counted from 1 after `set_clip`.
     """
     return clip_command("clip", f"more {number}", **_fields(clip), begins=False)
 
@@ -120,5 +120,5 @@ def _fields(clip: Clip) -> Json:
 
 
 def _clocks(tracks: Iterable[Track]) -> list[Array]:
-    """Return the times that tracks follow; those that several share, once."""
+    """Return the distinct arrays of times of the tracks."""
     return list({id(track.times): track.times for track in tracks}.values())

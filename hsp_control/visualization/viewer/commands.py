@@ -1,4 +1,4 @@
-"""What the page is told: Meshcat's commands and a few of our own, in MessagePack."""
+"""Commands for the page, in MessagePack: Meshcat's and a few additional ones."""
 
 import struct
 from functools import lru_cache
@@ -8,7 +8,7 @@ import numpy as np
 import umsgpack  # type: ignore[import-untyped]
 
 from hsp_control.common.arrays import Array
-from hsp_control.visualization.viewer.kept import key_of
+from hsp_control.visualization.viewer.latest_commands import key_of
 
 Json = dict[str, Any]
 
@@ -16,13 +16,14 @@ CAMERA, CAPTION, CLIP = "/camera", "/caption", "/clip"
 
 
 class Command(NamedTuple):
-    """One word to the page.
+    """One command for the page.
 
     Attributes:
-        path: The node of the scene tree that it is about.
-        key: What it sets; the next command with the same key replaces it.
+        path: The node of the scene tree that it changes.
+        key: The property that it sets, see `key_of`; a later command with the same key
+            replaces it.
         packed: The command itself, a map in MessagePack.
-        deletes: Whether it takes the node and all below it away.
+        deletes: Whether it deletes the node and all nodes below it.
     """
 
     path: str
@@ -32,12 +33,12 @@ class Command(NamedTuple):
 
 
 def set_object(path: str, thing: Json) -> Command:
-    """Put a thing (see `threejs`) at a path, in place of what was there."""
+    """Return the command that sets a node's object (see `threejs`)."""
     return _command("set_object", path, "object", object=thing)
 
 
 def set_transform(path: str, transform: Array) -> Command:
-    """Move a node: its pose in its parent, a homogeneous matrix of shape (4, 4)."""
+    """Return the command that sets a node's pose in its parent, shape (4, 4)."""
     matrix = np.ascontiguousarray(transform.T, dtype="<f8")
     return Command(
         path, key_of(path, "transform"), _transform_head(path) + matrix.tobytes()
@@ -45,12 +46,18 @@ def set_transform(path: str, transform: Array) -> Command:
 
 
 def set_property(path: str, name: str, value: Any) -> Command:
-    """Set a property of a node: ``visible``, ``scale`` and what else Meshcat knows."""
+    """Return the command that sets a property of a node, such as ``visible``."""
     return _command("set_property", path, name, property=name, value=value)
 
 
 def set_ghost(path: str, color: str, opacity: float) -> Command:
-    """Make all that is at a node and below it a ghost, tinted in ``#RRGGBB``."""
+    """Return the command that makes a node a ghost: tinted and translucent.
+
+    Args:
+        path: The node; all nodes below it are included.
+        color: The tint, ``#RRGGBB``.
+        opacity: 1 solid, 0 invisible.
+    """
     return _command("ghost", path, "ghost", color=color, opacity=float(opacity))
 
 
@@ -63,15 +70,15 @@ def set_trail(
     opacity: float = 1.0,
     sleeve: bool = False,
 ) -> Command:
-    """Put a path in space at a node, in place of what was there.
+    """Return the command that sets a node's object to a path in space, a tube.
 
     Args:
         path: The node.
         points: The path [m], shape (N, 3).
-        radius: Half its thickness [m].
-        color: Its colour as three.js's number, the same in any light.
+        radius: The tube's radius [m].
+        color: Its colour as a number, see `color_number`; the same in any light.
         opacity: 1 solid, 0 invisible.
-        sleeve: Show only the far half, seen from within: it never hides what it holds.
+        sleeve: Draw only the back faces, so that it never hides its content.
     """
     return _command(
         "trail",
@@ -86,30 +93,36 @@ def set_trail(
 
 
 def extend_trail(path: str, points: Array, number: int) -> Command:
-    """Add points (N, 3) to a path's end; ``number`` counts how often that was done."""
+    """Return the command that appends points to a path.
+
+    Args:
+        path: The node.
+        points: The points [m], shape (N, 3).
+        number: The number of this extension: each has its own key.
+    """
     more = typed_array(points, np.float32)
     return _command("trail_more", path, f"more {number}", points=more)
 
 
 def delete(path: str) -> Command:
-    """Take away a node and all below it."""
+    """Return the command that deletes a node and all nodes below it."""
     return _command("delete", path, "delete")._replace(deletes=True)
 
 
 def set_camera(**view: Any) -> Command:
-    """Look from elsewhere: see `Camera`."""
+    """Return the command that places the camera: see `look_at`."""
     return _command("camera", CAMERA, "camera", **view)
 
 
 def set_caption(
     title: str, legend: list[tuple[str, str]], *, dark: bool = False
 ) -> Command:
-    """Set the words beside the scene: a title, and names with their colours.
+    """Return the command that sets the title and the legend beside the scene.
 
     Args:
         title: The title.
         legend: Names and colours ``#RRGGBB``.
-        dark: Whether they stand on a dark background.
+        dark: Whether the background is dark.
     """
     entries = [{"name": name, "color": color} for name, color in legend]
     return _command(
@@ -118,36 +131,41 @@ def set_caption(
 
 
 def set_time(text: str) -> Command:
-    """Set the clock under the title; empty for none."""
+    """Return the command that sets the time below the title; "" hides it."""
     return _command("time", CAPTION, "time", text=text)
 
 
 def set_status(text: str) -> Command:
-    """Say beside the scene what the program is doing; empty for nothing."""
+    """Return the command that sets the program's status line; "" hides it."""
     return _command("status", CAPTION, "status", text=text)
 
 
-def clip_command(kind: str, what: str, **fields: Any) -> Command:
-    """Return a word about the clip: see `hsp_control.visualization.viewer.clip`."""
-    return _command(kind, CLIP, what, **fields)
+def clip_command(kind: str, name: str, **fields: Any) -> Command:
+    """Return a command for the clip: see `hsp_control.visualization.viewer.clip`."""
+    return _command(kind, CLIP, name, **fields)
 
 
 def forget_clip() -> Command:
-    """Forget the clip and all that extended it, to make room for another or for none.
+    """Return the command that drops the clip and its extensions from the scene.
 
-    A page that shows it goes on showing it until it is told what comes instead.
+    A page that shows the clip continues until another clip, or ``still``, follows.
     """
     packed = umsgpack.packb({"type": "nothing", "path": CLIP})
     return Command(CLIP, key_of(CLIP, "nothing"), packed, deletes=True)
 
 
 def seek(time: float) -> Command:
-    """Have the page's player rest and show a time of its clip [s]."""
+    """Return the command that pauses the player at a time of its clip [s]."""
     return clip_command("seek", "seek", time=float(time))
 
 
 def typed_array(values: Any, dtype: type[np.generic]) -> umsgpack.Ext:
-    """Return numbers as one of JavaScript's typed arrays."""
+    """Return numbers as one of JavaScript's typed arrays.
+
+    Args:
+        values: The numbers, of any shape.
+        dtype: ``uint8``, ``uint32``, ``float32`` or ``float64``.
+    """
     kinds: dict[Any, int] = {
         np.uint8: 0x12,
         np.uint32: 0x16,
@@ -158,7 +176,7 @@ def typed_array(values: Any, dtype: type[np.generic]) -> umsgpack.Ext:
 
 
 def unpack(packed: bytes) -> Json:
-    """Return a command as plain data, its typed arrays as arrays; for tests."""
+    """Return a command as plain data, its typed arrays as NumPy arrays."""
     kinds = {
         0x12: np.dtype("u1"),
         0x16: np.dtype("<u4"),
@@ -172,14 +190,14 @@ def unpack(packed: bytes) -> Json:
     return dict(umsgpack.unpackb(packed, ext_handlers=handlers))
 
 
-def _command(kind: str, path: str, what: str, **fields: Any) -> Command:
+def _command(kind: str, path: str, name: str, **fields: Any) -> Command:
     packed = umsgpack.packb({"type": kind, "path": path, **fields})
-    return Command(path, key_of(path, what), packed)
+    return Command(path, key_of(path, name), packed)
 
 
 @lru_cache(maxsize=4096)
 def _transform_head(path: str) -> bytes:
-    """Return the bytes before the matrix: packing them anew would cost the most."""
+    """Return the bytes before the matrix; cached, as packing them costs the most."""
     head = b"".join(
         umsgpack.packb(word)
         for word in ("type", "set_transform", "path", path, "matrix")

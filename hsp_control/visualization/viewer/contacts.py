@@ -1,4 +1,4 @@
-"""Contact forces, where a log has any: arrows at the points of contact."""
+"""Contact forces of a log: arrows at the contact points."""
 
 from collections.abc import Iterator
 
@@ -11,18 +11,18 @@ from hsp_control.visualization.viewer.appearance import ARROW_RADIUS, CONTACT
 from hsp_control.visualization.viewer.arrows import arrow_tracks, unit_arrow
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object
-from hsp_control.visualization.viewer.element import element
+from hsp_control.visualization.viewer.materials import always_visible, material
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.surfaces import material, seen_through
+from hsp_control.visualization.viewer.scene_path import path_element
 
-_PREFIX, _FORCE, _PLACE = "contact.", ".force", ".position"
-_WEIGHT = 0.5
-"""Length of a force that carries the robot's weight, over the robot's size."""
+_PREFIX, _FORCE, _POSITION = "contact.", ".force", ".position"
+_WEIGHT_LENGTH = 0.5
+"""Length of an arrow that shows the robot's weight, over the robot's size."""
 _GRAVITY = 9.81  # m/s²
 
 
 class Contacts:
-    """Forces on the robot, of columns ``contact.<name>.position`` and ``.force``."""
+    """Contact forces, from the columns ``contact.<name>.position`` and ``.force``."""
 
     def __init__(self, robot: Robot, motion: Motion, root: str) -> None:
         """Find the contacts."""
@@ -35,13 +35,15 @@ class Contacts:
             for column in columns
             if column.startswith(_PREFIX) and column.endswith(_FORCE)
             for name in [column[len(_PREFIX) : -len(_FORCE)]]
-            if f"{_PREFIX}{name}{_PLACE}" in columns
+            if f"{_PREFIX}{name}{_POSITION}" in columns
         ]
 
     def draw(self, size: float) -> Iterator[Command]:
-        """Yield what puts it into a scene of some size [m]."""
+        """Yield the commands that draw it in a scene of the given size [m]."""
         for name in self._names:
-            surface = seen_through(material(CONTACT, glow=0.5))  # legs are thick
+            surface = always_visible(
+                material(CONTACT, glow=0.5)
+            )  # contacts lie inside the legs' meshes
             arrow = unit_arrow(surface, ARROW_RADIUS * self._size)
             yield set_object(self._path(name, "force"), arrow)
             ball = threejs.sphere(1.5 * ARROW_RADIUS * self._size)
@@ -50,32 +52,36 @@ class Contacts:
             )
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
-        """Yield how it moves along the run; a contact without force is not shown."""
+        """Yield its tracks along the run; a contact without force is hidden."""
         times = motion.times
         for name in self._names:
-            place = _held(motion.rows[f"{_PREFIX}{name}{_PLACE}"])
+            position = _held(motion.rows[f"{_PREFIX}{name}{_POSITION}"])
             force = motion.rows[f"{_PREFIX}{name}{_FORCE}"]
-            arrows = _WEIGHT * self._size / self._weight * force
+            arrows = _WEIGHT_LENGTH * self._size / self._weight * force
             radius = ARROW_RADIUS * self._size
             path = self._path(name, "force")
-            yield from arrow_tracks(path, times, place, arrows, radius)
+            yield from arrow_tracks(path, times, position, arrows, radius)
             touches = np.linalg.norm(force, axis=1) > 0.0
-            yield Track(self._path(name, "point"), "position", times, place)
+            yield Track(self._path(name, "point"), "position", times, position)
             shown = touches.astype(float)[:, None]
             yield Track(self._path(name, "point"), "visible", times, shown)
 
     def legend(self) -> list[tuple[str, str]]:
-        """Return names and colours."""
+        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
         return [("contact force", CONTACT)] if self._names else []
 
     def _path(self, name: str, kind: str) -> str:
-        return f"{self._root}/{element(name)}/{kind}"
+        return f"{self._root}/{path_element(name)}/{kind}"
 
 
-def _held(places: Array) -> Array:
-    """Return places with those of a contact that is off, which are NaN, held."""
-    known = np.flatnonzero(np.isfinite(places).all(axis=1))
+def _held(positions: Array) -> Array:
+    """Return positions with NaN, of inactive contacts, replaced by the last position.
+
+    Args:
+        positions: Shape (N, 3) [m].
+    """
+    known = np.flatnonzero(np.isfinite(positions).all(axis=1))
     if not known.size:
-        return np.zeros_like(places)
-    latest = np.searchsorted(known, np.arange(len(places)), side="right") - 1
-    return np.asarray(places[known[np.maximum(latest, 0)]])
+        return np.zeros_like(positions)
+    latest = np.searchsorted(known, np.arange(len(positions)), side="right") - 1
+    return np.asarray(positions[known[np.maximum(latest, 0)]])

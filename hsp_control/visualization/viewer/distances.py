@@ -1,4 +1,4 @@
-"""The shortest distances that the null-space field watches, as bars."""
+"""The minimum distances that the null-space field evaluates, as bars."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -13,95 +13,103 @@ from hsp_control.visualization.viewer.appearance import BAR_RADIUS
 from hsp_control.visualization.viewer.arrows import bar_tracks, unit_bar
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object
-from hsp_control.visualization.viewer.element import element
-from hsp_control.visualization.viewer.explained import terms
+from hsp_control.visualization.viewer.controller_analysis import terms_of_type
+from hsp_control.visualization.viewer.materials import unlit_material
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.surfaces import paint
+from hsp_control.visualization.viewer.scene_path import path_element
 
 _SELF = "self"
 
 
-class Nearest(NamedTuple):
-    """The two points that are nearest, and whether the field sees them.
+class ClosestPoints(NamedTuple):
+    """The two closest points, and whether their distance is active in the field.
 
     Attributes:
         start: On the robot [m], shape (3,).
         end: On the obstacle, or on another link [m], shape (3,).
-        seen: Whether their distance is within the field's influence.
+        active: Whether their distance is below the field's influence distance.
     """
 
     start: Array
     end: Array
-    seen: bool
+    active: bool
 
 
 class Distances:
-    """One bar for each obstacle, from the link nearest to it, while the field acts."""
+    """One bar per obstacle, from the closest link, while the field is active there."""
 
     def __init__(self, controller: Controller, root: str, color: str) -> None:
-        """Find out what the controller's field watches; draw it in a colour."""
+        """Find the distances that the controller's field evaluates.
+
+        Args:
+            controller: The controller.
+            root: The path of the layer's node.
+            color: The bars' colour, ``#RRGGBB``.
+        """
         self._root = root
         self._color = color
         field = controller.field
-        self._watches: dict[str, _Pairs | _Frames] = {}
-        for clearance in terms(field, Clearance):
+        self._distances: dict[str, _PairDistance | _FrameDistance] = {}
+        for clearance in terms_of_type(field, Clearance):
             for name, pairs in _by_obstacle(clearance).items():
-                self._watches[f"{clearance.name} {name}"] = _Pairs(clearance, pairs)
-        for term in terms(field, PointDistance):
-            self._watches[f"{term.name} {term.obstacle.name}"] = _Frames(term)
+                self._distances[f"{clearance.name} {name}"] = _PairDistance(
+                    clearance, pairs
+                )
+        for term in terms_of_type(field, PointDistance):
+            self._distances[f"{term.name} {term.obstacle.name}"] = _FrameDistance(term)
 
     def draw(self, size: float) -> Iterator[Command]:
-        """Yield what puts it into a scene of some size [m]."""
-        for name in self._watches:
-            bar = unit_bar(paint(self._color), BAR_RADIUS * size)
+        """Yield the commands that draw it in a scene of the given size [m]."""
+        for name in self._distances:
+            bar = unit_bar(unlit_material(self._color), BAR_RADIUS * size)
             yield set_object(self._path(name), bar)
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
-        """Yield how it moves along the run."""
-        found: dict[str, list[Nearest]] = {name: [] for name in self._watches}
+        """Yield its tracks along the run."""
+        found: dict[str, list[ClosestPoints]] = {name: [] for name in self._distances}
         for state in motion.states():
-            for name, watch in self._watches.items():
-                found[name].append(watch.nearest(state))
+            for name, distance in self._distances.items():
+                found[name].append(distance.closest_points(state))
         for name, rows in found.items():
-            start, end, seen = map(np.array, zip(*rows, strict=True))
-            yield from bar_tracks(self._path(name), motion.times, start, end, seen)
+            start, end, active = map(np.array, zip(*rows, strict=True))
+            yield from bar_tracks(self._path(name), motion.times, start, end, active)
 
     def legend(self) -> list[tuple[str, str]]:
-        """Return names and colours."""
-        return [("shortest distance", self._color)] if self._watches else []
+        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
+        return [("minimum distance", self._color)] if self._distances else []
 
     def _path(self, name: str) -> str:
-        return f"{self._root}/{element(name)}"
+        return f"{self._root}/{path_element(name)}"
 
 
-class _Pairs:
-    """Links and one obstacle, or links among themselves."""
+class _PairDistance:
+    """The minimum distance of pairs: links and one obstacle, or links and links."""
 
     def __init__(self, clearance: Clearance, pairs: list[int]) -> None:
         self._clearance = clearance
         self._pairs = np.array(pairs)
 
-    def nearest(self, state: RobotState) -> Nearest:
+    def closest_points(self, state: RobotState) -> ClosestPoints:
         proximity = self._clearance.proximity
         distances = proximity.measure(state)[self._pairs]
         k = int(np.argmin(distances))
         start, end, _ = proximity.witness(int(self._pairs[k]))
-        # Coal's points are its own, and overwritten by the next state's.
-        seen = bool(distances[k] < self._clearance.influence)
-        return Nearest(np.array(start), np.array(end), seen)
+        # Coal overwrites its points at the next state: copy them.
+        active = bool(distances[k] < self._clearance.influence)
+        return ClosestPoints(np.array(start), np.array(end), active)
 
 
-class _Frames:
-    """Frames and an obstacle's centre: the paper's own cost, which acts from afar."""
+class _FrameDistance:
+    """The distance of frames to an obstacle's centre: the paper's cost, always on."""
 
     def __init__(self, cost: PointDistance) -> None:
         self._cost = cost
 
-    def nearest(self, state: RobotState) -> Nearest:
+    def closest_points(self, state: RobotState) -> ClosestPoints:
         center = self._cost.obstacle.center.sample(state.t).position.copy()
-        places = [np.array(state.position(frame)) for frame in self._cost.frames]
-        lengths = [np.linalg.norm(place - center) for place in places]
-        return Nearest(places[int(np.argmin(lengths))], center, True)
+        positions = [np.array(state.position(frame)) for frame in self._cost.frames]
+        lengths = [np.linalg.norm(position - center) for position in positions]
+        return ClosestPoints(positions[int(np.argmin(lengths))], center, True)
 
 
 def _by_obstacle(clearance: Clearance) -> dict[str, list[int]]:

@@ -1,4 +1,4 @@
-"""The manipulability ellipsoid (Yoshikawa 1985): how fast the hand can go, each way."""
+"""The manipulability ellipsoid (Yoshikawa 1985): the hand's speed per direction."""
 
 from collections.abc import Iterator
 from itertools import permutations
@@ -13,21 +13,21 @@ from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.appearance import ELLIPSOID, ELLIPSOID_OPACITY
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object
-from hsp_control.visualization.viewer.element import element
+from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.surfaces import material
+from hsp_control.visualization.viewer.scene_path import path_element
 
 SECONDS = 0.2
-"""An axis is as long as the hand goes in this time at a joint speed of norm 1 [s]."""
+"""A semi-axis is the hand's travel in this time at a joint speed of norm 1 [s]."""
 _THINNEST = 0.02
-"""Of an axis, over the longest: what has no volume is a disk."""
+"""Minimum semi-axis, over the longest: a flat ellipsoid is drawn as a disk."""
 
 
 class Ellipsoid:
-    """The image {J v : |v| = 1} of the joint speeds, at each task's frame."""
+    """The image {J v : |v| = 1} of unit joint velocities, at each task's frame."""
 
     def __init__(self, robot: Robot, controller: Controller | None, root: str) -> None:
-        """Find the frames: those of the tasks, else the robot's end effector."""
+        """Find the frames: those of the tasks, or else the robot's end effector."""
         self._root = root
         tasks = controller.tasks if controller else ()
         named = (getattr(task, "frame", None) for task in tasks)
@@ -35,14 +35,14 @@ class Ellipsoid:
         self._frames = tuple(frames) or (robot.end_effector,)
 
     def draw(self, size: float) -> Iterator[Command]:
-        """Yield what puts it into a scene of some size [m]."""
+        """Yield the commands that draw it in a scene of the given size [m]."""
         for frame in self._frames:
             surface = material(ELLIPSOID, opacity=ELLIPSOID_OPACITY, glow=0.4)
             ball = threejs.mesh(threejs.sphere(1.0), surface, shadow=False)
             yield set_object(self._path(frame), threejs.group([ball]))
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
-        """Yield how it moves along the run."""
+        """Yield its tracks along the run."""
         rows = len(motion.times)
         for frame in self._frames:
             places, turns, axes = np.empty((rows, 3)), np.empty((rows, 4)), []
@@ -59,21 +59,21 @@ class Ellipsoid:
             yield Track(path, "scale", motion.times, SECONDS * np.array(axes))
 
     def legend(self) -> list[tuple[str, str]]:
-        """Return names and colours."""
+        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
         return [("manipulability", ELLIPSOID)]
 
     def _path(self, frame: str) -> str:
-        return f"{self._root}/{element(frame)}"
+        return f"{self._root}/{path_element(frame)}"
 
 
 def principal_axes(J: Array, last: Array) -> tuple[Array, Array]:
-    """Return the axes of {J v : |v| = 1} as a rotation, and half their lengths.
+    """Return the principal axes of {J v : |v| = 1} as a rotation, and the semi-axes.
 
-    They come in the order and with the signs that turn the last ones the least.
+    Order and signs of the axes are chosen for the smallest rotation from ``last``.
 
     Args:
         J: Linear Jacobian, shape (3, nv).
-        last: The rotation before, shape (3, 3).
+        last: The previous rotation, shape (3, 3).
     """
     axes, lengths, _ = np.linalg.svd(J)
     padded = np.zeros(3)

@@ -1,4 +1,4 @@
-"""Where a field begins to push the robot off an obstacle: a shell about it."""
+"""Zones of influence: the shell around an obstacle in which the field acts."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -16,58 +16,64 @@ from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.appearance import OBSTACLE, ZONE_OPACITY
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, Json, set_object
-from hsp_control.visualization.viewer.element import element
-from hsp_control.visualization.viewer.explained import terms
+from hsp_control.visualization.viewer.controller_analysis import terms_of_type
+from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_layer import obstacle_tracks
 from hsp_control.visualization.viewer.obstacle_shapes import facets, triangles_of
-from hsp_control.visualization.viewer.poses import moved_to
-from hsp_control.visualization.viewer.surfaces import material
+from hsp_control.visualization.viewer.poses import pose_at
+from hsp_control.visualization.viewer.scene_path import path_element
 
 
 class Influence:
-    """The zone of influence of each obstacle that a clearance field watches."""
+    """The zone of influence of each obstacle of a clearance field."""
 
     def __init__(self, field: Any, shown: dict[str, Shape], root: str) -> None:
-        """Find the zones.
+        """Find the zones of influence.
 
         Args:
             field: The controller's field.
             shown: The obstacles' shapes by name.
-            root: The layer's node.
+            root: The path of the layer's node.
         """
         self._root = root
         self._zones: dict[str, tuple[Shape, float]] = {}
-        for term in terms(field, ObstacleClearance):
-            for each in term.proximity.obstacles:
-                if each.name in shown:
-                    known = self._zones.get(each.name, (each.shape, 0.0))[1]
-                    self._zones[each.name] = each.shape, max(known, term.influence)
+        for term in terms_of_type(field, ObstacleClearance):
+            for obstacle in term.proximity.obstacles:
+                name, shape = obstacle.name, obstacle.shape
+                if name in shown:
+                    known = self._zones.get(name, (shape, 0.0))[1]
+                    self._zones[name] = shape, max(known, term.influence)
 
     def draw(self, size: float) -> Iterator[Command]:
-        """Yield what puts it into a scene of some size [m]."""
+        """Yield the commands that draw it in a scene of the given size [m]."""
         for name, (shape, influence) in self._zones.items():
             yield set_object(self._path(name), zone(shape, influence, 4.0 * size))
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
-        """Yield how it moves along the run."""
+        """Yield its tracks along the run."""
         for name in self._zones:
             yield from obstacle_tracks(self._path(name), name, motion)
 
     def legend(self) -> list[tuple[str, str]]:
-        """Return nothing: it is the obstacle's colour."""
+        """Return no entry: the zone has the obstacle's colour."""
         return []
 
     def _path(self, name: str) -> str:
-        return f"{self._root}/{element(name)}"
+        return f"{self._root}/{path_element(name)}"
 
 
 def zone(shape: Shape, influence: float, extent: float) -> Json:
-    """Return the surface at a distance [m] from a shape; of a half-space, a square.
+    """Return the surface at a distance from a shape, as a three.js object.
 
-    Shapes with hollows get that of their convex hull.
+    A non-convex shape is replaced by its convex hull.
+
+    Args:
+        shape: The shape.
+        influence: The distance [m].
+        extent: The edge of the square that shows a half-space [m].
     """
-    # Its far half alone: it never veils the robot.
+    # Only its back faces are drawn: it never covers the robot.
     surface = material(OBSTACLE, opacity=ZONE_OPACITY, glow=0.6) | {"side": 1}
     pose = np.eye(4)
     match shape:
@@ -76,14 +82,14 @@ def zone(shape: Shape, influence: float, extent: float) -> Json:
         case shapes.Capsule():
             radius = shape.radius + influence
             solid = threejs.capsule(shape.length, radius, radius)
-            pose = moved_to([0.0, 0.0, -0.5 * shape.length])
+            pose = pose_at([0.0, 0.0, -0.5 * shape.length])
         case shapes.Cylinder():
             solid = threejs.rounded_cylinder(
                 shape.radius + influence, shape.length + 2.0 * influence, influence
             )
         case shapes.HalfSpace():
             solid = threejs.plane(extent)
-            pose = moved_to([0.0, 0.0, influence])
+            pose = pose_at([0.0, 0.0, influence])
             surface |= {"side": 2, "opacity": 0.5 * ZONE_OPACITY}
         case shapes.Box():
             corners = np.array(list(product((-0.5, 0.5), repeat=3)))
@@ -96,8 +102,15 @@ def zone(shape: Shape, influence: float, extent: float) -> Json:
 
 
 def _rounded(points: Array, distance: float) -> Json:
-    """Return the hull of balls of a radius [m] about points."""
-    cloud = (hull_corners(points)[:, None, :] + distance * _ball()).reshape(-1, 3)
+    """Return the convex hull of balls around points.
+
+    Args:
+        points: The centres [m], shape (K, 3).
+        distance: The radius [m].
+    """
+    cloud = (hull_corners(points)[:, None, :] + distance * _unit_sphere()).reshape(
+        -1, 3
+    )
     hull = ConvexHull(cloud)
     corners = hull.points[hull.simplices]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -107,8 +120,8 @@ def _rounded(points: Array, distance: float) -> Json:
     return facets(hull.points, triangles)
 
 
-def _ball() -> Array:
-    """Return points spread evenly over the unit ball's surface, shape (200, 3)."""
+def _unit_sphere() -> Array:
+    """Return evenly spread points on the unit sphere, shape (200, 3)."""
     k = np.arange(200) + 0.5
     height, turn = 1.0 - k / 100.0, np.pi * (1.0 + np.sqrt(5.0)) * k
     ring = np.sqrt(1.0 - height**2)

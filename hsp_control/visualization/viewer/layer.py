@@ -1,4 +1,4 @@
-"""A layer: one kind of thing that is drawn beside the robot, to be switched as one."""
+"""The interface of a layer: one kind of drawing that is switched on and off as one."""
 
 from collections.abc import Iterator
 from typing import Protocol
@@ -9,13 +9,13 @@ from hsp_control.visualization.viewer.motion import Motion
 
 
 class Layer(Protocol):
-    """Draws itself once, and tells how it moves."""
+    """Draws itself once, and returns the tracks of its motion."""
 
     def draw(self, size: float) -> Iterator[Command]:
-        """Yield what puts it into a scene of some size [m]."""
+        """Yield the commands that draw it in a scene of the given size [m]."""
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
-        """Yield how it moves along a run, or along a part of one."""
+        """Yield its tracks along a run, or along a part of one."""
 
     def legend(self) -> list[tuple[str, str]]:
-        """Return names and colours."""
+        """Return the legend's entries: (name, colour ``#RRGGBB``)."""

@@ -1,4 +1,4 @@
-"""A run in the browser while it is computed."""
+"""Shows a run in the browser while it is computed."""
 
 import logging
 import time
@@ -19,33 +19,41 @@ from hsp_control.visualization.viewer.paths import GrowingPaths
 from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers
 from hsp_control.visualization.viewer.viewer import Viewer
 
-PERIOD = 0.1
-"""Least time between two messages to the page [s]."""
-LONGEST = 1.0
-"""Most time between two messages [s]."""
-LATELY = 2.0
-"""Over which time the pace is measured [s]."""
-SHARE = 0.03
-"""Of the computing time, what drawing may take."""
-_PREVIEWED = 60
+MIN_PERIOD = 0.1
+"""Minimum time between two messages to the page [s]."""
+MAX_PERIOD = 1.0
+"""Maximum time between two messages [s]."""
+RATE_WINDOW = 2.0
+"""Time over which the computing rate is measured [s]."""
+DRAWING_SHARE = 0.03
+"""Maximum share of the computing time that drawing takes."""
+_PREVIEW_ROWS = 60
 
 _log = logging.getLogger(__name__)
 
 
 class LiveView:
-    """Sends the page what is computed, as it comes; the page plays it at its own pace.
+    """Sends the computed rows to the page, which plays them at its own speed.
 
-    Nothing waits for a page. What drawing costs is measured, and rows are left out so
-    that it stays a small share of the computing; the whole run comes at the end.
+    Nothing waits for a page. The cost of drawing is measured, and rows are left out so
+    that it stays a small share of the computing time. The whole run follows at the end.
     """
 
     def __init__(self, viewer: Viewer, experiment: Experiment) -> None:
-        """Show the stage: the robot at its start, obstacles, and the paths to come."""
+        """Show the robot at its start, the obstacles, and the desired paths.
+
+        Args:
+            viewer: The viewer, of the experiment's robot.
+            experiment: The experiment that will run.
+
+        Raises:
+            ViewerError: If the server has ended.
+        """
         self._viewer = viewer
         self._experiment = experiment
         viewer.show(experiment.q0)
         viewer.transport.send(
-            [set_status("preparing; the first time, for some seconds")]
+            [set_status("preparing; takes some seconds at the first time")]
         )
         preview = _preview(experiment)
         self._meta = preview.meta
@@ -54,37 +62,39 @@ class LiveView:
         shown = viewer.view.show.model_dump()
         layers = all_layers(robot, motion, controller, dark=viewer.dark)
         layers["paths"] = GrowingPaths(motion, "/paths")
-        # What nobody sees need not be computed now.
+        # Layers that are hidden are not computed now.
         layers = {name: layer for name, layer in layers.items() if shown[name]}
         self._run = RunDrawing(viewer.drawing, motion, layers, shown=shown)
         self._sent = 0  # rows of the run
         self._pieces = 0
-        self._cost = 0.0  # s a row that is drawn
+        self._cost = 0.0  # s per drawn row
         self._next = 0.0
-        self._marks: deque[tuple[float, float]] = deque()  # (computed at, time of run)
+        self._marks: deque[tuple[float, float]] = (
+            deque()
+        )  # (wall time, time of the run)
         self._begin: float | None = None
         self._size = viewer.set_stage(self._run, experiment.scenario.title)
 
     def on_row(self, recorder: Recorder) -> None:
-        """Send what has been computed since last time, if it is time again."""
+        """Send the rows computed since the last message, if the next one is due."""
         now = time.perf_counter()
         if self._begin is None:
             self._begin = now
         if now < self._next:
             return
-        # Not the clock's time: other processes, such as the browser, take that.
+        # Not wall time, which other processes, such as the browser, take too.
         before = time.thread_time()
         try:
             self._send(Rollout(recorder.rows(self._sent), self._meta), now)
         except ViewerError as error:
-            _log.warning("%s; the run goes on unseen", error)
+            _log.warning("%s; the run continues without a view", error)
             self._next = float("inf")
             return
         took = time.thread_time() - before
-        self._next = now + min(max(PERIOD, took / SHARE), LONGEST)
+        self._next = now + min(max(MIN_PERIOD, took / DRAWING_SHARE), MAX_PERIOD)
 
     def finish(self, rollout: Rollout) -> None:
-        """Have the page go on with the whole run, drawn in full.
+        """Replace the drawn rows by the whole run; the page keeps its time.
 
         Raises:
             ViewerError: If the server has ended.
@@ -100,8 +110,8 @@ class LiveView:
 
     def _send(self, rows: Rollout, now: float) -> None:
         rate = self._rate(now, float(rows.t[-1]))
-        # Rows a second of computing, times their cost, are the share.
-        finest = max(COARSEST, rate * self._cost / SHARE)
+        # Drawn rows per second of computing, times their cost, is drawing's share.
+        finest = max(COARSEST, rate * self._cost / DRAWING_SHARE)
         before = time.thread_time()
         motion = motion_of(self._experiment.robot, rows, finest, coarsest=np.inf)
         self._viewer.transport.send(self._commands(motion, rate))
@@ -110,10 +120,10 @@ class LiveView:
         self._pieces += 1
 
     def _rate(self, now: float, computed: float) -> float:
-        """Return the seconds of the run that were computed in a second, lately."""
+        """Return the seconds of the run that are computed per second, recently."""
         marks = self._marks
         marks.append((now, computed))
-        while len(marks) > 2 and marks[1][0] < now - LATELY:
+        while len(marks) > 2 and marks[1][0] < now - RATE_WINDOW:
             marks.popleft()
         then, before = marks[0]
         return (computed - before) / (now - then) if now > then else 0.0
@@ -127,7 +137,7 @@ class LiveView:
             self._experiment.scenario.simulation.duration,
         )
         view = self._viewer.view
-        said = (
+        clip_commands = (
             set_clip(clip, play=True, speed=view.speed, loop=view.loop)
             if first
             else [extend_clip(clip, self._pieces)]
@@ -135,22 +145,26 @@ class LiveView:
         paths = self._run.layers.get("paths")
         grown = paths.extend(motion) if isinstance(paths, GrowingPaths) else ()
         if not rate:
-            return [*grown, *said]
-        return [*grown, *said, set_status(f"computing at {_shown(rate)} × real time")]
+            return [*grown, *clip_commands]
+        return [
+            *grown,
+            *clip_commands,
+            set_status(f"computing at {_shown(rate)} × real time"),
+        ]
 
 
 def _preview(experiment: Experiment) -> Rollout:
-    """Return a log of what tasks and obstacles will do, with the robot at its start."""
+    """Return a log of the references and obstacles, with the robot at its start."""
     robot, controller = experiment.robot, experiment.controller
     duration = experiment.scenario.simulation.duration
-    recorder = Recorder(controller, experiment.scene, _PREVIEWED)
+    recorder = Recorder(controller, experiment.scene, _PREVIEW_ROWS)
     state = RobotState(robot)
-    for t in np.linspace(0.0, duration, _PREVIEWED):
+    for t in np.linspace(0.0, duration, _PREVIEW_ROWS):
         state.update(float(t), experiment.q0, experiment.v0)
         try:
             output = controller.compute(state)
             recorder.record(state, output, output.tau, {})
-        except HspControlError:  # as the run may, later
+        except HspControlError:  # the run may fail there, too
             if not len(recorder.rows(0)["t"]):
                 raise
             break

@@ -1,4 +1,4 @@
-"""Mesh files as the page reads them: it parses Collada, OBJ and STL itself."""
+"""Mesh files in Meshcat's format; the page itself parses Collada, OBJ and STL."""
 
 import base64
 import mimetypes
@@ -11,11 +11,11 @@ from hsp_control.visualization.viewer.commands import Json, typed_array
 from hsp_control.visualization.viewer.threejs import unique_name
 
 _PICTURES = {".bmp", ".gif", ".jpeg", ".jpg", ".png", ".tga", ".tif", ".tiff", ".webp"}
-"""What a surface may be covered with: a page must not carry other files away."""
+"""Image files that a texture may name: other files must not get into a page."""
 
 
 def mesh_geometry(file: Path) -> Json:
-    """Return an OBJ or STL file as a geometry, to be given a surface."""
+    """Return an OBJ or STL file as a geometry without material."""
     kind = file.suffix.lower()[1:]
     data = (
         typed_array(np.frombuffer(file.read_bytes(), np.uint8), np.uint8)
@@ -31,7 +31,7 @@ def mesh_geometry(file: Path) -> Json:
 
 
 def collada_object(file: Path) -> Json:
-    """Return a Collada file with its own surfaces and textures."""
+    """Return a Collada file as an object with its own materials and textures."""
     text = file.read_text(encoding="utf-8", errors="replace")
     return {
         "metadata": {"version": 4.5, "type": "Object"},
@@ -48,12 +48,12 @@ def collada_object(file: Path) -> Json:
 
 
 def _textures(file: Path, text: str) -> dict[str, str]:
-    """Return the images that a Collada file names, as data addresses."""
+    """Return the images that a Collada file names, as data URLs by name."""
     if "<init_from>" not in text:
         return {}
     try:
         root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError):  # the page will say so
+    except (ElementTree.ParseError, ValueError):  # the page reports it
         return {}
     names = {
         (element.text or "").strip()

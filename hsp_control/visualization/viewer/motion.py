@@ -1,4 +1,4 @@
-"""A run as it is drawn: in rows close enough to look smooth."""
+"""The rows of a log that are drawn: close enough in time to look smooth."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -8,25 +8,25 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
-from hsp_control.visualization.viewer.moments import (
-    between,
-    configuration_between,
-    moment,
-    orientation_between,
+from hsp_control.visualization.viewer.interpolation import (
+    interpolate_column,
+    interpolate_configuration,
+    interpolate_orientation,
+    row_position,
 )
 
 FINEST = 0.01
-"""Least time between two rows that are drawn [s]."""
+"""Minimum time between two drawn rows [s]."""
 COARSEST = 1 / 30
-"""Largest time between them [s]: the page goes straight from row to row."""
+"""Maximum time between two drawn rows [s]; the page interpolates linearly."""
 
 
 class Motion(NamedTuple):
-    """What a robot did.
+    """A robot's motion in a run.
 
     Attributes:
         robot: The robot.
-        rows: The rows to draw.
+        rows: The rows to draw, as a log.
     """
 
     robot: Robot
@@ -34,12 +34,12 @@ class Motion(NamedTuple):
 
     @property
     def times(self) -> Array:
-        """When [s], shape (N,)."""
+        """The rows' times [s], shape (N,)."""
         return self.rows.t
 
     @property
     def size(self) -> float:
-        """How far the robot reaches along the run, joint to joint [m]."""
+        """Diagonal of the box around all joint positions of the run [m]."""
         if "skeleton" in self.rows:
             points = self.rows["skeleton"].reshape(-1, 3)
         else:
@@ -48,7 +48,7 @@ class Motion(NamedTuple):
         return float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
 
     def states(self) -> Iterator[RobotState]:
-        """Yield the state at each row; the next one overwrites it."""
+        """Yield the state at each row; the next row overwrites it."""
         state = RobotState(self.robot)
         for t, q, v in zip(self.rows.t, self.rows.q, self.rows.v, strict=True):
             yield state.update(float(t), q, v)
@@ -60,13 +60,13 @@ def motion_of(
     finest: float = FINEST,
     coarsest: float = COARSEST,
 ) -> Motion:
-    """Return a log's rows, thinned or with others in between, as they are drawn.
+    """Return the rows of a log that are drawn: thinned, or with interpolated rows.
 
     Args:
         robot: The robot.
         rollout: The log.
-        finest: Least time between two rows [s].
-        coarsest: Largest time between two rows [s].
+        finest: Minimum time between two rows [s].
+        coarsest: Maximum time between two rows [s].
     """
     times = drawn_times(rollout.t, finest, coarsest)
     if len(times) == len(rollout.t) and np.array_equal(times, rollout.t):
@@ -77,24 +77,27 @@ def motion_of(
     if on_rows.all():
         columns = {name: column[kept] for name, column in rollout.columns.items()}
         return Motion(robot, Rollout(columns, rollout.meta))
-    moments = [moment(rollout.t, time) for time in times]
+    positions = [row_position(rollout.t, time) for time in times]
     columns = {}
     for name, column in rollout.columns.items():
         if name == "q":
-            rows = [configuration_between(robot, column, now) for now in moments]
+            rows = [
+                interpolate_configuration(robot, column, position)
+                for position in positions
+            ]
         else:
-            rows = [between(column, now) for now in moments]
+            rows = [interpolate_column(column, position) for position in positions]
         columns[name] = np.array(rows)
     for name, where in _orientations(rollout):
         turns = rollout[name][:, where]
         columns[name][:, where] = [
-            orientation_between(turns, now).coeffs() for now in moments
+            interpolate_orientation(turns, position).coeffs() for position in positions
         ]
     return Motion(robot, Rollout(columns, rollout.meta))
 
 
 def _orientations(rollout: Rollout) -> Iterator[tuple[str, slice]]:
-    """Yield which parts of which columns are quaternions."""
+    """Yield the columns, and the parts of them, that are quaternions."""
     for name in rollout.columns:
         if name.endswith(".quaternion"):
             yield name, slice(0, 4)
@@ -106,12 +109,14 @@ def _orientations(rollout: Rollout) -> Iterator[tuple[str, slice]]:
 
 
 def drawn_times(times: Array, finest: float, coarsest: float) -> Array:
-    """Return which of the times to draw, first and last among them, and others between.
+    """Return the times to draw: a choice of the given ones, and times between them.
+
+    The first and the last time are always included.
 
     Args:
         times: Ascending [s], shape (N,).
-        finest: Least time between two of them [s].
-        coarsest: Largest time between two of them [s].
+        finest: Minimum time between two drawn times [s].
+        coarsest: Maximum time between two drawn times [s].
     """
     kept = [0]
     for row in range(1, len(times)):
@@ -119,7 +124,7 @@ def drawn_times(times: Array, finest: float, coarsest: float) -> Array:
             kept.append(row)
     last = len(times) - 1
     if kept[-1] != last:
-        # The end is shown in any case; what is too close before it makes room.
+        # The end is always drawn; it replaces a row that is too close before it.
         kept[-1 if len(kept) > 1 else len(kept) :] = [last]
     chosen = times[kept]
     gaps = np.diff(chosen)

@@ -1,4 +1,4 @@
-"""Obstacles in the scene: translucent, each where its trajectory leads it."""
+"""Draws the obstacles of a scene: translucent, at their poses at a time."""
 
 from collections.abc import Iterable, Iterator
 
@@ -10,32 +10,37 @@ from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import Shape
 from hsp_control.visualization.viewer.appearance import OBSTACLE
 from hsp_control.visualization.viewer.commands import Command, set_object, set_transform
-from hsp_control.visualization.viewer.element import element
 from hsp_control.visualization.viewer.obstacle_shapes import obstacle
+from hsp_control.visualization.viewer.scene_path import path_element
 
 ROOT = "/obstacles"
 
 
 def draw_obstacle(name: str, shape: Shape, extent: float) -> Command:
-    """Return what puts an obstacle into the scene; see `obstacle`."""
+    """Return the command that draws an obstacle; see `obstacle`."""
     return set_object(_path(name), obstacle(shape, extent))
 
 
 def move_obstacle(name: str, placement: pin.SE3) -> Command:
-    """Return what moves an obstacle to its placement in the world."""
+    """Return the command that moves an obstacle to a placement in the world."""
     return set_transform(_path(name), placement.homogeneous)
 
 
-def enclosing(shape: Shape, center: Array) -> list[Array]:
-    """Return corners of boxes about balls that hold a shape at its centres [m]."""
-    reach = shape.reach
+def enclosing_corners(shape: Shape, center: Array) -> list[Array]:
+    """Return the two corners of the box around a shape; none if it is unbounded.
+
+    Args:
+        shape: The shape.
+        center: Its centre, or its centres at several times [m], shape (..., 3).
+    """
+    reach = shape.bounding_radius
     if not np.isfinite(reach):
         return []
     return [center - reach, center + reach]
 
 
 def obstacle_legend(names: Iterable[str]) -> list[tuple[str, str]]:
-    """Return the obstacles' names and colour: one entry, for all look the same."""
+    """Return the legend of the obstacles: one entry, as all have the same colour."""
     text = ", ".join(names)
     return [(text, OBSTACLE)] if text else []
 
@@ -44,36 +49,36 @@ class ObstacleDrawing:
     """The obstacles of a scene."""
 
     def __init__(self, scene: Scene) -> None:
-        """Draw this scene."""
+        """Store the scene."""
         self._scene = scene
 
     def draw(self, size: float) -> Iterator[Command]:
-        """Yield what puts the obstacles into a scene of some size [m]."""
-        for each in self._scene.values():
-            yield draw_obstacle(each.name, each.shape, 4.0 * size)
+        """Yield the commands that draw it in a scene of the given size [m]."""
+        for item in self._scene.values():
+            yield draw_obstacle(item.name, item.shape, 4.0 * size)
 
     def move(self, time: float) -> Iterator[Command]:
-        """Yield what moves them to where they are at a time [s]."""
-        for each in self._scene.values():
-            yield move_obstacle(each.name, each.placement(time))
+        """Yield the commands that move the obstacles to a time [s]."""
+        for item in self._scene.values():
+            yield move_obstacle(item.name, item.placement(time))
 
     def points(self) -> Array:
-        """Return no point: the robot is where the viewer shows it."""
+        """Return no points, shape (0, 3): the viewer knows the robot's."""
         return np.zeros((0, 3))
 
     def obstacle_points(self) -> Array:
         """Return points that enclose the obstacles at the start [m], shape (K, 3)."""
         corners = [
             corner
-            for each in self._scene.values()
-            for corner in enclosing(each.shape, each.placement(0.0).translation)
+            for item in self._scene.values()
+            for corner in enclosing_corners(item.shape, item.placement(0.0).translation)
         ]
         return np.reshape(corners, (-1, 3))
 
     def legend(self) -> list[tuple[str, str]]:
-        """Return names and colours."""
+        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
         return obstacle_legend(self._scene)
 
 
 def _path(name: str) -> str:
-    return f"{ROOT}/{element(name)}"
+    return f"{ROOT}/{path_element(name)}"

@@ -1,4 +1,4 @@
-"""A run's obstacles: each where its trajectory led it."""
+"""The layer of a run's obstacles."""
 
 from collections.abc import Iterator
 
@@ -7,17 +7,20 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object
-from hsp_control.visualization.viewer.element import element
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.obstacle_drawing import enclosing, obstacle_legend
+from hsp_control.visualization.viewer.obstacle_drawing import (
+    enclosing_corners,
+    obstacle_legend,
+)
 from hsp_control.visualization.viewer.obstacle_shapes import logged_shape, obstacle
+from hsp_control.visualization.viewer.scene_path import path_element
 
 
 class ObstacleLayer:
     """The obstacles of a log.
 
     Attributes:
-        shapes: Their shapes by name.
+        shapes: The obstacles' shapes by name.
     """
 
     def __init__(self, motion: Motion, root: str) -> None:
@@ -31,12 +34,12 @@ class ObstacleLayer:
         }
 
     def draw(self, size: float) -> Iterator[Command]:
-        """Yield what puts it into a scene of some size [m]."""
+        """Yield the commands that draw it in a scene of the given size [m]."""
         for name, shape in self.shapes.items():
             yield set_object(self._path(name), obstacle(shape, 4.0 * size))
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
-        """Yield how it moves along the run."""
+        """Yield its tracks along the run."""
         for name in self.shapes:
             yield from obstacle_tracks(self._path(name), name, motion)
 
@@ -45,20 +48,26 @@ class ObstacleLayer:
         clouds = [
             corners
             for name, shape in self.shapes.items()
-            for corners in enclosing(shape, self._rows[f"obstacle.{name}"])
+            for corners in enclosing_corners(shape, self._rows[f"obstacle.{name}"])
         ]
         return np.concatenate([np.zeros((0, 3)), *clouds])
 
     def legend(self) -> list[tuple[str, str]]:
-        """Return names and colours."""
+        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
         return obstacle_legend(self.shapes)
 
     def _path(self, name: str) -> str:
-        return f"{self._root}/{element(name)}"
+        return f"{self._root}/{path_element(name)}"
 
 
 def obstacle_tracks(path: str, name: str, motion: Motion) -> Iterator[Track]:
-    """Yield how a node goes with an obstacle."""
+    """Yield the tracks of a node that follows a logged obstacle.
+
+    Args:
+        path: The node.
+        name: The obstacle's name.
+        motion: The run.
+    """
     yield Track(path, "position", motion.times, motion.rows[f"obstacle.{name}"])
     turns = f"obstacle.{name}.quaternion"
     if turns in motion.rows:

@@ -1,4 +1,4 @@
-"""Obstacles' shapes as things to see, read from a scene or from a log."""
+"""Obstacles' shapes as three.js objects, from a scene or from a log."""
 
 from collections.abc import Mapping
 from itertools import product
@@ -10,12 +10,12 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import SceneError
 from hsp_control.geometry import shapes
-from hsp_control.geometry.shapes import Shape, described_shape
+from hsp_control.geometry.shapes import Shape, shape_from_log
 from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.appearance import OBSTACLE, OBSTACLE_OPACITY
 from hsp_control.visualization.viewer.commands import Json
-from hsp_control.visualization.viewer.poses import moved_to
-from hsp_control.visualization.viewer.surfaces import material
+from hsp_control.visualization.viewer.materials import material
+from hsp_control.visualization.viewer.poses import pose_at
 
 _CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 _FACES = np.array(
@@ -27,16 +27,19 @@ _FACES = np.array(
 
 
 def logged_shape(about: Mapping[str, Any]) -> Shape | None:
-    """Return the shape that a log describes; a ball of its size if it knows better.
+    """Return the shape that a log describes, or else its bounding ball.
 
     Args:
-        about: The obstacle's entry in the log: its ``shape``, ``parameters`` and the
-            ``radius`` of a ball that holds it, None if there is none.
+        about: The obstacle's entry in the log: its ``shape``, its ``parameters`` and
+            the ``radius`` of its bounding ball, None if there is none.
+
+    Returns:
+        The shape; None if the log has neither a known shape nor a radius.
     """
     try:
-        shape = described_shape(str(about.get("shape")), about.get("parameters", {}))
+        shape = shape_from_log(str(about.get("shape")), about.get("parameters", {}))
         if shape is not None:
-            shape.geometry()  # a mesh's file may be gone
+            shape.geometry()  # raises if a mesh's file no longer exists
             return shape
     except SceneError:
         pass
@@ -45,7 +48,12 @@ def logged_shape(about: Mapping[str, Any]) -> Shape | None:
 
 
 def obstacle(shape: Shape, extent: float) -> Json:
-    """Return an obstacle of a shape; a half-space as a square of an extent [m]."""
+    """Return a shape as a three.js object.
+
+    Args:
+        shape: The shape.
+        extent: The edge of the square that shows a half-space [m].
+    """
     surface = material(OBSTACLE, opacity=OBSTACLE_OPACITY, glow=0.3)
     pose = np.eye(4)
     match shape:
@@ -53,7 +61,7 @@ def obstacle(shape: Shape, extent: float) -> Json:
             solid = threejs.sphere(shape.radius)
         case shapes.Capsule():
             solid = threejs.capsule(shape.length, shape.radius, shape.radius)
-            pose = moved_to([0.0, 0.0, -0.5 * shape.length])
+            pose = pose_at([0.0, 0.0, -0.5 * shape.length])
         case shapes.Cylinder():
             solid = threejs.cylinder(shape.radius, shape.length)
         case shapes.Box():
@@ -67,19 +75,26 @@ def obstacle(shape: Shape, extent: float) -> Json:
             solid = facets(*triangles_of(shape.geometry()))
             surface |= {"side": 2}
     thing = threejs.mesh(solid, surface, pose)
-    thing["object"]["receiveShadow"] = False  # nor its own, which would show through
+    thing["object"]["receiveShadow"] = False  # its own would show through
     if isinstance(shape, shapes.HalfSpace):
-        thing["object"]["castShadow"] = False  # it has no end, but its picture has
+        thing["object"]["castShadow"] = (
+            False  # the drawn square ends, the half-space does not
+        )
     return threejs.group([thing])
 
 
 def facets(vertices: Array, triangles: Indices) -> Json:
-    """Return flat triangles, each with vertices and a normal of its own."""
+    """Return flat-shaded triangles: each has its own vertices and normal.
+
+    Args:
+        vertices: Shape (n, 3) [m].
+        triangles: Indices of vertices, shape (k, 3).
+    """
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals /= np.where(lengths > 0.0, lengths, 1.0)
-    return threejs.buffer(
+    return threejs.buffer_geometry(
         {
             "position": corners.reshape(-1, 3),
             "normal": np.repeat(normals, 3, axis=0),

@@ -1,8 +1,8 @@
-"""The server's process: serves the page and passes the scene on to all who look.
+"""The server's process: serves the page, and sends the scene to all open pages.
 
-It listens on the loopback address alone. Commands come in through its standard input,
-so that no other process can send any; when that ends, for whatever reason its parent
-died, so does the server. It imports neither Pinocchio nor anything that does.
+It listens on the loopback address only. It reads commands from its standard input, so
+that no other process can send any. When the input is closed because the parent ended
+or was killed, the server ends too. It imports neither Pinocchio nor modules that do.
 """
 
 import asyncio
@@ -19,41 +19,41 @@ from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
-from hsp_control.visualization.viewer.batches import batches
-from hsp_control.visualization.viewer.kept import Kept, key_of
-from hsp_control.visualization.viewer.records import ASK, DELETE, Decoder, Record
+from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
+from hsp_control.visualization.viewer.message_batches import batch_messages
+from hsp_control.visualization.viewer.pipe_protocol import ASK, DELETE, Decoder, Record
 
 ADDRESS = "127.0.0.1"
-PORTS = (*range(7000, 7100), 0)  # 0: any that is free
-TAKEN = "taken"  # what a page answers to each message
+PORTS = (*range(7000, 7100), 0)  # 0: any free port
+TAKEN = "taken"  # a page's acknowledgement of a message
 
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 _LOOPBACK_NAMES = {"127.0.0.1", "localhost"}
-_CHILD_WATCH = 1.0  # s
+_PARENT_CHECK_PERIOD = 1.0  # s
 
 
 class Hub:
     """The scene, and the pages that show it.
 
     Attributes:
-        scene: All that a page which opens now has to be told.
-        pages: Those that are open.
-        asked: How often it was asked whether a page shows everything.
+        scene: All commands that a newly opened page needs.
+        pages: The open pages.
+        asked: The number of the parent's latest request: does a page show everything?
     """
 
     def __init__(self) -> None:
         """Start with an empty scene and no page."""
-        self.scene = Kept()
+        self.scene = LatestCommands()
         self.pages: set[Page] = set()
         self.asked = 0
         self._decoder = Decoder()
 
     def feed(self, data: bytes) -> None:
-        """Take bytes from the parent."""
+        """Process bytes from the parent."""
         for record in self._decoder.feed(data):
             self._take(record)
         for page in self.pages:
-            page.news.set()
+            page.has_pending.set()
 
     def _take(self, record: Record) -> None:
         kind, name, packed = record
@@ -62,15 +62,15 @@ class Hub:
         elif kind == DELETE:
             self.scene.drop(name)
             for page in self.pages:
-                page.mail.drop(name)
-                page.mail.put(key_of(name, "delete"), packed)
+                page.pending.drop(name)
+                page.pending.put(key_of(name, "delete"), packed)
         else:
             self.scene.put(name, packed)
             for page in self.pages:
-                page.mail.put(name, packed)
+                page.pending.put(name, packed)
 
     def _answer(self, number: int) -> None:
-        """Tell the parent how many pages show all that came before its question."""
+        """Report to the parent how many pages show all that was sent before."""
         self.asked = number
         for page in self.pages:
             page.ask(number)
@@ -79,71 +79,73 @@ class Hub:
 
 
 class Page(WebSocketHandler):
-    """One open page. What it has not been told yet is replaced by what is newer."""
+    """One open page. A newer command replaces one of its key that was not yet sent."""
 
     def initialize(self, hub: Hub) -> None:
-        """Join the hub; called by Tornado."""
+        """Store the hub; called by Tornado."""
         self.hub = hub
-        self.mail = Kept()
-        self.news = asyncio.Event()
+        self.pending = LatestCommands()
+        self.has_pending = asyncio.Event()
         self.answered = self._asked = 0
         self._ready = asyncio.Event()
 
     def open(self, *args: str, **kwargs: str) -> None:
-        """Send the page the whole scene, and from then on what changes."""
-        self.mail = self.hub.scene.copy()
-        self.news.set()
+        """Send the page the whole scene, then all changes."""
+        self.pending = self.hub.scene.copy()
+        self.has_pending.set()
         self.hub.pages.add(self)
         self._delivery = asyncio.create_task(self._deliver())
 
     def on_message(self, message: str | bytes) -> None:
-        """Note that the page has taken a message, or up to where it shows all."""
+        """Process an answer: an acknowledgement, or the number of a request."""
         if message == TAKEN:
             self._ready.set()
         else:
             self.answered = max(self.answered, int(message))
 
     def on_close(self) -> None:
-        """Forget the page."""
+        """Remove the page."""
         self.hub.pages.discard(self)
         self._delivery.cancel()
 
     def ask(self, number: int) -> None:
-        """Have the page answer a number once it shows what was sent before."""
+        """Request that the page returns a number once it shows all sent before."""
         if self._asked < number:
             self._asked = number
             # {"type": "ask", "number": ...}, the number as an unsigned 32-bit integer
             packed = b"\x82\xa4type\xa3ask\xa6number\xce" + struct.pack(">I", number)
-            self.mail.put(key_of("", "ask"), packed)
-            self.news.set()
+            self.pending.put(key_of("", "ask"), packed)
+            self.has_pending.set()
 
     async def _deliver(self) -> None:
         while True:
-            await self.news.wait()
-            self.news.clear()
-            for message in batches(self.mail.take()):
+            await self.has_pending.wait()
+            self.has_pending.clear()
+            for message in batch_messages(self.pending.take()):
                 self._ready.clear()
                 try:
                     await self.write_message(message, binary=True)
                 except WebSocketClosedError:
                     return
-                await self._ready.wait()  # meanwhile, what is newer replaces the mail
+                await (
+                    self._ready.wait()
+                )  # meanwhile newer commands replace pending ones
 
 
-class File(RequestHandler):
-    """One of the page's files."""
+class FileHandler(RequestHandler):
+    """Serves the page's files."""
 
     def initialize(self, files: dict[str, tuple[str, bytes]]) -> None:
-        """Take the files by path, each as its type and content; called by Tornado."""
+        """Store the files, path -> (type, content); called by Tornado."""
         self._files = files
 
     def prepare(self) -> None:
-        """Refuse a page of another site whose name was made to lead here."""
+        """Check that the request names the loopback host, against DNS rebinding."""
         if self.request.host_name not in _LOOPBACK_NAMES:
             raise HTTPError(403)
 
     def get(self, name: str) -> None:
-        """Answer with the file."""
+        """Send the file."""
         if name not in self._files:
             raise HTTPError(404)
         kind, content = self._files[name]
@@ -153,7 +155,7 @@ class File(RequestHandler):
 
 
 def main(meshcat: str, port: int, parent: int) -> NoReturn:
-    """Serve until the parent is gone.
+    """Serve until the parent has ended.
 
     Args:
         meshcat: The folder of Meshcat's page.
@@ -176,7 +178,7 @@ async def _serve(meshcat: Path, port: int, parent: int) -> None:
     hub = Hub()
     routes: list[Any] = [
         (r"/scene", Page, {"hub": hub}),
-        (r"/(.*)", File, {"files": files}),
+        (r"/(.*)", FileHandler, {"files": files}),
     ]
     sockets = _listen(port)
     HTTPServer(Application(routes, websocket_ping_interval=20)).add_sockets(sockets)
@@ -185,7 +187,7 @@ async def _serve(meshcat: Path, port: int, parent: int) -> None:
     _tell_parent(url=f"http://{ADDRESS}:{sockets[0].getsockname()[1]}/")
     # Other children of the parent may hold our standard input open after its death.
     while os.getppid() == parent:
-        await asyncio.sleep(_CHILD_WATCH)
+        await asyncio.sleep(_PARENT_CHECK_PERIOD)
 
 
 def _listen(port: int) -> list[socket.socket]:
@@ -203,7 +205,7 @@ def _read(hub: Hub) -> None:
         data = os.read(0, 1 << 20)
     except BlockingIOError:
         return
-    if not data:  # the parent is gone
+    if not data:  # the parent has ended
         os._exit(0)
     hub.feed(data)
 

@@ -7,15 +7,19 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 
 
-def moved_to(position: ArrayLike) -> Array:
-    """Return the pose that only moves, to a position [m]."""
+def pose_at(position: ArrayLike) -> Array:
+    """Return the pose with a position [m] and no rotation, shape (4, 4)."""
     pose = np.eye(4)
     pose[:3, 3] = position
     return pose
 
 
-def along(direction: Array) -> Array:
-    """Return the pose that turns z along a direction the shortest way."""
+def pose_along(direction: Array) -> Array:
+    """Return the smallest rotation of z to a direction, as a pose of shape (4, 4).
+
+    Args:
+        direction: Shape (3,), non-zero, of any length.
+    """
     z = np.array([0.0, 0.0, 1.0])
     turn = pin.Quaternion.FromTwoVectors(z, direction / np.linalg.norm(direction))
     pose = np.eye(4)
@@ -24,10 +28,10 @@ def along(direction: Array) -> Array:
 
 
 def quaternions_along(directions: Array) -> Array:
-    """Return the turns of z along directions the shortest way, as (x, y, z, w).
+    """Return the smallest rotations of z to directions, as (x, y, z, w), shape (N, 4).
 
     Args:
-        directions: Shape (N, 3), of any length; of length 0: no turn.
+        directions: Shape (N, 3), of any length; length 0: no rotation.
     """
     lengths = np.linalg.norm(directions, axis=1, keepdims=True)
     x, y, z = (directions / np.where(lengths > 0.0, lengths, 1.0)).T

@@ -1,4 +1,4 @@
-"""Keeps the scene in memory, without a server: for tests and for export."""
+"""A transport that keeps the scene in memory: for tests and for export."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -7,24 +7,24 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.visualization.viewer.commands import Command, Json, unpack
-from hsp_control.visualization.viewer.kept import Kept, key_of
+from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
 
 
 class Recorder:
-    """A transport that only remembers what a page would show.
+    """A transport without server and page: it stores the commands.
 
     Attributes:
-        scene: The commands that build it.
+        scene: The commands that build the scene.
     """
 
     url = None
 
     def __init__(self) -> None:
         """Start with an empty scene."""
-        self.scene = Kept()
+        self.scene = LatestCommands()
 
     def send(self, commands: Iterable[Command]) -> None:
-        """Keep commands."""
+        """Store commands."""
         for command in commands:
             if command.deletes:
                 self.scene.drop(command.path)
@@ -32,30 +32,30 @@ class Recorder:
                 self.scene.put(command.key, command.packed)
 
     def wait_for_page(self, timeout: float) -> bool:
-        """Return False at once: no page will come."""
+        """Return False at once: there is no page."""
         return False
 
     def wait_until_closed(self) -> None:
-        """Return at once: no page is open."""
+        """Return at once: there is no page."""
 
     def close(self) -> None:
-        """Do nothing; what was kept stays."""
+        """Do nothing; the stored commands remain."""
 
     def paths(self, below: str = "") -> list[str]:
-        """Return the paths of all objects, or of those below a path."""
+        """Return the paths of all objects that begin with ``below``."""
         return [
             path
-            for path, what, _ in self.scene.items()
-            if what == "object" and path.startswith(below)
+            for path, name, _ in self.scene.items()
+            if name == "object" and path.startswith(below)
         ]
 
-    def command(self, path: str, what: str) -> Json | None:
-        """Return the command that set ``what`` of a node, as plain data."""
-        packed = self.scene.get(key_of(path, what))
+    def command(self, path: str, name: str) -> Json | None:
+        """Return the command that set the property ``name`` of a node, or None."""
+        packed = self.scene.get(key_of(path, name))
         return None if packed is None else unpack(packed)
 
     def transform(self, path: str) -> Array:
-        """Return the pose of a node in the world: its and its parents', (4, 4)."""
+        """Return the pose of a node in the world, shape (4, 4)."""
         total: Array = np.eye(4)
         nodes = path.split("/")
         for depth in range(2, len(nodes) + 1):

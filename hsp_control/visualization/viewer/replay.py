@@ -1,4 +1,4 @@
-"""From logs to the view: find their robots and controllers again, and play them."""
+"""Plays logs in a viewer: rebuilds their robots and controllers first."""
 
 import logging
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from hsp_control.robot import Robot
 from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import packaged_folders
 from hsp_control.simulation import Rollout
-from hsp_control.visualization.viewer.comparison import Act
+from hsp_control.visualization.viewer.comparison import ComparedRun
 from hsp_control.visualization.viewer.transport import Transport
 from hsp_control.visualization.viewer.viewer import Viewer
 
@@ -25,42 +25,49 @@ _log = logging.getLogger(__name__)
 def access_for(
     logs: Sequence[Path], strict: bool, allow: Sequence[str | PathLike[str]]
 ) -> Access:
-    """Return which files logs may name: told to be strict, those beside them."""
+    """Return which files logs may read.
+
+    Args:
+        logs: The logs' files.
+        strict: Allow only files in the logs' folders, in the package and in ``allow``;
+            else any file.
+        allow: Further allowed folders.
+    """
     if not strict:
         return ANYWHERE
     return only_within([*(log.parent for log in logs), *packaged_folders(), *allow])
 
 
 def robot_of(rollout: Rollout, access: Access = ANYWHERE) -> Robot:
-    """Return the robot of a log, built anew from the configuration that it holds.
+    """Return the robot of a log, rebuilt from the configuration in the log.
 
     Args:
         rollout: The log.
-        access: Which files it may name.
+        access: Which files it may read.
 
     Raises:
-        ViewerError: If the log holds none, or its robot cannot be found again.
+        ViewerError: If the log has no configuration, or its robot cannot be rebuilt.
     """
     document = _document(rollout, access)
     try:
         robot, _ = build_robot(document, validate(document, Scenario), Path())
     except HspControlError as error:
-        raise ViewerError(f"the log's robot cannot be found again: {error}") from error
+        raise ViewerError(f"the log's robot cannot be rebuilt: {error}") from error
     return robot
 
 
-def act_of(rollout: Rollout, name: str, access: Access = ANYWHERE) -> Act:
-    """Return a log with its robot and, if that can be built anew, its controller.
+def rebuild_run(rollout: Rollout, name: str, access: Access = ANYWHERE) -> ComparedRun:
+    """Return a log with its robot and, if it can be rebuilt, its controller.
 
-    A line in the log says so if it cannot.
+    Logs a warning if the controller cannot be rebuilt.
 
     Args:
         rollout: The log.
-        name: What to call it.
-        access: Which files it may name.
+        name: The run's name in the legend.
+        access: Which files it may read.
 
     Raises:
-        ViewerError: If the log holds no configuration, or its robot is gone.
+        ViewerError: If the log has no configuration, or its robot cannot be rebuilt.
         AccessError: If it names a file that is not allowed.
     """
     for obstacle, about in rollout.meta.get("obstacles", {}).items():
@@ -72,9 +79,11 @@ def act_of(rollout: Rollout, name: str, access: Access = ANYWHERE) -> Act:
         raise
     except HspControlError as error:
         robot = robot_of(rollout, access)
-        _log.warning("%s: only what its columns tell is drawn: %s", name, error)
-        return Act(name, robot, rollout)
-    return Act(name, experiment.robot, rollout, experiment.controller)
+        _log.warning(
+            "%s: no controller, only the log's columns are drawn: %s", name, error
+        )
+        return ComparedRun(name, robot, rollout)
+    return ComparedRun(name, experiment.robot, rollout, experiment.controller)
 
 
 def view_logs(
@@ -88,47 +97,47 @@ def view_logs(
     strict: bool = False,
     allow: Sequence[str | PathLike[str]] = (),
 ) -> Viewer:
-    """Open a viewer that plays one log, or several together; it stays open.
+    """Open a viewer that plays one log, or several together; the caller closes it.
 
-    Camera, speed and what is shown are as the first log's configuration says.
+    Camera, speed and visible layers are those of the first log's configuration.
 
     Args:
         logs: The files.
-        beside: Of several: see `Viewer.compare`.
-        speed: Seconds of the run shown in one second; None: as the log says.
-        loop: Play it again and again; None: as the log says.
+        beside: For several logs: see `Viewer.compare`.
+        speed: Seconds of the run per second of real time; None: the log's setting.
+        loop: Repeat the run; None: the log's setting.
         port: See `Viewer`.
         transport: See `Viewer`.
-        strict: For logs of strangers: see `load_experiment`.
+        strict: For untrusted logs: see `load_experiment`.
         allow: Further folders for strict reading.
 
     Raises:
         LogError: If a log cannot be read.
-        ViewerError: If a log is empty, its robot cannot be found again, or the view
-            cannot be opened.
+        ViewerError: If a log is empty, its robot cannot be rebuilt, or the view cannot
+            be opened.
     """
     access = access_for(logs, strict, allow)
     names = zip(logs, _names(logs), strict=True)
-    acts = [_act(path, name, access) for path, name in names]
-    first = acts[0]
+    runs = [_load(path, name, access) for path, name in names]
+    first = runs[0]
     view = (first.rollout.config or {}).get("view", {})
     viewer = Viewer(first.robot, port=port, transport=transport, **view)
     try:
-        if len(acts) == 1:
+        if len(runs) == 1:
             viewer.play(
                 first.rollout, controller=first.controller, speed=speed, loop=loop
             )
         else:
-            viewer.compare(acts, beside=beside, speed=speed, loop=loop)
+            viewer.compare(runs, beside=beside, speed=speed, loop=loop)
     except BaseException:
         viewer.close()
         raise
     return viewer
 
 
-def _act(path: Path, name: str, access: Access) -> Act:
+def _load(path: Path, name: str, access: Access) -> ComparedRun:
     try:
-        return act_of(Rollout.load(path), name, access)
+        return rebuild_run(Rollout.load(path), name, access)
     except ViewerError as error:
         raise ViewerError(f"{path}: {error}") from error
 
@@ -137,8 +146,8 @@ def _document(rollout: Rollout, access: Access) -> Document:
     if rollout.config is None:
         name = rollout.meta.get("robot", {}).get("name", "?")
         raise ViewerError(
-            f"this log was made from Python and does not say how its robot {name!r} "
-            "was built; give the robot, as in Viewer(robot).play(rollout)"
+            f"this log was made from Python: it has no configuration of its robot "
+            f"{name!r}; give the robot, as in Viewer(robot).play(rollout)"
         )
     document = Document(rollout.config, {}, "the log's configuration")
     document.access = access
@@ -146,7 +155,7 @@ def _document(rollout: Rollout, access: Access) -> Document:
 
 
 def _names(logs: Sequence[Path]) -> list[str]:
-    """Return names that tell the logs apart: the files', with folders if they must."""
+    """Return distinct names of the logs: the file names, with folders if necessary."""
     stems = [path.stem for path in logs]
     if len(set(stems)) == len(stems):
         return stems

@@ -1,4 +1,4 @@
-"""The robot in the scene: drawn once, then moved joint by joint."""
+"""Draws the robot once, then moves its joints."""
 
 import logging
 from collections.abc import Iterable, Iterator, Sequence
@@ -16,45 +16,44 @@ from hsp_control.visualization.viewer.commands import (
     set_object,
     set_transform,
 )
-from hsp_control.visualization.viewer.element import element
+from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.mesh_files import collada_object, mesh_geometry
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.poses import moved_to
-from hsp_control.visualization.viewer.stand_ins import stand_in
-from hsp_control.visualization.viewer.surfaces import material
+from hsp_control.visualization.viewer.placeholders import placeholder
+from hsp_control.visualization.viewer.poses import pose_at
+from hsp_control.visualization.viewer.scene_path import path_element
 from hsp_control.visualization.viewer.visuals import Visual, read_visuals
 
 ROOT = "/robot"
-"""Where a robot stands in the scene tree, unless told."""
+"""Default node of a robot in the scene tree."""
 
 _log = logging.getLogger(__name__)
 
 
 class RobotDrawing:
-    """A robot's nodes: one a joint, with the links that it carries below.
+    """A robot's nodes: one per joint, with the links of that joint below it.
 
-    Where a link's mesh is missing, or the robot has nothing to show at all, capsules
-    and drums stand in for it.
+    Capsules and drums replace missing meshes, and a robot without visuals.
     """
 
     def __init__(self, robot: Robot, root: str = ROOT) -> None:
-        """Find out what there is to show.
+        """Read the robot's visuals; log a warning if meshes are missing.
 
         Args:
             robot: The robot.
-            root: Its node.
+            root: The path of its node.
         """
         self.robot = robot
         self._visuals = read_visuals(robot)
-        self._nodes = [f"{root}/{element(name)}" for name in robot.model.names]
+        self._nodes = [f"{root}/{path_element(name)}" for name in robot.model.names]
         missing = [v for v in self._visuals if v.kind == "mesh" and v.file is None]
-        self._stand_ins = {visual.joint for visual in missing}
+        self._placeholders = {visual.joint for visual in missing}
         if not self._visuals:
-            self._stand_ins = set(range(robot.model.njoints))
+            self._placeholders = set(range(robot.model.njoints))
         if missing:
             _log.warning(
                 "%s: %d of %d meshes are not found (the first belongs to link %r)%s; "
-                "capsules are drawn for them",
+                "capsules are drawn instead",
                 robot.name,
                 len(missing),
                 sum(visual.kind == "mesh" for visual in self._visuals),
@@ -63,22 +62,22 @@ class RobotDrawing:
             )
 
     def draw(self) -> Iterable[Command]:
-        """Yield what puts the robot into the scene."""
-        for joint in sorted(self._stand_ins):
-            body = stand_in(self.robot, joint)
+        """Yield the commands that draw the robot."""
+        for joint in sorted(self._placeholders):
+            body = placeholder(self.robot, joint)
             if body is not None:
-                yield set_object(f"{self._nodes[joint]}/stand-in", body)
+                yield set_object(f"{self._nodes[joint]}/placeholder", body)
         links: dict[tuple[int, str], list[Json]] = {}
         for visual in self._visuals:
             thing = _thing(visual)
             if thing is not None:
                 links.setdefault((visual.joint, visual.link), []).append(thing)
         for (joint, link), things in links.items():
-            path = f"{self._nodes[joint]}/{element(link)}"
+            path = f"{self._nodes[joint]}/{path_element(link)}"
             yield set_object(path, threejs.group(things))
 
     def move(self, placements: Sequence[pin.SE3]) -> list[Command]:
-        """Return what moves the joints to their placements in the world."""
+        """Return the commands that move the joints to their placements in the world."""
         return [
             set_transform(node, placements[joint].homogeneous)
             for joint, node in enumerate(self._nodes)
@@ -86,7 +85,7 @@ class RobotDrawing:
         ]
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
-        """Yield how the joints move along a run."""
+        """Yield the tracks of the joints along a run."""
         joints = range(1, self.robot.model.njoints)
         poses = np.empty((len(motion.times), len(joints), 7))
         for row, state in enumerate(motion.states()):
@@ -99,15 +98,15 @@ class RobotDrawing:
             yield Track(node, "quaternion", motion.times, poses[:, k, 3:])
 
     def points(self, placements: Sequence[pin.SE3]) -> Array:
-        """Return points of the robot in the world [m]: joints, frames, shape (K, 3)."""
+        """Return the positions of all frames in the world [m], shape (K, 3)."""
         frames = [
             placements[frame.parentJoint].act(frame.placement).translation
             for frame in self.robot.model.frames
         ]
         return np.array(frames)
 
-    def stand(self) -> Array:
-        """Return points of what stands still [m], shape (K, 3)."""
+    def fixed_points(self) -> Array:
+        """Return the origin and the feet of the fixed visuals [m], shape (K, 3)."""
         points = [np.zeros(3)]
         for visual in self._visuals:
             if visual.joint == 0 and visual.kind in {"box", "cylinder", "sphere"}:
@@ -139,7 +138,7 @@ def _thing(visual: Visual) -> Json | None:
         case "cylinder":
             return threejs.mesh(threejs.cylinder(*size), surface, pose)
         case "capsule":
-            half = moved_to([0.0, 0.0, -size[1] / 2.0])
+            half = pose_at([0.0, 0.0, -size[1] / 2.0])
             body = threejs.capsule(size[1], size[0], size[0])
             return threejs.mesh(body, surface, pose @ half)
     if visual.file is None:

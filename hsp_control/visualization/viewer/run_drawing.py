@@ -1,4 +1,4 @@
-"""A run in the scene: its robot's motion, and the layers that explain it."""
+"""Draws a run: the motion of its robot, and the layers."""
 
 from collections.abc import Iterator, Mapping
 
@@ -20,7 +20,7 @@ from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
 from hsp_control.visualization.viewer.paths import Paths
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.self_motion import SelfMotion
-from hsp_control.visualization.viewer.target_marks import TargetMarks
+from hsp_control.visualization.viewer.target_markers import TargetMarkers
 
 LAYERS = (
     "paths",
@@ -32,7 +32,7 @@ LAYERS = (
     "self_motion",
     "contacts",
 )
-"""What can be switched, as nodes of the scene tree and in a configuration."""
+"""The layers: nodes of the scene tree, and keys of ``view: show``."""
 
 
 def all_layers(
@@ -43,21 +43,21 @@ def all_layers(
     root: str = "",
     dark: bool = False,
 ) -> dict[str, Layer]:
-    """Return the layers that a log can be drawn in, by name.
+    """Return the layers of a run, by name.
 
     Args:
         robot: The robot.
         motion: The run.
-        controller: What controlled the robot; without it, layers that need more than
-            the log's columns are left out.
-        root: The node that holds them.
-        dark: Whether the background is.
+        controller: The run's controller; None: only layers that need no more than the
+            log's columns.
+        root: The path of their parent node.
+        dark: Whether the background is dark.
     """
     ink = CHALK if dark else INK
     obstacles = ObstacleLayer(motion, f"{root}/obstacles")
     layers: dict[str, Layer] = {
         "paths": Paths(motion, f"{root}/paths"),
-        "targets": TargetMarks(motion, f"{root}/targets"),
+        "targets": TargetMarkers(motion, f"{root}/targets"),
         "obstacles": obstacles,
         "ellipsoid": Ellipsoid(robot, controller, f"{root}/ellipsoid"),
         "contacts": Contacts(robot, motion, f"{root}/contacts"),
@@ -75,15 +75,15 @@ def all_layers(
 
 
 def ghost_layers(motion: Motion, color: str, root: str) -> dict[str, Layer]:
-    """Return no more than where the robot went, in a colour."""
+    """Return the layers of a ghost: only its path, in a colour."""
     return {"paths": Paths(motion, f"{root}/paths", color, ghost=True)}
 
 
 class RunDrawing:
-    """What a log tells, in layers.
+    """A run: the robot's motion and the layers.
 
     Attributes:
-        motion: The rows that are drawn.
+        motion: The drawn rows.
         layers: The layers by name.
     """
 
@@ -96,14 +96,14 @@ class RunDrawing:
         root: str = "",
         shown: Mapping[str, bool] | None = None,
     ) -> None:
-        """Put a run together.
+        """Compose the drawing.
 
         Args:
             drawing: The robot in the scene.
             motion: The run.
-            layers: What to draw beside the robot.
-            root: The node that holds them.
-            shown: Whether each layer is shown at first; those not named are.
+            layers: The layers to draw besides the robot.
+            root: The path of their parent node.
+            shown: Whether each layer is shown initially; default: it is.
         """
         self.motion = motion
         self.layers = layers
@@ -112,25 +112,25 @@ class RunDrawing:
         self._shown = dict.fromkeys(LAYERS, True) | dict(shown or {})
 
     def draw(self, size: float) -> Iterator[Command]:
-        """Yield what puts the layers into a scene of some size [m]."""
+        """Yield the commands that draw the layers in a scene of the given size [m]."""
         for name, layer in self.layers.items():
             yield from layer.draw(size)
             if not self._shown[name]:
                 yield set_property(f"{self._root}/{name}", "visible", False)
 
     def clip(self) -> Clip:
-        """Return how everything moves."""
+        """Return the clip of robot and layers."""
         times = self.motion.times
         return Clip(float(times[0]), float(times[-1]), list(self.tracks(self.motion)))
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
-        """Yield how everything moves along the run, or along a part of it."""
+        """Yield the tracks of robot and layers along the run, or along a part of it."""
         yield from self._drawing.tracks(motion)
         for layer in self.layers.values():
             yield from layer.tracks(motion)
 
     def points(self) -> Array:
-        """Return where robot and targets are in the run [m], shape (K, 3)."""
+        """Return the positions of robot and targets in the run [m], shape (K, 3)."""
         rows = self.motion.rows
         skeleton = rows["skeleton"] if "skeleton" in rows else np.zeros((0, 3))
         paths = Paths(self.motion, "").points()
@@ -141,7 +141,7 @@ class RunDrawing:
         return ObstacleLayer(self.motion, "").points()
 
     def legend(self) -> list[tuple[str, str]]:
-        """Return names and colours of what is shown."""
+        """Return the legend's entries of the layers that are shown."""
         return [
             entry
             for name, layer in self.layers.items()
@@ -151,6 +151,6 @@ class RunDrawing:
 
 
 def clear() -> Iterator[Command]:
-    """Yield what takes all layers away."""
+    """Yield the commands that delete all layers."""
     for name in LAYERS:
         yield delete(f"/{name}")

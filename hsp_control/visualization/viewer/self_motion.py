@@ -1,4 +1,4 @@
-"""Self-motion: where the null-space velocity takes the joints, and where g would."""
+"""Self-motion: arrows of null-space velocity P v and projected field P g."""
 
 from collections.abc import Iterator
 
@@ -16,95 +16,106 @@ from hsp_control.visualization.viewer.appearance import (
 from hsp_control.visualization.viewer.arrows import arrow_tracks, unit_arrow
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object
-from hsp_control.visualization.viewer.element import element
-from hsp_control.visualization.viewer.explained import null_space_projector
+from hsp_control.visualization.viewer.controller_analysis import null_space_projector
+from hsp_control.visualization.viewer.materials import always_visible, material
 from hsp_control.visualization.viewer.motion import Motion
-from hsp_control.visualization.viewer.surfaces import material, seen_through
+from hsp_control.visualization.viewer.scene_path import path_element
 
 SECONDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-"""An arrow leads to where a joint would be after one of these times [s]."""
-_USUAL = 0.22
-"""Of a quick arrow, over the robot's size: the longest time that stays below."""
-_MOST = 4
-_APART = 0.06
-"""Joints that are nearer to each other, over the robot's size, share an arrow."""
-_WORTH = 0.1
-"""What a joint must move, over what the quickest does, to be given an arrow."""
-_LONGEST = 0.6
-"""Of an arrow, over the robot's size."""
+"""An arrow shows a joint's motion during one of these times [s]."""
+_TYPICAL_LENGTH = 0.22
+"""Maximum length of a fast arrow, over the robot's size; it chooses the time."""
+_MAX_ARROWS = 4
+_MIN_SPACING = 0.06
+"""Minimum distance of two joints with arrows, over the robot's size."""
+_MIN_SPEED = 0.1
+"""Minimum mean speed of a joint with an arrow, over that of the fastest joint."""
+_MAX_LENGTH = 0.6
+"""Maximum length of an arrow, over the robot's size."""
 _WIDENING = 2.2
+"""Radius of a field arrow over that of a velocity arrow."""
 
 
 class SelfMotion:
-    """Two arrows at the joints that self-motion moves most, as an elbow.
+    """Two arrows at the joints that self-motion moves most, such as the elbow.
 
-    The slender one is the velocity P v, the wide and pale one about it the projected
-    field P g, to which the law makes the velocity converge: it slips into it.
+    The thin arrow is the null-space velocity P v. The wide, pale arrow around it is the
+    projected field P g, to which the law makes P v converge.
+
+    Attributes:
+        seconds: The time of motion that an arrow shows [s].
     """
 
     def __init__(self, controller: Controller, motion: Motion, root: str) -> None:
-        """Choose joints that move most along the run, and are not all in a place."""
+        """Choose the joints that self-motion moves most, at distinct positions."""
         self._root = root
         self._controller = controller
         self._radius = ARROW_RADIUS * motion.size
-        self._longest = _LONGEST * motion.size
-        places, moves, wants = self._measured(motion)
-        self._last = motion, (places, moves, wants)
+        self._longest = _MAX_LENGTH * motion.size
+        positions, velocities, fields = self._velocities(motion)
+        self._last = motion, (positions, velocities, fields)
         size = motion.size
-        speeds = np.maximum(*(np.linalg.norm(each, axis=2) for each in (moves, wants)))
-        self._joints = _chosen(places, speeds.mean(axis=0), _APART * size)
-        quick = float(np.quantile(speeds.max(axis=1), 0.9))
-        fitting = [s for s in SECONDS if s * quick <= _USUAL * size]
+        speeds = np.maximum(
+            *(np.linalg.norm(each, axis=2) for each in (velocities, fields))
+        )
+        self._joints = _select_joints(
+            positions, speeds.mean(axis=0), _MIN_SPACING * size
+        )
+        fast = float(np.quantile(speeds.max(axis=1), 0.9))
+        fitting = [s for s in SECONDS if s * fast <= _TYPICAL_LENGTH * size]
         self.seconds = max(fitting, default=SECONDS[0])
 
     def draw(self, size: float) -> Iterator[Command]:
-        """Yield what puts it into a scene of some size [m]."""
+        """Yield the commands that draw it in a scene of the given size [m]."""
         for joint in self._joints:
-            surface = seen_through(material(FIELD, glow=0.5))
-            slender = unit_arrow(surface, self._radius)
-            yield set_object(self._path("velocity", joint), slender)
+            surface = always_visible(material(FIELD, glow=0.5))
+            thin = unit_arrow(surface, self._radius)
+            yield set_object(self._path("velocity", joint), thin)
             if self._controller.field.controls:
-                pale = seen_through(material(FIELD, opacity=FIELD_OPACITY, glow=0.5))
+                pale = always_visible(material(FIELD, opacity=FIELD_OPACITY, glow=0.5))
                 wide = unit_arrow(pale, _WIDENING * self._radius)
                 yield set_object(self._path("field", joint), wide)
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
-        """Yield how it moves along the run."""
+        """Yield its tracks along the run."""
         if self._last[0] is not motion:
-            self._last = motion, self._measured(motion)
-        places, moves, wants = self._last[1]
-        arrows = [("velocity", moves, self._radius)]
+            self._last = motion, self._velocities(motion)
+        positions, velocities, fields = self._last[1]
+        arrows = [("velocity", velocities, self._radius)]
         if self._controller.field.controls:
-            arrows.append(("field", wants, _WIDENING * self._radius))
+            arrows.append(("field", fields, _WIDENING * self._radius))
         for joint in self._joints:
-            k = joint - 1  # the world has no row
+            k = joint - 1  # the universe joint has no column
             for kind, speeds, radius in arrows:
                 yield from arrow_tracks(
                     self._path(kind, joint),
                     motion.times,
-                    places[:, k],
+                    positions[:, k],
                     self._shortened(self.seconds * speeds[:, k]),
                     radius,
                 )
 
     def legend(self) -> list[tuple[str, str]]:
-        """Return names and colours."""
+        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
         if not self._joints:
             return []
-        return [(f"self-motion in {self.seconds:g} s, within the field's", FIELD)]
+        return [(f"self-motion in {self.seconds:g} s (pale: the field's)", FIELD)]
 
-    def _measured(self, motion: Motion) -> tuple[Array, Array, Array]:
-        """Return places [m], velocities of P v and P g [m/s], each (N, joints, 3)."""
+    def _velocities(self, motion: Motion) -> tuple[Array, Array, Array]:
+        """Return the joints' positions [m] and velocities due to P v and P g [m/s].
+
+        Each has the shape (N, njoints - 1, 3).
+        """
         data = self._controller.robot.model.createData()
         rows: list[tuple[Array, Array, Array]] = []
         for state, g in zip(motion.states(), motion.rows["field.g"], strict=True):
             P = null_space_projector(self._controller, state)
-            places = np.array([place.translation for place in state.data.oMi])
-            moves = _joint_velocities(state, P @ state.v, data)
-            wants = _joint_velocities(state, P @ g, data)
-            rows.append((places[1:], moves[1:], wants[1:]))
-        places, moves, wants = map(np.array, zip(*rows, strict=True))
-        return places, moves, wants
+            positions = np.array([pose.translation for pose in state.data.oMi])
+            velocities = _joint_velocities(state, P @ state.v, data)
+            fields = _joint_velocities(state, P @ g, data)
+            rows.append((positions[1:], velocities[1:], fields[1:]))
+        positions, velocities, fields = map(np.array, zip(*rows, strict=True))
+        return positions, velocities, fields
 
     def _shortened(self, vectors: Array) -> Array:
         lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
@@ -113,7 +124,7 @@ class SelfMotion:
 
     def _path(self, kind: str, joint: int) -> str:
         name = self._controller.robot.model.names[joint]
-        return f"{self._root}/{kind}/{element(name)}"
+        return f"{self._root}/{kind}/{path_element(name)}"
 
 
 def _joint_velocities(state: RobotState, v: Array, data: pin.Data) -> Array:
@@ -127,22 +138,22 @@ def _joint_velocities(state: RobotState, v: Array, data: pin.Data) -> Array:
     return velocities
 
 
-def _chosen(places: Array, speeds: Array, apart: float) -> list[int]:
-    """Return the indices of joints: the quickest, and not nearer together than told.
+def _select_joints(positions: Array, speeds: Array, spacing: float) -> list[int]:
+    """Return the indices of the fastest joints that keep a distance from each other.
 
     Args:
-        places: Of all joints but the world [m], shape (N, joints, 3).
-        speeds: Their mean speeds [m/s], shape (joints,).
-        apart: Least mean distance of two [m].
+        positions: Of all joints but the universe [m], shape (N, njoints - 1, 3).
+        speeds: Their mean speeds [m/s], shape (njoints - 1,).
+        spacing: Minimum mean distance of two selected joints [m].
     """
     joints: list[int] = []
     for k in np.argsort(-speeds):
-        if len(joints) == _MOST or speeds[k] <= _WORTH * speeds.max():
+        if len(joints) == _MAX_ARROWS or speeds[k] <= _MIN_SPEED * speeds.max():
             break
-        away = [
-            np.linalg.norm(places[:, k] - places[:, other], axis=1).mean()
+        distances = [
+            np.linalg.norm(positions[:, k] - positions[:, other], axis=1).mean()
             for other in joints
         ]
-        if all(distance > apart for distance in away):
+        if all(distance > spacing for distance in distances):
             joints.append(int(k))
     return sorted(joint + 1 for joint in joints)

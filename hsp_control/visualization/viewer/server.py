@@ -1,4 +1,4 @@
-"""Starts the server's process, and talks to it."""
+"""Starts the server's process, and sends commands to it."""
 
 import atexit
 import importlib.util
@@ -16,14 +16,20 @@ from typing import Any
 
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.visualization.viewer.commands import Command
-from hsp_control.visualization.viewer.records import ASK, DELETE, SET, Record, encode
+from hsp_control.visualization.viewer.pipe_protocol import (
+    ASK,
+    DELETE,
+    SET,
+    Record,
+    encode,
+)
 
 START_TIMEOUT = 30.0  # s; it takes 0.2 on an idle machine
 STALL_TIMEOUT = 5.0  # s without progress after which the server counts as dead
-RELOAD_TIMEOUT = 3.0  # s; a page that comes back within it was not closed
+RELOAD_TIMEOUT = 3.0  # s; a page that reconnects within it was reloaded
 _POLL = 0.05  # s
 
-# The process needs two modules of this package, and none of what the package imports.
+# The process imports a few modules of this package, without the package's __init__.
 _LAUNCH = """
 import json, sys, types
 viewer, meshcat, port, parent = sys.argv[1:]
@@ -39,10 +45,10 @@ except Exception as error:
 
 
 class Server:
-    """A server's process that is ours alone; see `page_server`.
+    """The server's process, owned by this viewer; see `page_server`.
 
-    It listens on 127.0.0.1 and ends with `close`, with this process, or when this
-    process is killed.
+    It listens on 127.0.0.1. It ends with `close`, and when this process ends or is
+    killed.
 
     Attributes:
         url: The page's address.
@@ -50,7 +56,7 @@ class Server:
     """
 
     def __init__(self, port: int | None = None) -> None:
-        """Start it.
+        """Start the process.
 
         Args:
             port: The port to listen on; None: the first free one from 7000.
@@ -72,8 +78,8 @@ class Server:
             bufsize=0,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,  # a pipe that nobody reads would stop it
-            start_new_session=True,  # Ctrl-C is for us, who then end it
+            stderr=subprocess.DEVNULL,  # an unread pipe would block it
+            start_new_session=True,  # Ctrl-C reaches only this process
         )
         atexit.register(self.close)
         try:
@@ -88,7 +94,7 @@ class Server:
         """Send commands, to be shown together.
 
         Raises:
-            ViewerError: If the server has ended, or takes nothing any more.
+            ViewerError: If the server has ended or no longer reads its input.
         """
         records = [
             Record(DELETE, command.path, command.packed)
@@ -103,7 +109,7 @@ class Server:
         """Wait until a page shows all that was sent; return whether one does.
 
         Args:
-            timeout: How long at most [s].
+            timeout: The longest time to wait [s].
 
         Raises:
             ViewerError: If the server has ended, or does not answer.
@@ -119,7 +125,7 @@ class Server:
             time.sleep(_POLL)
 
     def wait_until_closed(self) -> None:
-        """Wait until no page is open any more; one that is loaded again stays open.
+        """Wait until no page is open any more; a page that is reloaded counts as open.
 
         Raises:
             ViewerError: If the server has ended, or does not answer.
@@ -131,12 +137,12 @@ class Server:
             time.sleep(RELOAD_TIMEOUT / 6.0)
 
     def close(self) -> None:
-        """End the process; again is no error."""
+        """End the process; a second call has no effect."""
         atexit.unregister(self.close)
         process = self.process
         for pipe in (process.stdin, process.stdout):
             if pipe is not None:
-                pipe.close()  # it ends when its input does
+                pipe.close()  # the process ends when its input is closed
         try:
             process.wait(2.0)
         except subprocess.TimeoutExpired:
@@ -144,7 +150,7 @@ class Server:
             process.wait()
 
     def _ask(self) -> dict[str, Any]:
-        """Return how many pages are open, and how many show all before the question."""
+        """Return how many pages are open, and how many show all sent before."""
         with self._lock:
             self._write(encode(Record(ASK, str(self._asked))))
             return self._answer(time.monotonic() + STALL_TIMEOUT)
@@ -158,24 +164,26 @@ class Server:
         try:
             while rest:
                 if not _wait(descriptor, select.POLLOUT, STALL_TIMEOUT):
-                    self._give_up(f"takes nothing for {STALL_TIMEOUT:g} s")
+                    self._fail(f"has not read its input for {STALL_TIMEOUT:g} s")
                 with suppress(BlockingIOError):
                     rest = rest[os.write(descriptor, rest) :]
         except OSError as error:
-            self._give_up(f"has ended ({error.strerror})")
+            self._fail(f"has ended ({error.strerror})")
         finally:
-            self._unsent = bytes(rest)  # some, if Ctrl-C came: no record is cut
+            self._unsent = bytes(
+                rest
+            )  # not empty after Ctrl-C: no record is cut in two
 
     def _answer(self, deadline: float) -> dict[str, Any]:
-        """Return its next line."""
+        """Return the process's next answer."""
         assert self.process.stdout is not None
         descriptor = self.process.stdout.fileno()
         while b"\n" not in self._answers:
             if not _wait(descriptor, select.POLLIN, deadline - time.monotonic()):
-                self._give_up("does not answer")
+                self._fail("does not answer")
             data = os.read(descriptor, 4096)
             if not data:
-                self._give_up("has ended")
+                self._fail("has ended")
             self._answers += data
         line, _, self._answers = self._answers.partition(b"\n")
         answer: dict[str, Any] = json.loads(line)
@@ -183,21 +191,25 @@ class Server:
             raise ViewerError(f"the viewer's server cannot start: {answer['error']}")
         return answer
 
-    def _give_up(self, what: str) -> None:
+    def _fail(self, reason: str) -> None:
         self.process.kill()
         self.close()
-        raise ViewerError(f"the viewer's server {what}; open a new viewer")
+        raise ViewerError(f"the viewer's server {reason}; open a new viewer")
 
 
 def _wait(descriptor: int, event: int, timeout: float) -> bool:
-    """Wait until a pipe can be written or read [s]; return whether it can."""
+    """Wait until a pipe is ready, at most ``timeout`` [s]; return whether it is."""
     poll = select.poll()
     poll.register(descriptor, event)
     return bool(poll.poll(max(0.0, 1000.0 * timeout)))
 
 
 def meshcat_page() -> Path:
-    """Return the folder of Meshcat's page, without importing Meshcat."""
+    """Return the folder of Meshcat's page, without importing Meshcat.
+
+    Raises:
+        ViewerError: If Meshcat or its page is not installed.
+    """
     spec = importlib.util.find_spec("meshcat")
     if spec is None or spec.origin is None:
         raise ViewerError(

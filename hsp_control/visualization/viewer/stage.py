@@ -1,4 +1,4 @@
-"""What surrounds the robot: background, lights, and a floor with a grid."""
+"""The stage: background, lights, and a floor with a grid."""
 
 from collections.abc import Iterator
 
@@ -16,7 +16,7 @@ from hsp_control.visualization.viewer.commands import (
     set_property,
     set_transform,
 )
-from hsp_control.visualization.viewer.poses import moved_to
+from hsp_control.visualization.viewer.poses import pose_at
 
 _LIGHT_FROM = np.array([0.5, -0.45, 1.6])
 _FINE = 1e-3
@@ -26,9 +26,9 @@ def draw_stage(points: Array, floor: float, view: ViewModel) -> Iterator[Command
     """Yield the background, the lights and the floor.
 
     Args:
-        points: What stands on the stage [m], shape (K, 3).
+        points: Points that enclose the scene [m], shape (K, 3).
         floor: The floor's height [m].
-        view: How it is lit and coloured, and whether there is a grid.
+        view: The settings: background colour, light, grid.
     """
     sky = view.background
     horizon = palette.blend(sky, palette.MUTED, HAZE)
@@ -48,10 +48,10 @@ def is_dark(color: str) -> bool:
 
 
 def in_sight(subject: Array, others: Array) -> Array:
-    """Return the points to be seen: the subject's, and others near it.
+    """Return the points that the camera must show: the subject's, and others near it.
 
-    What lies far off, or is much larger, counts only up to the subject's own size from
-    it.
+    Other points are clipped to a distance of the subject's size from it, so that far or
+    large obstacles do not make the subject small.
 
     Args:
         subject: Points of the robot and its paths [m], shape (K, 3).
@@ -74,8 +74,8 @@ def _lights(center: Array, size: float, strength: float) -> Iterator[Command]:
     back = np.array([-_LIGHT_FROM[0], 1.2 * abs(_LIGHT_FROM[1]), 0.6])
     yield set_object("/lights/sky", threejs.group([sky]))
     yield set_object("/lights/fill", threejs.group([fill]))
-    yield set_transform("/lights/fill", moved_to(back * 4.0 * size))
-    # The light looks at the origin; what casts shadows must lie in its view.
+    yield set_transform("/lights/fill", pose_at(back * 4.0 * size))
+    # The light points at the origin; objects that cast shadows must be in its view.
     around = float(np.linalg.norm(center)) + 1.3 * size
     distance = 4.0 * around
     key = threejs.light(
@@ -101,17 +101,17 @@ def _lights(center: Array, size: float, strength: float) -> Iterator[Command]:
     )
     towards = _LIGHT_FROM / np.linalg.norm(_LIGHT_FROM)
     yield set_object("/lights/key", threejs.group([key]))
-    yield set_transform("/lights/key", moved_to(towards * distance))
+    yield set_transform("/lights/key", pose_at(towards * distance))
 
 
 def _floor(center: Array, size: float, height: float) -> Iterator[Command]:
-    pose = moved_to([center[0], center[1], height])
+    pose = pose_at([center[0], center[1], height])
     yield set_object("/floor/shadow", threejs.group([_shadow(size)]))
     yield set_transform("/floor/shadow", pose)
     step = _round_step(size / 4.0)
     middle = np.round(center[:2] / step) * step
     yield set_object("/floor/grid", threejs.group([_grid(size, step)]))
-    yield set_transform("/floor/grid", moved_to([*middle, height]))
+    yield set_transform("/floor/grid", pose_at([*middle, height]))
 
 
 def _shadow(size: float) -> Json:
@@ -119,7 +119,7 @@ def _shadow(size: float) -> Json:
 
 
 def _grid(size: float, step: float) -> Json:
-    """Return lines in x and y that fade with the distance from the middle."""
+    """Return grid lines in x and y that fade with the distance from the middle."""
     reach = 2.6 * size
     ticks = np.arange(-np.floor(reach / step), np.floor(reach / step) + 1.0) * step
     cuts = np.linspace(-reach, reach, 41)
@@ -134,7 +134,7 @@ def _grid(size: float, step: float) -> Json:
 
 
 def _round_step(length: float) -> float:
-    """Return the largest of 1, 2 or 5 times a power of ten that is not above."""
+    """Return the largest of 1, 2, 5 times a power of ten that is at most a length."""
     power = 10.0 ** np.floor(np.log10(length))
     return float(power * max(n for n in (1.0, 2.0, 5.0) if n * power <= length * 1.001))
 

@@ -1,4 +1,4 @@
-"""Where tasks wanted the robot, read from a log: points, orientations, directions."""
+"""Targets of the tasks in a log: positions, orientations, directions."""
 
 from itertools import permutations
 from typing import NamedTuple
@@ -10,13 +10,13 @@ from hsp_control.simulation import Rollout
 
 
 class Target(NamedTuple):
-    """What one task asked for at every row, and where it was.
+    """The target of one task at every row, and the actual position.
 
     Attributes:
         name: The task's name.
-        actual: Where the task's point was [m], shape (N, 3).
-        desired: Where it should have been [m], shape (N, 3); along world axes that the
-            task leaves free, where it was. None if the task asks for no place.
+        actual: The actual position of the task's point [m], shape (N, 3).
+        desired: Its desired position [m], shape (N, 3); the actual one along world axes
+            that the task does not track. None if the task tracks no position.
         rotation: The desired orientation as a quaternion (x, y, z, w), shape (N, 4).
         direction: The desired direction, unit vectors, shape (N, 3).
     """
@@ -39,7 +39,7 @@ def read_targets(rollout: Rollout) -> list[Target]:
 def _target(rollout: Rollout, name: str) -> Target | None:
     reference = rollout[f"task.{name}.reference"]
     actual = rollout[f"task.{name}.actual"]
-    tip = rollout["skeleton"][:, -1]  # the last frame that a task follows
+    tip = rollout["skeleton"][:, -1]  # the last frame that a task tracks
     match rollout.meta["tasks"][name].get("type"):
         case "FramePosition":
             point, axes = _located(rollout, actual)
@@ -57,9 +57,9 @@ def _target(rollout: Rollout, name: str) -> Target | None:
 
 
 def _located(rollout: Rollout, actual: Array) -> tuple[Array, list[int]]:
-    """Return the point of the skeleton that was measured, and along which axes.
+    """Return the skeleton's point that a task tracks, and the tracked axes.
 
-    The log tells neither: they are those whose numbers are the same.
+    The log contains neither; they are found by equality with the logged positions.
     """
     skeleton = rollout["skeleton"]
     rows = actual.shape[1]

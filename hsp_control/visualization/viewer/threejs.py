@@ -1,4 +1,4 @@
-"""Things to see, as three.js reads them: solids, tubes, lines and lights."""
+"""Objects in three.js's JSON format: solids, lines and lights."""
 
 from collections.abc import Sequence
 from itertools import count
@@ -11,25 +11,25 @@ from hsp_control.visualization.viewer.commands import Json, typed_array
 
 _serial = count(1)
 
-# three.js turns its solids about y, a URDF and we about z.
+# The axis of three.js's solids is y; ours, and a URDF's, is z.
 _Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
 
 
 def box(size: Sequence[float]) -> Json:
-    """Return a box of these lengths [m] about the origin."""
+    """Return a box with the given edges [m], centred at the origin."""
     width, height, depth = map(float, size)
     return _geometry("BoxGeometry", width=width, height=height, depth=depth)
 
 
 def sphere(radius: float) -> Json:
-    """Return a ball [m] about the origin."""
+    """Return a ball of a radius [m], centred at the origin."""
     return _geometry(
         "SphereGeometry", radius=radius, widthSegments=40, heightSegments=24
     )
 
 
 def cylinder(radius: float, length: float) -> Json:
-    """Return a cylinder [m] about z, its middle at the origin."""
+    """Return a cylinder along z, centred at the origin; lengths in m."""
     return _geometry(
         "CylinderGeometry",
         radiusTop=radius,
@@ -40,45 +40,56 @@ def cylinder(radius: float, length: float) -> Json:
 
 
 def capsule(length: float, start_radius: float, end_radius: float) -> Json:
-    """Return a capsule [m] along z, from a ball at 0 to one at ``length``."""
+    """Return a capsule along z, from a ball at 0 to one at ``length``; in m."""
     quarter = np.linspace(0.0, np.pi / 2.0, 9)
     below = np.column_stack([np.sin(quarter), -np.cos(quarter)]) * start_radius
     above = np.column_stack([np.cos(quarter), np.sin(quarter)]) * end_radius
-    return turned(np.vstack([below, above + np.array([0.0, length])]))
+    return lathe(np.vstack([below, above + np.array([0.0, length])]))
 
 
 def rounded_cylinder(radius: float, length: float, rounding: float) -> Json:
-    """Return a cylinder [m] about z with rounded rims, its middle at the origin."""
+    """Return a cylinder along z with rounded rims, centred at the origin; in m."""
     quarter = np.linspace(0.0, np.pi / 2.0, 5)
     rim = np.column_stack([np.cos(quarter), np.sin(quarter)]) * rounding
     upper = rim + np.array([radius - rounding, length / 2.0 - rounding])
     lower = upper[::-1] * [1.0, -1.0]
     axis = [0.0, length / 2.0]
-    return turned(np.vstack([[0.0, -axis[1]], lower, upper, axis]))
+    return lathe(np.vstack([[0.0, -axis[1]], lower, upper, axis]))
 
 
 def arrow(length: float, radius: float) -> Json:
-    """Return an arrow [m] along z from the origin."""
+    """Return an arrow along z from the origin; lengths in m."""
     neck = length - 5.0 * radius
     profile = [(0, 0), (1, 0), (1, neck), (2.4, neck), (0, length)]
-    return turned(np.array(profile) * [radius, 1.0])
+    return lathe(np.array(profile) * [radius, 1.0])
 
 
-def turned(profile: Array) -> Json:
-    """Return the solid that a profile of (radius, z) [m], from below, makes about z."""
+def lathe(profile: Array) -> Json:
+    """Return the solid of revolution about z of a profile.
+
+    Args:
+        profile: Rows of (radius, z) [m], in ascending order along the profile.
+    """
     points = [{"x": float(max(r, 0.0)), "y": float(z)} for r, z in profile]
     return _geometry("LatheGeometry", points=points, segments=48)
 
 
 def plane(size: float) -> Json:
-    """Return a square [m] in x and y."""
+    """Return a square in the x-y plane with an edge [m]."""
     return _geometry("PlaneGeometry", width=size, height=size)
 
 
 def mesh(
     geometry: Json, surface: Json, pose: Array | None = None, *, shadow: bool = True
 ) -> Json:
-    """Return a solid with a surface, at a pose (4, 4) in its node."""
+    """Return an object of a geometry and a material.
+
+    Args:
+        geometry: The geometry.
+        surface: The material, see `materials`.
+        pose: Its pose in its node, shape (4, 4); None: the identity.
+        shadow: Whether it casts and receives shadows.
+    """
     total = np.eye(4) if pose is None else pose
     if geometry["type"] in {"CylinderGeometry", "LatheGeometry"}:
         total = total @ _Y_TO_Z
@@ -98,7 +109,7 @@ def mesh(
 
 
 def group(things: Sequence[Json]) -> Json:
-    """Return several things as one; each keeps its own shadow."""
+    """Return several objects as one; each keeps its shadow settings."""
     return {
         "metadata": {"version": 4.5, "type": "Object"},
         "geometries": [g for thing in things for g in thing.get("geometries", [])],
@@ -111,15 +122,16 @@ def group(things: Sequence[Json]) -> Json:
     }
 
 
-def buffer(
+def buffer_geometry(
     attributes: dict[str, Array], triangles: Indices | None = None, segment: int = 0
 ) -> Json:
-    """Return a geometry of vertices.
+    """Return a geometry of explicit vertices.
 
     Args:
-        attributes: ``position``, and perhaps ``normal`` and ``color``, a row a vertex.
-        triangles: Indices of vertices, three a row; none for lines.
-        segment: Indices that one segment of a tube takes, for `set_length`.
+        attributes: ``position``, and optionally ``normal`` and ``color``; one row per
+            vertex.
+        triangles: Indices of vertices, shape (k, 3); None for lines.
+        segment: Number of indices of one segment of a tube, for tracks of ``length``.
     """
     packed = {
         name: {
@@ -142,8 +154,13 @@ def buffer(
 
 
 def segments(points: Array, colors: Array) -> Json:
-    """Return lines of one pixel, a pair of points (2n, 3) [m] each, in RGBA (2n, 4)."""
-    geometry = buffer({"position": points, "color": colors})
+    """Return line segments of one pixel width.
+
+    Args:
+        points: Pairs of end points [m], shape (2n, 3).
+        colors: Their colours in RGBA from 0 to 1, shape (2n, 4).
+    """
+    geometry = buffer_geometry({"position": points, "color": colors})
     surface = {
         "uuid": unique_name(),
         "type": "LineBasicMaterial",
@@ -157,7 +174,12 @@ def segments(points: Array, colors: Array) -> Json:
 
 
 def shadow_catcher(size: float, opacity: float) -> Json:
-    """Return a square [m] in x and y that shows nothing but the shadows on it."""
+    """Return a square in the x-y plane that shows only the shadows on it.
+
+    Args:
+        size: Its edge [m].
+        opacity: The shadows' opacity.
+    """
     surface = {
         "uuid": unique_name(),
         "type": "ShadowMaterial",
@@ -167,13 +189,13 @@ def shadow_catcher(size: float, opacity: float) -> Json:
         "depthWrite": False,
     }
     thing = mesh(plane(size), surface)
-    # On the floor first: lines and shadow lie at one depth, and would take turns.
+    # Drawn first: the grid and the shadow have the same depth and would flicker.
     thing["object"] |= {"castShadow": False, "renderOrder": -2}
     return thing
 
 
 def light(kind: str, intensity: float, **properties: Any) -> Json:
-    """Return one of three.js's lights."""
+    """Return a light; ``kind`` is the name of three.js's class."""
     thing = {
         "uuid": unique_name(),
         "type": kind,
@@ -185,7 +207,7 @@ def light(kind: str, intensity: float, **properties: Any) -> Json:
 
 
 def matrix(transform: Array) -> list[float]:
-    """Return a homogeneous transform column by column."""
+    """Return a homogeneous transform, shape (4, 4), as 16 numbers column by column."""
     return [float(number) for number in transform.T.ravel()]
 
 
@@ -194,5 +216,5 @@ def _geometry(kind: str, **fields: Any) -> Json:
 
 
 def unique_name() -> str:
-    """Return a name that no other thing of this process has: three.js asks no more."""
+    """Return a name that is unique in this process, which three.js requires."""
     return f"hsp-{next(_serial)}"

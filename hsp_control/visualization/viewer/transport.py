@@ -1,4 +1,4 @@
-"""Where a viewer's commands go: to a server that shows them, or into a record."""
+"""The interface of a viewer's transport: a server with pages, or a recorder."""
 
 from collections.abc import Iterable
 from typing import Protocol
@@ -7,24 +7,28 @@ from hsp_control.visualization.viewer.commands import Command
 
 
 class Transport(Protocol):
-    """Takes commands and answers for whoever looks at them."""
+    """Sends commands to pages, and reports whether pages are open."""
 
     @property
     def url(self) -> str | None:
         """The page's address; None where there is no page."""
 
     def send(self, commands: Iterable[Command]) -> None:
-        """Pass commands on, to be shown together.
+        """Send commands, to be shown together.
 
         Raises:
-            ViewerError: If nobody takes them any more.
+            ViewerError: If the server has ended.
         """
 
     def wait_for_page(self, timeout: float) -> bool:
-        """Wait until a page shows all that was sent [s]; return whether one does."""
+        """Wait until a page shows all that was sent; return whether one does.
+
+        Args:
+            timeout: The longest time to wait [s].
+        """
 
     def wait_until_closed(self) -> None:
         """Wait until no page is open any more."""
 
     def close(self) -> None:
-        """Stop; again is no error."""
+        """Close it; a second call has no effect."""

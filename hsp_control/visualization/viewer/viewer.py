@@ -1,4 +1,4 @@
-"""The viewer: a robot, what surrounds it and what it did, in a browser."""
+"""The viewer: shows a robot, its surroundings and its runs in a browser."""
 
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -18,8 +18,8 @@ from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer import browser
-from hsp_control.visualization.viewer.camera import look_at, to_the_right
-from hsp_control.visualization.viewer.clip import no_clip, set_clip
+from hsp_control.visualization.viewer.camera import look_at, right_direction
+from hsp_control.visualization.viewer.clip import remove_clip, set_clip
 from hsp_control.visualization.viewer.commands import (
     Command,
     delete,
@@ -28,8 +28,7 @@ from hsp_control.visualization.viewer.commands import (
     set_status,
     set_time,
 )
-from hsp_control.visualization.viewer.comparison import Act, Comparison
-from hsp_control.visualization.viewer.drawable import Drawable
+from hsp_control.visualization.viewer.comparison import ComparedRun, Comparison
 from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.obstacle_drawing import ObstacleDrawing
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
@@ -41,19 +40,20 @@ from hsp_control.visualization.viewer.stage import (
     is_dark,
     scene_size,
 )
+from hsp_control.visualization.viewer.stage_content import StageContent
 from hsp_control.visualization.viewer.transport import Transport
 
 
 class Viewer:
-    """Shows a robot in a browser that may come, go and come back, or never come.
+    """Shows a robot in a browser; pages may be opened, closed and reopened at any time.
 
-    In a notebook, a viewer that is a cell's last line shows its page there.
+    In a notebook, a viewer in the last line of a cell shows its page there.
 
     Attributes:
         robot: The robot.
-        view: How it is shown: a configuration's ``view``.
+        view: The settings, as under ``view`` in a configuration.
         drawing: The robot in the scene.
-        transport: Where the commands go.
+        transport: The server, or a `Recorder`.
     """
 
     def __init__(
@@ -70,15 +70,15 @@ class Viewer:
         Args:
             robot: The robot.
             open_browser: Open the page in the user's browser.
-            transport: A `Recorder`, to show nothing and only remember; None: a server
-                of its own on the loopback address.
+            transport: A `Recorder`, to store the commands and show nothing; None: a new
+                server on the loopback address.
             port: The server's port; None: the first free one from 7000.
-            view: What a configuration says under ``view``, such as ``camera`` and
+            view: The keys of a configuration's ``view``, such as ``camera`` and
                 ``target`` [m], ``background``, or ``show={"ellipsoid": True}``.
 
         Raises:
             ViewerError: If Meshcat is not installed, or the server cannot start.
-            ConfigError: If there is no such thing in a view.
+            ConfigError: If a view has no such key, or a value is not valid.
         """
         self.robot = robot
         self.view = validate(Document(dict(view), {}, "view"), ViewModel)
@@ -109,17 +109,17 @@ class Viewer:
     def draw_scene(
         self, scene: Rollout | Scene, *, controller: Controller | None = None
     ) -> None:
-        """Show a run, at rest at its start, or a scene's obstacles.
+        """Show a run, paused at its start, or a scene's obstacles.
 
-        Replaces what was shown before, fits the stage, and places the camera.
+        Replaces the previous run or scene, fits the stage, and places the camera.
 
         Args:
             scene: The run or the scene.
-            controller: Of a run: see `play`.
+            controller: The run's controller: see `play`.
 
         Raises:
-            ViewerError: If the run is not this robot's or is empty, or if the server
-                has ended.
+            ViewerError: If the run is empty or not of this robot, or if the server has
+                ended.
         """
         if isinstance(scene, Rollout):
             self._draw_run(scene, controller)
@@ -129,7 +129,7 @@ class Viewer:
     def show(self, state: RobotState | Any) -> None:
         """Show the robot in a state, or at a configuration of shape (nq,).
 
-        At a state, what surrounds the robot goes to where it is at the state's time.
+        With a state, obstacles move to their poses at the state's time.
 
         Raises:
             ViewerError: If the server has ended.
@@ -137,13 +137,13 @@ class Viewer:
             NonFiniteError: If it holds a NaN or an infinity.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
         """
-        around: list[Command] = []
+        others: list[Command] = []
         if isinstance(state, RobotState):
             placements = state.data.oMi
-            around = self._around(state.t)
+            others = self._move_others(state.t)
         else:
             placements = self._placements(self.robot.check_configuration(state))
-        self.transport.send([*around, *self.drawing.move(placements)])
+        self.transport.send([*others, *self.drawing.move(placements)])
 
     def play(
         self,
@@ -153,19 +153,19 @@ class Viewer:
         loop: bool | None = None,
         controller: Controller | None = None,
     ) -> None:
-        """Have the page play a run, and return at once, whether anyone looks or not.
+        """Send a run to the page, which plays it; return at once.
 
-        The page has the run then: pausing, speed and going to a time are its own.
+        The page then controls pause, speed and time by itself.
 
         Args:
             rollout: The run.
-            speed: Seconds of the run shown in one second; None: as the view says.
-            loop: Play it again and again; None: as the view says.
-            controller: What controlled the run; shows what the log's columns alone do
-                not tell, such as shortest distances and self-motion.
+            speed: Seconds of the run per second of real time; None: the view's setting.
+            loop: Repeat the run; None: the view's setting.
+            controller: The run's controller; it is needed for layers that are not in
+                the log's columns, such as minimum distances and self-motion.
 
         Raises:
-            ViewerError: If the run is not this robot's or is empty, the speed is not
+            ViewerError: If the run is empty or not of this robot, the speed is not
                 positive, or the server has ended.
         """
         playing = self._playing(speed, loop)
@@ -173,36 +173,39 @@ class Viewer:
 
     def compare(
         self,
-        acts: Sequence[Act],
+        runs: Sequence[ComparedRun],
         *,
         beside: bool | None = None,
         speed: float | None = None,
         loop: bool | None = None,
     ) -> None:
-        """Have the page play several runs together.
+        """Send several runs to the page, which plays them together; return at once.
 
         Args:
-            acts: The runs; the first is of this viewer's robot, the others may be of
-                others.
-            beside: Side by side; or else over each other, all but the first as ghosts.
-                None: over each other if all robots have one name.
-            speed: Seconds of the runs shown in one second; None: as the view says.
-            loop: Play them again and again; None: as the view says.
+            runs: The runs; the first is of this viewer's robot, the others may be of
+                other robots.
+            beside: True: side by side; False: overlaid, all but the first as ghosts.
+                None: overlaid if all robots have the same name.
+            speed: Seconds of the runs per second of real time; None: the view's
+                setting.
+            loop: Repeat the runs; None: the view's setting.
 
         Raises:
-            ViewerError: If a run is empty or not its robot's, the speed is not
+            ViewerError: If a run is empty or not of its robot, the speed is not
                 positive, or the server has ended.
         """
-        for act in acts:
-            _check(act.robot, act.rollout, act.controller)
+        for run in runs:
+            _check(run.robot, run.rollout, run.controller)
         playing = self._playing(speed, loop)
         if beside is None:
-            beside = len({act.robot.name for act in acts}) > 1
+            beside = len({run.robot.name for run in runs}) > 1
         view = self.view
-        right = to_the_right(self.robot, view.camera, view.target) if beside else None
+        right = (
+            right_direction(self.robot, view.camera, view.target) if beside else None
+        )
         comparison = Comparison(
             self.drawing,
-            acts,
+            runs,
             shown=view.show.model_dump(),
             beside=right,
             dark=self.dark,
@@ -216,12 +219,12 @@ class Viewer:
     def open_browser(self) -> bool:
         """Open the page in the user's browser; return whether there is one.
 
-        A line in the log says so if there is none.
+        Logs a warning if there is none.
         """
         return self.url is not None and browser.open_browser(self.url)
 
     def wait_until_closed(self) -> None:
-        """Wait until no page shows the view any more.
+        """Wait until no page is open any more.
 
         Raises:
             ViewerError: If the server has ended.
@@ -229,7 +232,10 @@ class Viewer:
         self.transport.wait_until_closed()
 
     def wait_for_browser(self, timeout: float) -> bool:
-        """Wait until a page shows everything [s]; return whether one does.
+        """Wait until a page shows everything; return whether one does.
+
+        Args:
+            timeout: The longest time to wait [s].
 
         Raises:
             ViewerError: If the server has ended.
@@ -237,7 +243,7 @@ class Viewer:
         return self.transport.wait_for_page(timeout)
 
     def close(self) -> None:
-        """End the server; what a page shows stays. Again is no error."""
+        """End the server; open pages keep their scene. A second call has no effect."""
         self.transport.close()
 
     def __enter__(self) -> Self:
@@ -252,16 +258,16 @@ class Viewer:
         self.close()
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: the page, in a frame."""
+        """Return the HTML for a notebook: the page in a frame."""
         if self.url is None:
-            return "<p>This viewer only remembers: it has no page.</p>"
+            return "<p>This viewer has no page: its transport only records.</p>"
         return (
             f'<iframe src="{escape(self.url)}" style="width: 100%; height: 520px; '
             'border: 0; border-radius: 8px" allowfullscreen></iframe>'
         )
 
     def set_stage(self, run: RunDrawing, title: str | None) -> float:
-        """Clear the stage for a run, and fit it; return the scene's size [m]."""
+        """Clear the stage and fit it to a run; return the scene's size [m]."""
         points = in_sight(self._subject(run.points()), run.obstacle_points())
         self._obstacles = None
         self.transport.send(self._stage(run, title))
@@ -270,13 +276,13 @@ class Viewer:
     def replace_run(
         self, rollout: Rollout, size: float, controller: Controller, status: str
     ) -> None:
-        """Draw a run anew, in full, while the page goes on showing it.
+        """Replace a partly drawn run by the complete one; the page keeps its time.
 
         Args:
             rollout: The run.
             size: The scene's size, as `set_stage` returned it [m].
-            controller: What controlled it.
-            status: What is said beside the scene.
+            controller: The run's controller.
+            status: The status line beside the scene.
 
         Raises:
             ViewerError: If the server has ended.
@@ -307,22 +313,22 @@ class Viewer:
         stage = self._stage(obstacles, None, self.drawing.points(placements))
         self._obstacles = obstacles
         still = [*obstacles.move(0.0), *self.drawing.move(placements)]
-        self.transport.send([*stage, *no_clip(), *still])
+        self.transport.send([*stage, *remove_clip(), *still])
 
     def _stage(
         self,
-        scene: Drawable,
+        scene: StageContent,
         title: str | None,
         moving: Array | None = None,
         fit: bool = False,
     ) -> list[Command]:
-        """Return what clears the stage, fits it to a scene, and draws that on it.
+        """Return the commands that clear the stage, fit it, and draw a scene.
 
         Args:
-            scene: What is drawn.
+            scene: The scene.
             title: The title; None: the robot's name.
             moving: Points of the robot [m], shape (K, 3); None: the scene's own.
-            fit: See all points, even if the view says where the eye is.
+            fit: Show all points, even if the view sets the camera's position.
         """
         view = self.view
         subject = self._subject(scene.points() if moving is None else moving)
@@ -342,8 +348,8 @@ class Viewer:
         return commands
 
     def _subject(self, moving: Array) -> Array:
-        """Return points that are to be in sight in any case [m], shape (K, 3)."""
-        return np.vstack([moving, self.drawing.stand()])
+        """Return the points that must be visible [m], shape (K, 3)."""
+        return np.vstack([moving, self.drawing.fixed_points()])
 
     def _playing(self, speed: float | None, loop: bool | None) -> Mapping[str, Any]:
         speed = self.view.speed if speed is None else speed
@@ -351,21 +357,21 @@ class Viewer:
             raise ViewerError(f"speed {speed} must be positive")
         return {"speed": speed, "loop": self.view.loop if loop is None else loop}
 
-    def _around(self, time: float) -> list[Command]:
-        """Return what moves all but the robot to where it is at a time [s]."""
+    def _move_others(self, time: float) -> list[Command]:
+        """Return the commands that move all but the robot to a time [s]."""
         if self._obstacles is None:
             return [seek(time)]
         return [*self._obstacles.move(time), set_time(f"t = {time:.2f} s")]
 
     def _placements(self, q: Array) -> Any:
-        """Return where all joints are in the world."""
+        """Return the placements of all joints in the world."""
         pin.forwardKinematics(self.robot.model, self._data, q)
         return self._data.oMi
 
 
 def _check(robot: Robot, rollout: Rollout, controller: Controller | None) -> None:
     if not len(rollout):
-        raise ViewerError("the run is empty: it has no row to show")
+        raise ViewerError("the run is empty: it has no rows")
     if rollout.q.shape[1] != robot.nq:
         name = rollout.meta.get("robot", {}).get("name", "?")
         raise ViewerError(

@@ -1,4 +1,4 @@
-"""What a URDF says its links look like, read without loading a mesh."""
+"""The visual elements of a robot's URDF, read without loading meshes."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,12 +12,12 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError, RobotNotFoundError
 from hsp_control.robot import Robot
 from hsp_control.robot.description.combining import Part
-from hsp_control.robot.description.mesh_files import complaint
+from hsp_control.robot.description.mesh_files import find_problem
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf_checks import read_urdf
 
 _GREY = (0.72, 0.74, 0.76, 1.0)
-_MESHES = {".dae", ".obj", ".stl"}  # what the page can read
+_MESHES = {".dae", ".obj", ".stl"}  # formats that the page can read
 _NO_NUMBERS: tuple[float, ...] = ()
 _SIZES = {
     "box": ("size",),
@@ -29,16 +29,16 @@ _SIZES = {
 
 
 class Visual(NamedTuple):
-    """One piece of what a link looks like.
+    """One visual element of a link.
 
     Attributes:
-        joint: The index of the joint that carries it; 0: it stands still.
+        joint: The index of its link's parent joint; 0: it does not move.
         link: Its link's name.
         pose: Its pose in the joint's frame, shape (4, 4).
         kind: ``box``, ``cylinder``, ``sphere``, ``capsule`` or ``mesh``.
-        size: Its lengths [m] as the URDF gives them; of a mesh: its scale.
+        size: Its lengths [m] in the URDF's order; of a mesh: its scale.
         color: Red, green, blue and opacity, from 0 to 1.
-        file: Of a mesh: the file, or None if there is none that can be shown.
+        file: Of a mesh: its file, or None if it is not found or not readable.
     """
 
     joint: int
@@ -51,7 +51,7 @@ class Visual(NamedTuple):
 
 
 def read_visuals(robot: Robot) -> list[Visual]:
-    """Return what the robot's links look like; nothing of a URDF that is gone."""
+    """Return the visuals of the robot's links; none of a URDF that no longer exists."""
     return [visual for part in robot.parts for visual in _of_part(robot, part)]
 
 
@@ -96,7 +96,7 @@ def _visual(
 def _materials(
     tree: Element,
 ) -> Iterator[tuple[str, tuple[float, ...]]]:
-    """Yield the named colours, wherever in the file they are given."""
+    """Yield (name, colour) of all named materials in the file."""
     for material in tree.iter("material"):
         color = material.find("color")
         if color is not None and material.get("name"):
@@ -124,7 +124,7 @@ def _pose(origin: Element | None) -> Array:
 
 
 def _mesh_file(source: RobotSource, name: str) -> Path | None:
-    """Return the file that a mesh's name stands for, if it exists and can be shown."""
+    """Return the file that a mesh's name refers to, if it exists and can be shown."""
     scheme, _, rest = name.rpartition("://")
     if scheme == "package":
         package, _, inside = rest.partition("/")
@@ -139,7 +139,7 @@ def _mesh_file(source: RobotSource, name: str) -> Path | None:
             file
             for file in candidates
             if file.suffix.lower() in _MESHES
-            and not complaint(file)
+            and not find_problem(file)
             and source.access.allows(file)
         ),
         None,

@@ -14,7 +14,7 @@ import pytest
 
 from hsp_control import Rollout
 from hsp_control.cli import main
-from hsp_control.cli.interrupts import PATIENCE, FirstInterruptWaits
+from hsp_control.cli.interrupts import PATIENCE, DeferredInterrupt
 
 MOVING = "paper/4_moving_obstacle"
 SHORT = ["--set", "simulation.duration=0.1"]
@@ -63,7 +63,7 @@ def test_check_says_what_it_found(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", MOVING]) == 0
     text = capsys.readouterr().out
     assert "planar3r: nq = 6, nv = 3" in text
-    assert f"{MOVING}: fine" in text
+    assert f"{MOVING}: OK" in text
 
 
 def test_check_warns_of_a_singular_start(capsys: pytest.CaptureFixture[str]) -> None:
@@ -96,7 +96,7 @@ def test_schema_is_json(capsys: pytest.CaptureFixture[str]) -> None:
         (["check", MOVING, "--set", "tasks.tip.frame=tpi"], "did you mean 'tip'?"),
         (["check", MOVING, "--set", "nonsense"], "--set nonsense"),
         (["plot", "nowhere.npz"], "hsp: nowhere.npz: no such file"),
-        (["plot", __file__], "not a whole .npz log"),
+        (["plot", __file__], "not a complete .npz log"),
         (["robots", "pand"], "did you mean 'panda'?"),
         (["run", MOVING, *SHORT, "--out", "/proc/nowhere"], "hsp: /proc/nowhere"),
     ],
@@ -161,7 +161,7 @@ def test_ctrl_c_does_not_wait_for_a_row_that_never_comes(
     def press() -> None:
         while not isinstance(
             getattr(signal.getsignal(signal.SIGINT), "__self__", None),
-            FirstInterruptWaits,
+            DeferredInterrupt,
         ):
             time.sleep(0.01)
         time.sleep(0.3)
@@ -184,11 +184,11 @@ def test_ctrl_c_does_not_wait_for_a_row_that_never_comes(
 
 
 def test_a_log_is_written_whatever_is_pressed_meanwhile() -> None:
-    with FirstInterruptWaits() as interrupts:
-        interrupts.settle()
+    with DeferredInterrupt() as interrupts:
+        interrupts.ignore_first()
         _thread.interrupt_main()
         time.sleep(1.5 * PATIENCE)
-    assert interrupts.asked
+    assert interrupts.requested
 
 
 def test_the_module_is_the_command() -> None:

@@ -37,9 +37,9 @@ from hsp_control import (
     RobotState,
 )
 from hsp_control.common import kernels, native
-from hsp_control.control.actuation import EXACT
+from hsp_control.control.actuation import Status
 from hsp_control.geometry import Proximity, link_shapes
-from hsp_control.geometry.by_coal import ByCoal
+from hsp_control.geometry.coal_distances import CoalDistances
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
 from hsp_control.null_space.fields import (
     EqualJointAngles,
@@ -94,8 +94,8 @@ def tasks(robot: Robot, frame: str) -> dict[str, Task]:
     blended = Blend([0.4, 0.1, 0.5], CIRCLE, 2.0)
     path = OrientationPath([np.eye(3), TURNED], [0.0, 2.0])
     turning = BlendOrientation(TURNED, SPIN, 2.0)
-    motion = Spline(np.eye(3, 7)[:, : len(robot.single_joints)], [0.0, 0.5, 1.0])
-    all_joints = motion.dimension == len(robot.single_joints)
+    motion = Spline(np.eye(3, 7)[:, : len(robot.single_dof_joints)], [0.0, 0.5, 1.0])
+    all_joints = motion.dimension == len(robot.single_dof_joints)
     return {
         "position": FramePosition(robot, frame, blended, GAINS),
         "axes": FramePosition(
@@ -266,10 +266,12 @@ def test_formulas_agree_with_coal_and_with_differences(kind: str) -> None:
     else:
         pairs = [(i, len(links)) for i in range(len(links))]
         proximity = Proximity(robot, links, [obstacle(SHAPES[kind])], pairs)
-    assert proximity.others is None
-    assert proximity.formulas is not None
+    assert proximity.coal is None
+    assert proximity.closed_form is not None
     count = len(pairs)
-    coal = ByCoal(robot, links, proximity.obstacles, np.array(pairs), np.arange(count))
+    coal = CoalDistances(
+        robot, links, proximity.obstacles, np.array(pairs), np.arange(count)
+    )
     agreed = 0
     while agreed < 6:
         q, v = robot.random_configuration(rng), 0.5 * rng.standard_normal(7)
@@ -284,7 +286,7 @@ def test_formulas_agree_with_coal_and_with_differences(kind: str) -> None:
         by_coal = np.zeros(7)
         coal.add_gradient(state, weights, by_coal)
         gradient, rate = np.zeros(7), np.zeros(7)
-        proximity.formulas.differentiate(
+        proximity.closed_form.differentiate(
             state, weights, np.zeros(count), gradient, rate
         )
         np.testing.assert_allclose(gradient, by_coal, atol=1e-4)
@@ -363,7 +365,7 @@ def test_no_allocation_in_a_task(name: str, chain: Robot) -> None:
     out = TaskSample.allocate(task.rows, JOINTS)
 
     def step() -> None:
-        state.instant[0] += 1  # the frame anew, too
+        state.stamp_array[0] += 1  # the frame anew, too
         task.evaluate(state, out)
 
     peak, left = allocated(step, 2000)
@@ -389,7 +391,7 @@ def test_no_allocation_in_a_field(name: str, chain: Robot) -> None:
     metric, out = MetricSample.allocate(JOINTS), FieldSample.allocate(JOINTS)
 
     def step() -> None:
-        state.instant[0] += 1
+        state.stamp_array[0] += 1
         field.evaluate(state, metric, 0, out)
 
     peak, left = allocated(step, 200 if name in SHAPES or name == "self" else 2000)
@@ -409,14 +411,14 @@ def test_a_step_allocates_what_pinocchio_returns_and_nothing_else(
     clearance = ObstacleClearance(chain, [obstacle(Sphere(0.1))], influence=9.0)
     field = JointCentering(chain) + 0.1 * clearance
     controller = Controller(chain, [pose], field, limits=Limits(chain))
-    assert controller.compute(state).status == EXACT
+    assert controller.compute(state).status == Status.EXACT
 
     peak, left = allocated(lambda: state.update(0.1, q, v), 500)
     assert 6 * VECTOR <= peak < 7 * VECTOR
     assert left < 50
 
     def compute() -> None:
-        state.instant[0] += 1
+        state.stamp_array[0] += 1
         controller.compute(state)
 
     peak, left = allocated(compute, 500)

@@ -33,11 +33,11 @@ from hsp_control import (
 from hsp_control.common import linalg
 from hsp_control.common.linalg import (
     cholesky,
-    least_singular_value_bound,
     multiply,
     multiply_transposed,
     orthogonalise_rows,
     orthonormalise_rows,
+    smallest_singular_value_bound,
     solve_lower,
     solve_lower_transposed,
     solve_rows,
@@ -46,6 +46,7 @@ from hsp_control.common.linalg import (
 from hsp_control.law import law
 from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY, raise_covector
 from hsp_control.robot import kinematics, robot
+from hsp_control.tasks import TaskSample
 from hsp_control.trajectories import HoldOrientation
 
 Array = NDArray[np.float64]
@@ -348,13 +349,14 @@ def arguments(name: str) -> tuple[Any, ...]:
         "gram": (J, J_dot, True, np.zeros((m, m))),
         "norm": (spd, normal(17, 6)),
         "orthonormalise_rows": (independent, np.zeros((5, 7)), np.zeros((5, 5))),
-        "_share_row": (independent.copy(), triangular(5), 2),
+        "_project_out_row": (independent.copy(), triangular(5), 2),
         "_square": (sample[0],),
-        "least_singular_value_bound": (triangular(6),),
+        "smallest_singular_value_bound": (triangular(6),),
         "orthogonalise_rows": (deficient.copy(), np.zeros((5, 5))),
         "acceleration": (
-            *(J, J_dot, normal(14, m, n), triangular(4), triangular(7), CONSTANT),
-            *(sample[0], sample[1][:m], sample[2], np.zeros((6, n)), np.zeros(n)),
+            *(rows_of(J, J_dot, sample[1][:m]), triangular(7), CONSTANT),
+            *(normal(14, m, n), triangular(4), sample[0], sample[2]),
+            *(np.zeros((6, n)), np.zeros(n)),
         ),
         "frame_kinematics": (
             *(np.array([2]), np.array([1]), *world),
@@ -362,7 +364,7 @@ def arguments(name: str) -> tuple[Any, ...]:
             *(normal(19, n - 1), index, shared, np.zeros((3, 3)), np.zeros(3)),
             *(np.zeros((6, n - 1)), np.zeros((6, n - 1)), np.zeros(6), np.zeros(6)),
         ),
-        "_take": (
+        "_copy_valid": (
             *(0.5, np.array([0.6, 0.8, 3.0]), sample[0], np.zeros(3), np.zeros(n)),
             *(np.array([[0, 2]]), np.array([4])),
         ),
@@ -377,8 +379,17 @@ KERNELS: dict[str, Callable[..., Any]] = {
     },
     "acceleration": law.acceleration,
     "frame_kinematics": kinematics.frame_kinematics,
-    "_take": robot._take,
+    "_copy_valid": robot._copy_valid,
 }
+
+
+def rows_of(J: Array, J_dot: Array, a_x: Array) -> TaskSample:
+    return TaskSample(J, J_dot, np.zeros(len(a_x)), np.zeros(len(a_x)), a_x)
+
+
+def flat(values: Any) -> list[Any]:
+    """Return arguments with records taken apart."""
+    return [x for v in values for x in (flat(v) if isinstance(v, tuple) else [v])]
 
 
 @pytest.mark.parametrize("name", KERNELS)
@@ -390,7 +401,7 @@ def test_compiled_equals_uncompiled(name: str) -> None:
     result = function(*compiled)
     expected = uncompiled(function)(*plain)
     assert result == (expected if expected is None else pytest.approx(expected, 1e-13))
-    for mine, other in zip(compiled, plain, strict=True):
+    for mine, other in zip(flat(compiled), flat(plain), strict=True):
         # Rounding: compiled sums are added in another order, and fused.
         np.testing.assert_allclose(mine, other, rtol=1e-13, atol=1e-13)
 
@@ -472,7 +483,7 @@ def test_bounds_of_the_least_singular_value(seed: int, m: int) -> None:
     J = rng.standard_normal((m, m + 2))
     Q, X = np.zeros((m, m + 2)), np.zeros((m, m))
     loose = orthonormalise_rows(J, Q, X)
-    tight = least_singular_value_bound(X)
+    tight = smallest_singular_value_bound(X)
     true = np.linalg.svd(J, compute_uv=False)[-1]
     assert loose <= true * (1.0 + 1e-9)
     assert tight <= true * (1.0 + 1e-9)

@@ -4,12 +4,15 @@ import copy
 import gc
 import pickle
 import weakref
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import hsp_control as hsp
+from hsp_control.common import native
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import NativeCall, Timed, bind, sequence
@@ -189,3 +192,56 @@ def test_several_calls_as_one_return_what_one_of_them_says() -> None:
     assert CallSequence(*calls)() == 2.0
     assert CallSequence(*calls, result=1)() == 1.0
     assert called(log) == [0.0, 1.0, 2.0, 0.0, 1.0, 2.0]
+
+
+class _Pair(NamedTuple):
+    matrix: Array
+    vector: Array
+
+
+@kernel
+def _apply(pair: _Pair, factors: tuple[float, float], out: Array) -> None:
+    """Write the product, scaled."""
+    for i in range(pair.matrix.shape[0]):
+        out[i] = 0.0
+        for j in range(pair.matrix.shape[1]):
+            out[i] += factors[0] * factors[1] * pair.matrix[i, j] * pair.vector[j]
+
+
+def test_records_are_arguments() -> None:
+    pair, out = _Pair(np.arange(6.0).reshape(2, 3).T[:2], np.zeros(2)), np.zeros(2)
+    call = bind(_apply, pair, (2.0, 3.0), out)
+    pair.vector[:] = [1.0, -2.0]
+    call()
+    np.testing.assert_array_equal(out, 6.0 * pair.matrix @ pair.vector)
+
+
+@compiled
+def test_numba_s_layout_is_known() -> None:
+    assert native.unknown_layout() == ""
+    assert native.AVAILABLE
+
+
+def test_another_layout_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native, "_ARRAY", ("data", "shape"))
+    with pytest.warns(RuntimeWarning, match="an array is meminfo, .*; known is data, "):
+        assert not native._available()
+
+
+def test_ordinary_calls_give_the_same_efforts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As with a Numba whose layout is not known: slower, but right."""
+
+    def effort() -> Array:
+        robot = hsp.Robot.load("panda")
+        hold = hsp.Hold([0.4, 0.1, 0.5])
+        task = hsp.FramePosition(robot, "panda_tcp", hold, hsp.Gains(25.0, 10.0))
+        field = hsp.JointCentering(robot) + hsp.Manipulability(robot, "panda_tcp")
+        controller = hsp.Controller(robot, [task], field, limits=hsp.Limits(robot))
+        state = robot.state(0.2, robot.home(), np.linspace(-0.5, 0.5, 7))
+        return np.array(controller.compute(state).tau)
+
+    packed = effort()
+    monkeypatch.setattr(native, "AVAILABLE", False)
+    assert not isinstance(bind(_note, np.zeros(2), 1.0), NativeCall)
+    # Kernels that are not compiled into one another add their sums in another order.
+    np.testing.assert_allclose(effort(), packed, rtol=1e-12, atol=1e-11)

@@ -275,6 +275,6 @@ def test_what_moves_by_itself_needs_a_control_period(plant: Any) -> None:
     pytest.importorskip("mujoco")
     config = panda(plant)
     del config["simulation"]["control_period"]
-    message = r"plant: efforts are held on this plant: set simulation.control_period"
+    message = r"plant: this plant needs efforts that are held for a period: set "
     with pytest.raises(HspControlError, match=message):
         load_experiment(config)

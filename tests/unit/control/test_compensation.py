@@ -47,7 +47,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.common.exceptions import CompensationError, GainError, SimulationError
-from hsp_control.control.actuation.status import EXACT, LIMITED
+from hsp_control.control.actuation.status import Status
 from hsp_control.null_space.fields import TargetPosture
 from hsp_control.simulation.plants.drives import EffortDelay
 from hsp_control.simulation.plants.model_changes import Payload, ScaledInertias, changed
@@ -109,7 +109,7 @@ def everything() -> Compensation:
 # ----------------------------------------------------------------------- the chain
 
 
-def test_without_remedies_it_is_the_controller_to_the_last_bit() -> None:
+def test_without_compensators_it_is_the_controller_to_the_last_bit() -> None:
     """Beside a loop written by hand, as a user would, on a noisy plant."""
     made = controller(limits=Limits(PANDA, effort_rate=1000.0))
     engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
@@ -131,7 +131,7 @@ def test_without_remedies_it_is_the_controller_to_the_last_bit() -> None:
 
 
 @pytest.mark.parametrize("name", [*EVERYTHING, "all"])
-def test_a_run_repeats_itself_and_its_remedies_travel(name: str) -> None:
+def test_a_run_repeats_itself_and_its_compensators_travel(name: str) -> None:
     compensation = (
         everything() if name == "all" else Compensation(**{name: EVERYTHING[name]()})
     )
@@ -149,7 +149,7 @@ def test_a_run_repeats_itself_and_its_remedies_travel(name: str) -> None:
     assert set(bare.columns) <= set(first.columns)
 
 
-def test_compensation_need_a_control_period() -> None:
+def test_compensators_need_a_control_period() -> None:
     with pytest.raises(
         SimulationError, match=r"compensation \(predictor\) is computed"
     ):
@@ -222,7 +222,7 @@ def test_what_is_cancelled_is_clipped() -> None:
     command.effort(5 * H, Q0, np.zeros(7), H)
     np.testing.assert_array_equal(own.cancelled, 1.0)
     bare = command.controller.compute(state.update(5 * H, Q0, np.zeros(7))).tau
-    modified = command.at(5 * H, Q0, np.zeros(7)).tau
+    modified = command.evaluate(5 * H, Q0, np.zeros(7)).tau
     np.testing.assert_allclose(modified, bare - 1.0, atol=1e-12)
 
 
@@ -238,7 +238,7 @@ def test_limits_are_kept_by_the_whole_effort() -> None:
     )
     assert (np.abs(log.tau) <= most + 1e-9).all()
     assert np.abs(log.tau[:, 1]).max() > 45.0 - 1e-6  # and it is reached
-    assert {EXACT, LIMITED} <= set(log["status"].astype(int))
+    assert {Status.EXACT, Status.LIMITED} <= set(log["status"].astype(int))
 
 
 def test_the_observer_leaves_the_effort_rate_to_the_limits() -> None:
@@ -283,9 +283,9 @@ def test_known_friction_costs_nothing_and_the_observer_leaves_it_alone() -> None
 
 
 @pytest.mark.parametrize("levels", [1, 2, 3])
-def test_the_wanted_velocity_is_the_law_s_flow(levels: int) -> None:
+def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
     """v_d = J# x_d' + P g whatever v is: what is measured, and its noise, cancel."""
-    from hsp_control.control.compensation.friction_feed_forward import wanted_velocity
+    from hsp_control.control.compensation.friction_feed_forward import desired_velocity
 
     robot, rng = PANDA, np.random.default_rng(2)
     turned = FrameOrientation(
@@ -306,7 +306,9 @@ def test_the_wanted_velocity_is_the_law_s_flow(levels: int) -> None:
         state = robot.state(0.4, q, rng.uniform(-1.0, 1.0, 7))
         made.compute(state)
         # Round-off of a product of inverses, at velocities of 1 rad/s.
-        np.testing.assert_allclose(wanted_velocity(state, made.mode), flow, atol=1e-12)
+        np.testing.assert_allclose(
+            desired_velocity(state, made.active_stack), flow, atol=1e-12
+        )
 
 
 # ------------------------------------------------------------------ integral action
@@ -478,16 +480,16 @@ def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:
     action = IntegralAction(10.0, limit=8.0)
     action.restart([task])
     e = np.array([1e-3, -1e-3, 0.0])
-    action.advance({"hand": e}, 0.5, bound=False)
+    action.advance({"hand": e}, 0.5, saturated=False)
     np.testing.assert_allclose(action.integrals["hand"], 0.5 * e)
     np.testing.assert_allclose(task.offset, 4000.0 * 0.5 * e)
-    action.advance({"hand": e}, 0.5, bound=True)  # would grow: stays
+    action.advance({"hand": e}, 0.5, saturated=True)  # would grow: stays
     np.testing.assert_allclose(action.integrals["hand"], 0.5 * e)
-    action.advance({"hand": -e}, 0.25, bound=True)  # unwinds
+    action.advance({"hand": -e}, 0.25, saturated=True)  # unwinds
     np.testing.assert_allclose(action.integrals["hand"], 0.25 * e)
-    action.advance({"hand": e}, 100.0, bound=False)
+    action.advance({"hand": e}, 100.0, saturated=False)
     assert np.abs(task.offset).max() == pytest.approx(8.0)
-    action.advance({"hand": None}, 1.0, bound=False)
+    action.advance({"hand": None}, 1.0, saturated=False)
     assert np.abs(task.offset).max() == pytest.approx(8.0)
 
 
@@ -496,7 +498,7 @@ def test_an_arm_that_is_too_weak_does_not_wind_up() -> None:
     weak = np.array([87.0, 20.0, 87.0, 87.0, 12.0, 12.0, 12.0])  # gravity takes 30
     made = controller(limits=Limits(PANDA, effort=weak, velocity=None, position=None))
     log = run(made, Compensation(integral_action=IntegralAction(20.0)), duration=0.015)
-    assert (log["status"] >= LIMITED).all()
+    assert (log["status"] >= Status.LIMITED).all()
     assert np.abs(log["task.hand.error"][-1]).max() > 1e-4
     np.testing.assert_array_equal(log["task.hand.integral"], 0.0)
 
@@ -524,7 +526,7 @@ def test_half_of_the_power_passes_at_the_cut_off(order: int) -> None:
     own.restart()
     late = np.array([own.apply(np.array([s]), H)[0] for s in t])
     # A held input is itself half a period late.
-    assert t[-1] - late[-1] == pytest.approx(own.lateness, abs=0.51 * H)
+    assert t[-1] - late[-1] == pytest.approx(own.delay, abs=0.51 * H)
 
 
 @pytest.mark.parametrize(("efforts", "sensors"), [(1, 0), (2, 0), (0, 1), (1, 2)])
@@ -661,7 +663,7 @@ def walker() -> Robot:
         (lambda: StartUpRamp(1.0, -1.0), "natural_frequency is -1.0; must not be"),
         (lambda: FrictionFeedForward(1.0, smoothing=0.0), "smoothing is 0"),
         (lambda: on(FrictionFeedForward([1.0])), "friction_feed_forward: coulomb has"),
-        (lambda: on(FrictionFeedForward(viscous=-1.0)), "viscous is -1.0; must not"),
+        (lambda: on(FrictionFeedForward(viscous=-1.0)), "viscous is -1.0; must be"),
         (
             lambda: on(EffortRateClip([1.0, 2.0])),
             r"effort_rate has shape \(2,\); needs",

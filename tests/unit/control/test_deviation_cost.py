@@ -28,7 +28,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.constraints.limits import StaticEffort
-from hsp_control.control.actuation import EXACT, LIMITED, RELAXED
+from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.deviation_cost import (
     decay_rate,
     deviation_cost,
@@ -67,7 +67,7 @@ METRICS: dict[str, Metric] = {
 @given(seeds)
 @settings(max_examples=15)
 def test_the_bound_leaves_the_law_alone(metric: str, seed: int) -> None:
-    """No other limit active: closed form and programme are one to 1e-8."""
+    """No other limit active: closed form and QP agree to 1e-8."""
     robot, rng = panda(), np.random.default_rng(seed)
     q, v = robot.random_configuration(rng), 2.0 * rng.standard_normal(7)
     options: dict[str, Any] = {"metric": METRICS[metric]}
@@ -78,12 +78,12 @@ def test_the_bound_leaves_the_law_alone(metric: str, seed: int) -> None:
     free = Controller(robot, [hand()], field, **options)
     bounded = Controller(robot, [hand()], field, limits=limits, **options)
     law, out = free.compute(state), bounded.compute(state)
-    assert out.status == EXACT
+    assert out.status == Status.EXACT
     np.testing.assert_array_equal(out.tau, law.tau)
     # And solving it all the same gives nothing else.
-    order = deviation_cost(free.mode.resolution, supported=False)
+    order = deviation_cost(free.active_stack.resolution, supported=False)
     speed = np.full(7, 1e-3)
-    rows = null_space_rows(free.mode.resolution, order.projector, speed, 7)
+    rows = null_space_rows(free.active_stack.resolution, order.projector, speed, 7)
     delta = solve(order.metric, np.zeros(7), rows)
     assert delta is not None
     np.testing.assert_allclose(delta, 0.0, atol=1e-8)
@@ -102,7 +102,7 @@ def test_the_projector_is_the_law_s(metric: str, seed: int) -> None:
     out = controller.compute(state)
     if out.damped:  # then e_N keeps a part of the direction that is being lost
         return
-    P = deviation_cost(controller.mode.resolution, supported=False).projector
+    P = deviation_cost(controller.active_stack.resolution, supported=False).projector
     e_N = P @ (out.field.g - state.v)
     np.testing.assert_allclose(e_N, out.null_space_error, rtol=0, atol=1e-9)
 
@@ -159,18 +159,18 @@ def test_null_space_error_stays_bounded(seed: int) -> None:
     controller, q0 = limited(seed, null_space_speed=SPEED)
     rollout = run(controller, q0, 0.8)
     assert rollout.meta["status"] == "completed"
-    assert rollout["status"].max() == LIMITED
+    assert rollout["status"].max() == Status.LIMITED
     # Efforts held for 1 ms leave the error half a period behind: λ h / 2 = 0.5 %.
     norm = rollout["null_space_norm"]
     most = max(SPEED * np.sqrt(7.0), norm[0])
     assert norm.max() <= 1.005 * most
     free = Controller(panda(), [controller.tasks[0]], controller.field)
     state, binds = RobotState(panda()), False
-    for k in np.flatnonzero(rollout["status"] == LIMITED)[::10]:
+    for k in np.flatnonzero(rollout["status"] == Status.LIMITED)[::10]:
         state.update(rollout.t[k], rollout["q"][k], rollout["v"][k])
         law = free.compute(state).acceleration.copy()
         delta = controller.compute(state).acceleration - law
-        P = deviation_cost(free.mode.resolution, supported=False).projector
+        P = deviation_cost(free.active_stack.resolution, supported=False).projector
         assert np.abs(P @ delta).max() <= 10.0 * SPEED * (1.0 + 1e-6)
         binds = binds or np.abs(P @ delta).max() > 9.9 * SPEED
     assert binds
@@ -192,7 +192,7 @@ def test_the_bound_gives_way_to_every_limit() -> None:
         task = FramePosition(robot, "panda_tcp", Hold(here), Gains.from_frequency(10))
         controller = Controller(robot, [task], null_space_gain=1.0, limits=limits)
         out = controller.compute(robot.state(0.0, q, v))
-        assert out.status == LIMITED
+        assert out.status == Status.LIMITED
         outs.append(out.acceleration[6])
     most = 100.0 * (0.1 - 0.005) - 20.0 * 1.5
     np.testing.assert_allclose(outs, most, rtol=1e-5)
@@ -244,7 +244,7 @@ def test_an_arm_goes_where_it_can_be_held() -> None:
     for static in (None, share):
         limits = Limits(robot, static_effort=static)
         rollout = run(Controller(robot, [far], limits=limits), q0, 1.5)
-        assert rollout["status"].max() < RELAXED
+        assert rollout["status"].max() < Status.RELAXED
         held = np.array(
             [robot.inverse_dynamics(q, 0 * q, 0 * q) for q in rollout["q"][::20]]
         )

@@ -1,4 +1,4 @@
-"""Limits: the programme is the law where none binds, and keeps them where one does."""
+"""Limits: the QP gives the law where none binds, and keeps them where one does."""
 
 from functools import cache
 from typing import Any
@@ -32,7 +32,7 @@ from hsp_control import (
 )
 from hsp_control.common.exceptions import LimitError
 from hsp_control.constraints.limits.acceleration_bounds import acceleration_bounds
-from hsp_control.control.actuation import EXACT, LIMITED
+from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.actuation import _relax
 from hsp_control.control.actuation.deviation_cost import deviation_cost
 from hsp_control.control.actuation.qp import Rows, solve
@@ -57,32 +57,28 @@ def hand(frequency: float = 10.0, **circle: Any) -> FramePosition:
 
 
 def bounds(limits: Limits, q: Array, v: Array) -> tuple[Array, Array]:
-    least, greatest = np.zeros(7), np.zeros(7)
+    a_lower, a_upper = np.zeros(7), np.zeros(7)
     acceleration_bounds(
         q,
         v,
         panda().dof_indices,
-        limits.guarded_lower,
-        limits.guarded_upper,
-        limits.guarded_velocity,
-        limits.acceleration,
-        limits.bandwidth,
-        least,
-        greatest,
+        limits.motion,
+        a_lower,
+        a_upper,
     )
-    return least, greatest
+    return a_lower, a_upper
 
 
 def test_bounds_are_the_barriers() -> None:
     robot = panda()
     limits = Limits(robot, bandwidth=8.0, position_margin=0.0, velocity_margin=0.0)
     q, v = robot.home(), np.full(7, 0.1)
-    least, greatest = bounds(limits, q, v)
+    a_lower, a_upper = bounds(limits, q, v)
     lower, upper = robot.position_limits()
     expected = np.minimum(64.0 * (upper - q) - 16.0 * v, 16.0 * (limits.velocity - v))
-    np.testing.assert_allclose(greatest, expected, rtol=1e-14)
+    np.testing.assert_allclose(a_upper, expected, rtol=1e-14)
     expected = np.maximum(-64.0 * (q - lower) - 16.0 * v, -16.0 * (limits.velocity + v))
-    np.testing.assert_allclose(least, expected, rtol=1e-14)
+    np.testing.assert_allclose(a_lower, expected, rtol=1e-14)
 
 
 def test_too_fast_is_slowed_down_more_steeply() -> None:
@@ -90,28 +86,28 @@ def test_too_fast_is_slowed_down_more_steeply() -> None:
     limits = Limits(panda(), velocity=1.0, position=None, bandwidth=8.0)
     guarded = limits.guarded_velocity[0]
     for excess, slope in ((-0.01, 16.0), (0.01, 64.0)):
-        _, greatest = bounds(limits, panda().home(), np.full(7, guarded + excess))
-        np.testing.assert_allclose(greatest, -slope * excess, rtol=1e-12)
-        least, _ = bounds(limits, panda().home(), np.full(7, -guarded - excess))
-        np.testing.assert_allclose(least, slope * excess, rtol=1e-12)
+        _, a_upper = bounds(limits, panda().home(), np.full(7, guarded + excess))
+        np.testing.assert_allclose(a_upper, -slope * excess, rtol=1e-12)
+        a_lower, _ = bounds(limits, panda().home(), np.full(7, -guarded - excess))
+        np.testing.assert_allclose(a_lower, slope * excess, rtol=1e-12)
 
 
 @given(seeds)
 def test_bounds_never_cross(seed: int) -> None:
-    """Position goes before velocity before acceleration: something is always left."""
+    """Position has priority over velocity and acceleration: a range always remains."""
     rng = np.random.default_rng(seed)
     limits = Limits(panda(), acceleration=rng.uniform(0.1, 5.0))
     lower, upper = panda().position_limits()
     q = lower + (upper - lower) * rng.uniform(-0.2, 1.2, 7)
-    least, greatest = bounds(limits, q, rng.normal(0.0, 5.0, 7))
-    assert (least <= greatest).all()
+    a_lower, a_upper = bounds(limits, q, rng.normal(0.0, 5.0, 7))
+    assert (a_lower <= a_upper).all()
 
 
-# --- the programme -------------------------------------------------------------------
+# --- the QP --------------------------------------------------------------------------
 
 
 def oracle(H: Array, f: Array, rows: Rows) -> Array:
-    """Return what quadprog makes of the same programme."""
+    """Return the solution of the same QP by quadprog."""
     same = rows.upper - rows.lower < 1e-12
     C = np.vstack([rows.A[same], rows.A[~same], -rows.A[~same]])
     b = np.concatenate([rows.lower[same], rows.lower[~same], -rows.upper[~same]])
@@ -143,7 +139,7 @@ def test_solver_says_when_there_is_nothing() -> None:
 
 @given(seeds)
 @settings(max_examples=50)
-def test_without_an_active_limit_the_programme_is_the_law(seed: int) -> None:
+def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
     """Wide limits: the optimum is δ = 0, solved or not; to 1e-8 over random states."""
     robot, rng = panda(), np.random.default_rng(seed)
     q, v = robot.random_configuration(rng), 0.3 * rng.standard_normal(7)
@@ -153,10 +149,10 @@ def test_without_an_active_limit_the_programme_is_the_law(seed: int) -> None:
     limited = Controller(robot, [hand()], field, limits=wide)
     state = robot.state(0.3, q, v)
     out, same = free.compute(state), limited.compute(state)
-    assert same.status == EXACT
+    assert same.status == Status.EXACT
     np.testing.assert_array_equal(same.tau, out.tau)
     # And solving it all the same gives nothing else.
-    H = deviation_cost(free.mode.resolution, supported=False).metric
+    H = deviation_cost(free.active_stack.resolution, supported=False).metric
     M, a = state.mass_matrix, out.acceleration
     tau = state.inverse_dynamics(a)
     rows = Rows(np.vstack([M, np.eye(7)]), *np.split(np.full(28, 0.0), 2))
@@ -195,7 +191,7 @@ def test_null_space_gives_way_first_then_the_lower_task() -> None:
         limits = Limits(robot, effort=effort, velocity=None, position=None)
         controller = Controller(robot, levels, field, limits=limits)
         out = controller.compute(state)
-        assert out.status == LIMITED
+        assert out.status == Status.LIMITED
         assert abs(out.tau[joint]) <= effort[joint]
         given_up = out.task.jacobian @ (out.acceleration - a)
         # What the costs' ratios, 1e-4 a level, leave of strict order.
@@ -258,7 +254,7 @@ def test_no_limit_is_violated(seed: int) -> None:
     controller = Controller(robot, [task], JointCentering(robot), limits=limits)
     rollout = run(controller, q0, 0.8)
     assert rollout.meta["status"] == "completed"
-    assert (rollout["status"] == LIMITED).any()  # limits did bind
+    assert (rollout["status"] == Status.LIMITED).any()  # limits did bind
     worst = violations(rollout, limits)
     assert max(worst.values()) <= 1e-8, worst
 
@@ -289,12 +285,12 @@ def test_contradiction_is_relaxed_and_told() -> None:
     out = Controller(robot, [hand()], limits=limits).compute(robot.state(0.0, q, v))
     assert np.isfinite(out.tau).all()
     assert (np.abs(out.tau) <= 1.0).all()
-    assert out.status > LIMITED
+    assert out.status > Status.LIMITED
     assert 0.0 < out.relaxation < np.inf
 
 
 def test_least_violation_is_the_least() -> None:
-    """However far the law's acceleration is: against the same programme, alone."""
+    """However far the law's acceleration is: against the same QP, solved alone."""
     rng = np.random.default_rng(3)
     effort = rng.standard_normal((3, 5))
     hard = Rows(effort, np.full(3, -1.0), np.full(3, 1.0))
@@ -343,7 +339,7 @@ def test_effort_rate_needs_to_know_what_went_out() -> None:
         ({"static_effort": 0.0}, "static_effort is 0.0; must be a part of the effort"),
         ({"null_space_speed": 0.0}, "null_space_speed limit is .* greater than 0"),
         ({"null_space_weight": 1.0}, "null_space_weight is 1.0; must be between"),
-        ({"velocity": np.nan}, "velocity holds a NaN"),
+        ({"velocity": np.nan}, "velocity contains NaN"),
     ],
 )
 def test_impossible_limits(options: dict[str, Any], message: str) -> None:
@@ -443,5 +439,5 @@ def test_start_too_near() -> None:
     limits = Limits(robot, distances=[MinimumDistance(proximity, 0.05)])
     with pytest.raises(LimitError, match=r"to ball are .* must be at least 0.05 m"):
         limits.check_start(robot.home(), np.zeros(7))
-    with pytest.raises(LimitError, match="least distance is -1"):
+    with pytest.raises(LimitError, match="minimum distance is -1"):
         MinimumDistance(proximity, -1.0)

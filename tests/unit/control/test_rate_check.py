@@ -197,8 +197,9 @@ def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
         assert found.path == ("compensation", "integral_action")
         assert not found.unstable
         told = re.fullmatch(
-            r"where the robot is (.*) times as heavy at task 'posture' as its model, .*"
-            r"design for 5: Ki of at most (.*) times this, or a (faster )?momentum .*",
+            r"if the robot is (.*) times as heavy at task 'posture' as its model, .*"
+            r"design for a factor of 5: use Ki of at most (.*) times this, "
+            r"or a (faster )?momentum .*",
             found.message,
         )
         assert told is not None
@@ -272,27 +273,27 @@ def test_the_robot_grows_just_above_and_dies_just_below(
         (
             lambda: holding(gain=2500.0),
             ("null_space", "gain"),
-            r"unstable at this rate: K_N times the period is 2.5 \(a period multiplies "
-            r"the motion by up to 1.501\): K_N of at most 1990 1/s or a control_period "
-            r"of at most 0.000799 s would do",
+            r"unstable at this rate: K_N times the period is 2.5 \(motion grows by a "
+            r"factor of up to 1.501 per period\); use K_N of at most 1990 1/s or a "
+            r"control_period of at most 0.000799 s$",
         ),
         (
             lambda: holding(frequency=1500.0),
             ("tasks", "hand", "gains"),
-            r"unstable at this rate: ω0 of task 'hand' times the period is 1.5 \(.*\): "
-            r"ω0 of task 'hand' of at most (999|1000) 1/s or a control_period of at "
-            r"most 0.000666 s would do",
+            r"unstable at this rate: ω0 of task 'hand' times the period is 1.5 \(.*\); "
+            r"use ω0 of task 'hand' of at most (999|1000) 1/s or a control_period of "
+            r"at most 0.000666 s$",
         ),
         (
             lambda: holding(gain=1100.0, stiffness=1100.0),
             ("null_space", "gain"),
-            r"K_N times the period is 1.1, with a field of stiffness 1100 1/s \(.*\): "
-            r"K_N of at most (899|900) 1/s or fields of at most 0.818 times these "
-            r"weights or a control_period of at most 0.000909 s would do",
+            r"K_N times the period is 1.1, with a field of stiffness 1100 1/s \(.*\); "
+            r"use K_N of at most (899|900) 1/s or fields of at most 0.818 times these "
+            r"weights or a control_period of at most 0.000909 s$",
         ),
     ],
 )
-def test_an_unstable_rate_is_told_with_numbers_that_would_do(
+def test_an_unstable_rate_is_reported_with_stable_values(
     made: Any, path: tuple[str, ...], message: str
 ) -> None:
     (finding,) = [f for f in rate_findings(made(), Q0, H) if f.unstable]
@@ -318,7 +319,7 @@ def test_an_unstable_rate_is_told_with_numbers_that_would_do(
         ),
     ],
 )
-def test_the_advice_on_a_remedy_does(
+def test_the_advice_on_a_compensator_works(
     compensation: dict[str, Any], delay: int, advice: str
 ) -> None:
     made = holding(frequency=40.0, gain=20.0)
@@ -344,7 +345,7 @@ def test_what_misses_the_rule_is_said_and_not_refused() -> None:
         ("tasks", "hand", "gains"),
         ("null_space", "gain"),
     ]
-    assert "is 0.25; design at no more than 0.2" in found[0].message
+    assert "is 0.25; at most 0.2 is recommended" in found[0].message
     assert "K_N of at most 200 1/s, or a control_period of at most 0.000667 s" in (
         found[1].message
     )
@@ -352,7 +353,7 @@ def test_what_misses_the_rule_is_said_and_not_refused() -> None:
     assert stiff.path == ("null_space", "fields")
     assert "the field's stiffness times the period is 0.4" in stiff.message
     (late,) = check_rate(holding(frequency=150.0), Q0, H, effort_delay=1)
-    assert "is 0.15; design at no more than 0.1" in late.message
+    assert "is 0.15; at most 0.1 is recommended" in late.message
     assert not check_rate(holding(frequency=150.0), Q0, H)
     predicted = Compensation(predictor=Predictor(1))
     assert not check_rate(holding(frequency=150.0), Q0, H, predicted)
@@ -414,7 +415,7 @@ ALL: dict[str, Any] = {
 }
 
 
-def test_all_remedies_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
+def test_all_compensators_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
     file = tmp_path / "all.yaml"
     import yaml
 
@@ -453,7 +454,7 @@ def test_all_remedies_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
         ),
         (
             {"compensation": {"start_up_ramp": {}}, "simulation": {"duration": 1}},
-            "compensation: it acts once a period: set simulation.control_period",
+            "compensation acts once per control period: set simulation.control_period",
         ),
         (
             {"null_space": {"gain": 2500}},
@@ -471,7 +472,7 @@ def test_all_remedies_from_yaml_and_each_turned_off(tmp_path: Path) -> None:
                     }
                 },
             },
-            "tasks.hand.gains: unstable at this rate: .* 0.5, 1 period late .*"
+            "tasks.hand.gains: unstable at this rate: .* 0.5, 1 period of delay .*"
             "ω0 of task 'hand' of at most 426 1/s",
         ),
         (
@@ -503,7 +504,7 @@ def test_the_command_line_says_what_is_close(
     for command in (["check", str(file)], ["run", str(file), "--out", str(tmp_path)]):
         assert main(command) == 0
         assert (
-            "hsp: null_space.gain: K_N times the period is 0.5; design at no more than"
+            "hsp: null_space.gain: K_N times the period is 0.5; at most 0.2 is reco"
             in capsys.readouterr().err
         )
     assert main(["check", str(file), "--set", "null_space.gain=2500"]) == 2

@@ -40,7 +40,7 @@ from hsp_control.live import (
     Hardware,
     LoopReport,
     Measurement,
-    Operator,
+    OperatorRequests,
     Phase,
     StopSettings,
     Tolerance,
@@ -74,7 +74,7 @@ def test_it_is_the_simulation_then_stops(tmp_path: Path) -> None:
     rig, log = Rig(), tmp_path / "run.journal"
     report = run_loop(law(), rig, duration=0.4, log=log, log_period=0.01)
     assert isinstance(rig, Hardware)
-    assert (report.ended, report.reason) == ("completed", "its time is over")
+    assert (report.ended, report.reason) == ("completed", "the duration is over")
     assert_held(rig, report)
     run = Rollout.load(log)
     reference = simulate(
@@ -98,7 +98,7 @@ def test_it_is_the_simulation_then_stops(tmp_path: Path) -> None:
     assert run["live.phase"][-1] == Phase.HOLDING
 
 
-def test_a_commander_of_ones_own_is_asked_and_restarted() -> None:
+def test_a_users_effort_source_is_used_and_restarted() -> None:
     class Halved(Command):
         restarts = 0
 
@@ -110,10 +110,10 @@ def test_a_commander_of_ones_own_is_asked_and_restarted() -> None:
             tau = super().effort(t, q, v, period)
             return gravity(q) + 0.5 * (tau - gravity(q))
 
-    commander = Halved(law())
+    source = Halved(law())
     rig = Rig()
-    run_loop(commander, rig, duration=0.05)
-    assert commander.restarts == 2  # when it was made, and when the run began
+    run_loop(source, rig, duration=0.05)
+    assert source.restarts == 2  # when it was made, and when the run began
     state = panda().state(0.0, start(), np.zeros(7))
     full = law().compute(state).tau
     np.testing.assert_allclose(rig.sent[0], gravity(start()) + 0.5 * (
@@ -121,20 +121,20 @@ def test_a_commander_of_ones_own_is_asked_and_restarted() -> None:
     ), atol=1e-9)  # fmt: skip
 
 
-def test_the_controller_is_told_what_acts() -> None:
-    told: list[Array] = []
+def test_the_controller_receives_the_applied_effort() -> None:
+    applied: list[Array] = []
 
-    class Told(Command):
+    class Recording(Command):
         def applied(self, tau: Array, period: float) -> None:
-            told.append(np.array(tau))
+            applied.append(np.array(tau))
             super().applied(tau, period)
 
     interface = EffortInterface(compensates_gravity=True, effort_rate=50.0)
     rig = Rig(watched(interface))
-    run_loop(Told(law()), rig, duration=0.05, interface=interface)
-    told, sent = told[: len(rig.sent)], np.array(rig.sent)
+    run_loop(Recording(law()), rig, duration=0.05, interface=interface)
+    applied, sent = applied[: len(rig.sent)], np.array(rig.sent)
     # tau = sent + g(q); at the start, where it barely moves, g is the start's.
-    np.testing.assert_allclose(told[0], sent[0] + gravity(start()), atol=1e-9)
+    np.testing.assert_allclose(applied[0], sent[0] + gravity(start()), atol=1e-9)
     # And the rate binds at first: the law wants to start at once.
     assert np.abs(sent[0]).max() == pytest.approx(50.0 * PERIOD)
 
@@ -216,10 +216,10 @@ TRICKS: dict[str, tuple[dict[int, Trick], str]] = {
     "old": ({200: lambda m: m._replace(age=0.03)}, "0.03 s old; 0.02 s are allowed"),
     "gap": (
         always(lambda m: m._replace(sequence=m.sequence + 30), 200),
-        "30 states in a row were not seen",
+        "30 states in a row were not received",
     ),
-    "far": ({200: far}, "panda_joint4 is at 0.1, beyond"),
-    "fast": ({200: fast}, "panda_joint2 moves at 2.5, beyond"),
+    "far": ({200: far}, "panda_joint4 is at 0.1, outside"),
+    "fast": ({200: fast}, "panda_joint2 moves at 2.5, outside"),
     "halted": ({200: lambda m: m._replace(halted=True)}, "has stopped by itself"),
 }
 
@@ -245,8 +245,8 @@ def test_a_gap_that_is_allowed_is_held_over_and_counted() -> None:
     rig = Rig(tricks=tricks)
     report = run_loop(law(), rig, duration=0.5)
     assert report.ended == "completed"
-    assert report.deadlines.silent == 23
-    assert report.deadlines.unseen == 23
+    assert report.deadlines.without_state == 23
+    assert report.deadlines.skipped_states == 23
     # The first read is not answered, the second is by the first effort: 200 by 198.
     held = np.array(rig.sent)[197:219]
     still = np.abs(np.diff(held, axis=0)).max(axis=1) == 0.0
@@ -260,8 +260,8 @@ def test_without_any_state_the_model_stops_it_and_the_loop_falls_silent() -> Non
     assert report.silent
     # What the model reckoned was true: plant and model are one here, and the robot
     # had come to rest under the efforts sent blind, before its watchdog could know.
-    blind = Tolerance().blind / PERIOD
-    assert len(rig.sent) == pytest.approx(199 + blind, abs=3)
+    predicted = Tolerance().prediction_time / PERIOD
+    assert len(rig.sent) == pytest.approx(199 + predicted, abs=3)
     assert report.speed < 0.05
     assert np.abs(rig.robot.v).max() < AT_REST
 
@@ -329,7 +329,7 @@ def test_a_law_that_fails_ends_in_the_safe_stop(what: Any, tmp_path: Path) -> No
     assert np.isfinite(run.q).all()
 
 
-def test_a_commander_s_nan_never_goes_out() -> None:
+def test_a_nan_of_an_effort_source_is_not_sent() -> None:
     class Broken(Command):
         def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
             tau = super().effort(t, q, v, period)
@@ -355,9 +355,9 @@ def call_from(t: float, what: Callable[[], object]) -> Callable[[float], None]:
 
 
 def test_the_operator_s_stop_and_ctrl_c(tmp_path: Path) -> None:
-    operator, rig = Operator(), Rig()
-    on_period = call_from(0.1, operator.stop)
-    report = run_loop(law(), rig, operator=operator, on_period=on_period)
+    requests, rig = OperatorRequests(), Rig()
+    on_period = call_from(0.1, requests.stop)
+    report = run_loop(law(), rig, requests=requests, on_period=on_period)
     assert (report.ended, report.status) == ("operator", "interrupted")
     assert_held(rig, report)
 
@@ -377,10 +377,10 @@ def test_a_second_ctrl_c_leaves_it_to_the_robot() -> None:
 
 
 def test_what_a_change_raises_stops_it() -> None:
-    operator, rig = Operator(), Rig()
+    requests, rig = OperatorRequests(), Rig()
     gains = Gains.from_frequency(5.0)
-    operator.call(lambda: law().change_gains("tipp", gains, start=0.0, ramp=1.0))
-    report = run_loop(law(), rig, operator=operator)
+    requests.call(lambda: law().change_gains("tipp", gains, start=0.0, ramp=1.0))
+    report = run_loop(law(), rig, requests=requests)
     assert "'tipp'" in report.reason
     assert_held(rig, report)
     rig = Rig()
@@ -468,7 +468,7 @@ def test_whatever_comes_it_ends_and_no_effort_is_beyond_limits(
 
 
 def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
-    controller, operator, rig = law(), Operator(), Rig()
+    controller, requests, rig = law(), OperatorRequests(), Rig()
     q = start()
     q[0] -= 0.5
     new = TargetPosture(panda(), q, name="other")
@@ -488,11 +488,11 @@ def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
 
     def on_period(t: float) -> None:
         while for_now and t >= for_now[0][0]:
-            operator.call(for_now.pop(0)[1])
+            requests.call(for_now.pop(0)[1])
 
     log = tmp_path / "run.journal"
     report = run_loop(
-        controller, rig, duration=1.0, operator=operator, on_period=on_period, log=log,
+        controller, rig, duration=1.0, requests=requests, on_period=on_period, log=log,
         log_period=PERIOD,
     )  # fmt: skip
     assert report.ended == "completed", report.reason
@@ -516,7 +516,9 @@ def test_a_floating_base_is_refused() -> None:
     task = hsp.JointPosture(robot, robot.neutral(), Gains.from_frequency(5.0))
     controller = hsp.Controller(robot, [task], base="driven")
     rig = Rig()
-    with pytest.raises(LiveError, match="floating base; a live loop is for fixed ones"):
+    with pytest.raises(
+        LiveError, match="floating base; a live loop needs a fixed base"
+    ):
         run_loop(controller, rig)
     assert rig.closed
 
@@ -536,7 +538,7 @@ def test_a_floating_base_is_refused() -> None:
         ),
         (
             {"interface": EffortInterface(effort=-1.0)},
-            "must be greater than 0",
+            "must be positive",
         ),
         (
             {"interface": EffortInterface(effort_rate="fast")},
@@ -555,7 +557,7 @@ def test_settings_that_are_none(options: dict[str, Any], message: str) -> None:
         lambda: Tolerance(missing=-1),
         lambda: Tolerance(missing=1.5),  # type: ignore[arg-type]
         lambda: Tolerance(age=0.0),
-        lambda: Tolerance(blind=np.nan),
+        lambda: Tolerance(prediction_time=np.nan),
         lambda: StopSettings(rest_speed=0.0),
         lambda: StopSettings(hold=-1.0),
         lambda: StopSettings(damping=np.inf),
@@ -569,24 +571,24 @@ def test_numbers_that_are_none(make: Callable[[], object]) -> None:
 def test_a_robot_that_is_silent_or_unfit_is_not_started() -> None:
     clock = iter(np.arange(0.0, 1e4, 0.1))
     rig = Rig(tricks=always(missing, 1))
-    with pytest.raises(HardwareError, match="no state of the robot came in 10 s"):
+    with pytest.raises(HardwareError, match="no state of the robot arrived in 10 s"):
         run_loop(law(), rig, clock=lambda: float(next(clock)))
     assert rig.closed
     assert not rig.sent
     for trick, why in ((nan_velocity, "not finite"), (far, "panda_joint4 is at")):
         rig = Rig(tricks=always(trick, 1))
-        with pytest.raises(HardwareError, match=f"not fit to start: .*{why}"):
+        with pytest.raises(HardwareError, match=f"cannot be started: .*{why}"):
             run_loop(law(), rig)
         assert not rig.sent
         assert rig.closed
 
 
-def test_limits_of_the_controller_are_the_guard_s() -> None:
+def test_the_monitor_uses_the_limits_of_the_controller() -> None:
     q = start()
     limits = Limits(panda(), position=(q - 0.05, q + 0.05))
     controller = law()  # does not know of them, and swings by 0.5 rad
     controller.limits = limits
     report = run_loop(controller, Rig(), duration=5.0)
     assert report.ended == "fault"
-    assert "beyond" in report.reason
+    assert "outside" in report.reason
     assert report.t < 3.0

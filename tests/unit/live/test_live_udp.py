@@ -12,9 +12,9 @@ from live_rigs import PERIOD, panda, start, watched
 from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.live import Faults, Hardware, Link, Phase, UdpHardware, serve
 from hsp_control.live.faults import FaultInjector
-from hsp_control.live.link import Ages
+from hsp_control.live.link import AgeEstimator
 from hsp_control.live.packets import Kind, Packet, decode, encode
-from hsp_control.live.udp_robot import BYE
+from hsp_control.live.udp_robot import CLOSED_BY_LOOP
 
 numbers = st.lists(st.floats(allow_nan=False), max_size=20)
 
@@ -68,7 +68,7 @@ def test_other_versions_kinds_and_lengths_are_refused() -> None:
         assert decode(body + struct.pack("<I", zlib.crc32(body))) is None
 
 
-def test_not_finite_numbers_pass_the_line_and_are_the_guard_s() -> None:
+def test_not_finite_numbers_are_decoded_and_left_to_the_monitor() -> None:
     found = decode(encode(packet(1, [np.nan, np.inf])))
     assert found is not None
     assert same(found, packet(1, [np.nan, np.inf]))
@@ -83,10 +83,10 @@ def test_each_fault_does_what_it_says_and_is_counted(seed: int, delay: int) -> N
     injector = FaultInjector(faults)
     came: list[int | None] = []
     for k in range(1, 201):
-        for data in injector.pass_on(encode(packet(k))):
+        for data in injector.apply(encode(packet(k))):
             found = decode(data)
             came.append(None if found is None else found.sequence)
-    came += [found.sequence for d in injector.rest() if (found := decode(d))]
+    came += [found.sequence for d in injector.flush() if (found := decode(d))]
     done = injector.injected
     whole = [k for k in came if k is not None]
     assert came.count(None) == done["corrupted"]
@@ -97,14 +97,14 @@ def test_each_fault_does_what_it_says_and_is_counted(seed: int, delay: int) -> N
     assert sum(done.values()) == pytest.approx(160, abs=30)
     again = FaultInjector(faults)  # the same seed, the same faults
     for k in range(1, 201):
-        again.pass_on(encode(packet(k)))
+        again.apply(encode(packet(k)))
     assert again.injected == done
 
 
 def test_no_faults_change_nothing() -> None:
     injector = FaultInjector(Faults())
     data = [encode(packet(k)) for k in range(1, 50)]
-    assert [injector.pass_on(each) for each in data] == [[each] for each in data]
+    assert [injector.apply(each) for each in data] == [[each] for each in data]
 
 
 def test_faults_are_parsed_and_refused() -> None:
@@ -195,7 +195,7 @@ def test_a_peer_that_is_gone_is_no_error(links: tuple[Link, Link]) -> None:
 
 def test_nobody_to_send_to_and_nowhere_to_listen() -> None:
     link = Link(7)
-    with pytest.raises(HardwareError, match="nothing was heard of the robot yet"):
+    with pytest.raises(HardwareError, match="no packet of the robot has arrived yet"):
         link.send(Kind.EFFORT)
     with pytest.raises(HardwareError, match=r"cannot listen at 127\.0\.0\.1"):
         Link(7, link.address)
@@ -210,7 +210,7 @@ def test_nobody_to_send_to_and_nowhere_to_listen() -> None:
 def test_age_is_what_a_packet_waited_longer_than_the_quickest(
     offset: float, drift: float, delays: list[float]
 ) -> None:
-    ages = Ages(window=1.0)
+    ages = AgeEstimator(window=1.0)
     delays = [0.0 if k % 10 == 0 else delay for k, delay in enumerate(delays)]
     for k, delay in enumerate(delays):
         sent = 0.1 * k
@@ -240,11 +240,11 @@ def test_a_served_robot_runs_stops_and_says_why() -> None:
         elif not hardware.closed:
             hardware.close()
 
-    served = serve(robot, link, orphaned=pilot)  # type: ignore[arg-type]
-    assert robot.reason == BYE
+    served = serve(robot, link, stop_reason=pilot)  # type: ignore[arg-type]
+    assert robot.reason == CLOSED_BY_LOOP
     assert robot.phase is Phase.HOLDING
     assert robot.done
-    assert not served.waited
+    assert not served.never_started
     assert link.counts["accepted"] == 49 + 3
     hardware.drain()
     assert hardware.link.counts["accepted"] == link.counts["sent"]
@@ -256,16 +256,16 @@ def test_efforts_that_answer_old_states_are_nobody_s() -> None:
     receiver, robot = Link(7), watched(watchdog=10)
     link = Link(7, peer=receiver.address)
     tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
-    receiver.seen = 0
+    receiver.newest = 0
 
     def pilot() -> None:
         newest = receiver.receive(0.0)
         if newest and robot.t > 0.05:
-            receiver.seen = 20  # what it answers is long ago
+            receiver.newest = 20  # what it answers is long ago
         if newest:
             receiver.send(Kind.EFFORT, tau)
 
-    served = serve(robot, link, orphaned=pilot)  # type: ignore[arg-type]
+    served = serve(robot, link, stop_reason=pilot)  # type: ignore[arg-type]
     assert robot.reason.startswith("the watchdog")
     assert served.outdated > 10
     receiver.close()
@@ -275,9 +275,11 @@ def test_efforts_that_answer_old_states_are_nobody_s() -> None:
 def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
     hardware = UdpHardware(panda(), PERIOD)
     link = Link(hardware.session, peer=hardware.address)
-    assert serve(watched(), link, orphaned=lambda: None, patience=0.05).waited
+    assert serve(
+        watched(), link, stop_reason=lambda: None, start_timeout=0.05
+    ).never_started
     robot = watched()
-    assert serve(robot, link, orphaned=lambda: "gone").waited
+    assert serve(robot, link, stop_reason=lambda: "gone").never_started
     assert robot.phase is Phase.WAITING
     periods = iter(range(100_000))
 
@@ -287,8 +289,8 @@ def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
             hardware.write(np.zeros(7))
         return "its parent is gone" if k == 30 else None
 
-    served = serve(robot, link, orphaned=dies)
-    assert not served.waited
+    served = serve(robot, link, stop_reason=dies)
+    assert not served.never_started
     assert robot.reason == "its parent is gone"
     assert robot.phase is Phase.HOLDING
     hardware.close()

@@ -13,8 +13,8 @@ from hsp_control.common.exceptions import LiveError
 from hsp_control.live import EffortInterface, Phase, SafeStop, StopSettings
 from hsp_control.live.dead_reckoning import DeadReckoning
 from hsp_control.live.deadlines import Deadlines
-from hsp_control.live.effort_port import EffortPort
-from hsp_control.live.safe_stop import share_within
+from hsp_control.live.effort_limiter import EffortLimiter
+from hsp_control.live.safe_stop import largest_scale
 from hsp_control.simulation.plants.model_changes import ScaledInertias, changed
 
 Array = NDArray[np.float64]
@@ -125,7 +125,7 @@ def test_the_share_is_the_greatest_that_fits(seed: int) -> None:
     most[0] = np.inf
     base = rng.uniform(-1.3, 1.3, 6) * np.where(np.isfinite(most), most, 1.0)
     direction = rng.standard_normal(6) * rng.choice([0.0, 0.1, 10.0], 6)
-    s = share_within(base, direction, most)
+    s = largest_scale(base, direction, most)
     assert 0.0 <= s <= 1.0
     inside = (np.abs(base) <= most).all()
     if inside:
@@ -136,32 +136,32 @@ def test_the_share_is_the_greatest_that_fits(seed: int) -> None:
 
 
 @given(seed=seeds, compensates=st.booleans())
-def test_the_port_keeps_both_limits_where_both_can_be(
+def test_the_limiter_keeps_both_limits_where_both_can_be(
     seed: int, compensates: bool
 ) -> None:
     rng = np.random.default_rng(seed)
     rate, most = 500.0, 40.0
     interface = EffortInterface(compensates, rate, most)
-    port = EffortPort(panda(), interface, PERIOD)
+    limiter = EffortLimiter(panda(), interface, PERIOD)
     q = start()
-    port.begin(q)
+    limiter.reset(q)
     for _ in range(30):
-        before = port.sent.copy()
+        before = limiter.sent.copy()
         q = panda().integrate(q, 1e-3 * rng.standard_normal(7))
-        assert port.pass_on(100.0 * rng.standard_normal(7), q)
-        assert (np.abs(port.sent - before) <= rate * PERIOD + 1e-12).all()
+        assert limiter.apply(100.0 * rng.standard_normal(7), q)
+        assert (np.abs(limiter.sent - before) <= rate * PERIOD + 1e-12).all()
         borne = gravity(q) if compensates else 0.0
-        np.testing.assert_allclose(port.acting, port.sent + borne, atol=1e-12)
+        np.testing.assert_allclose(limiter.applied, limiter.sent + borne, atol=1e-12)
         # q moves by 1e-3 rad a period: gravity by less than the step of 0.5 N·m.
-        assert (np.abs(port.acting) <= most + 1e-9).all()
-    before = port.sent.copy()
-    assert not port.pass_on(np.full(7, np.nan), q)
-    np.testing.assert_array_equal(port.sent, before)
+        assert (np.abs(limiter.applied) <= most + 1e-9).all()
+    before = limiter.sent.copy()
+    assert not limiter.apply(np.full(7, np.nan), q)
+    np.testing.assert_array_equal(limiter.sent, before)
 
 
-def test_the_urdf_s_limits_are_the_port_s() -> None:
-    port = EffortPort(panda(), EffortInterface(), PERIOD)
-    np.testing.assert_array_equal(port.greatest, panda().model.effortLimit)
+def test_the_urdf_s_limits_are_the_limiter_s() -> None:
+    limiter = EffortLimiter(panda(), EffortInterface(), PERIOD)
+    np.testing.assert_array_equal(limiter.effort_limits, panda().model.effortLimit)
     endless = Robot.load("planar3r")
     limits = EffortInterface().effort_limits(endless)
     assert (limits > 0.0).all()
@@ -170,11 +170,11 @@ def test_the_urdf_s_limits_are_the_port_s() -> None:
 def test_reckoning_is_the_model_s_motion() -> None:
     q, v = at_random(3)
     reckoning = DeadReckoning(panda(), PERIOD)
-    reckoning.see(0.0, q, v)
+    reckoning.correct(0.0, q, v)
     tau = gravity(q)
     for _ in range(50):
-        reckoning.reckon(tau)
-    assert reckoning.blind == pytest.approx(0.05)
+        reckoning.predict(tau)
+    assert reckoning.predicted_for == pytest.approx(0.05)
     plant = IntegratedPlant(RigidBodyPlant(panda()), Rk4(PERIOD))
     plant.reset(0.0, q, v)
     for i in range(50):
@@ -183,7 +183,7 @@ def test_reckoning_is_the_model_s_motion() -> None:
     assert np.abs(panda().difference(q, reckoning.state.q)).max() < 2e-3
     assert reckoning.state.t == pytest.approx(0.05)
     before = reckoning.state.q.copy()
-    reckoning.reckon(np.full(7, np.nan))
+    reckoning.predict(np.full(7, np.nan))
     np.testing.assert_array_equal(reckoning.state.q, before)
 
 
@@ -238,10 +238,10 @@ def test_a_watchdog_needs_a_period() -> None:
 def test_compensation_is_of_the_robot_s_own_mass() -> None:
     heavy = changed(panda(), [ScaledInertias(1.3, 1.0, [0.0, 0.0, 0.0])])
     plant = IntegratedPlant(RigidBodyPlant(heavy), Rk4(PERIOD))
-    from hsp_control.live import WatchedRobot
+    from hsp_control.live import SimulatedRobot
 
     interface = EffortInterface(compensates_gravity=True)
-    robot = WatchedRobot(plant, start(), np.zeros(7), PERIOD, interface=interface)
+    robot = SimulatedRobot(plant, start(), np.zeros(7), PERIOD, interface=interface)
     for _ in range(200):
         robot.advance([np.zeros(7)])
     g = np.array(pin.computeGeneralizedGravity(heavy.model, heavy._data, start()))
@@ -253,18 +253,18 @@ def test_compensation_is_of_the_robot_s_own_mass() -> None:
 
 
 def test_deadlines_are_counted_over_all_and_sorted_over_the_last() -> None:
-    deadlines = Deadlines(0.001, kept=100)
+    deadlines = Deadlines(0.001, capacity=100)
     assert deadlines.response is None
     deadlines.add(0.5, 0.01)  # the worst, and long ago
     for k in range(150):
         deadlines.add(0.001, 1e-5 * (k % 100 + 1))
     assert deadlines.periods == 151
     assert deadlines.missed == 1
-    response, gap = deadlines.response, deadlines.gap
+    response, interval = deadlines.response, deadlines.interval
     assert response is not None
-    assert gap is not None
+    assert interval is not None
     assert response.worst == 0.01
-    assert gap.worst == 0.5
+    assert interval.worst == 0.5
     assert response.median == pytest.approx(0.00051, rel=0.03)
     assert response.p99 == pytest.approx(0.001, rel=0.02)
-    assert gap.median == 0.001
+    assert interval.median == 0.001

@@ -543,7 +543,7 @@ MISTAKES: list[tuple[Callable[[Robot], Any], str]] = [
     (lambda r: Ramp(-1.0, 1.0, start=0.0, duration=1.0), "weight is -1.0"),
     (lambda r: Ramp(1.0, np.nan, start=0.0, duration=1.0), "weight is nan"),
     (lambda r: Ramp(0.0, 1.0, start=0.0, duration=0.0),
-     "a ramp from 0.0 s over 0.0 s; needs a positive duration"),
+     "a ramp from 0.0 s over 0.0 s; needs a finite start and a posit"),
     (lambda r: Ramp(0.0, 1.0, start=0.0, duration=-2.0), "over -2.0 s"),
     (lambda r: Ramp(0.0, 1.0, start=np.nan, duration=1.0), "a ramp from nan s"),
     (lambda r: Ramp(0.0, 1.0, start=0.0, duration=np.inf), "over inf s"),

@@ -279,19 +279,21 @@ def source() -> RobotSource:
 
 MISTAKES: list[tuple[Callable[[], object], type[HspControlError], str]] = [
     (lambda: Robot.combine({"only": (load("panda"), HERE)}), ModelError,
-     "robots to combine need different names, two or more: got ['only_']"),
-    (lambda: combine([]), ModelError, "two or more: got []"),
+     "robots to combine must be two or more, with different names; got prefixes "
+     "['only_']"),
+    (lambda: combine([]), ModelError, "with different names; got prefixes []"),
     (lambda: combine([(Part("a_", source(), HERE), load("panda").model)] * 2),
-     ModelError, "need different names, two or more: got ['a_', 'a_']"),
+     ModelError, "with different names; got prefixes ['a_', 'a_']"),
     (lambda: Robot.combine({"a": (load("panda"), HERE),
                             "b": (Robot.load("panda", gravity=[0, 0, 0]), HERE)}),
-     ModelError, "robots to combine differ in gravity; load them with the same"),
+     ModelError, "robots to combine differ in gravity; load all with one value"),
     (lambda: Robot.combine({"a": (load("panda"), HERE),
                             "b": (Robot.load("panda", locked={}), HERE)}),
-     ModelError, "b_panda: joints that mimic others cannot be combined; lock them, or "
-     "load with mimic: false"),
+     ModelError, "b_panda: a robot with mimic joints cannot be combined; lock these "
+     "joints, or load the robot with mimic=False"),
     (lambda: Robot.combine({"a": (pair(), HERE), "b": (load("panda"), HERE)}),
-     ModelError, "a_panda+panda: is combined already; combine all robots at once"),
+     ModelError, "a_panda+panda is already a combined robot; combine all robots "
+     "in one call"),
     (lambda: pair().frame_id("panda_tcp"), FrameNotFoundError,
      "no frame 'panda_tcp'; did you mean"),
     (lambda: pair().velocity_index("left_panda_joint8"), JointNotFoundError,

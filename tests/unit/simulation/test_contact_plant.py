@@ -281,7 +281,7 @@ def test_contacts_that_are_none() -> None:
     with pytest.raises(FrameNotFoundError, match=r"^no frame 'FL_FOO'; did you mean"):
         ContactPlant(robot, [RigidContact("FL_FOO")])
     with pytest.raises(
-        SimulationError, match=r"^two contacts are of the frame 'FL_FOO"
+        SimulationError, match=r"^two contacts have the same frame 'FL_FOO"
     ):
         ContactPlant(robot, [RigidContact("FL_FOOT"), RigidContact("FL_FOOT", "point")])
     with pytest.raises(

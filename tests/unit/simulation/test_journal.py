@@ -37,11 +37,11 @@ def rollout() -> Rollout:
 
 def write(path: Path, rollout: Rollout, *, end: bool = True) -> Path:
     journal = JournalWriter(path)
-    journal.head(rollout.columns, rollout.meta)
+    journal.write_heading(rollout.columns, rollout.meta)
     for i in range(len(rollout)):
-        journal.append({name: a[i : i + 1] for name, a in rollout.columns.items()})
+        journal.write_row({name: a[i : i + 1] for name, a in rollout.columns.items()})
     if end:
-        journal.end("completed", "")
+        journal.write_end("completed", "")
     journal.close()
     return path
 
@@ -87,10 +87,10 @@ def test_a_changed_byte_ends_it_and_spoils_nothing_before(data: st.DataObject) -
     path = Path(os.environ.get("TMPDIR", "/tmp")) / f"spoilt-{os.getpid()}.journal"
     try:
         journal = JournalWriter(path)
-        journal.head({"a": np.zeros((0, 2))}, {"what": "ä"})
+        journal.write_heading({"a": np.zeros((0, 2))}, {"what": "ä"})
         rows = np.arange(12.0).reshape(6, 1, 2)
         for row in rows:
-            journal.append({"a": row})
+            journal.write_row({"a": row})
         journal.close()
         whole = path.read_bytes()
         frame = 9 + 16
@@ -109,13 +109,13 @@ def test_a_changed_byte_ends_it_and_spoils_nothing_before(data: st.DataObject) -
 
 def test_columns_that_come_or_grow_hold_nan_before(tmp_path: Path) -> None:
     journal = JournalWriter(tmp_path / "a.journal")
-    journal.head({"t": np.zeros(0), "s": np.zeros((0, 1))}, {"heading": 1})
-    journal.append({"t": np.array([1.0]), "s": np.array([[2.0]])})
+    journal.write_heading({"t": np.zeros(0), "s": np.zeros((0, 1))}, {"heading": 1})
+    journal.write_row({"t": np.array([1.0]), "s": np.array([[2.0]])})
     wider = {"t": np.array([3.0]), "s": np.array([[4.0, 5.0]]), "x": np.ones((1, 2, 2))}
-    assert not journal.has(wider)
-    journal.head(wider, {"heading": 2})
-    assert journal.has(wider)
-    journal.append(wider)
+    assert not journal.describes(wider)
+    journal.write_heading(wider, {"heading": 2})
+    assert journal.describes(wider)
+    journal.write_row(wider)
     journal.close()
     columns, meta = read_journal(tmp_path / "a.journal")
     assert meta["heading"] == 2
@@ -131,9 +131,9 @@ from pathlib import Path
 import numpy as np
 from hsp_control.simulation.journal import JournalWriter
 journal = JournalWriter(Path(sys.argv[1]))
-journal.head({"t": np.zeros(0)}, {})
+journal.write_heading({"t": np.zeros(0)}, {})
 for k in range(1000):
-    journal.append({"t": np.array([float(k)])})
+    journal.write_row({"t": np.array([float(k)])})
     if k == 700:
         os.kill(os.getpid(), signal.SIGKILL)
 """
@@ -166,15 +166,15 @@ def test_continuous_joints_are_unwound(tmp_path: Path) -> None:
         "columns": about,
         "robot": {
             "name": "wheel",
-            "freedoms": ["turn"],
+            "dofs": ["turn"],
             "units": ["rad"],
             "skeleton_parents": [-1],
             "continuous": [0],
         },
     }
-    journal.head(columns, meta)
+    journal.write_heading(columns, meta)
     for i in range(40):
-        journal.append({name: a[i : i + 1] for name, a in columns.items()})
+        journal.write_row({name: a[i : i + 1] for name, a in columns.items()})
     journal.close()
     read = Rollout.load(tmp_path / "a.journal")
     np.testing.assert_allclose(read["joint_positions"][:, 0], turning, atol=1e-12)

@@ -476,7 +476,7 @@ def test_impossible_inertias_are_refused() -> None:
     joint = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "hip")
     inertia = pin.Inertia(1.0, np.zeros(3), np.diag([1.0, 1.0, 3.0]))
     model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
-    with pytest.raises(SimulationError, match=r"^MuJoCo refuses planar3r: .*inertia"):
+    with pytest.raises(SimulationError, match=r"^MuJoCo rejects planar3r: .*inertia"):
         MujocoPlant(Robot(model, find_robot("planar3r")))
 
 

@@ -561,15 +561,15 @@ ERRORS: dict[str, Callable[[], Any]] = {
     r"give axes or a normal, not both": lambda: Circle(
         [0, 0, 0], 1, 1, axes=np.eye(3)[:2], normal=[0, 0, 1]
     ),
-    r"normal is for dimension 3; center has dimension 2": lambda: Circle(
+    r"a normal needs dimension 3; center has dimension 2": lambda: Circle(
         [0, 0], 1, 1, normal=[0, 0, 1]
     ),
-    r"start goes with normal": lambda: Circle([0, 0], 1, 1, start=[1, 0]),
-    r"normal must have a direction": lambda: Circle([0] * 3, 1, 1, normal=[0, 0, 0]),
-    r"start must not point along normal": lambda: Circle(
+    r"start needs a normal": lambda: Circle([0, 0], 1, 1, start=[1, 0]),
+    r"normal must be non-zero": lambda: Circle([0] * 3, 1, 1, normal=[0, 0, 0]),
+    r"start must not be parallel to normal": lambda: Circle(
         [0, 0, 0], 1, 1, normal=[0, 0, 1], start=[0, 0, -2]
     ),
-    r"rows of axes must be orthonormal; they are off by 3.0e\+00": lambda: Circle(
+    r"rows of axes must be orthonormal; .* is 3.0e\+00": lambda: Circle(
         [0, 0], 1, 1, axes=[[2, 0], [0, 1]]
     ),
     r"amplitudes must have shape \(2\)": lambda: Lissajous([0, 0], [1], [1, 1]),
@@ -577,7 +577,7 @@ ERRORS: dict[str, Callable[[], Any]] = {
         lambda: MinimumJerk(np.zeros((3, 2)), [0, 1, 1])
     ),
     r"times must have shape \(3\); it has \(2,\)": lambda: Spline(np.eye(3), [0, 1]),
-    r"a path needs two waypoints or more; it has 1": lambda: MinimumJerk([[1.0]], [0]),
+    r"a path needs at least two waypoints; it has 1": lambda: MinimumJerk([[1.0]], [0]),
     r"degree must be 3, 5 or 7; degree = 4": lambda: Spline(np.eye(2), [0, 1], 4),
     r"waypoints must have shape \(n, n\)": lambda: Spline([0, 1], [0, 1]),
     r"coefficients must have shape": lambda: PiecewisePolynomial([0, 1], [[1.0, 2]]),
@@ -594,9 +594,9 @@ ERRORS: dict[str, Callable[[], Any]] = {
     r"start must have shape \(2\); it has \(3,\)": lambda: Blend([0] * 3, CIRCLE, 1),
     r"start_velocity must have shape \(2\)": lambda: Blend([0, 0], CIRCLE, 1, [1]),
     r"the rows of rotation must be orthonormal": lambda: HoldOrientation(2 * IDENTITY),
-    r"rotation must be a rotation; it mirrors": lambda: HoldOrientation(MIRROR),
+    r"rotation must be a rotation; it is a reflection": lambda: HoldOrientation(MIRROR),
     r"rotation must have shape \(3, 3\); it has \(4,\)": lambda: Spin([0] * 4, [1], 1),
-    r"axis must have a direction; axis = \[0, 0, 0\]": (
+    r"axis must be non-zero; axis = \[0, 0, 0\]": (
         lambda: Spin(IDENTITY, [0, 0, 0], 1)
     ),
     r"rotations\[1\] must be a rotation": (
@@ -609,7 +609,7 @@ ERRORS: dict[str, Callable[[], Any]] = {
     r"start_angular_velocity must have shape \(3\)": (
         lambda: BlendOrientation(R1, SPIN, 1.0, [1.0])
     ),
-    r"position has dimension 2; the origin of a pose moves in dimension 3": (
+    r"position has dimension 2; the origin of a pose needs dimension 3": (
         lambda: ComposedPose(CIRCLE, SPIN)
     ),
     r"end.rotation must be orthonormal": (

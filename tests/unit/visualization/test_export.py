@@ -28,25 +28,28 @@ from hsp_control.visualization.viewer.export import (
     export_film,
     export_html,
 )
+from hsp_control.visualization.viewer.export.clip_reduction import (
+    ANGLE_BOUND,
+    POSITION_BOUND,
+)
+from hsp_control.visualization.viewer.export.keyframes import (
+    angle_error,
+    distance_error,
+    hold,
+    keyframe_rows,
+    linear,
+    slerp,
+)
 from hsp_control.visualization.viewer.export.meshes import read_mesh
 from hsp_control.visualization.viewer.export.packing import ArrayTable
 from hsp_control.visualization.viewer.export.panels import CURVE_BOUND, pack_panels
-from hsp_control.visualization.viewer.export.scene import VERTEX_STEP
-from hsp_control.visualization.viewer.export.shooting import frame_times
-from hsp_control.visualization.viewer.export.surfaces import (
-    in_order,
+from hsp_control.visualization.viewer.export.scene_reduction import VERTEX_STEP
+from hsp_control.visualization.viewer.export.screenshots import frame_times
+from hsp_control.visualization.viewer.export.triangle_meshes import (
+    sort_along_curve,
     split_creases,
     weld,
 )
-from hsp_control.visualization.viewer.export.thinning import (
-    angle,
-    distance,
-    on_line,
-    on_sphere,
-    stays,
-    thin,
-)
-from hsp_control.visualization.viewer.export.tracks import ANGLE_BOUND, POSITION_BOUND
 
 MEGABYTE = 1e6
 PLANAR = "paper/4_moving_obstacle"
@@ -161,21 +164,24 @@ def played(times: np.ndarray, keys: np.ndarray, rows: np.ndarray, how: Any) -> A
 def test_thinned_keyframes_stay_within_the_bound_and_are_few() -> None:
     values = np.column_stack([np.sin(T), 0.3 * np.cos(2.0 * T), T])
     rounded = np.round(values / 2.5e-5) * 2.5e-5
-    keys = thin(T, values, rounded, on_line, distance(2e-4))
-    error = np.linalg.norm(played(T, keys, rounded, on_line) - values, axis=1)
+    keys = keyframe_rows(T, values, rounded, linear, distance_error(2e-4))
+    error = np.linalg.norm(played(T, keys, rounded, linear) - values, axis=1)
     assert error.max() <= 2e-4
     # A parabola of curvature c leaves its chord of length h by c h² / 8: with the
     # strongest curvature, 1.6, everywhere that would be 310 keyframes; cutting where it
     # is worst, not where it is best, may take twice as many.
     assert len(keys) < 620
     line = np.column_stack([T, -2.0 * T, 0.0 * T])
-    assert thin(T, line, line, on_line, distance(1e-9)).tolist() == [0, 1000]
+    assert keyframe_rows(T, line, line, linear, distance_error(1e-9)).tolist() == [
+        0,
+        1000,
+    ]
 
 
 def test_a_jump_stays_a_jump() -> None:
     values = np.where(T > 4.995, 1.0, 0.0)[:, None]
-    for how in (on_line, stays):
-        keys = thin(T, values, values, how, distance(0.25))
+    for how in (linear, hold):
+        keys = keyframe_rows(T, values, values, how, distance_error(0.25))
         # Between two samples nobody knows when it was.
         assert set(keys.tolist()) <= {0, 498, 499, 500, 501, 999, 1000}
         np.testing.assert_array_equal(played(T, keys, values, how), values)
@@ -183,13 +189,13 @@ def test_a_jump_stays_a_jump() -> None:
 
 def test_turning_is_thinned_on_the_sphere() -> None:
     steady = np.column_stack([0.0 * T, 0.0 * T, np.sin(1.5 * T), np.cos(1.5 * T)])
-    keys = thin(T, steady, steady, on_sphere, angle(1e-5))
+    keys = keyframe_rows(T, steady, steady, slerp, angle_error(1e-5))
     assert len(keys) < 20  # 30 rad in all; a short way is less than half a turn
     rng = np.random.default_rng(5)
     waves = np.cumsum(rng.standard_normal((3, 1001)), axis=1) * 0.002
     turns = np.array([pin.Quaternion(pin.exp3(w)).coeffs() for w in waves.T])
-    keys = thin(T, turns, turns, on_sphere, angle(ANGLE_BOUND))
-    shown = played(T, keys, turns, on_sphere)
+    keys = keyframe_rows(T, turns, turns, slerp, angle_error(ANGLE_BOUND))
+    shown = played(T, keys, turns, slerp)
     for a, b in zip(shown, turns, strict=True):
         off = pin.Quaternion(*a[[3, 0, 1, 2]]).angularDistance(
             pin.Quaternion(*b[[3, 0, 1, 2]])
@@ -198,7 +204,7 @@ def test_turning_is_thinned_on_the_sphere() -> None:
     assert len(keys) < 900
     # The two quaternions of one orientation are one orientation.
     flipped = turns * np.where(np.arange(1001) % 2, -1.0, 1.0)[:, None]
-    assert angle(1.0)(flipped, turns).max() < 1e-12
+    assert angle_error(1.0)(flipped, turns).max() < 1e-12
 
 
 # -- meshes ---------------------------------------------------------------------------
@@ -226,7 +232,9 @@ def test_edges_stay_sharp_and_round_things_smooth() -> None:
 
 def test_the_order_changes_and_nothing_else() -> None:
     ball = trimesh.creation.icosphere(subdivisions=3)
-    vertices, triangles = in_order(np.array(ball.vertices), np.array(ball.faces))
+    vertices, triangles = sort_along_curve(
+        np.array(ball.vertices), np.array(ball.faces)
+    )
     table = ArrayTable()
     table.triangles(triangles)
     np.testing.assert_array_equal(unpacked(table.entries[0]), triangles)
@@ -409,8 +417,8 @@ def test_every_joint_is_where_the_log_has_it(panda: Rollout, tmp_path: Path) -> 
         clock, turns = tracks[f"/robot/{joint}", "quaternion"]
         keyframes += len(times)
         at[joint] = (
-            sampled(times, positions, panda.t, on_line),
-            sampled(clock, turns, panda.t, on_sphere),
+            sampled(times, positions, panda.t, linear),
+            sampled(clock, turns, panda.t, slerp),
         )
     assert keyframes < 0.5 * len(panda) * (robot.model.njoints - 1)
     for row, q in enumerate(panda.q):
@@ -502,7 +510,7 @@ def test_the_plots_are_the_logs(panda: Rollout) -> None:
     assert list(panels) == [
         "Task error ‖e‖",
         "Null-space error ‖e_N‖",
-        "Least distance",
+        "Minimum distance",
         "Joint positions",
         "Manipulability",
         "Value of the field",
@@ -519,7 +527,7 @@ def test_the_plots_are_the_logs(panda: Rollout) -> None:
         error = np.abs(curve(panel, place) - panda["joint_positions"][:, place])
         assert error.max() <= CURVE_BOUND * (panel["high"] - panel["low"]) * 1.01
     panel = panels["Null-space error ‖e_N‖"]
-    assert [s["name"] for s in panel["series"]] == ["promised: exp(−10 t)", "‖e_N‖"]
+    assert [s["name"] for s in panel["series"]] == ["predicted: exp(−10 t)", "‖e_N‖"]
     height = panel["high"] - panel["low"]
     shown = np.log10(panda["null_space_norm"]).clip(panel["low"] - height)
     assert np.abs(curve(panel, 1) - shown).max() <= CURVE_BOUND * height * 1.01
@@ -534,7 +542,7 @@ def test_where_the_law_is_bounded_the_plots_say_so(planar: Rollout) -> None:
     changed = Rollout({**planar.columns, "damped": damped}, planar.meta)
     t = planar.t
     expected = [[t[10], t[12]], [t[50], t[50]], [t[-3], t[-1]]]
-    assert pack_panels(changed, ArrayTable())["bounded"] == expected
+    assert pack_panels(changed, ArrayTable())["damped"] == expected
 
 
 @pytest.mark.parametrize("values", [[np.nan] * 4, [0.0] * 4, [1.0, np.inf, 0.5, -1.0]])
@@ -583,23 +591,27 @@ def test_a_films_moments_are_evenly_spread() -> None:
     assert len(times) == 46
     np.testing.assert_allclose(np.diff(times), 2.0 / 30.0)
     assert times[-1] == pytest.approx(3.0)
-    with pytest.raises(ExportError, match="900001 pictures"):
+    with pytest.raises(ExportError, match="900001 images"):
         frame_times((0.0, 3.0), 30.0, 1e-4)
 
 
 @pytest.mark.parametrize(
     ("name", "style", "message"),
     [
-        ("film.mpg", FilmStyle(), r"ends with one of \.mp4.* did you mean '\.mp4'"),
-        ("film.mp4", FilmStyle(size=(10, 400)), "10x400 pixels: each must be between"),
-        ("film.gif", FilmStyle(frame_rate=0.5), "0.5 pictures in a second"),
+        ("film.mpg", FilmStyle(), r"must be one of \.mp4.* did you mean '\.mp4'"),
+        ("film.mp4", FilmStyle(size=(10, 400)), "10x400 pixels: width and height must"),
+        ("film.gif", FilmStyle(frame_rate=0.5), "frame rate 0.5 Hz"),
         ("film.gif", FilmStyle(speed=0.0), "speed 0 must be positive"),
         (
             "film.gif",
             FilmStyle(start=2, end=1),
-            "from 2 to 1 s: the run goes from 0 to",
+            "from 2 to 1 s: must lie within the run, 0 to",
         ),
-        ("film.gif", FilmStyle(end=3.5), "from 0 to 3.5 s: the run goes from 0 to 3 s"),
+        (
+            "film.gif",
+            FilmStyle(end=3.5),
+            "0 to 3.5 s: must lie within the run, 0 to 3 s",
+        ),
     ],
 )
 def test_a_film_that_cannot_be_is_refused(
@@ -626,7 +638,9 @@ def test_what_is_missing_for_a_film_is_said_and_the_rest_goes_on(
     assert "page.html" in said.out
     assert page.is_file()
     assert said.err.count("hsp: ") == 1  # once, not once a film
-    assert re.search(r"no-such-browser is no program; .*apt-get install chr", said.err)
+    assert re.search(
+        r"no-such-browser is not an executable; .*apt-get install chr", said.err
+    )
 
     monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
     assert main(command) == 2
@@ -658,9 +672,9 @@ def test_the_command_says_what_it_wants(
 ) -> None:
     log = str(planar.save(tmp_path / "run.npz"))
     assert main(["export", log]) == 2
-    assert "name a file with --html" in capsys.readouterr().err
+    assert "give a file with --html" in capsys.readouterr().err
     assert main(["export", log, "--gif=film.mp4"]) == 2
-    assert "--gif film.mp4: its name must end with .gif" in capsys.readouterr().err
+    assert "--gif film.mp4: the name must end with .gif" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         main(["export", log, "--gif=a.gif", "--size=800"])
     assert "'800' is not WIDTHxHEIGHT" in capsys.readouterr().err

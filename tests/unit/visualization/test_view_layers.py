@@ -20,10 +20,16 @@ from hsp_control.geometry.shapes import (
     Sphere,
 )
 from hsp_control.null_space.metrics import MetricSample
-from hsp_control.visualization.viewer import Act, LiveView, Recorder, Viewer, live
+from hsp_control.visualization.viewer import (
+    ComparedRun,
+    LiveView,
+    Recorder,
+    Viewer,
+    live,
+)
 from hsp_control.visualization.viewer.commands import CAPTION, CLIP, unpack
+from hsp_control.visualization.viewer.controller_analysis import null_space_projector
 from hsp_control.visualization.viewer.ellipsoid import SECONDS, principal_axes
-from hsp_control.visualization.viewer.explained import null_space_projector
 from hsp_control.visualization.viewer.influence import zone
 from hsp_control.visualization.viewer.motion import drawn_times
 from hsp_control.visualization.viewer.run_drawing import LAYERS
@@ -388,8 +394,8 @@ def comparison(
     rest = other.run()
     viewer = Viewer(experiment.robot, transport=recorder)
     acts = [
-        Act("with", experiment.robot, rollout, experiment.controller),
-        Act("without", other.robot, rest, other.controller),
+        ComparedRun("with", experiment.robot, rollout, experiment.controller),
+        ComparedRun("without", other.robot, rest, other.controller),
     ]
     viewer.compare(acts, **how)
     return Clip(recorder), rest
@@ -437,7 +443,7 @@ def test_runs_of_different_robots_stand_side_by_side(
 ) -> None:
     viewer = Viewer(planar[0].robot, transport=recorder)
     acts = [
-        Act(name, experiment.robot, rollout, experiment.controller)
+        ComparedRun(name, experiment.robot, rollout, experiment.controller)
         for name, (experiment, rollout) in (("a", planar), ("b", spatial))
     ]
     viewer.compare(acts)
@@ -468,8 +474,8 @@ class Watched(Recorder):
 def test_a_run_is_shown_while_it_is_computed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(live, "PERIOD", 0.0)
-    monkeypatch.setattr(live, "LONGEST", 0.0)
+    monkeypatch.setattr(live, "MIN_PERIOD", 0.0)
+    monkeypatch.setattr(live, "MAX_PERIOD", 0.0)
     experiment = load_experiment(PLANAR, "simulation.duration=0.5")
     transport = Watched()
     viewer = Viewer(experiment.robot, transport=transport)
@@ -514,7 +520,7 @@ def test_a_run_is_shown_while_it_is_computed(
 
 
 def test_what_is_hidden_costs_the_run_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(live, "PERIOD", 0.0)
+    monkeypatch.setattr(live, "MIN_PERIOD", 0.0)
     experiment = load_experiment(PLANAR, "simulation.duration=0.1")
     transport = Watched()
     off = dict.fromkeys(LAYERS, False)
@@ -565,7 +571,7 @@ def test_a_view_that_ends_does_not_end_the_run(
         viewer.close()
         rollout = experiment.run(on_row=view.on_row)
     assert rollout.status == "completed"
-    assert "the run goes on unseen" in caplog.text
+    assert "the run continues without a view" in caplog.text
 
 
 # -- its parts ------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Drives: what becomes of an effort that is commanded."""
+"""Drives: they turn the commanded effort into the applied one."""
 
 from .drive import Drive as Drive
 from .dropped_periods import DroppedPeriods as DroppedPeriods

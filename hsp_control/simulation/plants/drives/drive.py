@@ -1,4 +1,4 @@
-"""What a drive is: a link in the chain from the commanded effort to the joints."""
+"""The interface of drives."""
 
 from abc import ABC, abstractmethod
 
@@ -7,20 +7,20 @@ from hsp_control.robot import Robot
 
 
 class Drive(ABC):
-    """One imperfection on the way of an effort; several make a chain, in order."""
+    """One imperfection of the actuation; several make a chain, in their order."""
 
     @abstractmethod
     def reset(self, robot: Robot) -> None:
-        """Begin a run, and forget the last one.
+        """Begin a run, and clear all memory of the last one.
 
         Raises:
-            SimulationError: If its settings do not fit the robot.
+            SimulationError: If the settings do not fit the robot.
         """
 
     @abstractmethod
     def apply(self, tau: Array) -> Array:
-        """Return what it makes of an effort, shape (nv,); called once a period."""
+        """Return the output for an effort, both shape (nv,); called once per period."""
 
-    def lateness(self) -> float:
-        """Return by how much this period's effort comes late [s]."""
+    def delay(self) -> float:
+        """Return the delay of this period's effort [s]; called once per period."""
         return 0.0

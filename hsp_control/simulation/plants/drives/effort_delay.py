@@ -1,4 +1,4 @@
-"""Efforts that arrive late."""
+"""Efforts that are delayed by whole periods."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -11,24 +11,24 @@ from hsp_control.simulation.plants.periods import check_periods
 
 @dataclass
 class EffortDelay(Drive):
-    """The effort commanded some periods ago; until there is one, the first.
+    """The effort commanded some periods ago; the first effort until there is one.
 
     Attributes:
-        periods: How many control periods it is late.
+        periods: Delay in control periods.
     """
 
     periods: int
 
     def __post_init__(self) -> None:
-        """Refuse what is no number of periods."""
+        """Check the number of periods."""
         check_periods(self.periods, "effort delay")
 
     def reset(self, robot: Robot) -> None:
-        """Empty the line; see `Drive.reset`."""
-        self._line: deque[Array] = deque()
+        """Empty the queue; see `Drive.reset`."""
+        self._queue: deque[Array] = deque()
 
     def apply(self, tau: Array) -> Array:
-        """Put the effort into the line, and return what comes out of it."""
-        while len(self._line) <= self.periods:
-            self._line.append(tau.copy())
-        return self._line.popleft()
+        """Append the effort, and return the oldest one; see `Drive.apply`."""
+        while len(self._queue) <= self.periods:
+            self._queue.append(tau.copy())
+        return self._queue.popleft()

@@ -1,4 +1,4 @@
-"""Efforts that come at no certain moment."""
+"""Efforts that arrive with a random delay within their period."""
 
 from dataclasses import dataclass
 
@@ -7,37 +7,38 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.robot import Robot
-from hsp_control.simulation.plants.chance import generator
 from hsp_control.simulation.plants.drives.drive import Drive
+from hsp_control.simulation.plants.random_numbers import seeded_generator
 
 
 @dataclass
 class Jitter(Drive):
-    """Every effort takes over late, by a uniformly random time.
+    """Every effort takes effect after a uniformly random delay.
 
     Attributes:
-        longest: The longest lateness [s]; an effort never waits beyond its period.
-        seed: Of the random numbers.
+        longest: The longest delay [s]; an effort takes effect at the end of its period
+            at the latest.
+        seed: Seed of the random numbers.
     """
 
     longest: float
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what is no time."""
+        """Check the longest delay."""
         if not 0.0 <= self.longest < np.inf:
             raise SimulationError(
-                f"jitter: the longest lateness is {self.longest} s; must be positive"
+                f"jitter: the longest delay is {self.longest} s; must not be negative"
             )
 
     def reset(self, robot: Robot) -> None:
-        """Begin the random numbers anew; see `Drive.reset`."""
-        self._rng = generator(self)
+        """Restart the random numbers; see `Drive.reset`."""
+        self._rng = seeded_generator(self)
 
     def apply(self, tau: Array) -> Array:
-        """Leave the effort as it is."""
+        """Return the effort unchanged; see `Drive.apply`."""
         return tau
 
-    def lateness(self) -> float:
-        """Draw this period's."""
+    def delay(self) -> float:
+        """Return a random delay [s]; see `Drive.delay`."""
         return float(self._rng.uniform(0.0, self.longest))

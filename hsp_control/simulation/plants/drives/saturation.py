@@ -1,4 +1,4 @@
-"""Motors have limits."""
+"""Effort limits of the motors."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,17 +14,17 @@ from hsp_control.simulation.plants.drives.drive import Drive
 
 @dataclass
 class Saturation(Drive):
-    """Each joint's effort is cut off at its limit.
+    """Each joint's effort is clipped at its limit.
 
     Attributes:
-        limit: The largest effort [N·m or N], for all joints or of shape (nv,), 0 where
-            there is none; None: the model's own, where it says any.
+        limit: The largest effort [N·m or N], for all joints or of shape (nv,), 0 for no
+            limit; None: the model's effort limits, where it has any.
     """
 
     limit: Any = None
 
     def reset(self, robot: Robot) -> None:
-        """Take the limits; see `Drive.reset`."""
+        """Set the limits; see `Drive.reset`."""
         if self.limit is None:
             own = np.asarray(robot.model.upperEffortLimit, dtype=float)
             given = joint_dofs(robot) & (own > 0.0) & np.isfinite(own)
@@ -39,5 +39,5 @@ class Saturation(Drive):
         self._limit = np.where(limit > 0.0, limit, np.inf)
 
     def apply(self, tau: Array) -> Array:
-        """Cut it off."""
+        """Return the clipped effort; see `Drive.apply`."""
         return np.clip(tau, -self._limit, self._limit)

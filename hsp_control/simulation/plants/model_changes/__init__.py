@@ -1,4 +1,4 @@
-"""How the robot that moves differs from the controller's model of it."""
+"""Differences between the simulated robot and the controller's model of it."""
 
 from .model_change import ModelChange as ModelChange
 from .model_change import changed as changed

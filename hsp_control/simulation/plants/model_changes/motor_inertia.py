@@ -1,4 +1,4 @@
-"""Rotors that turn with the joints, seen through their gears."""
+"""Inertia of the motors' rotors, reflected through their gears."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +12,7 @@ from hsp_control.simulation.plants.model_changes.model_change import ModelChange
 
 @dataclass(frozen=True)
 class MotorInertia(ModelChange):
-    """Inertia on the mass matrix's diagonal, besides what the model has there.
+    """Inertia that is added to the diagonal of the mass matrix.
 
     Attributes:
         inertia: Rotor inertia times the gear ratio squared [kg·m² or kg]: one number
@@ -22,7 +22,7 @@ class MotorInertia(ModelChange):
     inertia: Any
 
     def apply(self, model: pin.Model, robot: Robot) -> None:
-        """Add it.
+        """Add the inertia.
 
         Raises:
             SimulationError: If it is negative or does not fit the robot.

@@ -1,4 +1,4 @@
-"""Something in the hand that the controller does not know of."""
+"""A payload that the controller does not know."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from hsp_control.simulation.plants.model_changes.model_change import ModelChange
 
 @dataclass(frozen=True)
 class Payload(ModelChange):
-    """A solid ball fixed to a frame.
+    """A solid sphere fixed to a frame.
 
     Attributes:
         frame: The frame.
@@ -28,7 +28,7 @@ class Payload(ModelChange):
     radius: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no body."""
+        """Check mass, centre and radius."""
         where = f"payload at {self.frame!r}"
         if not 0.0 < self.mass < np.inf:
             raise SimulationError(f"{where}: mass is {self.mass} kg; must be positive")
@@ -36,11 +36,11 @@ class Payload(ModelChange):
             raise SimulationError(f"{where}: center is {self.center}; needs 3 numbers")
         if not 0.0 <= self.radius < np.inf:
             raise SimulationError(
-                f"{where}: radius is {self.radius} m; must be positive"
+                f"{where}: radius is {self.radius} m; must not be negative"
             )
 
     def apply(self, model: pin.Model, robot: Robot) -> None:
-        """Add the ball to the body that carries the frame.
+        """Add the sphere to the body of the frame.
 
         Raises:
             FrameNotFoundError: If there is no such frame.
@@ -52,5 +52,5 @@ class Payload(ModelChange):
                 f"payload at {self.frame!r}: the frame is fixed to the world"
             )
         center = frame.placement.act(np.asarray(self.center, dtype=float))
-        turning = 0.4 * self.mass * self.radius**2 * np.eye(3)
-        model.inertias[frame.parentJoint] += pin.Inertia(self.mass, center, turning)
+        inertia = 0.4 * self.mass * self.radius**2 * np.eye(3)
+        model.inertias[frame.parentJoint] += pin.Inertia(self.mass, center, inertia)

@@ -1,4 +1,4 @@
-"""All bodies off by the same factors."""
+"""The same errors of the inertial parameters for every body."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from hsp_control.simulation.plants.model_changes.model_change import ModelChange
 
 @dataclass(frozen=True)
 class ScaledInertias(ModelChange):
-    """Every body is heavier, its mass elsewhere, or harder to turn.
+    """Scaled masses and inertias, and shifted centres of mass, of every body.
 
     Attributes:
-        mass: Factor of every mass; rotational inertias grow with it.
+        mass: Factor of every mass; rotational inertias are scaled with it.
         inertia: Further factor of the inertias about the centres of mass.
         com: Shift of every centre of mass in its joint's frame [m], shape (3,).
     """
@@ -26,7 +26,7 @@ class ScaledInertias(ModelChange):
     com: Sequence[float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Refuse bodies that cannot be."""
+        """Check that the factors are positive and the shift is finite."""
         for name, factor in (("mass", self.mass), ("inertia", self.inertia)):
             if not 0.0 < factor < np.inf:
                 raise SimulationError(f"{name} factor is {factor}; must be positive")

@@ -1,4 +1,4 @@
-"""MuJoCo as a plant; it is imported when such a plant is built, not before."""
+"""MuJoCo as a plant; the package mujoco is imported when such a plant is built."""
 
 from .contact_shapes import ContactShape as ContactShape
 from .mjcf import Ground as Ground

@@ -1,4 +1,4 @@
-"""What of a robot touches the ground: shapes given, or those of its own links."""
+"""The shapes of a robot that touch the ground: given ones, or those of its links."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,23 +17,23 @@ from hsp_control.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from hsp_control.robot import Robot
 from hsp_control.robot.description.combining import placement
 
-_KNOWN = (Box, Capsule, Cylinder, Sphere)
-_THINNEST = 1e-3
-"""Half the height of the box that a flat mesh becomes [m]; MuJoCo needs some."""
+_SUPPORTED = (Box, Capsule, Cylinder, Sphere)
+_MIN_HALF_HEIGHT = 1e-3
+"""Half the height of the box for a flat mesh [m]; MuJoCo needs a positive one."""
 
 
 @dataclass(frozen=True)
 class ContactShape:
-    """What of a frame may touch the ground.
+    """A shape fixed to a frame that may touch the ground.
 
     Attributes:
-        frame: A frame of the robot; forces are reported under its name.
-        shape: A box, ball, capsule or cylinder; None: the collision geometry of the
-            frame's link, or where that has none, of all links fixed to it. A mesh with
-            a flat sole becomes its box in the frame's axes, another its capsule: on a
-            mesh's own corners a robot chatters.
-        position: Of the shape in the frame [m], shape (3,).
-        rpy: Its roll, pitch and yaw in the frame [rad].
+        frame: A frame of the robot; forces are logged under its name.
+        shape: A box, sphere, capsule or cylinder; None: the collision geometry of the
+            frame's link, or if it has none, of all links fixed to it. A mesh with a
+            flat sole is replaced by its box in the frame's axes, any other mesh by its
+            capsule, because a robot chatters on the corners of a mesh.
+        position: Position of the shape in the frame [m], shape (3,).
+        rpy: Its roll, pitch and yaw in the frame [rad], shape (3,).
     """
 
     frame: str
@@ -42,8 +42,8 @@ class ContactShape:
     rpy: Sequence[float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Refuse a shape that MuJoCo has no counterpart of."""
-        if self.shape is not None and not isinstance(self.shape, _KNOWN):
+        """Check that MuJoCo supports the shape."""
+        if self.shape is not None and not isinstance(self.shape, _SUPPORTED):
             raise SimulationError(
                 f"contact of {self.frame!r}: a {type(self.shape).__name__} cannot "
                 "touch the ground; choose a Box, Capsule, Cylinder or Sphere"
@@ -66,12 +66,12 @@ class Geom:
 
 
 def geoms_of(robot: Robot, contact: ContactShape) -> list[Geom]:
-    """Return the geoms that stand for a contact, on its frame's joint.
+    """Return the geoms of a contact, placed in the frame of its joint.
 
     Raises:
         FrameNotFoundError: If the robot has no such frame.
-        SimulationError: If the frame does not move, or shall have its links' geometry
-            and they have none.
+        SimulationError: If the frame is fixed to the world, or no shape is given and
+            its links have no geometry.
     """
     frame = robot.model.frames[robot.frame_id(contact.frame)]
     if frame.parentJoint == 0:
@@ -83,9 +83,9 @@ def geoms_of(robot: Robot, contact: ContactShape) -> list[Geom]:
         return [
             _geom(contact.shape.geometry(), frame.placement * offset, frame.placement)
         ]
-    every = [s for s in link_shapes(robot, "meshes") if s.joint == frame.parentJoint]
-    own = [s for s in every if s.link == contact.frame] or every
-    # Of a robot without any geometry, `link_shapes` makes capsules up between joints.
+    fixed = [s for s in link_shapes(robot, "meshes") if s.joint == frame.parentJoint]
+    own = [s for s in fixed if s.link == contact.frame] or fixed
+    # For a robot without any geometry, `link_shapes` invents capsules between joints.
     bodies = {f.name for f in robot.model.frames if f.type == pin.FrameType.BODY}
     real = [s for s in own if s.link in bodies]
     if not real:
@@ -111,16 +111,17 @@ def _geom(geometry: Any, place: pin.SE3, frame: pin.SE3) -> Geom:
 
 
 def _box_of_sole(points: Array, frame: pin.SE3) -> Geom | None:
-    """Return the points' box, if they end below in a flat sole.
+    """Return the bounding box of points that have a flat sole, None for others.
 
-    They do if the lowest tenth is at least half as long and as wide as all.
+    The sole is flat if the lowest tenth of the height is at least half as long and half
+    as wide as the whole.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     sole = points[points[:, 2] <= low[2] + 0.1 * (high[2] - low[2])]
     if (np.ptp(sole[:, :2], axis=0) < 0.5 * (high - low)[:2]).any():
         return None
     middle = pin.SE3(np.eye(3), 0.5 * (low + high))
-    half = np.maximum(0.5 * (high - low), _THINNEST)
+    half = np.maximum(0.5 * (high - low), _MIN_HALF_HEIGHT)
     return Geom("box", tuple(map(float, half)), frame * middle)
 
 

@@ -1,4 +1,4 @@
-"""Pinocchio's coordinates and MuJoCo's: the one place that knows how they differ.
+"""Converts between Pinocchio's coordinates and MuJoCo's.
 
 ======== ================================== =====================================
 joint    Pinocchio's q and v                MuJoCo's qpos and qvel
@@ -14,7 +14,7 @@ free     position and x y z w in the joint; in the world, w x y z; v in the worl
 mimic    none of its own                    a joint of its own, tied to its leader
 ======== ================================== =====================================
 
-MuJoCo may also number joints and freedoms in another order.
+MuJoCo may also number joints and degrees of freedom in another order.
 """
 
 from collections.abc import Mapping
@@ -45,23 +45,23 @@ _KINDS = {
     "JointModelR": HINGE,
     "JointModelP": SLIDE,
 }
-"""Pinocchio's short names, or how they begin, the longer ones first."""
+"""Kinds by the beginning of Pinocchio's short names, the longer ones first."""
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint of the Pinocchio model, as MuJoCo is to have it.
+    """A joint of the Pinocchio model, with what MuJoCo needs of it.
 
     Attributes:
         name: Its name.
         index: Its index in the Pinocchio model.
         kind: One of the constants above.
-        q: Where its configuration begins, its leader's if it mimics one.
-        v: Where its velocity begins, its leader's if it mimics one.
+        q: Index in q where its configuration (a mimic joint: its leader's) begins.
+        v: Index in v where its velocity (a mimic joint: its leader's) begins.
         axis: The axis of a hinge or a slide, shape (3,).
         leader: The joint that it mimics, if any.
-        scaling: Its position is scaling · leader's + offset.
-        offset: The same [rad or m].
+        scaling: Factor in position = scaling · leader's position + offset.
+        offset: Offset in that formula [rad or m].
     """
 
     name: str
@@ -76,17 +76,17 @@ class Joint:
 
     @property
     def mujoco_names(self) -> tuple[str, ...]:
-        """The MuJoCo joints that stand for it."""
+        """The names of the MuJoCo joints that represent it."""
         if self.kind != PLANAR:
             return (self.name,)
-        return tuple(f"{self.name}.{freedom}" for freedom in ("x", "y", "yaw"))
+        return tuple(f"{self.name}.{dof}" for dof in ("x", "y", "yaw"))
 
 
 def joints_of(robot: Robot) -> list[Joint]:
-    """Return the robot's joints in Pinocchio's order, those that mimic others too.
+    """Return the robot's joints in Pinocchio's order, including mimic joints.
 
     Raises:
-        ModelError: If a joint is of a kind that MuJoCo does not have.
+        ModelError: If MuJoCo has no joint of that kind.
     """
     model = robot.model
     found: list[Joint] = []
@@ -108,7 +108,7 @@ def joints_of(robot: Robot) -> list[Joint]:
             if kind in (FREE, PLANAR) and model.parents[index] != 0:
                 raise ModelError(
                     f"{robot.name}: joint {name!r} is {kind} but not the root's; "
-                    "MuJoCo has such joints only there"
+                    "MuJoCo supports such joints only at the root"
                 )
             axis = _axis(data) if model_joint.nv == 1 else np.zeros(3)
             joint = Joint(name, index, kind, model_joint.idx_q, model_joint.idx_v, axis)
@@ -134,16 +134,17 @@ def _axis(data: Any) -> Array:
 
 
 class Conventions:
-    """Carries states and efforts between Pinocchio's coordinates and MuJoCo's.
+    """Converts states and efforts between Pinocchio's coordinates and MuJoCo's.
 
-    In formulas qvel = T(q) v. T is a permutation, with a rotation for a planar or
-    free-flyer root and a column that is repeated for joints that mimic; so power is
-    tau · v = f · qvel for qfrc = f that solves tau = Tᵀ f.
+    Velocities are related by qvel = T(q) v. T is a permutation, with a rotation block
+    for a planar or free-flyer root, and with repeated columns for mimic joints. The
+    force qfrc = f is a solution of tau = Tᵀ f, so that the power is the same,
+    tau · v = f · qvel.
 
     Attributes:
         robot: The robot.
-        steady: Whether f does not change as the robot moves under the same tau, which
-            has nothing for a free-flyer root.
+        constant_effort: Whether f depends on tau only, not on q, for a tau that is zero
+            at a free-flyer root.
     """
 
     def __init__(
@@ -153,11 +154,18 @@ class Conventions:
         qpos_address: Mapping[str, int],
         qvel_address: Mapping[str, int],
     ) -> None:
-        """Take where MuJoCo keeps each of its joints' numbers, by name."""
+        """Set the joints and where MuJoCo stores their coordinates.
+
+        Args:
+            robot: The robot.
+            joints: Its joints, from `joints_of`.
+            qpos_address: Index in qpos by name of the MuJoCo joint.
+            qvel_address: Index in qvel by name of the MuJoCo joint.
+        """
         self.robot = robot
-        self.steady = all(j.kind != PLANAR for j in joints)
-        plain = [j for j in joints if j.kind in (HINGE, SLIDE)]
-        own = [j for j in plain if j.leader is None]
+        self.constant_effort = all(j.kind != PLANAR for j in joints)
+        scalar = [j for j in joints if j.kind in (HINGE, SLIDE)]
+        own = [j for j in scalar if j.leader is None]
         self._q = np.array([j.q for j in own], dtype=int)
         self._v = np.array([j.v for j in own], dtype=int)
         self._qpos = np.array([qpos_address[j.name] for j in own], dtype=int)
@@ -173,7 +181,7 @@ class Conventions:
                 (qpos_address[j.name], qpos_address[j.leader.name]),
                 (qvel_address[j.name], qvel_address[j.leader.name]),
             )
-            for j in plain
+            for j in scalar
             if j.leader is not None
         ]
         self._placements = {
@@ -181,33 +189,33 @@ class Conventions:
         }
 
     def to_mujoco(self, q: Array, v: Array, qpos: Array, qvel: Array) -> None:
-        """Write qpos and qvel of a state."""
+        """Write the qpos and qvel of a state (q, v)."""
         qpos[self._qpos] = q[self._q]
         for joint, at, _ in self._special:
-            mine = q[joint.q :]
+            part = q[joint.q :]
             if joint.kind == CONTINUOUS:
-                qpos[at] = np.arctan2(mine[1], mine[0])
+                qpos[at] = np.arctan2(part[1], part[0])
             elif joint.kind == SPHERICAL:
-                qpos[at : at + 4] = mine[[3, 0, 1, 2]]
+                qpos[at : at + 4] = part[[3, 0, 1, 2]]
             elif joint.kind == PLANAR:
-                qpos[at : at + 3] = *mine[:2], np.arctan2(mine[3], mine[2])
+                qpos[at : at + 3] = *part[:2], np.arctan2(part[3], part[2])
             else:
-                world = self._placements[joint.index] * _pose(mine)
-                turn = pin.Quaternion(world.rotation).coeffs()
+                world = self._placements[joint.index] * _pose(part)
+                xyzw = pin.Quaternion(world.rotation).coeffs()
                 qpos[at : at + 3] = world.translation
-                qpos[at + 3 : at + 7] = turn[[3, 0, 1, 2]]
+                qpos[at + 3 : at + 7] = xyzw[[3, 0, 1, 2]]
         for (scaling, offset), (at, leader), _ in self._followers:
             qpos[at] = scaling * qpos[leader] + offset
         self.velocity_to_mujoco(q, v, qvel)
 
     def velocity_to_mujoco(self, q: Array, v: Array, qvel: Array) -> None:
-        """Write T(q) v."""
+        """Write qvel = T(q) v."""
         self._rotated(q, v, qvel)
         for (scaling, _), _, (at, leader) in self._followers:
             qvel[at] = scaling * qvel[leader]
 
     def effort_to_mujoco(self, q: Array, tau: Array, qfrc: Array) -> None:
-        """Write f with tau = Tᵀ f: zero for a joint that mimics, its leader pushes."""
+        """Write f with tau = Tᵀ f; it is zero for mimic joints, not for leaders."""
         self._rotated(q, tau, qfrc)
         for _, _, (at, _) in self._followers:
             qfrc[at] = 0.0
@@ -242,23 +250,26 @@ class Conventions:
         return q, v
 
     def _rotated(self, q: Array, tangent: Array, out: Array) -> None:
-        """Write a tangent or cotangent vector: the blocks of T are rotations."""
+        """Write a velocity or an effort in MuJoCo's order, without mimic joints.
+
+        Both transform in the same way, because the blocks of T are rotations.
+        """
         out[self._qvel] = tangent[self._v]
         for joint, _, at in self._special:
-            mine = tangent[joint.v :]
+            part = tangent[joint.v :]
             if joint.kind == PLANAR:
                 cos, sin = q[joint.q + 2 : joint.q + 4]
-                out[at] = cos * mine[0] - sin * mine[1]
-                out[at + 1] = sin * mine[0] + cos * mine[1]
-                out[at + 2] = mine[2]
+                out[at] = cos * part[0] - sin * part[1]
+                out[at + 1] = sin * part[0] + cos * part[1]
+                out[at + 2] = part[2]
             elif joint.kind == FREE:
                 own = _pose(q[joint.q :]).rotation
-                turn = self._placements[joint.index].rotation @ own
-                out[at : at + 3] = turn @ mine[:3]
-                out[at + 3 : at + 6] = mine[3:6]
+                rotation = self._placements[joint.index].rotation @ own
+                out[at : at + 3] = rotation @ part[:3]
+                out[at + 3 : at + 6] = part[3:6]
             else:
                 n = 3 if joint.kind == SPHERICAL else 1
-                out[at : at + n] = mine[:n]
+                out[at : at + n] = part[:n]
 
 
 def _pose(coordinates: Array) -> pin.SE3:

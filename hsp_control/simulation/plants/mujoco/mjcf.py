@@ -1,7 +1,7 @@
-"""Writes a Pinocchio model down as MJCF, number by number.
+"""Writes a Pinocchio model as MJCF.
 
-It starts from the model and not from the URDF: what was locked, added, appended or
-changed in the model is so here too, and nothing else is.
+It uses the Pinocchio model and not the URDF, so that locked joints, added parts and
+changed inertias are the same in MuJoCo.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,19 +26,19 @@ from hsp_control.simulation.plants.mujoco.conventions import (
     Joint,
 )
 
-LEAST_INERTIA = 1e-12
-"""What a body is given instead of no mass or inertia [kg, kg·m²]: MuJoCo wants some."""
+MIN_INERTIA = 1e-12
+"""Smallest mass and inertia of a body [kg, kg·m²]; MuJoCo needs positive ones."""
 
-_FEET, _GROUND = 1, 2  # kinds of geoms: feet touch the ground, and nothing else
+_CONTACT, _GROUND = 1, 2  # kinds of geoms; they collide only with the other kind
 
 
 @dataclass(frozen=True)
 class Ground:
-    """A horizontal floor.
+    """A horizontal ground plane.
 
     Attributes:
-        height: Where it is [m].
-        friction: Coulomb's coefficient between it and whatever touches it.
+        height: Its height [m].
+        friction: Coulomb friction coefficient between it and the contacts.
     """
 
     height: float = 0.0
@@ -62,9 +62,9 @@ def write_mjcf(
         joints: Its joints.
         integrator: MuJoCo's name of it.
         joint_limits: Whether MuJoCo keeps joints within the model's position limits.
-        friction: Of the joints.
-        geoms: Named geoms to fix to the joints, by index.
-        ground: The floor, there if there are geoms.
+        friction: Friction of the joints.
+        geoms: Geoms with their names to fix to the joints, by index of the joint.
+        ground: The ground; it is written only if there are geoms.
     """
     root = Element("mujoco", model=robot.name)
     SubElement(root, "compiler", angle="radian", autolimits="false")
@@ -72,7 +72,7 @@ def write_mjcf(
         "gravity": _numbers(robot.model.gravity.linear),
         "integrator": integrator,
         "cone": "elliptic",
-        "impratio": "10",  # friction as stiff as the normal force: feet do not creep
+        "impratio": "10",  # stiffer friction than by default: feet do not creep
     }
     flags = SubElement(SubElement(root, "option", options), "flag")
     flags.set("autoreset", "disable")  # a run that diverges is an error, not a restart
@@ -86,17 +86,17 @@ def write_mjcf(
     for joint in joints:
         body = _add_body(bodies[robot.model.parents[joint.index]], robot, joint)
         bodies[joint.index] = body
-        moving = [SubElement(body, *form) for form in _joint_forms(joint)]
+        elements = [SubElement(body, *form) for form in _joint_elements(joint)]
         if joint.leader is None and joint.kind != FREE:
-            for k, element in enumerate(moving):
-                _set_resistance(element, robot, friction, joint.v + k)
+            for k, element in enumerate(elements):
+                _set_armature_and_friction(element, robot, friction, joint.v + k)
         if joint_limits and joint.kind in (HINGE, SLIDE) and joint.leader is None:
-            span = [lower[joint.v], upper[joint.v]]
-            if np.isfinite(span).all():
-                moving[0].set("limited", "true")
-                moving[0].set("range", _numbers(span))
+            limits = [lower[joint.v], upper[joint.v]]
+            if np.isfinite(limits).all():
+                elements[0].set("limited", "true")
+                elements[0].set("range", _numbers(limits))
         for name, geom in geoms.get(joint.index, ()):
-            _add_geom(body, name, geom, ground.friction, _FEET)
+            _add_geom(body, name, geom, ground.friction, _CONTACT)
     ties = SubElement(root, "equality")
     for joint in joints:
         if joint.leader is not None:
@@ -113,15 +113,15 @@ def _add_body(parent: Element, robot: Robot, joint: Joint) -> Element:
     principal, axes = np.linalg.eigh(inertia.inertia)
     axes[:, 2] *= np.linalg.det(axes)  # a rotation
     inertial = SubElement(
-        body, "inertial", mass=_numbers([max(inertia.mass, LEAST_INERTIA)])
+        body, "inertial", mass=_numbers([max(inertia.mass, MIN_INERTIA)])
     )
     _place(inertial, pin.SE3(axes, inertia.lever))
-    inertial.set("diaginertia", _numbers(np.maximum(principal, LEAST_INERTIA)))
+    inertial.set("diaginertia", _numbers(np.maximum(principal, MIN_INERTIA)))
     return body
 
 
-def _joint_forms(joint: Joint) -> list[tuple[str, dict[str, str]]]:
-    """Return element and attributes of each MuJoCo joint that stands for a joint."""
+def _joint_elements(joint: Joint) -> list[tuple[str, dict[str, str]]]:
+    """Return tag and attributes of each MuJoCo joint that represents a joint."""
     if joint.kind == FREE:
         return [("freejoint", {"name": joint.name})]
     if joint.kind == SPHERICAL:
@@ -137,13 +137,13 @@ def _joint_forms(joint: Joint) -> list[tuple[str, dict[str, str]]]:
     return [("joint", {"name": joint.name, "type": kind, "axis": axis})]
 
 
-def _set_resistance(
-    element: Element, robot: Robot, friction: JointFriction | None, freedom: int
+def _set_armature_and_friction(
+    element: Element, robot: Robot, friction: JointFriction | None, dof: int
 ) -> None:
-    element.set("armature", _numbers([robot.model.armature[freedom]]))
+    element.set("armature", _numbers([robot.model.armature[dof]]))
     if friction is not None:
-        element.set("damping", _numbers([friction.viscous[freedom]]))
-        element.set("frictionloss", _numbers([friction.coulomb[freedom]]))
+        element.set("damping", _numbers([friction.viscous[dof]]))
+        element.set("frictionloss", _numbers([friction.coulomb[dof]]))
         element.set("solreffriction", "0.002 1")
         element.set("solimpfriction", "0.999 0.999 0.001 0.5 2")
 
@@ -154,7 +154,7 @@ def _add_geom(body: Element, name: str, geom: Geom, mu: float, kind: int) -> Non
     _place(element, geom.placement)
     element.set("friction", _numbers([mu, 0.0, 0.0]))
     element.set("contype", str(kind))
-    element.set("conaffinity", str(_FEET + _GROUND - kind))
+    element.set("conaffinity", str(_CONTACT + _GROUND - kind))
     element.set("mass", "0")
 
 

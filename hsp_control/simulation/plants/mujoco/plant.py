@@ -1,4 +1,4 @@
-"""MuJoCo as a plant: another engine, with its own contacts, friction and integrator."""
+"""MuJoCo as a plant: a physics engine with its own contacts, friction, integrator."""
 
 import importlib
 import logging
@@ -15,8 +15,8 @@ from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import number_of_steps
 from hsp_control.simulation.plants.contact_channels import contact_channels
-from hsp_control.simulation.plants.describing import described
-from hsp_control.simulation.plants.floating import FloatingRoots
+from hsp_control.simulation.plants.floating_roots import FloatingRoots
+from hsp_control.simulation.plants.json_data import to_json_data
 from hsp_control.simulation.plants.mujoco.contact_shapes import ContactShape, geoms_of
 from hsp_control.simulation.plants.mujoco.conventions import Conventions, joints_of
 from hsp_control.simulation.plants.mujoco.mjcf import Ground, write_mjcf
@@ -29,15 +29,15 @@ _log = logging.getLogger(__name__)
 
 
 class MujocoPlant(SampledPlant):
-    """A robot in MuJoCo, made of the Pinocchio model.
+    """A robot in MuJoCo, built from the Pinocchio model.
 
-    Whatever is declared a contact touches a flat ground, and nothing else.
+    The declared contacts can touch a flat ground; there are no other collisions.
 
     Attributes:
-        mjcf: The model's text, to be opened in any of MuJoCo's tools.
+        mjcf: The model as MJCF text, for MuJoCo's own tools.
         model: MuJoCo's model.
         data: MuJoCo's data.
-        conventions: What carries states between Pinocchio's coordinates and MuJoCo's.
+        conventions: Converts between Pinocchio's coordinates and MuJoCo's.
     """
 
     def __init__(
@@ -56,17 +56,17 @@ class MujocoPlant(SampledPlant):
 
         Args:
             robot: The robot that moves.
-            timestep: The largest step [s]; each interval is cut into equal ones.
+            timestep: The largest step [s]; each interval is divided into equal steps.
             integrator: MuJoCo's integrator.
-            contacts: What may touch the ground.
-            ground: The ground; None: at height 0, with a friction of 0.8.
+            contacts: The shapes that may touch the ground.
+            ground: The ground; None: at height 0, with the friction coefficient 0.8.
             joint_limits: Whether MuJoCo keeps joints within the robot's position
                 limits, by its own soft constraints.
-            friction: In the joints, by MuJoCo's own constraints.
-            pushes: Wrenches from outside.
+            friction: Friction of the joints, by MuJoCo's own constraints.
+            pushes: External wrenches.
 
         Raises:
-            SimulationError: If MuJoCo is not installed or refuses the model.
+            SimulationError: If MuJoCo is not installed or rejects the model.
             ModelError: If a joint has no counterpart in MuJoCo.
             FrameNotFoundError: If a contact's frame does not exist.
         """
@@ -86,13 +86,13 @@ class MujocoPlant(SampledPlant):
         self.pushes = Pushes(robot, pushes)
         joints = joints_of(robot)
         geoms: dict[int, list[Any]] = {}
-        touching: dict[str, str] = {}
+        frame_of_geom: dict[str, str] = {}
         for contact in self.contacts:
             joint = robot.model.frames[robot.frame_id(contact.frame)].parentJoint
             for geom in geoms_of(robot, contact):
-                name = f"{contact.frame}/{len(touching)}"
+                name = f"{contact.frame}/{len(frame_of_geom)}"
                 geoms.setdefault(joint, []).append((name, geom))
-                touching[name] = contact.frame
+                frame_of_geom[name] = contact.frame
         self.mjcf = write_mjcf(
             robot,
             joints,
@@ -106,19 +106,19 @@ class MujocoPlant(SampledPlant):
             self.model: Any = mujoco.MjModel.from_xml_string(self.mjcf)
         except ValueError as error:
             reason = str(error).strip().splitlines()[0]
-            raise SimulationError(f"MuJoCo refuses {robot.name}: {reason}") from error
+            raise SimulationError(f"MuJoCo rejects {robot.name}: {reason}") from error
         self.data: Any = mujoco.MjData(self.model)
         names = [name for joint in joints for name in joint.mujoco_names]
-        at = [self.model.joint(name) for name in names]
+        found = [self.model.joint(name) for name in names]
         self.conventions = Conventions(
             robot,
             joints,
-            {name: int(j.qposadr[0]) for name, j in zip(names, at, strict=True)},
-            {name: int(j.dofadr[0]) for name, j in zip(names, at, strict=True)},
+            {name: int(j.qposadr[0]) for name, j in zip(names, found, strict=True)},
+            {name: int(j.dofadr[0]) for name, j in zip(names, found, strict=True)},
         )
         self._roots = FloatingRoots(robot)
         self._geoms = {
-            self.model.geom(name).id: contact for name, contact in touching.items()
+            self.model.geom(name).id: frame for name, frame in frame_of_geom.items()
         }
         self._data = robot.model.createData()
         self._origins = {c.frame: robot.frame_id(c.frame) for c in self.contacts}
@@ -130,24 +130,25 @@ class MujocoPlant(SampledPlant):
         self.conventions.to_mujoco(q, v, self.data.qpos, self.data.qvel)
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
-        """Let MuJoCo step; see `SampledPlant.advance`.
+        """Step MuJoCo from t to ``end``; see `SampledPlant.advance`.
 
         Raises:
-            SimulationError: If the effort pushes a root without a motor, or the motion
-                diverges.
+            SimulationError: If the effort pushes a root, which has no motor, or the
+                motion diverges.
         """
         data = self.data
-        motors = self._roots.without(t, tau)
+        motors = self._roots.remove_effort(t, tau)
         steps = number_of_steps(end - t, self.timestep)
         h = self.model.opt.timestep = (end - t) / steps
         q, v = self.conventions.from_mujoco(data.qpos, data.qvel)
-        steady = self.conventions.steady and not self.pushes.act(t, end)
-        at_once = steps if steady else 1
-        for k in range(0, steps, at_once):
+        pushed = self.pushes.any_active(t, end)
+        constant = self.conventions.constant_effort and not pushed
+        steps_at_once = steps if constant else 1
+        for k in range(0, steps, steps_at_once):
             effort = motors + self.pushes.effort(t + (k + 0.5) * h, q)
             self.conventions.effort_to_mujoco(q, effort, data.qfrc_applied)
-            self._mujoco.mj_step(self.model, data, at_once)
-            self._stop_warned(end)
+            self._mujoco.mj_step(self.model, data, steps_at_once)
+            self._check_warnings(end)
             q, v = self.conventions.from_mujoco(data.qpos, data.qvel)
         return q, v
 
@@ -157,15 +158,18 @@ class MujocoPlant(SampledPlant):
         """Return each contact's force and moment at a true state under an effort."""
         if not self.contacts:
             return {}
-        effort = self._roots.without(t, tau) + self.pushes.effort(t, q)
+        effort = self._roots.remove_effort(t, tau) + self.pushes.effort(t, q)
         self.conventions.effort_to_mujoco(q, effort, self.data.qfrc_applied)
         self._mujoco.mj_forward(self.model, self.data)
         return contact_channels(self._wrenches(q))
 
     def clearance(self, q: Array) -> float:
-        """Return how far the nearest contact is above the ground [m], negative below.
+        """Return the height of the lowest contact above the ground [m], negative below.
 
-        A robot that shall start on its feet is lowered by that much.
+        To start a robot on its feet, lower its root by that height.
+
+        Args:
+            q: Configuration, shape (nq,).
 
         Raises:
             SimulationError: If there are no contacts.
@@ -191,15 +195,15 @@ class MujocoPlant(SampledPlant):
             "timestep": self.timestep,
             "integrator": self.integrator,
             "joint_limits": self.joint_limits,
-            "contacts": described(self.contacts),
-            "ground": described(self.ground),
-            "friction": described(self.friction),
-            "pushes": described(self.pushes.pushes),
+            "contacts": to_json_data(self.contacts),
+            "ground": to_json_data(self.ground),
+            "friction": to_json_data(self.friction),
+            "pushes": to_json_data(self.pushes.pushes),
         }
 
     @property
     def _mujoco(self) -> Any:
-        """The module; a plant that kept it could not be pickled."""
+        """The module mujoco; not an attribute, because a module cannot be pickled."""
         return importlib.import_module("mujoco")
 
     def _wrenches(self, q: Array) -> dict[str, Array]:
@@ -207,20 +211,20 @@ class MujocoPlant(SampledPlant):
         model, data = self.model, self.data
         pin.framesForwardKinematics(self.robot.model, self._data, q)
         wrenches = {contact.frame: np.zeros(6) for contact in self.contacts}
-        own = np.zeros(6)
+        local = np.zeros(6)
         for k, contact in enumerate(data.contact[: data.ncon]):
-            self._mujoco.mj_contactForce(model, data, k, own)
-            # Of the first geom on the second, along the rows of its frame.
-            side = 1.0 if contact.geom2 in self._geoms else -1.0
-            name = self._geoms[contact.geom2 if side > 0.0 else contact.geom1]
+            self._mujoco.mj_contactForce(model, data, k, local)
+            # From the first geom on the second, along the rows of contact.frame.
+            sign = 1.0 if contact.geom2 in self._geoms else -1.0
+            name = self._geoms[contact.geom2 if sign > 0.0 else contact.geom1]
             rows = contact.frame.reshape(3, 3)
-            force, moment = side * rows.T @ own[:3], side * rows.T @ own[3:]
+            force, moment = sign * rows.T @ local[:3], sign * rows.T @ local[3:]
             origin = self._data.oMf[self._origins[name]].translation
             wrenches[name][:3] += force
             wrenches[name][3:] += moment + np.cross(contact.pos - origin, force)
         return wrenches
 
-    def _stop_warned(self, end: float) -> None:
+    def _check_warnings(self, end: float) -> None:
         warnings = self._mujoco.mjtWarning
         for kind in (
             warnings.mjWARN_BADQPOS,
@@ -242,6 +246,6 @@ def _import_mujoco() -> Any:
             "the plant mujoco needs MuJoCo, which is not installed; install it with: "
             "pip install 'hsp_control[mujoco]'"
         ) from error
-    if mujoco.get_mju_user_warning() is None:  # or it leaves a file where it was run
+    if mujoco.get_mju_user_warning() is None:  # otherwise MuJoCo writes a log file
         mujoco.set_mju_user_warning(_log.info)
     return mujoco

@@ -1,4 +1,4 @@
-"""Sensors: what the controller is shown of the true state."""
+"""Sensors: they turn the true state into the measured one."""
 
 from .differenced_velocity import DifferencedVelocity as DifferencedVelocity
 from .encoder import Encoder as Encoder

@@ -1,4 +1,4 @@
-"""Velocity of a robot that measures positions alone."""
+"""Velocity by differences, for a robot that measures only positions."""
 
 from dataclasses import dataclass
 
@@ -12,19 +12,19 @@ from hsp_control.simulation.plants.sensors.sensor import Sensor
 
 @dataclass
 class DifferencedVelocity(Sensor):
-    """The last two measured positions' difference, over the time between them.
+    """The difference of the last two measured positions, over the time between them.
 
-    It is late by half a period, and a count of the encoder becomes a count a period.
-    At the first measurement, and of a root, the velocity is the one passed on to it.
+    Its delay is half a period, and its resolution is one encoder count per period. At
+    the first measurement, and for a root, the velocity is passed on unchanged.
     """
 
     def reset(self, robot: Robot, t: float, q: Array, v: Array) -> None:
-        """Forget the last position; see `Sensor.reset`."""
+        """Clear the last position; see `Sensor.reset`."""
         self._robot, self._joints = robot, joint_dofs(robot)
         self._last: tuple[float, Array] | None = None
 
     def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Replace the joints' velocities."""
+        """Replace the joints' velocities; see `Sensor.measure`."""
         if self._last is not None and t > self._last[0]:
             rate = self._robot.difference(self._last[1], q) / (t - self._last[0])
             v = np.where(self._joints, rate, v)

@@ -1,4 +1,4 @@
-"""Encoders, which count."""
+"""Encoders with a finite resolution."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,24 +13,24 @@ from hsp_control.simulation.plants.sensors.sensor import Sensor
 
 @dataclass
 class Encoder(Sensor):
-    """Joint positions in whole counts; a root and a joint with resolution 0 are exact.
+    """Joint positions rounded to counts; a root or a joint with resolution 0 is exact.
 
     Attributes:
         resolution: One count [rad or m], for all joints or of shape (nv,): 2π/2¹⁹ for
-            19 bits a turn.
+            19 bits per revolution.
     """
 
     resolution: Any
 
     def reset(self, robot: Robot, t: float, q: Array, v: Array) -> None:
-        """Take the robot; see `Sensor.reset`."""
+        """Set the robot; see `Sensor.reset`."""
         self._robot = robot
         count = per_dof(robot, self.resolution, "encoder resolution")
-        self._counts = count > 0.0
-        self._count = np.where(self._counts, count, 1.0)
+        self._rounded = count > 0.0
+        self._count = np.where(self._rounded, count, 1.0)
 
     def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Round to the nearest count."""
+        """Round the positions to the nearest count; see `Sensor.measure`."""
         position = self._robot.joint_positions(q)
-        rest = np.round(position / self._count) * self._count - position
-        return self._robot.integrate(q, np.where(self._counts, rest, 0.0)), v
+        change = np.round(position / self._count) * self._count - position
+        return self._robot.integrate(q, np.where(self._rounded, change, 0.0)), v

@@ -1,4 +1,4 @@
-"""What a sensor is: a link in the chain from the true state to the controller."""
+"""The interface of sensors."""
 
 from abc import ABC, abstractmethod
 
@@ -7,16 +7,28 @@ from hsp_control.robot import Robot
 
 
 class Sensor(ABC):
-    """One imperfection of what is measured; several make a chain, in their order."""
+    """One imperfection of the measurement; several make a chain, in their order."""
 
     @abstractmethod
     def reset(self, robot: Robot, t: float, q: Array, v: Array) -> None:
-        """Begin a run at time t [s] in the true state q, v, and forget the last one.
+        """Begin a run, and clear all memory of the last one.
+
+        Args:
+            robot: The robot.
+            t: Start time [s].
+            q: True configuration at the start, shape (nq,).
+            v: True velocity at the start, shape (nv,).
 
         Raises:
-            SimulationError: If its settings do not fit the robot.
+            SimulationError: If the settings do not fit the robot.
         """
 
     @abstractmethod
     def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Return (q, v) as this sensor passes them on; called once a control period."""
+        """Return (q, v) as measured; it is called once per control period.
+
+        Args:
+            t: Time [s].
+            q: Configuration from the sensor before, shape (nq,).
+            v: Velocity from the sensor before, shape (nv,).
+        """

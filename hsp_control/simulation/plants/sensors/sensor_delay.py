@@ -1,4 +1,4 @@
-"""Measurements that arrive late."""
+"""Delayed measurements."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -11,23 +11,23 @@ from hsp_control.simulation.plants.sensors.sensor import Sensor
 
 @dataclass
 class SensorDelay(Sensor):
-    """The state of some periods ago; until there is one, that of the start.
+    """The state of some periods ago; the start state until there is one.
 
     Attributes:
-        periods: How many control periods it is old.
+        periods: Delay in control periods.
     """
 
     periods: int
 
     def __post_init__(self) -> None:
-        """Refuse what is no number of periods."""
+        """Check the number of periods."""
         check_periods(self.periods, "sensor delay")
 
     def reset(self, robot: Robot, t: float, q: Array, v: Array) -> None:
-        """Fill the line with the start; see `Sensor.reset`."""
-        self._line = deque([(q.copy(), v.copy())] * self.periods)
+        """Fill the queue with the start state; see `Sensor.reset`."""
+        self._queue = deque([(q.copy(), v.copy())] * self.periods)
 
     def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Put the state into the line, and return what comes out of it."""
-        self._line.append((q.copy(), v.copy()))
-        return self._line.popleft()
+        """Append the state, and return the oldest one; see `Sensor.measure`."""
+        self._queue.append((q.copy(), v.copy()))
+        return self._queue.popleft()

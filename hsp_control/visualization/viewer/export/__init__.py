@@ -1,4 +1,4 @@
-"""A run as a file that one can send: a page that plays offline, or a film."""
+"""Exports a run to a file: a page that plays offline, or a film."""
 
 from .film import FilmStyle as FilmStyle
 from .film import export_film as export_film

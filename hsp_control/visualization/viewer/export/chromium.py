@@ -1,4 +1,4 @@
-"""Chromium without a window: found where it is, and one of our pages in it."""
+"""Headless Chromium: finds it, starts it, and opens an exported page."""
 
 import os
 import shutil
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 INSTALL_DRIVER = "pip install 'hsp_control[film]'"
 PAGE_TIMEOUT = 120.0
-"""How long a page may take until it shows its scene [s]."""
+"""Longest time until a page shows its scene [s]."""
 
 _NAMES = (
     "chromium",
@@ -25,7 +25,7 @@ _NAMES = (
     "msedge",
 )
 _FLAGS = (
-    "--disable-gpu",  # the same picture on every machine
+    "--disable-gpu",  # the same image on every machine
     "--disable-quic",
     "--no-first-run",
     "--disable-background-networking",
@@ -38,9 +38,9 @@ _FLAGS = (
 
 
 def find_browser() -> str | None:
-    """Return the path of a Chromium or a browser that is made of it, if there is one.
+    """Return the path of Chromium or a browser based on it; None if there is none.
 
-    That of the environment's ``HSP_BROWSER`` if it is set, else the first on the path.
+    The environment variable ``HSP_BROWSER`` comes first, then the search path.
     """
     wanted = os.environ.get("HSP_BROWSER")
     if wanted:
@@ -59,14 +59,14 @@ def headless_browser() -> Iterator["Browser"]:
         from playwright.sync_api import Error, sync_playwright
     except ImportError:
         raise ExportError(
-            f"a film is taken with playwright, which is not installed: {INSTALL_DRIVER}"
+            f"a film needs playwright, which is not installed: {INSTALL_DRIVER}"
         ) from None
     root = ["--no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
     with sync_playwright() as driver:
         executable = find_browser() or driver.chromium.executable_path
         if not Path(executable).is_file():
             wanted = os.environ.get("HSP_BROWSER")
-            missing = f"HSP_BROWSER={wanted} is no program; " if wanted else ""
+            missing = f"HSP_BROWSER={wanted} is not an executable; " if wanted else ""
             raise ExportError(
                 f"{missing}a film needs Chromium or Chrome, and none is found on the "
                 "path; install one (on Debian: apt-get install chromium; anywhere: "
@@ -86,12 +86,12 @@ def headless_browser() -> Iterator["Browser"]:
 
 
 def open_page(browser: "Browser", file: Path, size: tuple[int, int]) -> "Page":
-    """Open one of our pages and wait until it shows its scene.
+    """Open an exported page and wait until it shows its scene.
 
     Args:
         browser: See `headless_browser`.
-        file: The page.
-        size: Width and height of the picture [pixels].
+        file: The page's file.
+        size: Width and height of the viewport [pixels].
     """
     page = browser.new_page(viewport={"width": size[0], "height": size[1]})
     page.goto(file.resolve().as_uri())

@@ -1,4 +1,4 @@
-"""Pictures to a film, by ffmpeg."""
+"""Encodes images to a film with ffmpeg."""
 
 import shutil
 import subprocess
@@ -27,14 +27,14 @@ FORMATS = {
         *("-compression_level", "5", "-pix_fmt", "yuv420p"),
     ),
 }
-"""What ffmpeg is told, by the file's ending."""
+"""ffmpeg's output options by the file's extension."""
 
 
 def find_ffmpeg() -> str:
-    """Return the path of ffmpeg: the system's, else that of imageio-ffmpeg.
+    """Return the path of ffmpeg: the system's, or else that of imageio-ffmpeg.
 
     Raises:
-        ExportError: If there is none.
+        ExportError: If neither is installed.
     """
     found = shutil.which("ffmpeg")
     if found:
@@ -45,24 +45,24 @@ def find_ffmpeg() -> str:
         return str(imageio_ffmpeg.get_ffmpeg_exe())
     except (ImportError, RuntimeError):
         raise ExportError(
-            "a film is written by ffmpeg, and none is found on the path; install it "
+            "a film needs ffmpeg, and none is found on the path; install it "
             "(on Debian: apt-get install ffmpeg; anywhere: pip install imageio-ffmpeg)"
         ) from None
 
 
-def _write(pipe: IO[bytes], picture: bytes) -> None:
-    pipe.write(picture)
+def _write(pipe: IO[bytes], image: bytes) -> None:
+    pipe.write(image)
 
 
 @contextmanager
 def encoder(path: Path, frame_rate: float) -> Iterator[Callable[[bytes], None]]:
-    """Give a function that takes the film's pictures, PNG each, in order.
+    """Yield a function that appends one image, a PNG file, to the film.
 
-    The film appears under its name when it is whole.
+    The film is renamed to ``path`` once it is complete.
 
     Args:
-        path: The film; its ending, one of `FORMATS`, tells which kind.
-        frame_rate: Pictures in a second [Hz].
+        path: The film's file; its extension, one of `FORMATS`, selects the format.
+        frame_rate: Images per second [Hz].
 
     Raises:
         ExportError: If ffmpeg is missing or fails, or the file cannot be written.
@@ -87,21 +87,21 @@ def encoder(path: Path, frame_rate: float) -> Iterator[Callable[[bytes], None]]:
     ]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile() as words:
+        with TemporaryFile() as messages:
             with subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
-                stderr=words,
+                stderr=messages,
             ) as process:
                 assert process.stdin is not None
-                with suppress(BrokenPipeError):  # ffmpeg's own words tell more
+                with suppress(BrokenPipeError):  # ffmpeg's own message follows
                     yield partial(_write, process.stdin)
                     process.stdin.close()
             if process.returncode != 0:
-                words.seek(0)
-                said = words.read().decode(errors="replace").strip().splitlines()
-                reason = said[-1] if said else f"exit status {process.returncode}"
+                messages.seek(0)
+                lines = messages.read().decode(errors="replace").strip().splitlines()
+                reason = lines[-1] if lines else f"exit status {process.returncode}"
                 raise ExportError(f"{path}: ffmpeg failed: {reason}")
         part.replace(path)
     except OSError as error:

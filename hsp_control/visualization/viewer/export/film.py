@@ -1,4 +1,4 @@
-"""From a run to a film, without a display."""
+"""Exports a run to a film; needs no display."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -19,22 +19,22 @@ from hsp_control.visualization.viewer.export.encoding import (
     find_ffmpeg,
 )
 from hsp_control.visualization.viewer.export.html import export_html
-from hsp_control.visualization.viewer.export.shooting import frame_times, pictures
+from hsp_control.visualization.viewer.export.screenshots import frame_times, screenshots
 
-_SMALLEST, _LARGEST = 64, 7680
+_MIN_SIZE, _MAX_SIZE = 64, 7680
 
 
 class FilmStyle(NamedTuple):
-    """How a film is taken.
+    """The settings of a film.
 
     Attributes:
         size: Width and height [pixels]; None: 1280 x 720, of a GIF or WebP 800 x 450.
-        frame_rate: Pictures in a second [Hz]; None: 30, of a GIF or WebP 20.
-        speed: Seconds of the run in one second of the film.
-        plots: Whether the plots are in the picture.
-        caption: Whether title, clock and legend are.
-        start: The moment with which it begins [s]; None: the run's start.
-        end: The moment after which it ends [s]; None: the run's end.
+        frame_rate: Images per second [Hz]; None: 30, of a GIF or WebP 20.
+        speed: Seconds of the run per second of the film.
+        plots: Whether the plots are shown.
+        caption: Whether title, clock and legend are shown.
+        start: First time of the run that is shown [s]; None: the run's start.
+        end: Last time of the run that is shown [s]; None: the run's end.
     """
 
     size: tuple[int, int] | None = None
@@ -56,90 +56,90 @@ def export_film(
     progress: Callable[[float], None] | None = None,
     **view: Any,
 ) -> Path:
-    """Write a film of a run: MP4, GIF or animated WebP, by the file's ending.
+    """Write a film of a run: MP4, GIF or animated WebP, by the file's extension.
 
-    Every picture shows exactly its moment, however slow the machine is; the same run
-    gives the same pictures again.
+    Every image shows exactly its time, however slow the machine is; the same run gives
+    the same images.
 
     Args:
         rollout: The run.
         path: The file to write.
-        style: Size, pace and what is in the picture.
+        style: Size, speed and contents.
         robot: See `export_html`.
         controller: See `export_html`.
-        progress: Told the share that is done, from 0 to 1; from another thread.
+        progress: Called with the completed share, from 0 to 1, from another thread.
         view: See `export_html`.
 
     Raises:
         ViewerError: See `export_html`.
         ConfigError: See `export_html`.
-        ExportError: If the style cannot be, playwright, a browser or ffmpeg is missing,
-            one of them fails, or the file cannot be written.
+        ExportError: If the style is not valid, if playwright, a browser or ffmpeg is
+            missing or fails, or if the file cannot be written.
     """
     path = Path(path)
     style = style or FilmStyle()
-    size, frame_rate = _settled(path, style)
+    size, frame_rate = _checked_format(path, style)
     times = frame_times(_span(rollout, style), frame_rate, style.speed)
-    find_ffmpeg()  # what is missing is said before the work, not after
+    find_ffmpeg()  # raise before the work, not after it
     stopped = Event()
 
-    def take() -> None:
+    def record() -> None:
         with headless_browser() as browser, TemporaryDirectory() as folder:
             file = Path(folder) / "page.html"
             export_html(rollout, file, robot=robot, controller=controller, **view)
             page = open_page(browser, file, size)
             with encoder(path, frame_rate) as write:
-                for number, picture in enumerate(
-                    pictures(page, times, plots=style.plots, caption=style.caption),
+                for number, image in enumerate(
+                    screenshots(page, times, plots=style.plots, caption=style.caption),
                     start=1,
                 ):
-                    write(picture)
+                    write(image)
                     if stopped.is_set():
                         raise ExportError(f"{path}: stopped")
                     if progress is not None:
                         progress(number / len(times))
 
-    # The browser's driver must not share a thread with an event loop, and notebooks
-    # run one.
+    # The browser's driver must not run in a thread with an event loop, as notebooks
+    # have one.
     with ThreadPoolExecutor(1) as other_thread:
         try:
-            other_thread.submit(take).result()
+            other_thread.submit(record).result()
         except BaseException:
             stopped.set()
             raise
     return path
 
 
-def _settled(path: Path, style: FilmStyle) -> tuple[tuple[int, int], float]:
-    """Return size and frame rate; refuse a style that cannot be."""
+def _checked_format(path: Path, style: FilmStyle) -> tuple[tuple[int, int], float]:
+    """Return size and frame rate; raise if the style is not valid."""
     if path.suffix.lower() not in FORMATS:
         raise ExportError(
-            f"{path}: a film ends with one of {', '.join(FORMATS)}"
+            f"{path}: the extension of a film must be one of {', '.join(FORMATS)}"
             f"{did_you_mean(path.suffix, FORMATS)}"
         )
     light = path.suffix.lower() != ".mp4"
     size = style.size or ((800, 450) if light else (1280, 720))
     frame_rate = style.frame_rate or (20.0 if light else 30.0)
-    if not all(_SMALLEST <= edge <= _LARGEST for edge in size):
+    if not all(_MIN_SIZE <= edge <= _MAX_SIZE for edge in size):
         raise ExportError(
-            f"a film of {size[0]}x{size[1]} pixels: each must be between {_SMALLEST} "
-            f"and {_LARGEST}"
+            f"a film of {size[0]}x{size[1]} pixels: width and height must be between "
+            f"{_MIN_SIZE} and {_MAX_SIZE}"
         )
     if not 1.0 <= frame_rate <= 240.0:
-        raise ExportError(f"{frame_rate:g} pictures in a second: must be 1 to 240")
+        raise ExportError(f"frame rate {frame_rate:g} Hz: must be between 1 and 240")
     if not 0.0 < style.speed < float("inf"):
         raise ExportError(f"speed {style.speed:g} must be positive")
     return size, frame_rate
 
 
 def _span(rollout: Rollout, style: FilmStyle) -> tuple[float, float]:
-    """Return the first and the last moment [s]."""
+    """Return the first and the last time that the film shows [s]."""
     first, last = (float(t) for t in rollout.t[[0, -1]]) if len(rollout) else (0.0, 0.0)
     start = first if style.start is None else style.start
     end = last if style.end is None else style.end
     if not first <= start <= end <= last:
         raise ExportError(
-            f"a film from {start:g} to {end:g} s: the run goes from {first:g} to "
-            f"{last:g} s"
+            f"a film from {start:g} to {end:g} s: must lie within the run, "
+            f"{first:g} to {last:g} s"
         )
     return start, end

@@ -1,4 +1,4 @@
-"""From a run to a file that plays it offline."""
+"""Exports a run to a page that plays it offline."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -12,9 +12,9 @@ from hsp_control.visualization.viewer.commands import Json, unpack
 from hsp_control.visualization.viewer.export.packing import ArrayTable
 from hsp_control.visualization.viewer.export.page import assemble
 from hsp_control.visualization.viewer.export.panels import pack_panels
-from hsp_control.visualization.viewer.export.scene import light_scene
+from hsp_control.visualization.viewer.export.scene_reduction import reduce_scene
 from hsp_control.visualization.viewer.recorder import Recorder
-from hsp_control.visualization.viewer.replay import act_of
+from hsp_control.visualization.viewer.replay import rebuild_run
 from hsp_control.visualization.viewer.viewer import Viewer
 
 
@@ -26,24 +26,25 @@ def export_html(
     controller: Controller | None = None,
     **view: Any,
 ) -> Path:
-    """Write one page that plays a run offline, with its plots beside it.
+    """Write a page that plays a run offline, with its plots beside the scene.
 
-    The page needs no server and asks for nothing; a browser of 2023 or newer opens it.
+    The page needs no server and loads no other file; it needs a browser of 2023 or
+    newer.
 
     Args:
         rollout: The run.
         path: The file to write.
-        robot: The robot; None: it and its controller are built anew from the
-            configuration that the log holds.
-        controller: What controlled the run: see `Viewer.play`.
-        view: What to change of the log's own ``view``: see `Viewer`.
+        robot: The robot; None: it and its controller are rebuilt from the configuration
+            in the log.
+        controller: The run's controller: see `Viewer.play`.
+        view: Settings that replace those of the log's ``view``: see `Viewer`.
 
     Raises:
-        ViewerError: If the robot cannot be found again, or the run is empty or of
-            another robot.
-        ConfigError: If there is no such thing in a view.
-        ExportError: If a mesh cannot be read, what reads it is not installed, or the
-            file cannot be written.
+        ViewerError: If the robot cannot be rebuilt, or the run is empty or of another
+            robot.
+        ConfigError: If a view has no such key, or a value is not valid.
+        ExportError: If a mesh cannot be read, the library for it is not installed, or
+            the file cannot be written.
     """
     path = Path(path)
     text = page_of(rollout, robot, controller, view)
@@ -69,7 +70,7 @@ def page_of(
 ) -> str:
     """Return the page that `export_html` writes."""
     if robot is None:
-        _, robot, _, controller = act_of(rollout, "the log")
+        _, robot, _, controller = rebuild_run(rollout, "the log")
     recorder, arrays = Recorder(), ArrayTable()
     own = (rollout.config or {}).get("view", {})
     with Viewer(robot, transport=recorder, **{**own, **view}) as viewer:
@@ -77,7 +78,7 @@ def page_of(
     commands = [unpack(packed) for _, _, packed in recorder.scene.items()]
     content: Json = {
         "type": "show",
-        "commands": light_scene(commands, arrays),
+        "commands": reduce_scene(commands, arrays),
         "plots": pack_panels(rollout, arrays),
         "about": _about(rollout),
     }
@@ -86,7 +87,7 @@ def page_of(
 
 
 def _about(rollout: Rollout) -> Json:
-    """Return words about the run, for the foot of the page."""
+    """Return the description and the facts at the foot of the page."""
     meta, config = rollout.meta, rollout.config or {}
     facts = [
         ("robot", meta["robot"]["name"]),

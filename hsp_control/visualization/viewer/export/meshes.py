@@ -1,4 +1,4 @@
-"""Mesh files as triangles of one colour each, read as the page would read them."""
+"""Reads mesh files as triangles, one piece per colour, as the page reads them."""
 
 import base64
 import io
@@ -16,12 +16,12 @@ INSTALL = "pip install 'hsp_control[export]'"
 
 
 class Piece(NamedTuple):
-    """Part of a mesh.
+    """A part of a mesh with one colour.
 
     Attributes:
-        vertices: Shape (n, 3), in the file's own length.
+        vertices: Shape (n, 3), in the file's unit of length.
         triangles: Indices of vertices, shape (k, 3).
-        color: Red, green, blue and opacity, from 0 to 1; None: the URDF says.
+        color: Red, green, blue and opacity, from 0 to 1; None: the URDF's colour.
     """
 
     vertices: Array
@@ -30,16 +30,16 @@ class Piece(NamedTuple):
 
 
 def read_mesh(thing: Json, owner: str) -> list[Piece]:
-    """Return a mesh file's pieces, one a colour; textures as their mean colour.
+    """Return a mesh file's pieces, one per colour; a texture becomes its mean colour.
 
-    As Meshcat's page and Pinocchio do, a Collada file's unit and up axis are ignored.
+    A Collada file's unit and up axis are ignored, as in Meshcat's page and Pinocchio.
 
     Args:
         thing: Meshcat's ``_meshfile_geometry`` or ``_meshfile_object``.
-        owner: Whose it is, for messages.
+        owner: The node that it belongs to, for messages.
 
     Raises:
-        ExportError: If what reads meshes is not installed, or the mesh cannot be read.
+        ExportError: If the libraries are not installed, or the mesh cannot be read.
     """
     try:
         import collada  # noqa: F401
@@ -53,11 +53,11 @@ def read_mesh(thing: Json, owner: str) -> list[Piece]:
     content = data.encode() if isinstance(data, str) else bytes(data)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the file's quirks
+            warnings.simplefilter("ignore")  # about defects of the file
             scene = trimesh.load_scene(
                 io.BytesIO(content),
                 file_type=thing["format"],
-                resolver=_pictures(thing.get("resources", {})),
+                resolver=_textures(thing.get("resources", {})),
                 process=False,
             )
             colored = thing["type"] == "_meshfile_object"
@@ -66,13 +66,13 @@ def read_mesh(thing: Json, owner: str) -> list[Piece]:
                 for node in scene.graph.nodes_geometry
                 if hasattr(scene.geometry[scene.graph[node][1]], "faces")
             ]
-    except Exception as error:  # a reader of other people's files may raise anything
+    except Exception as error:  # any error is possible with untrusted files
         raise ExportError(f"{owner}: its mesh cannot be read: {error}") from error
     return merged([piece for piece in pieces if len(piece.triangles)])
 
 
 def merged(pieces: list[Piece]) -> list[Piece]:
-    """Return pieces of one colour as one."""
+    """Merge the pieces of each colour into one."""
     by_color: dict[tuple[float, ...] | None, list[Piece]] = {}
     for piece in pieces:
         by_color.setdefault(piece.color, []).append(piece)
@@ -90,13 +90,13 @@ def _piece(trimesh: Any, scene: Any, node: str, colored: bool) -> Piece:
     mesh = scene.geometry[name]
     vertices = trimesh.transform_points(np.asarray(mesh.vertices, float), pose)
     triangles = np.asarray(mesh.faces, np.int64)
-    if np.linalg.det(pose[:3, :3]) < 0.0:  # mirrored: what was outside stays outside
+    if np.linalg.det(pose[:3, :3]) < 0.0:  # mirrored: keep the outside outside
         triangles = triangles[:, ::-1]
     return Piece(vertices, triangles, _color(mesh.visual) if colored else None)
 
 
 def _color(visual: Any) -> tuple[float, ...]:
-    """Return a surface's colour; of a picture, the mean over what it covers."""
+    """Return a material's colour; of a texture, the mean over the vertices."""
     material = getattr(visual, "material", None)
     if getattr(material, "image", None) or getattr(material, "baseColorTexture", None):
         sampled = visual.to_color().vertex_colors.mean(axis=0)
@@ -107,10 +107,10 @@ def _color(visual: Any) -> tuple[float, ...]:
     return tuple(float(channel) / 255.0 for channel in sampled)
 
 
-def _pictures(addresses: dict[str, str]) -> dict[str, bytes]:
-    """Return a mesh's pictures, which came with it as data addresses, by name."""
-    pictures = {}
+def _textures(addresses: dict[str, str]) -> dict[str, bytes]:
+    """Decode a mesh's textures from data URLs; return them by name."""
+    textures = {}
     for name, address in addresses.items():
         content = base64.b64decode(address.partition(",")[2])
-        pictures[name] = pictures[PurePath(name).name] = content
-    return pictures
+        textures[name] = textures[PurePath(name).name] = content
+    return textures

@@ -1,7 +1,7 @@
-"""Numbers in few bytes: whole multiples of a step, as differences, byte by byte.
+"""Packs arrays of numbers into few bytes; ``unpack.js`` unpacks them.
 
-``unpack.js`` is the other half. What neighbours share vanishes in the differences, and
-bytes of one weight stand together: the page's compression finds much to take out.
+Numbers become integer multiples of a step. Differences of neighbours are stored, byte
+plane by byte plane, because the page's gzip then compresses them well.
 """
 
 import hashlib
@@ -19,37 +19,37 @@ _KINDS = {
     np.dtype("u1"): "Uint8Array",
     np.dtype("u4"): "Uint32Array",
 }
-"""What JavaScript calls them."""
-_MOST = 2**31
+"""Names of the types in JavaScript."""
+_MAX_STEPS = 2**31
 
 
 class ArrayTable:
-    """The arrays of a page: each once, however often the scene uses it.
+    """The arrays of a page; equal arrays are stored once.
 
     Attributes:
-        entries: What the page makes the arrays from.
+        entries: The packed arrays, in the order of their numbers.
     """
 
     def __init__(self) -> None:
-        """Start with none."""
+        """Start without arrays."""
         self.entries: list[Json] = []
         self._numbers: dict[bytes, int] = {}
 
     def numbers(self, values: ArrayLike, step: float, dtype: Any = np.float32) -> Json:
-        """Keep numbers, each within half a step, and return what stands for them.
+        """Store numbers to within half a step; return a reference to the array.
 
         Args:
             values: Shape (n,) or (n, k), finite.
-            step: Distance of two numbers that are told apart, positive; coarsened for a
-                column that would need more than 31 bits.
-            dtype: What the page makes of them: ``float32`` or ``float64``.
+            step: Resolution, positive; coarser for a column that would need more than
+                31 bits.
+            dtype: The type in the page: ``float32`` or ``float64``.
         """
         rows = np.asarray(values, float)
         rows = rows[:, None] if rows.ndim == 1 else rows
         offset = rows.min(axis=0) if len(rows) else np.zeros(rows.shape[1])
         spread = np.ptp(rows, axis=0) if len(rows) else np.zeros(rows.shape[1])
-        steps = np.maximum(step, spread / (_MOST - 1))
-        return self._keep(
+        steps = np.maximum(step, spread / (_MAX_STEPS - 1))
+        return self._store(
             np.rint((rows - offset) / steps).astype(np.int64),
             kind=_KINDS[np.dtype(dtype)],
             offset=offset.tolist(),
@@ -57,8 +57,8 @@ class ArrayTable:
         )
 
     def whole(self, values: NDArray[np.integer[Any]]) -> Json:
-        """Keep whole numbers of shape (n,), exactly."""
-        return self._keep(
+        """Store integers of shape (n,) exactly; return a reference to the array."""
+        return self._store(
             values.astype(np.int64)[:, None],
             kind=_KINDS[values.dtype],
             offset=[0.0],
@@ -66,12 +66,12 @@ class ArrayTable:
         )
 
     def triangles(self, triangles: Indices) -> Json:
-        """Keep triangles, shape (n, 3), of vertices numbered in order of first use."""
+        """Store triangles, shape (n, 3); vertices must be numbered by first use."""
         flat = triangles.ravel()
         unused = np.maximum.accumulate(np.concatenate([[0], flat[:-1] + 1]))
-        return self._keep((unused - flat).reshape(-1, 3), kind="triangles")
+        return self._store((unused - flat).reshape(-1, 3), kind="triangles")
 
-    def _keep(self, whole: Indices, **about: Any) -> Json:
+    def _store(self, whole: Indices, **about: Any) -> Json:
         differences = whole
         if about["kind"] != "triangles":
             differences = np.diff(whole, axis=0, prepend=0)
@@ -86,13 +86,13 @@ class ArrayTable:
         key = hashlib.sha256(head + data).digest()
         if key not in self._numbers:
             self._numbers[key] = len(self.entries)
-            bytes_of_it = typed_array(np.frombuffer(data, np.uint8), np.uint8)
+            packed = typed_array(np.frombuffer(data, np.uint8), np.uint8)
             self.entries.append(
                 {
                     "rows": rows,
                     "columns": count,
                     "width": width,
-                    "bytes": bytes_of_it,
+                    "bytes": packed,
                     **about,
                 }
             )
@@ -100,6 +100,6 @@ class ArrayTable:
 
 
 def step_of(values: Array, bits: int) -> float:
-    """Return the step that tells 2**bits values apart over the widest column."""
+    """Return the step that divides the widest column into 2**bits values."""
     spread = float(np.ptp(values, axis=0).max()) if values.size else 0.0
     return spread / (2**bits - 1) or 1.0

@@ -1,4 +1,4 @@
-"""The page itself: scene, plots and every script in one file that asks for nothing."""
+"""Assembles the page: scene, plots and all scripts in one file."""
 
 import base64
 import gzip
@@ -20,7 +20,7 @@ _STYLES = ("export.css",)
 _NOTE = (
     "Written by hsp_control. Holds Meshcat's page (MIT), which holds three.js (MIT)."
 )
-# Whatever the scripts might do, the browser will let nothing out and nothing in.
+# The browser blocks all network access of the page, whatever the scripts do.
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data: blob:"
@@ -28,18 +28,18 @@ _POLICY = (
 
 
 def assemble(title: str, content: Json) -> str:
-    """Return the page: the live view's own, with its files inside, and the plots.
+    """Return the page's HTML: the live page with its files inlined, and the plots.
 
     Args:
-        title: Its title.
-        content: What ``export.js`` shows: see ``show`` there.
+        title: The page's title.
+        content: The content that ``export.js`` shows: see ``show`` there.
     """
     live = (_LIVE / "index.html").read_text(encoding="utf-8")
     body = live[live.index("<body>") + len("<body>") : live.index("</body>")]
     names = re.findall(r'<script src="([^"]+)"></script>', body)
     body = re.sub(r"<script.*?</script>\s*", "", body, flags=re.DOTALL)
     styles = [
-        *((_LIVE / name).read_text(encoding="utf-8") for name in _linked(live)),
+        *((_LIVE / name).read_text(encoding="utf-8") for name in _stylesheets(live)),
         *re.findall(r"<style>(.*?)</style>", live, flags=re.DOTALL),
         *((_OWN / name).read_text(encoding="utf-8") for name in _STYLES),
     ]
@@ -71,7 +71,7 @@ def assemble(title: str, content: Json) -> str:
     )
 
 
-def _linked(page: str) -> Iterable[str]:
+def _stylesheets(page: str) -> Iterable[str]:
     return re.findall(r'<link rel="stylesheet" href="([^"]+)">', page)
 
 
@@ -81,6 +81,6 @@ def _live_script(name: str) -> Path:
 
 
 def _block(name: str, data: bytes) -> str:
-    # No time stamp in the archive: the same run makes the same file.
+    # No time stamp in the archive: the same run gives the same file.
     packed = base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
     return f'<script type="application/octet-stream" id="{name}">{packed}</script>'

@@ -1,4 +1,4 @@
-"""The plots beside the robot: what of a log they show, in how few points."""
+"""The plots beside the scene: curves of a log, reduced to few points."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -10,15 +10,19 @@ from hsp_control.simulation import Rollout, log_series
 from hsp_control.simulation.decay import predicted_decay
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.commands import Json
+from hsp_control.visualization.viewer.export.clip_reduction import CLOCK_STEP
+from hsp_control.visualization.viewer.export.keyframes import (
+    distance_error,
+    keyframe_rows,
+    linear,
+)
 from hsp_control.visualization.viewer.export.packing import ArrayTable
-from hsp_control.visualization.viewer.export.thinning import distance, on_line, thin
-from hsp_control.visualization.viewer.export.tracks import CLOCK_STEP
 
 CURVE_BOUND = 1 / 500
-"""How far a curve may be from the log, over the height of its plot."""
+"""Maximum error of a curve, over the height of its plot."""
 _FLOOR, _TOP = 1e-17, 1e-6
-"""What counts as rounding, and what a logarithmic axis of errors reaches at least."""
-_MOST, _NAMED = 14, 7
+"""Values up to the floor are rounding errors; a logarithmic axis reaches the top."""
+_MAX_CURVES, _SELECTED = 14, 7
 """Of more than 14 curves, only the 7 that vary most are shown."""
 
 
@@ -26,29 +30,29 @@ class Series(NamedTuple):
     """One curve.
 
     Attributes:
-        name: What it is called.
-        values: One a row of the log, shape (N,).
+        name: Its name in the legend.
+        values: One per row of the log, shape (N,).
         color: Its colour, ``#RRGGBB``.
         dashed: Draw it dashed.
-        promised: It is no measurement: the axis need not reach it.
+        predicted: It is a prediction, not measured: the axis need not reach it.
     """
 
     name: str
     values: Array
     color: str
     dashed: bool = False
-    promised: bool = False
+    predicted: bool = False
 
 
 class Panel(NamedTuple):
     """One plot over time.
 
     Attributes:
-        title: What it shows.
-        unit: Of what it shows.
+        title: Its title.
+        unit: The unit of the curves.
         series: The curves.
-        logarithmic: Whether its axis is.
-        zero: Whether zero is on the axis, and drawn as a line that means contact.
+        logarithmic: Whether its axis is logarithmic.
+        zero: Whether the axis includes zero, drawn as a line that means contact.
     """
 
     title: str
@@ -59,18 +63,23 @@ class Panel(NamedTuple):
 
 
 def panels_of(rollout: Rollout) -> list[Panel]:
-    """Return the plots of a log; only of what it has."""
+    """Return the plots of a log, without those whose columns it lacks."""
     return list(_panels(rollout))
 
 
 def pack_panels(rollout: Rollout, arrays: ArrayTable) -> Json:
-    """Return the plots of a log as the page draws them."""
+    """Return the plots of a log in the page's format: see ``plots.js``.
+
+    Args:
+        rollout: The log.
+        arrays: The table that stores the numbers.
+    """
     damped = np.concatenate([[False], rollout["damped"] > 0.0, [False]])
     edges = np.flatnonzero(np.diff(damped)).reshape(-1, 2)
     return {
         "start": float(rollout.t[0]),
         "end": float(rollout.t[-1]),
-        "bounded": [
+        "damped": [
             [float(rollout.t[first]), float(rollout.t[stop - 1])]
             for first, stop in edges
         ],
@@ -108,7 +117,7 @@ def _panels(rollout: Rollout) -> Iterator[Panel]:
     if watched:
         values = np.column_stack([rollout[f"distance.{name}"] for name in watched])
         names = [name.replace("_", " ") for name in watched]
-        yield Panel("Least distance", "m", _lines(values, names), zero=True)
+        yield Panel("Minimum distance", "m", _lines(values, names), zero=True)
     positions, what = log_series.joint_positions(rollout)
     yield Panel(
         what.capitalize() + "s",
@@ -135,14 +144,14 @@ def _panels(rollout: Rollout) -> Iterator[Panel]:
 
 def _null_space(rollout: Rollout) -> Iterator[Series]:
     decay = predicted_decay(rollout)
-    for promised, gain in zip((decay.slow, decay.fast), decay.gains, strict=True):
-        if promised is not None:
+    for predicted, gain in zip((decay.slow, decay.fast), decay.gains, strict=True):
+        if predicted is not None:
             yield Series(
-                f"promised: exp(−{gain:g} t)",
-                promised,
+                f"predicted: exp(−{gain:g} t)",
+                predicted,
                 palette.INK,
                 dashed=True,
-                promised=True,
+                predicted=True,
             )
             if decay.fast is decay.slow:
                 break
@@ -150,8 +159,8 @@ def _null_space(rollout: Rollout) -> Iterator[Series]:
 
 
 def _lines(values: Array, names: Sequence[str]) -> list[Series]:
-    """Return a curve a column; of very many, those that vary most."""
-    count = len(names) if len(names) <= _MOST else _NAMED
+    """Return one curve per column; of very many, those that vary most."""
+    count = len(names) if len(names) <= _MAX_CURVES else _SELECTED
     order = np.argsort(-np.ptp(values, axis=0), kind="stable")[:count]
     return [
         Series(
@@ -165,23 +174,23 @@ def _lines(values: Array, names: Sequence[str]) -> list[Series]:
 
 
 def _packed(panel: Panel, times: Array, arrays: ArrayTable) -> Json:
-    every = [np.asarray(series.values, float) for series in panel.series]
-    measured = [s.values for s in panel.series if not s.promised]
+    all_values = [np.asarray(series.values, float) for series in panel.series]
+    measured = [s.values for s in panel.series if not s.predicted]
     low, high = _range(panel, np.concatenate(measured))
     bound = CURVE_BOUND * (high - low)
     curves = []
-    for series, values in zip(panel.series, every, strict=True):
+    for series, values in zip(panel.series, all_values, strict=True):
         shown = values
         if panel.logarithmic:
             with np.errstate(divide="ignore", invalid="ignore"):
                 shown = np.log10(values)
-        # Out of sight all values are the same: a little beyond the edge.
-        edge = high - low
-        shown = np.nan_to_num(shown, nan=low - edge).clip(low - edge, high + edge)
+        # All values outside the axis are clipped to one height beyond its end.
+        span = high - low
+        shown = np.nan_to_num(shown, nan=low - span).clip(low - span, high + span)
         shown = shown[:, None]
         step = bound / 8.0
         rounded = step * np.rint(shown / step)
-        keys = thin(times, shown, rounded, on_line, distance(bound))
+        keys = keyframe_rows(times, shown, rounded, linear, distance_error(bound))
         curves.append(
             {
                 "name": series.name,
@@ -203,12 +212,12 @@ def _packed(panel: Panel, times: Array, arrays: ArrayTable) -> Json:
 
 
 def _range(panel: Panel, values: Array) -> tuple[float, float]:
-    """Return what the axis spans; in powers of ten where it is logarithmic."""
+    """Return the limits of the axis; as powers of ten if it is logarithmic."""
     shown = values[np.isfinite(values)]
     if panel.logarithmic:
         shown = shown[shown > _FLOOR]
         high = max(float(shown.max(initial=_TOP)), _TOP)
-        # A norm that crosses zero dips at single rows; the axis need not follow.
+        # A norm that crosses zero has dips at single rows; the axis ignores them.
         low = float(np.quantile(shown, 0.005)) if shown.size else high
         return float(np.log10(0.4 * low)), float(np.log10(3.0 * high))
     low, high = float(shown.min(initial=np.inf)), float(shown.max(initial=-np.inf))

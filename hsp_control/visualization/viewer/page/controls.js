@@ -1,14 +1,14 @@
-// The player's bar and its keys: see player.js.
+// The player's control bar and keys: see player.js.
 //
-//   space       play, pause            home, end   to the start, to the end
-//   ← →         a frame (shift: 1 s)   + -         faster, slower
-//   l           again and again, or once
+//   space       play, pause               home, end   to the start, to the end
+//   ← →         1/30 s (with shift 1 s)   + -         faster, slower
+//   l           repeat, or play once
 "use strict";
 
 class Controls {
   static FRAME = 1 / 30;  // s
 
-  // Put the bar into an element of the page; it hides while there is nothing to play.
+  // Add the bar to an element of the page; it is hidden while there is no clip.
   constructor(player, parent) {
     this.player = player;
     this.bar = document.createElement("div");
@@ -22,7 +22,7 @@ class Controls {
       <input class="timeline" type="range" step="any" aria-label="Time">
       <output class="clock"></output>
       <select class="speed" title="Speed (+ and -)" aria-label="Speed"></select>
-      <button class="loop" title="Again and again (l)" aria-label="Loop">
+      <button class="loop" title="Repeat (l)" aria-label="Repeat">
         <svg viewBox="0 0 24 24"><path d="M7 7h9v3l4.6-4.2L16 1.6V4.6H4.6v7H7zM17 17H8v-3l-4.6
           4.2L8 22.4v-3h11.4v-7H17z"/></svg></button>`;
     parent.append(this.bar);
@@ -36,10 +36,10 @@ class Controls {
     this.loop.onclick = () => player.setLoop(!player.loop);
     this.speed.onchange = () => {
       player.setSpeed(Number(this.speed.value));
-      this.speed.blur();  // the keys are the player's again
+      this.speed.blur();  // return the keyboard to the player
     };
     this.timeline.oninput = () => player.seek(Number(this.timeline.value));
-    // While the hand is on the timeline, time stands still.
+    // Pause while the timeline is dragged.
     this.timeline.onpointerdown = () => {
       const resume = player.playing;
       player.pause();
@@ -54,8 +54,8 @@ class Controls {
   key(event) {
     const {player} = this;
     const {target} = event;
-    const writes = target.matches?.("select, textarea, input:not([type=range], [type=checkbox])");
-    if (!player.loaded || writes || event.ctrlKey || event.metaKey || event.altKey) return;
+    const editable = target.matches?.("select, textarea, input:not([type=range], [type=checkbox])");
+    if (!player.loaded || editable || event.ctrlKey || event.metaKey || event.altKey) return;
     const step = event.shiftKey ? 1 : Controls.FRAME;
     const actions = {
       " ": () => player.toggle(),
@@ -70,7 +70,7 @@ class Controls {
     };
     const action = actions[event.key];
     if (!action) return;
-    event.preventDefault();  // a button in focus, or the timeline, would act too
+    event.preventDefault();  // else a focused button or the timeline would react, too
     action();
   }
 
@@ -80,7 +80,7 @@ class Controls {
     timeline.value = time;
     const share = (t) => `${horizon > start ? 100 * (t - start) / (horizon - start) : 0}%`;
     timeline.style.setProperty("--played", share(time));
-    timeline.style.setProperty("--there", share(end));
+    timeline.style.setProperty("--available", share(end));
     this.clock.textContent = `${time.toFixed(2)} / ${horizon.toFixed(2)} s`;
   }
 

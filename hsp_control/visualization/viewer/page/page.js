@@ -1,21 +1,21 @@
-// Meshcat's viewer, told a few more words than it knows: see hsp_control/viewer/commands.py.
+// Extends Meshcat's viewer by additional commands: see viewer/commands.py.
 "use strict";
 
 const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
 const meshcat = viewer.handle_command.bind(viewer);
 
-// Our own lights, floor and grid come with the scene; they fit the robot.
+// The scene brings its own lights, floor and grid, which fit the robot.
 for (const name of ["Lights", "Grid", "Axes"]) viewer.delete_path([name]);
-viewer.gui.removeFolder(viewer.animator.folder);  // the player is ours, too
+viewer.gui.removeFolder(viewer.animator.folder);  // the scene has its own player
 
 const player = new Player(viewer);
 new Controls(player, document.body);
 
-const words = {camera, caption, time, status, ghost, trail, trail_more, clip, still, seek, ask, set_object,
-               nothing() {}};
+const commandHandlers = {camera, caption, time, status, ghost, trail, trail_more, clip, still,
+                         seek, ask, set_object, nothing() {}};
 viewer.handle_command = (command) => {
   if (Array.isArray(command)) command.forEach(viewer.handle_command);
-  else (words[command.type] ?? meshcat)(command);
+  else (commandHandlers[command.type] ?? meshcat)(command);
   viewer.set_dirty();
 };
 
@@ -23,9 +23,9 @@ function node(path) {
   return viewer.scene_tree.find(path.split("/").filter((name) => name.length > 0)).object;
 }
 
-// Meshcat merges a mesh file's parts into one geometry, but forgets which triangles of a
-// part have which of its surfaces: those were not drawn. And it gives up on parts of which
-// only some have texture coordinates.
+// Meshcat merges the parts of a mesh file into one geometry. It loses which triangles of a
+// part have which material, and then does not draw them; and it fails if only some parts
+// have texture coordinates. Both are corrected here.
 function set_object(command) {
   const {BufferGeometry, BufferAttribute} = MeshCat.THREE;
   const apply = BufferGeometry.prototype.applyMatrix4;
@@ -43,14 +43,14 @@ function set_object(command) {
   }
   node(command.path).traverse((object) => {
     const {geometry, material} = object;
-    if (Array.isArray(material) && material.some(Array.isArray)) divide(object, parts);
-    // Some mesh files have no normals and would be black.
+    if (Array.isArray(material) && material.some(Array.isArray)) assignMaterials(object, parts);
+    // Without normals, a mesh would be black.
     if (geometry?.isBufferGeometry && !geometry.attributes.normal) geometry.computeVertexNormals();
   });
 }
 
-// Tell a merged mesh which triangles have which surface.
-function divide(mesh, parts) {
+// Assign its material to each group of triangles of a merged mesh.
+function assignMaterials(mesh, parts) {
   const size = ({attributes}) => attributes.position.count;
   const number = mesh.material.length;
   const first = parts.findIndex((_, k) => {
@@ -60,26 +60,27 @@ function divide(mesh, parts) {
   });
   if (first < 0) return;
   mesh.geometry.clearGroups();
-  const surfaces = [];
+  const materials = [];
   let offset = 0;
   parts.slice(first, first + number).forEach((part, k) => {
     const whole = {start: 0, count: size(part), materialIndex: 0};
     for (const {start, count, materialIndex} of part.groups.length ? part.groups : [whole]) {
-      mesh.geometry.addGroup(offset + start, count, surfaces.length);
-      surfaces.push([mesh.material[k]].flat()[materialIndex]);
+      mesh.geometry.addGroup(offset + start, count, materials.length);
+      materials.push([mesh.material[k]].flat()[materialIndex]);
     }
     offset += size(part);
   });
-  mesh.material = surfaces;
+  mesh.material = materials;
 }
 
-// Pinocchio's z is up, three.js's y.
+// From Pinocchio's axes (z up) to those of three.js (y up).
 function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
 
-// The shares of the picture's height that are left to the player's bar and to the title.
+// Shares of the picture's height that are reserved for the player's bar and the title.
 const BAR = 0.1, TITLE = 0.06;
 
-// Look at a target, from an eye or, along a direction, from where all balls are seen.
+// Look at a target from an eye, or along a direction from a distance at which all balls
+// around the points are visible.
 function camera({target, eye, direction, up, points, radius, field_of_view}) {
   const center = vector(target);
   const toEye = vector(eye ?? direction);
@@ -106,7 +107,7 @@ function camera({target, eye, direction, up, points, radius, field_of_view}) {
   lens.setViewOffset(1, 1, 0, (BAR - TITLE) / 2, 1, 1);
   viewer.set_3d_pane_size();
   viewer.controls.dispose();
-  viewer.set_camera(lens);  // new controls, that orbit about the new up
+  viewer.set_camera(lens);  // new controls, which orbit about the new up direction
   viewer.controls.target.copy(center);
 }
 
@@ -122,22 +123,22 @@ function caption({title, legend, dark}) {
   }));
 }
 
-// Tint all that is at a node, and let what is behind it shine through.
+// Tint a node and all nodes below it, and make them translucent.
 function ghost({path, color, opacity}) {
   const tint = new MeshCat.THREE.Color(color);
   eachMaterial(node(path), (material) => {
     material.color?.lerp(tint, 0.6);
-    // Where it coincides with what is solid, it lies behind.
+    // Where it coincides with a solid object, it is drawn behind it.
     const behind = {polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 8};
     Object.assign(material, {opacity, transparent: true, needsUpdate: true, ...behind});
   });
   node(path).traverse((thing) => { thing.castShadow = false; });
 }
 
-// The clock of a scene that is shown from outside, step by step.
+// Show a time that the program sets, without a clip.
 function time({text}) { document.querySelector("#caption .time").textContent = text; }
 
-// What the program behind the page is doing.
+// Show the program's status.
 function status({text}) {
   document.querySelector("#caption .status").textContent = text;
 }
@@ -148,13 +149,13 @@ function trail(command) {
 
 function trail_more({path, points}) { extendTrail(node(path), points); }
 
-// A clip, or what comes after the last one's end.
+// Load a clip, or append an extension to the current one.
 function clip(command) {
   if (command.begins) player.load(command, command.keep);
   else player.extend(command);
 }
 
-// Take the clip away: the scene is shown from outside from now on.
+// Remove the clip; from now on the program moves the scene.
 function still() { player.unload(); }
 
 function seek({time}) {
@@ -162,13 +163,13 @@ function seek({time}) {
   player.seek(time);
 }
 
-// Answer once all that came before is drawn.
+// Answer once all previous commands are drawn.
 function ask({number}) {
   viewer.render();
   viewer.connection.send(String(number));
 }
 
-// Follow the server; when it ends, wait for the next one at the same address.
+// Connect to the server; when it ends, retry until one runs at the same address.
 function connect(again = false) {
   const address = new URL("scene", location.href);
   address.protocol = address.protocol.replace("http", "ws");
@@ -178,7 +179,7 @@ function connect(again = false) {
   socket.onopen = () => { if (again) location.reload(); };
   socket.onmessage = ({data}) => {
     viewer.handle_command_bytearray(new Uint8Array(data));
-    socket.send("taken");  // only then comes the next: nothing out of date waits in between
+    socket.send("taken");  // flow control: the server sends the next message after it
   };
   socket.onclose = () => {
     document.getElementById("lost").hidden = false;

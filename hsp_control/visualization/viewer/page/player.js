@@ -1,38 +1,38 @@
-// The player: moves the scene along a clip, and tells everybody the time.
+// The player: moves the scene along a clip, and sends events with the time.
 //
-// The one player of all our pages. It knows neither a server nor a file: give it a scene
-// tree and a clip, wherever they come from. The live page gets its clip over the
-// websocket, the exported page holds it; what follows is the same for both.
+// All pages use this player. It depends on neither a server nor a file: it needs a scene
+// tree and a clip. The live page receives its clip over the websocket, the exported page
+// contains it.
 //
 //   const player = new Player(viewer);        // a MeshCat.Viewer
-//   new Controls(player, document.body);      // controls.js: the bar and the keyboard
-//   player.load(clip);                        // shows the clip's start; plays if it says so
-//   player.seek(2.5);                         // shows t = 2.5 s, exactly and at once
+//   new Controls(player, document.body);      // controls.js: the bar and the keys
+//   player.load(clip);                        // shows the clip's start; plays if clip.play is set
+//   player.seek(2.5);                         // shows t = 2.5 s, exactly and immediately
 //   player.addEventListener("time", ({detail}) => cursor.moveTo(detail.time));
 //
-// A clip, as hsp_control/viewer/clip.py writes it:
+// A clip, as viewer/clip.py writes it:
 //
 //   start, end   [s]    first and last time that can be shown
-//   horizon      [s]    where the clip will end once it is whole; the same as `end` then
-//   open                whether more of it is to come (a run that is still computed)
-//   play, loop, speed   how to begin: playing or at rest, once or again and again
+//   horizon      [s]    the end of the complete clip
+//   open                whether extensions will follow (a run that is being computed)
+//   play, loop, speed   initial state: playing or paused, repeated or once
 //   clocks              arrays of times [s], ascending
-//   tracks              [{path, property, clock, values}]: what a node of the scene does;
+//   tracks              [{path, property, clock, values}]: the animation of a node's property;
 //                       `clock` is the index of its times, `values` are all rows in one
 //                       Float32Array. Before its first time and after its last one, a
 //                       track keeps its first and its last value.
 //
 // Properties: "position" (3), "quaternion" (x, y, z, w), "scale" (3), "color" (red, green,
-// blue from 0 to 1), "opacity" (1), "length" (1: the rings of a trail, see trail.js, that
-// are drawn after its first), all interpolated, the quaternion on its sphere; and "visible" (1: 0 or 1), which jumps, and
-// leaves the node's own switch in the scene tree to the user. A path that is not in the
-// scene is passed over: what is left out of the scene need not be left out of the clip.
+// blue from 0 to 1), "opacity" (1) and "length" (1: the number of drawn rings of a trail
+// after its first, see trail.js) are interpolated, the quaternion spherically. "visible"
+// (1: 0 or 1) is not interpolated; it acts on the node's object, so that the node's switch
+// in the scene tree remains the user's. A path that is not in the scene is ignored.
 //
 // Attributes (read): time, start, end, horizon, open, playing, speed, loop, loaded.
 // Methods: load(clip), extend(clip), unload(), play(), pause(), toggle(), seek(t),
 // step(dt), faster(), slower(), setSpeed(x), setLoop(on), refresh().
-// Events: "time" (detail: {time, start, end}) whenever another time is shown; "state"
-// whenever playing, speed, loop, or what can be played has changed.
+// Events: "time" (detail: {time, start, end}) when another time is shown; "state" when
+// playing, speed, loop or the clip has changed.
 "use strict";
 
 class Player extends EventTarget {
@@ -46,15 +46,15 @@ class Player extends EventTarget {
     this.unload();
   }
 
-  // Forget the clip; the scene stays as it is.
+  // Remove the clip; the scene does not change.
   unload() {
     this.tracks = new Map();
     this.time = this.start = this.end = this.horizon = 0;
     this.open = this.playing = this.loaded = false;
-    this._said("state");
+    this._emit("state");
   }
 
-  // Show a clip in place of the last one. With `keep`, at the same time and as before.
+  // Replace the clip. With `keep`, time, speed and state of the last clip are kept.
   load(clip, keep = false) {
     const {time, playing, loaded} = this;
     this.tracks = new Map();
@@ -71,7 +71,7 @@ class Player extends EventTarget {
     if (keep && loaded ? playing : clip.play) this.play();
   }
 
-  // Add what comes after the clip's end.
+  // Append an extension to the clip.
   extend(clip) {
     const copies = clip.clocks.map((clock) => Float64Array.from(clock));
     for (const {path, property, clock, values} of clip.tracks) {
@@ -84,18 +84,18 @@ class Player extends EventTarget {
     this.horizon = Math.max(this.end, clip.horizon ?? clip.end);
     this.open = Boolean(clip.open);
     this.refresh();
-    this._said("state");
+    this._emit("state");
   }
 
   play() {
     if (!this.loaded || this.playing) return;
     if (this.time >= this.end && !this.open) this.seek(this.start);
     this.playing = true;
-    this._said("state");
+    this._emit("state");
     let last = performance.now();
     const frame = (now) => {
       if (this._frame !== frame || !this.playing) return;
-      // A page that was out of sight goes on where it was.
+      // A page that was hidden continues where it was: limit the step.
       this._advance(Math.min(Math.max(now - last, 0) / 1000, 0.25));
       last = now;
       if (this.playing) requestAnimationFrame(frame);
@@ -107,20 +107,20 @@ class Player extends EventTarget {
   pause() {
     if (!this.playing) return;
     this.playing = false;
-    this._said("state");
+    this._emit("state");
   }
 
   toggle() { if (this.playing) this.pause(); else this.play(); }
 
-  // Show a time [s], within what there is.
+  // Show a time [s], limited to the clip.
   seek(time) {
     this.time = Math.min(Math.max(time, this.start), this.end);
     this.refresh();
     const {start, end} = this;
-    this._said("time", {time: this.time, start, end});
+    this._emit("time", {time: this.time, start, end});
   }
 
-  // Rest, and go on or back by some seconds.
+  // Pause, and move by some seconds.
   step(seconds) {
     this.pause();
     this.seek(this.time + seconds);
@@ -128,7 +128,7 @@ class Player extends EventTarget {
 
   setSpeed(speed) {
     this.speed = speed;
-    this._said("state");
+    this._emit("state");
   }
 
   faster() { this.setSpeed(Player.SPEEDS.find((x) => x > this.speed) ?? this.speed); }
@@ -137,10 +137,10 @@ class Player extends EventTarget {
 
   setLoop(on) {
     this.loop = on;
-    this._said("state");
+    this._emit("state");
   }
 
-  // Show the present time again, after the scene has changed.
+  // Show the current time again, after the scene has changed.
   refresh() {
     for (const track of this.tracks.values()) {
       const node = this._node(track.path);
@@ -152,7 +152,7 @@ class Player extends EventTarget {
   _advance(seconds) {
     let next = this.time + seconds * this.speed;
     if (this.open) {
-      // Behind a run that is slower than its clock: follow its end smoothly.
+      // A run that is computed slower than real time: follow its end smoothly.
       const behind = Math.max(this.end - this.time, 0);
       next = Math.min(next, this.time + behind * Math.min(1, seconds / 0.3));
     } else if (next >= this.end) {
@@ -164,7 +164,7 @@ class Player extends EventTarget {
       }
     }
     this.seek(next);
-    if (!this.playing) this._said("state");
+    if (!this.playing) this._emit("state");
   }
 
   _node(path) {
@@ -175,10 +175,10 @@ class Player extends EventTarget {
     return node;
   }
 
-  _said(kind, detail = {}) { this.dispatchEvent(new CustomEvent(kind, {detail})); }
+  _emit(kind, detail = {}) { this.dispatchEvent(new CustomEvent(kind, {detail})); }
 }
 
-// What one property of one node does in time.
+// The animation of one property of one node.
 class Track {
   constructor(path, property, times, values) {
     Object.assign(this, {path, property, times, values, count: times.length});
@@ -194,8 +194,8 @@ class Track {
     this.count += times.length;
   }
 
-  // The row before a time and how far it is to the next one.
-  moment(time) {
+  // The rows before and after a time, and the fraction of the way between them.
+  bracket(time) {
     const {times, count} = this;
     let low = this._at, high = count - 1;
     if (!(times[low] <= time)) low = 0;
@@ -210,7 +210,7 @@ class Track {
   }
 
   linear(time) {
-    const [low, high, fraction] = this.moment(time);
+    const [low, high, fraction] = this.bracket(time);
     const {values, width, _value} = this;
     for (let k = 0; k < width; k++) {
       const here = values[low * width + k];
@@ -220,14 +220,14 @@ class Track {
   }
 
   spherical(time) {
-    const [low, high, fraction] = this.moment(time);
+    const [low, high, fraction] = this.bracket(time);
     MeshCat.THREE.Quaternion.slerpFlat(
       this._value, 0, this.values, 4 * low, this.values, 4 * high, fraction);
     return this._value;
   }
 
   stepped(time) {
-    const [low, high, fraction] = this.moment(time);
+    const [low, high, fraction] = this.bracket(time);
     return this.values[(fraction >= 1 ? high : low) * this.width];
   }
 
@@ -236,7 +236,7 @@ class Track {
     quaternion({object}, time) { object.quaternion.fromArray(this.spherical(time)); },
     scale({object}, time) {
       const scale = this.linear(time);
-      object.scale.fromArray(scale.map((x) => x || 1e-9));  // 0 has no inverse
+      object.scale.fromArray(scale.map((x) => x || 1e-9));  // a scale of 0 is not invertible
     },
     visible({children}, time) {
       const thing = children["<object>"];
@@ -263,13 +263,13 @@ function eachMaterial(object, use) {
   });
 }
 
-// An array with more behind its first `count` numbers, in room that doubles.
+// Append to the first `count` numbers of an array; its capacity doubles when it is full.
 function grown(array, count, more) {
-  let room = array;
+  let buffer = array;
   if (count + more.length > array.length) {
-    room = new array.constructor(Math.max(2 * array.length, count + more.length));
-    room.set(array.subarray(0, count));
+    buffer = new array.constructor(Math.max(2 * array.length, count + more.length));
+    buffer.set(array.subarray(0, count));
   }
-  room.set(more, count);
-  return room;
+  buffer.set(more, count);
+  return buffer;
 }

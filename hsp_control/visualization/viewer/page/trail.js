@@ -1,8 +1,7 @@
-// A path in space as a thin tube: WebGL draws lines never thicker than a pixel.
+// A path in space as a thin tube, because WebGL's lines are one pixel wide.
 //
-// Ring i lies about point i, and `userData.segment` tells how many indices the tube takes
-// from one ring to the next, so that a part of the tube is a part of the path: see "length"
-// in player.js.
+// Ring i surrounds point i, and `userData.segment` is the number of indices from one ring to
+// the next, so that a part of the path can be drawn: see "length" in player.js.
 "use strict";
 
 function trailGeometry(points, radius, sides = 8) {
@@ -15,7 +14,7 @@ function trailGeometry(points, radius, sides = 8) {
     const [a, b, c] = [x, y, z].map(Math.abs);
     return new Vector3(+(a <= b && a <= c), +(b < a && b <= c), +(c < a && c < b));
   };
-  // Two unit vectors across the path, carried along it so that they twist little.
+  // Two unit vectors normal to the path, transported along it with little twist.
   let tangent = null, normal = null;
   for (let i = 0; i < count && !tangent; i++) tangent = direction(i);
   tangent ??= new Vector3(1, 0, 0);
@@ -57,20 +56,20 @@ function trailGeometry(points, radius, sides = 8) {
   return geometry;
 }
 
-// A trail in one colour, the same in any light. A sleeve shows only its far half, so that
-// it never hides what it holds.
+// A trail in one colour, the same in any light. Of a sleeve only the back faces are drawn,
+// so that it never hides its content.
 function trailMesh({points, radius, color, opacity, sleeve}) {
   const {Mesh, MeshBasicMaterial, BackSide, FrontSide} = MeshCat.THREE;
-  const surface = new MeshBasicMaterial({
+  const material = new MeshBasicMaterial({
     color, opacity, transparent: opacity < 1, side: sleeve ? BackSide : FrontSide,
   });
-  const mesh = new Mesh(trailGeometry(points, radius), surface);
+  const mesh = new Mesh(trailGeometry(points, radius), material);
   mesh.userData = {radius};
   mesh.frustumCulled = false;  // it grows
   return mesh;
 }
 
-// Make a trail longer.
+// Append points to a trail.
 function extendTrail(object, more) {
   object.traverse((mesh) => {
     const {points} = mesh.geometry?.userData ?? {};
@@ -83,7 +82,7 @@ function extendTrail(object, more) {
   });
 }
 
-// Draw trails only up to a number of rings after the first.
+// Draw only the given number of rings after the first.
 function drawLength(object, rings) {
   object.traverse(({geometry}) => {
     const size = geometry?.userData.segment;

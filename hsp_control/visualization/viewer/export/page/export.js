@@ -1,4 +1,4 @@
-// A page that holds its scene: puts plots beside it and shows both.
+// An exported page, which contains its scene: shows the scene and the plots beside it.
 "use strict";
 
 const stage = document.createElement("main");
@@ -10,38 +10,38 @@ for (const part of document.querySelectorAll("#meshcat-pane, .dg.main, #caption,
   stage.append(part);
 }
 
-// Meshcat takes the window's height; here the scene shares it.
+// Meshcat uses the whole window; here the scene has only a part of it.
 const fitPane = viewer.set_3d_pane_size.bind(viewer);
 viewer.set_3d_pane_size = () => {
   const {clientWidth, clientHeight} = viewer.dom_element;
   if (clientWidth && clientHeight) fitPane(clientWidth, clientHeight);
 };
 
-// All stays in sight when the window changes, until one looks from elsewhere.
-let shot = null;
-const place = words.camera;
-words.camera = (command) => {
-  shot = command;
-  place(command);
-  viewer.controls.addEventListener("start", () => { shot = null; });
+// When the window changes, keep the whole scene visible, until the user moves the camera.
+let lastCamera = null;
+const placeCamera = commandHandlers.camera;
+commandHandlers.camera = (command) => {
+  lastCamera = command;
+  placeCamera(command);
+  viewer.controls.addEventListener("start", () => { lastCamera = null; });
 };
 function refit() {
   viewer.set_3d_pane_size();
-  if (shot) words.camera(shot);
+  if (lastCamera) commandHandlers.camera(lastCamera);
   viewer.set_dirty();
 }
 new ResizeObserver(refit).observe(viewer.dom_element);
 
-words.show = ({arrays, commands, plots, about}) => {
-  const made = arrays.map(unpackArray);
+commandHandlers.show = ({arrays, commands, plots, about}) => {
+  const unpacked = arrays.map(unpackArray);
   viewer.set_3d_pane_size();
-  viewer.handle_command(withArrays(commands, made));
-  new Plots(player, side, withArrays(plots, made));
-  tell(about);
+  viewer.handle_command(withArrays(commands, unpacked));
+  new Plots(player, side, withArrays(plots, unpacked));
+  addFooter(about);
 };
 
-// What the run was, under the plots.
-function tell({text, facts}) {
+// The description and the facts of the run, below the plots.
+function addFooter({text, facts}) {
   const foot = document.createElement("footer");
   if (text) foot.append(Object.assign(document.createElement("p"), {textContent: text}));
   const list = document.createElement("p");
@@ -51,7 +51,7 @@ function tell({text, facts}) {
   side.append(foot);
 }
 
-// Show or hide the plots; the scene takes the room.
+// Show or hide the plots; the scene takes their space.
 function toggleSide() {
   document.body.classList.toggle("alone");
 }
@@ -68,7 +68,7 @@ addEventListener("keydown", (event) => {
   toggleSide();
 });
 
-// `page.html#t=2.5` opens at rest at that time.
+// `page.html#t=2.5` opens the page paused at that time.
 function openAtHash() {
   const time = new URLSearchParams(location.hash.slice(1)).get("t");
   if (time === null || !Number.isFinite(Number(time))) return;

@@ -1,9 +1,8 @@
-// The plots beside the scene: curves over time, and a cursor that moves with the robot.
+// The plots beside the scene: curves over time, and a cursor at the player's time.
 //
-//   new Plots(player, side, {start, end, bounded, panels, colors});
+//   new Plots(player, side, {start, end, damped, panels, colors});
 //
-// as hsp_control/viewer/export/panels.py writes them. To press or drag in a plot moves the
-// player there.
+// with the data of viewer/export/panels.py. A click or drag in a plot sets the player's time.
 "use strict";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -16,8 +15,8 @@ function svg(name, attributes, parent) {
 }
 
 class Plots {
-  constructor(player, parent, {start, end, bounded, panels, colors}) {
-    Object.assign(this, {player, start, end: end > start ? end : start + 1, bounded, colors});
+  constructor(player, parent, {start, end, damped, panels, colors}) {
+    Object.assign(this, {player, start, end: end > start ? end : start + 1, damped, colors});
     this.plots = panels.map((panel) => new Plot(this, parent, panel));
     player.addEventListener("time", () => this.showTime());
     new ResizeObserver(() => this.draw()).observe(parent);
@@ -62,7 +61,7 @@ class Plot {
     this.picture.addEventListener("pointerdown", (event) => this.drag(event));
   }
 
-  // Where on the page a time and a value are.
+  // The coordinates of a time and a value in the plot.
   x(time) {
     const {start, end} = this.plots;
     return Plot.MARGIN.left + (time - start) / (end - start) * this.width;
@@ -83,12 +82,12 @@ class Plot {
     this.height = Plot.HEIGHT - top - bottom;
     picture.replaceChildren();
     picture.setAttribute("viewBox", `0 0 ${full} ${Plot.HEIGHT}`);
-    for (const [from, to] of plots.bounded) {
+    for (const [from, to] of plots.damped) {
       const x = this.x(from);
       svg("rect", {x, y: top, width: Math.max(this.x(to) - x, 1), height: this.height,
                    fill: warning, opacity: 0.15}, picture)
         .append(svg("title", {}));
-      picture.lastChild.firstChild.textContent = "the law is bounded near a singularity";
+      picture.lastChild.firstChild.textContent = "damped near a singularity";
     }
     const {ticks, label} = panel.logarithmic
       ? decades(panel.low, panel.high) : steps(panel.low, panel.high, 4);
@@ -134,11 +133,11 @@ class Plot {
       const value = valueAt(series, time);
       this.dots[i].setAttribute("cy", this.y(value));
       this.dots[i].style.display = value < panel.low || value > panel.high ? "none" : "";
-      this.entries[i].textContent = brief(panel.logarithmic ? 10 ** value : value);
+      this.entries[i].textContent = shortNumber(panel.logarithmic ? 10 ** value : value);
     });
   }
 
-  // While the hand is on the plot, the player stands where it points.
+  // While the plot is dragged, pause the player at the time under the pointer.
   drag(event) {
     if (event.button) return;
     const {player, start, end} = this.plots;
@@ -161,7 +160,7 @@ class Plot {
   }
 }
 
-// A curve's value at a time, on the line between two of its points.
+// A curve's value at a time, interpolated linearly between two of its points.
 function valueAt({times, values}, time) {
   let low = 0, high = times.length - 1;
   while (high - low > 1) {
@@ -172,7 +171,7 @@ function valueAt({times, values}, time) {
   return values[low] + Math.min(Math.max(fraction, 0), 1) * (values[high] - values[low]);
 }
 
-// Round numbers from low to high, about `count` of them.
+// About `count` round numbers from low to high.
 function steps(low, high, count) {
   const raw = (high - low) / count, power = 10 ** Math.floor(Math.log10(raw));
   const step = power * [1, 2, 5, 10].find((factor) => factor * power >= raw * 0.999);
@@ -194,8 +193,8 @@ function decades(low, high) {
   return {ticks, label: (tick) => tick === 0 ? "1" : `10${raised(String(tick))}`};
 }
 
-// A number in a few letters, always as wide.
-function brief(value) {
+// A number with few characters, always of about the same width.
+function shortNumber(value) {
   const size = Math.abs(value);
   const text = size !== 0 && (size < 1e-3 || size >= 1e5)
     ? value.toExponential(1) : value.toFixed(size < 10 ? 3 : size < 1000 ? 1 : 0);

@@ -1,4 +1,4 @@
-// Unpack the scripts, then let export.js show the content.
+// Unpack and run the scripts; export.js then shows the content.
 "use strict";
 
 async function unzipped(id) {
@@ -8,16 +8,16 @@ async function unzipped(id) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-function complain(reason) {
-  const words = document.createElement("p");
-  words.className = "complaint";
-  words.textContent = reason;
-  document.body.append(words);
+function showError(message) {
+  const paragraph = document.createElement("p");
+  paragraph.className = "error";
+  paragraph.textContent = message;
+  document.body.append(paragraph);
 }
 
 (async () => {
   if (typeof DecompressionStream === "undefined") {
-    return complain("This page needs a browser of 2023 or newer.");
+    return showError("This page needs a browser of 2023 or newer.");
   }
   for (const code of JSON.parse(new TextDecoder().decode(await unzipped("scripts")))) {
     const script = document.createElement("script");
@@ -26,6 +26,6 @@ function complain(reason) {
   }
   begin(await unzipped("content"));
 })().catch((error) => {
-  complain(`This page cannot be shown: ${error.message}. Does the browser have WebGL?`);
+  showError(`This page cannot be shown: ${error.message}. Does the browser support WebGL?`);
   throw error;
 });

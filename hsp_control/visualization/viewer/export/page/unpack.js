@@ -1,8 +1,8 @@
-// Arrays as hsp_control/viewer/export/packing.py packed them.
+// Unpacks the arrays that viewer/export/packing.py packed.
 "use strict";
 
 function unpackArray({kind, rows, columns, width, bytes, offset, step}) {
-  // Planes of bytes, the lowest first; in each, columns one after another.
+  // Byte planes, the lowest byte first; in each plane one column after another.
   const whole = (row, column) => {
     let number = 0;
     for (let plane = width - 1; plane >= 0; plane--) {
@@ -29,7 +29,7 @@ function unpackArray({kind, rows, columns, width, bytes, offset, step}) {
   return values;
 }
 
-// Data with its arrays back in their places.
+// Replace the references to arrays by the arrays.
 function withArrays(value, arrays) {
   if (value === null || typeof value !== "object" || ArrayBuffer.isView(value)) return value;
   if (Array.isArray(value)) return value.map((item) => withArrays(item, arrays));

@@ -1,0 +1,13 @@
+"""Replace sections of documents between two markers."""
+
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+
+
+def replace_section(page: Path, name: str, text: str) -> None:
+    """Replace the text between ``<!-- name: begin -->`` and ``<!-- name: end -->``."""
+    begin, end = f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->"
+    head, rest = page.read_text(encoding="utf-8").split(begin, 1)
+    _, tail = rest.split(end, 1)
+    page.write_text(head + begin + text + end + tail, encoding="utf-8")

@@ -1,0 +1,127 @@
+"""Keys that have a new name: configurations and logs of earlier versions still load."""
+
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from hsp_control.config.keys import KeyPath, written
+from hsp_control.config.located import located
+
+RENAMED: dict[KeyPath, KeyPath] = {
+    ("remedies",): ("compensation",),
+}
+"""Old key path to new key path.
+
+A ``*`` in the old path matches any one key or list entry. The new path has as many
+``*``; they take, in order, what those of the old path matched.
+"""
+
+
+_NESTED = dict, list
+
+
+class RenamedKeyWarning(FutureWarning):
+    """A configuration uses the old name of a key."""
+
+
+def rename_keys(
+    data: dict[str, Any],
+    origins: dict[KeyPath, Any],
+    location: Callable[[KeyPath], str],
+) -> None:
+    """Give renamed keys their new names, and warn about each of them.
+
+    Args:
+        data: The configuration; changed in place.
+        origins: Where each key path comes from; changed in place, so that the values
+            under a renamed key keep their lines.
+        location: Returns ``file:line`` of a key path, for messages.
+
+    Raises:
+        ConfigError: If the old and the new key are both given.
+    """
+    for old_pattern, new_pattern in RENAMED.items():
+        for old in list(_matches(data, old_pattern)):
+            new = _new_path(old_pattern, new_pattern, old)
+            holders = [_get(data, new[:k]) for k in range(len(new))]
+            if isinstance(holders[-1], dict) and new[-1] in holders[-1]:
+                message = (
+                    f"is now {written(new)}, which is also given; remove one of them"
+                )
+                raise located(location(old), message, old)
+            if not all(
+                holder is None or isinstance(holder, _NESTED) for holder in holders
+            ):
+                continue  # the new place cannot exist: the schema reports what is wrong
+            _warn(location(old), old, new)
+            _move(data, old, new)
+            for path in [path for path in origins if path[: len(old)] == old]:
+                origins[(*new, *path[len(old) :])] = origins.pop(path)
+
+
+def current_keys(keys: Sequence[str], where: str) -> list[str]:
+    """Return the parts of a key path with their new names; warn if one is renamed.
+
+    Args:
+        keys: The parts, as text: those of ``--set`` or ``--over``.
+        where: The file and line, or the option, for the warning.
+    """
+    current: KeyPath = tuple(keys)
+    for old_pattern, new_pattern in RENAMED.items():
+        old = current[: len(old_pattern)]
+        if _fits(old, old_pattern):
+            new = _new_path(old_pattern, new_pattern, old)
+            _warn(where, old, new)
+            current = (*new, *current[len(old) :])
+    return [str(part) for part in current]
+
+
+def _warn(where: str, old: KeyPath, new: KeyPath) -> None:
+    message = f"{where}: {written(old)} is now {written(new)}"
+    warnings.warn(message, RenamedKeyWarning, stacklevel=4)
+
+
+def _fits(path: KeyPath, pattern: KeyPath) -> bool:
+    return len(path) == len(pattern) and all(
+        wanted in ("*", part) for part, wanted in zip(path, pattern, strict=True)
+    )
+
+
+def _new_path(old_pattern: KeyPath, new_pattern: KeyPath, old: KeyPath) -> KeyPath:
+    """Return the new key path, with the parts that each ``*`` matched."""
+    matched = (
+        part for part, wanted in zip(old, old_pattern, strict=True) if wanted == "*"
+    )
+    return tuple(next(matched) if part == "*" else part for part in new_pattern)
+
+
+def _matches(value: Any, pattern: KeyPath, path: KeyPath = ()) -> Iterator[KeyPath]:
+    """Yield the key paths in the data that match a pattern."""
+    if not pattern:
+        yield path
+    elif isinstance(value, _NESTED):
+        entries = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, inner in entries:
+            if pattern[0] in ("*", key):
+                yield from _matches(inner, pattern[1:], (*path, key))
+
+
+def _get(data: Any, path: KeyPath) -> Any:
+    """Return the value at a key path, None if there is none."""
+    for part in path:
+        if isinstance(data, list) and isinstance(part, int):
+            data = data[part] if part < len(data) else None
+        else:
+            data = data.get(part) if isinstance(data, dict) else None
+    return data
+
+
+def _move(data: dict[str, Any], old: KeyPath, new: KeyPath) -> None:
+    """Move a value, creating the mappings that lead to its new place."""
+    value = _get(data, old[:-1]).pop(old[-1])
+    holder: Any = data
+    for part in new[:-1]:
+        if _get(holder, (part,)) is None:
+            holder[part] = {}
+        holder = holder[part]
+    holder[new[-1]] = value

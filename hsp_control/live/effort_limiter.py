@@ -1,0 +1,76 @@
+"""The last stage before the robot: limit efforts and their rates, block NaN and inf."""
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.live.settings import EffortInterface
+from hsp_control.robot import Robot
+
+
+class EffortLimiter:
+    """Converts an effort into the value that is sent, within effort and rate limits.
+
+    Attributes:
+        sent: The value sent last, shape (nv,): tau, or tau - g(q).
+        applied: The effort that the motors then apply, shape (nv,): tau.
+        gravity: g(q) at the last configuration, shape (nv,).
+    """
+
+    def __init__(self, robot: Robot, interface: EffortInterface, period: float) -> None:
+        """Read the limits.
+
+        Args:
+            robot: The model.
+            interface: Limits, and whether the robot adds g(q) itself.
+            period: Time between two efforts [s].
+
+        Raises:
+            LiveError: If a limit is not positive or has the wrong shape.
+        """
+        self._robot = robot
+        self._rest = np.zeros(robot.nv)
+        self._compensates = interface.compensates_gravity
+        self._upper = interface.effort_limits(robot)
+        self._step = interface.rate_limits(robot) * period
+        self.sent: Array = np.zeros(robot.nv)
+        self.applied: Array = np.zeros(robot.nv)
+        self.gravity: Array = np.zeros(robot.nv)
+
+    @property
+    def effort_limits(self) -> Array:
+        """The upper limits of the motors' efforts, shape (nv,)."""
+        return self._upper
+
+    def reset(self, q: Array) -> None:
+        """Start at rest at q, shape (nq,): brakes or motors provide g(q)."""
+        self.gravity = self._robot.inverse_dynamics(q, self._rest, self._rest)
+        self.sent = np.zeros(self._robot.nv)
+        if not self._compensates:
+            self.sent = np.clip(self.gravity, -self._upper, self._upper)
+        self.applied = self.sent + self._added_by_robot
+
+    @property
+    def _added_by_robot(self) -> Array | float:
+        return self.gravity if self._compensates else 0.0
+
+    def apply(self, tau: Array, q: Array) -> bool:
+        """Compute ``sent`` from an effort.
+
+        The effort is clipped to its limits first, then the sent value to its rate. If
+        some value satisfies both limits, the result does.
+
+        Args:
+            tau: Effort, shape (nv,).
+            q: Configuration, shape (nq,).
+
+        Returns:
+            Whether tau is finite; if not, ``sent`` keeps its last value.
+        """
+        if not np.isfinite(tau).all():
+            return False
+        if self._compensates:
+            self.gravity = self._robot.inverse_dynamics(q, self._rest, self._rest)
+        wanted = np.clip(tau, -self._upper, self._upper) - self._added_by_robot
+        np.clip(wanted, self.sent - self._step, self.sent + self._step, out=self.sent)
+        self.applied = self.sent + self._added_by_robot
+        return True

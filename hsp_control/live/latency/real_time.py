@@ -1,0 +1,55 @@
+"""Settings of a process that runs a real-time loop."""
+
+import gc
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from hsp_control.common.exceptions import SimulationError
+
+
+@contextmanager
+def no_garbage_collection() -> Iterator[None]:
+    """Disable Python's garbage collector in this context.
+
+    A collection visits every container object: it takes milliseconds, at an unknown
+    time. A control step creates no reference cycles, so that reference counting frees
+    all its memory. Existing objects are frozen: an explicit collection skips them.
+    """
+    was_enabled = gc.isenabled()
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        if was_enabled:
+            gc.enable()
+
+
+@contextmanager
+def real_time_priority(level: int) -> Iterator[None]:
+    """Run the process with real-time priority (SCHED_FIFO) in this context.
+
+    Args:
+        level: Priority, 1 to 99; on a real-time kernel drivers' threads have 50.
+
+    Raises:
+        SimulationError: If the level is out of range, or the user lacks the permission:
+            root, the capability CAP_SYS_NICE, or a line ``rtprio`` in limits.conf.
+    """
+    if not 1 <= level <= 99:
+        raise SimulationError(f"real-time priority {level}; must be from 1 to 99")
+    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(level))
+    except OSError as error:
+        raise SimulationError(
+            f"real-time priority {level}: {error.strerror}; needs root, "
+            "CAP_SYS_NICE, or a line 'rtprio' in /etc/security/limits.conf"
+        ) from None
+    try:
+        yield
+    finally:
+        os.sched_setscheduler(0, policy, parameters)

@@ -1,0 +1,36 @@
+"""Requests of an operator, or of another thread, to a running loop."""
+
+from collections import deque
+from collections.abc import Callable
+
+
+class OperatorRequests:
+    """A stop request, and changes to make between two periods; safe from any thread.
+
+    Attributes:
+        reason: Why the operator requested a stop; None without a request.
+    """
+
+    def __init__(self) -> None:
+        """Start without requests."""
+        self.reason: str | None = None
+        self._changes: deque[Callable[[], object]] = deque()
+
+    def stop(self, reason: str = "the operator's stop") -> None:
+        """Request a safe stop; the first reason is kept."""
+        if self.reason is None:
+            self.reason = reason
+
+    def call(self, change: Callable[[], object]) -> None:
+        """Request that a change is made between two periods, for example a new task.
+
+        ``requests.call(lambda: controller.change_gains(...))``. If it raises, the
+        robot is stopped. The loop waits until it returns: build what it needs, and
+        compute once with it, before the call.
+        """
+        self._changes.append(change)
+
+    def run_pending(self) -> None:
+        """Make the requested changes, oldest first."""
+        while self._changes:
+            self._changes.popleft()()

@@ -1,0 +1,142 @@
+"""A simulated robot: a plant with a watchdog and its own safe stop."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import LiveError
+from hsp_control.live.safe_stop import Phase, SafeStop
+from hsp_control.live.settings import EffortInterface, StopSettings
+from hsp_control.robot import RobotState
+from hsp_control.simulation.plants import SampledPlant
+
+WATCHDOG = 20
+"""Periods without a valid effort before the robot stops itself; the same as a Panda."""
+
+
+class SimulatedRobot:
+    """A plant that is advanced period by period, and checks the efforts it receives.
+
+    Until the first effort its brakes hold it and its time stands still. Afterwards, in
+    a period without an effort it holds the last one. After too many of them, or after
+    an effort that is not finite, it stops by itself with a `SafeStop` from its true
+    state, and ignores all further efforts, as a real robot's safety controller and
+    brakes do.
+
+    Attributes:
+        plant: The plant.
+        period: Length of a period [s].
+        t: Time since the first effort [s].
+        q: True configuration, shape (nq,).
+        v: True velocity, shape (nv,).
+        tau: The effort of its motors in the last period, shape (nv,).
+        periods: Number of periods since the first effort.
+        watchdog: Number of periods without a valid effort that are tolerated.
+        phase: Waiting, running, damping or holding.
+        reason: Why it stopped; empty before.
+    """
+
+    def __init__(
+        self,
+        plant: SampledPlant,
+        q: Array,
+        v: Array,
+        period: float,
+        *,
+        interface: EffortInterface | None = None,
+        watchdog: int = WATCHDOG,
+        stop: StopSettings | None = None,
+    ) -> None:
+        """Set the robot to its start, at rest or moving.
+
+        Args:
+            plant: The plant.
+            q: Start configuration, shape (nq,).
+            v: Start velocity, shape (nv,).
+            period: Length of a period [s].
+            interface: Which efforts it accepts; if it compensates gravity, then with
+                its true mass.
+            watchdog: Number of periods without a valid effort that are tolerated.
+            stop: Settings of its own safe stop.
+
+        Raises:
+            LiveError: If the settings contradict each other.
+        """
+        if watchdog < 1:
+            raise LiveError(f"watchdog is {watchdog}; needs at least 1 period")
+        robot = plant.robot
+        self._interface = interface or EffortInterface()
+        limits = self._interface.effort_limits(robot)
+        self._interface.rate_limits(robot)  # raises if they are invalid
+        self._stop = SafeStop(robot, stop or StopSettings(), limits, period)
+        self._state = RobotState(robot)
+        self._rest = np.zeros(robot.nv)
+        self.plant, self.period, self.watchdog = plant, period, watchdog
+        self.q, self.v = q.copy(), v.copy()
+        self.t, self.periods = 0.0, 0
+        self.phase, self.reason = Phase.WAITING, ""
+        self._missing = 0
+        self._command: Array = np.zeros(robot.nv)
+        self.tau = self._gravity()
+        plant.reset(0.0, self.q, self.v)
+
+    @property
+    def halted(self) -> bool:
+        """Whether it has stopped by itself."""
+        return self.phase > Phase.RUNNING
+
+    @property
+    def done(self) -> bool:
+        """Whether it has stopped, and was held for `StopSettings.hold`."""
+        return self.phase == Phase.HOLDING and self._stop.done
+
+    def measure(self) -> tuple[Array, Array]:
+        """Return the measured q, shape (nq,), and v, shape (nv,)."""
+        return self.plant.measure(self.t, self.q, self.v)
+
+    def halt(self, reason: str) -> None:
+        """Start the safe stop; the first reason is kept."""
+        if self.phase <= Phase.RUNNING:
+            self._stop.begin()
+            self.phase, self.reason = Phase.DAMPING, reason
+
+    def advance(self, efforts: Sequence[Array]) -> None:
+        """Simulate a period.
+
+        Args:
+            efforts: Efforts that arrived in it, shape (nv,) each; the last one is used.
+        """
+        if self.phase <= Phase.RUNNING:
+            self._receive(efforts)
+        if self.phase == Phase.WAITING:
+            return
+        if self.phase == Phase.RUNNING:
+            self.tau = self._command
+            if self._interface.compensates_gravity:
+                self.tau = self.tau + self._gravity()
+        else:
+            state = self._state.update(self.t, self.q, self.v)
+            self.tau = self._stop.effort(state)
+            self.phase = self._stop.phase
+        end = (self.periods + 1) * self.period
+        self.q, self.v = self.plant.advance(self.t, end, self.tau)
+        self.periods += 1
+        self.t = end
+
+    def _gravity(self) -> Array:
+        return self.plant.robot.inverse_dynamics(self.q, self._rest, self._rest)
+
+    def _receive(self, efforts: Sequence[Array]) -> None:
+        if not efforts:
+            self._missing += self.phase == Phase.RUNNING
+            if self._missing > self.watchdog:
+                self.halt(f"the watchdog: no valid effort for {self._missing} periods")
+            return
+        self._missing = 0
+        if self.phase == Phase.WAITING:
+            self.phase = Phase.RUNNING
+        if not np.isfinite(efforts[-1]).all():
+            self.halt(f"an effort is not finite: {efforts[-1].tolist()}")
+            return
+        self._command = np.array(efforts[-1], dtype=float)

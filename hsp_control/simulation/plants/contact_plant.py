@@ -1,0 +1,169 @@
+"""A plant of rigid bodies with bilateral contacts, whose constraints hold exactly."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.control.log_channel import LogChannel
+from hsp_control.robot import Robot, RobotState
+from hsp_control.simulation.plants.contact_channels import contact_channels
+from hsp_control.simulation.plants.floating_roots import FloatingRoots
+from hsp_control.simulation.plants.json_data import to_json_data
+from hsp_control.simulation.plants.plant import ContinuousPlant
+from hsp_control.simulation.plants.push import Push, Pushes
+
+ContactKind = Literal["point", "surface"]
+
+REDUNDANT = 1e-12
+"""Eigenvalues of J M⁻¹ Jᵀ below this share of the largest are redundant rows."""
+
+
+@dataclass(frozen=True)
+class RigidContact:
+    """A frame that is fixed to the world while the contact is on; it can also pull.
+
+    Attributes:
+        frame: The frame; forces are logged under its name.
+        kind: ``point`` holds its origin, ``surface`` also its orientation.
+        on: Intervals (start, end) [s] during which it holds; None: always.
+    """
+
+    frame: str
+    kind: ContactKind = "surface"
+    on: Sequence[tuple[float, float]] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the kind, and that each interval starts before it ends."""
+        if self.kind not in get_args(ContactKind):
+            raise SimulationError(
+                f"contact of {self.frame!r}: kind {self.kind!r}: choose among "
+                f"{', '.join(get_args(ContactKind))}"
+            )
+        for span in self.on or ():
+            if len(span) != 2 or not span[0] < span[1]:
+                raise SimulationError(
+                    f"contact of {self.frame!r}: on from {span[0]} to {span[-1]} s; "
+                    "the start must be before the end"
+                )
+
+    @property
+    def rows(self) -> int:
+        """How many velocities it keeps at zero."""
+        return 3 if self.kind == "point" else 6
+
+    def holds(self, t: float) -> bool:
+        """Return whether it holds at time t [s]."""
+        return self.on is None or any(begin <= t < end for begin, end in self.on)
+
+
+class ContactPlant(ContinuousPlant):
+    """M v' + N = tau + Jᵀλ with J v' + J'v = -k J v, solved for v' and λ.
+
+    Contacts can pull as well as push, and never slip: a plant for proofs. Their forces
+    are logged as ``plant.contact.<frame>.force`` and ``.moment``, so that you can check
+    whether a real contact could exert them. A velocity at the start of a contact decays
+    as exp(-k t).
+
+    Attributes:
+        contacts: The contacts.
+        damping: k [1/s].
+        pushes: External wrenches.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        contacts: Sequence[RigidContact],
+        *,
+        damping: float = 100.0,
+        pushes: Sequence[Push] = (),
+    ) -> None:
+        """Set the robot and its contacts.
+
+        Args:
+            robot: The robot that moves; a free-flyer root has no motor.
+            contacts: The contacts.
+            damping: Rate k at which the velocity of a contact decays [1/s].
+            pushes: External wrenches.
+
+        Raises:
+            FrameNotFoundError: If a frame does not exist.
+            SimulationError: If two contacts share a frame, or the damping is negative.
+        """
+        super().__init__(robot)
+        names = [contact.frame for contact in contacts]
+        for name in names:
+            robot.frame_id(name)
+            if names.count(name) > 1:
+                raise SimulationError(f"two contacts have the same frame {name!r}")
+        if not 0.0 <= damping < np.inf:
+            raise SimulationError(
+                f"contacts: damping is {damping}; must not be negative"
+            )
+        self.contacts, self.damping = tuple(contacts), damping
+        self.pushes = Pushes(robot, pushes)
+        self._roots = FloatingRoots(robot)
+        self._state = RobotState(robot)
+
+    def acceleration(self, t: float, q: Array, v: Array, tau: Array) -> Array:
+        """Return v'; see `ContinuousPlant.acceleration`."""
+        return self._solve(t, q, v, tau)[0]
+
+    def log_channels(
+        self, t: float, q: Array, v: Array, tau: Array
+    ) -> Mapping[str, LogChannel]:
+        """Return the force and moment of every contact, zero while it is off."""
+        return contact_channels(self._solve(t, q, v, tau)[1])
+
+    def describe(self) -> dict[str, Any]:
+        """Return its contacts and pushes."""
+        return {
+            "type": "ContactPlant",
+            "contacts": to_json_data(self.contacts),
+            "damping": self.damping,
+            "pushes": to_json_data(self.pushes.pushes),
+        }
+
+    def _solve(
+        self, t: float, q: Array, v: Array, tau: Array
+    ) -> tuple[Array, dict[str, Array]]:
+        """Return v' and the wrench of every contact, shape (6,), in world axes."""
+        state = self._state.update(t, q, v)
+        effort = self._roots.remove_effort(t, tau)
+        if self.pushes.any_active(t, t):
+            effort = effort + self.pushes.effort(t, q)
+        M = np.triu(state.mass_matrix)
+        M += np.triu(M, 1).T
+        net_effort = effort - state.nonlinear_effects
+        holding = [contact for contact in self.contacts if contact.holds(t)]
+        wrenches = {contact.frame: np.zeros(6) for contact in self.contacts}
+        if not holding:
+            return np.asarray(np.linalg.solve(M, net_effort)), wrenches
+        frames = [(state.frame(c.frame), c.rows) for c in holding]
+        J = np.vstack([frame.jacobian[:rows] for frame, rows in frames])
+        drift = np.concatenate([frame.drift[:rows] for frame, rows in frames])
+        solutions = np.linalg.solve(M, np.column_stack([net_effort, J.T]))
+        free, response = solutions[:, 0], solutions[:, 1:]
+        missing = -drift - self.damping * (J @ v) - J @ free
+        multipliers = _minimum_norm_solution(J @ response, missing)
+        start = 0
+        for contact in holding:
+            own = multipliers[start : start + contact.rows]
+            wrenches[contact.frame][: contact.rows] = own
+            start += contact.rows
+        return free + response @ multipliers, wrenches
+
+
+def _minimum_norm_solution(A: Array, b: Array) -> Array:
+    """Return the x of minimum norm with A x = b, A positive semidefinite.
+
+    So redundant contacts share the force.
+    """
+    values, vectors = np.linalg.eigh(A)
+    kept = values > REDUNDANT * values[-1]
+    share = vectors[:, kept].T @ b / values[kept]
+    return np.asarray(vectors[:, kept] @ share)

@@ -1,0 +1,37 @@
+"""Quantities of a controller that the viewer draws: field terms and projector."""
+
+from collections.abc import Iterator
+from typing import TypeVar
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.control.controller import Controller
+from hsp_control.null_space.fields import NullSpaceField, WeightedSum
+from hsp_control.null_space.metrics import MetricSample
+from hsp_control.robot import RobotState
+
+_Term = TypeVar("_Term", bound=NullSpaceField)
+
+
+def terms_of_type(field: NullSpaceField, kind: type[_Term]) -> Iterator[_Term]:
+    """Yield the terms of a field that are instances of a class."""
+    each = [field]
+    if isinstance(field, WeightedSum):
+        each = [term for _, term in field.terms]
+    yield from (term for term in each if isinstance(term, kind))
+
+
+def null_space_projector(controller: Controller, state: RobotState) -> Array:
+    """Return the null-space projector P = I - J#J in the metric W, shape (nv, nv).
+
+    J stacks the Jacobians of all contacts and tasks that are active at the state's
+    time, and J# = W⁻¹Jᵀ(J W⁻¹Jᵀ)⁻¹. Where J loses rank, J# is the pseudo-inverse.
+    """
+    J = controller.stack(state).jacobian
+    nv = controller.robot.nv
+    metric = controller.metric.evaluate(state, MetricSample.allocate(nv))
+    # With W = L Lᵀ, P = L⁻ᵀ (I - B⁺B) Lᵀ for B = J L⁻ᵀ.
+    B = np.linalg.solve(metric.L, J.T).T
+    projector = np.eye(nv) - np.linalg.pinv(B, rcond=1e-9) @ B
+    return np.asarray(np.linalg.solve(metric.L.T, projector @ metric.L.T))

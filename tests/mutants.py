@@ -1,0 +1,119 @@
+"""Break the code on purpose, and see whether a test notices: ``make mutants``.
+
+Every mutant is one edit in one named place, and the tests that should go red. A mutant
+that survives is a claim that nobody checks. ``tests/unit/test_mutants.py`` checks that
+every edit still fits the code.
+
+    python tests/mutants.py                    all of them
+    python tests/mutants.py law gain           those whose name contains a word
+    python tests/mutants.py --list
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import NamedTuple
+
+from mutant_list import MUTANTS, Mutant
+
+ROOT = Path(__file__).resolve().parents[1]
+COPIED = ("hsp_control", "tests", "robots", "configs", "docs", "pyproject.toml")
+TESTS_FAILED = 1
+"""The exit status of pytest when tests ran and one failed."""
+
+
+class Verdict(NamedTuple):
+    """What became of one mutant.
+
+    Attributes:
+        word: ``caught``, ``SURVIVED`` or ``BROKEN`` (no test ran).
+        detail: The first test that failed, or the end of what pytest printed.
+    """
+
+    word: str
+    detail: str
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Try mutants; return 0 if all were caught."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("words", nargs="*", help="parts of names; default: all")
+    parser.add_argument("--list", action="store_true", help="print the names")
+    options = parser.parse_args(arguments)
+    chosen = [m for m in MUTANTS if all(word in m.name for word in options.words)]
+    if options.list:
+        print(*(mutant.name for mutant in chosen), sep="\n")
+        return 0
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "checkout"
+        copy.mkdir()
+        for name in COPIED:
+            source = ROOT / name
+            if source.is_dir():
+                shutil.copytree(source, copy / name)
+            else:
+                shutil.copy(source, copy / name)
+        not_caught = [name for name, word in tried(copy, chosen) if word != "caught"]
+    print(f"{len(chosen) - len(not_caught)} of {len(chosen)} caught")
+    if not_caught:
+        print("not caught:", *not_caught, sep="\n  ")
+    return 1 if not_caught else 0
+
+
+def tried(copy: Path, mutants: Sequence[Mutant]) -> Iterator[tuple[str, str]]:
+    """Try each mutant in a copy of the checkout; yield its name and the verdict."""
+    for number, mutant in enumerate(mutants, start=1):
+        file = copy / mutant.file
+        text = file.read_text(encoding="utf-8")
+        file.write_text(mutated(mutant, text), encoding="utf-8")
+        start = perf_counter()
+        verdict = run(copy, mutant.tests)
+        file.write_text(text, encoding="utf-8")
+        print(
+            f"{number:3d}/{len(mutants)} {verdict.word:9} {mutant.name:44} "
+            f"{perf_counter() - start:4.0f} s  {verdict.detail}",
+            flush=True,
+        )
+        yield mutant.name, verdict.word
+
+
+def mutated(mutant: Mutant, text: str) -> str:
+    """Return the text with the mutant's edit.
+
+    Raises:
+        ValueError: If the edit does not fit just one place.
+    """
+    count = text.count(mutant.old)
+    if count != 1:
+        raise ValueError(f"{mutant.name}: {count} places in {mutant.file} fit; needs 1")
+    return text.replace(mutant.old, mutant.new)
+
+
+def run(copy: Path, tests: str) -> Verdict:
+    """Run tests in a copy of the checkout until one fails."""
+    ran = subprocess.run(
+        [
+            *(sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:randomly"),
+            *("-p", "no:cacheprovider", "--tb=no", *tests.split()),
+        ],
+        cwd=copy,
+        env=os.environ | {"PYTHONPATH": str(copy)},
+        capture_output=True,
+        text=True,
+    )
+    lines = ran.stdout.strip().splitlines()
+    if ran.returncode == TESTS_FAILED:
+        failed = [line for line in lines if line.startswith(("FAILED", "ERROR"))]
+        return Verdict("caught", failed[0].split(" - ")[0] if failed else "")
+    word = "SURVIVED" if ran.returncode == 0 else "BROKEN"
+    return Verdict(word, lines[-1] if lines else ran.stderr[-200:])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,91 @@
+"""Robots at rest, their links' shapes, and differences, for tests of clearances."""
+
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+from oracles import slope
+
+from hsp_control import (
+    Cost,
+    Robot,
+)
+from hsp_control.common.resources import bundled_robots
+from hsp_control.geometry import LinkShape
+from hsp_control.null_space.fields.barrier import barrier
+from hsp_control.trajectories import (
+    Lissajous,
+)
+
+Array = NDArray[np.float64]
+
+
+@cache
+def load(name: str) -> Robot:
+    """Return a robot; skip if example-robot-data is asked for and not there."""
+    if name not in bundled_robots():
+        pytest.importorskip("example_robot_data")
+    return Robot.load(name)
+
+
+def still(robot: Robot) -> Any:
+    """Return the robot's state at home, at rest."""
+    return robot.state(0.0, robot.home(), np.zeros(robot.nv))
+
+
+def turned(*rpy: float) -> Array:
+    """Return a rotation from roll, pitch and yaw."""
+    return np.asarray(pin.rpy.rpyToMatrix(*rpy))
+
+
+def barrier_at(d: float, influence: float) -> tuple[float, float, float]:
+    """Return b, b' and b'' at one distance."""
+    slopes, curvatures = np.full(1, np.nan), np.full(1, np.nan)
+    value = barrier(np.array([d]), influence, slopes, curvatures)
+    return float(value), float(slopes[0]), float(curvatures[0])
+
+
+def outside(points: Array, first: Array, second: Array, radius: float) -> float:
+    """Return by how much the farthest point stands out of a capsule."""
+    along = second - first
+    square = float(along @ along)
+    s = (points - first) @ along / square if square > 0.0 else np.zeros(len(points))
+    on_axis = first + np.clip(s, 0.0, 1.0)[:, None] * along
+    return float(np.linalg.norm(points - on_axis, axis=1).max()) - radius
+
+
+def placed(robot: Robot, shapes: Iterable[LinkShape], q: Array) -> list[pin.SE3]:
+    """Return where shapes are in the world, by plain Pinocchio."""
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, q)
+    return [data.oMi[shape.joint] * shape.placement for shape in shapes]
+
+
+def ends(shape: LinkShape) -> tuple[Array, Array, float]:
+    """Return a capsule's or a ball's ends in the joint's frame, and its radius."""
+    half = getattr(shape.geometry, "halfLength", 0.0) * shape.placement.rotation[:, 2]
+    center = shape.placement.translation
+    return center - half, center + half, float(shape.geometry.radius)
+
+
+AIR = Lissajous([0.5, 0.3, 0.5], [0.1, 0.15, 0.05], [1.0, 2.0, 1.5])
+
+
+def flowing(field: Cost, state: Any, step: float) -> Array:
+    """Return the rate of a gradient by differences of sixth order along the flow."""
+    robot, q, v = state.robot, state.q.copy(), state.v.copy()
+    return slope(
+        lambda s: field.gradient(
+            robot.state(state.t + s, robot.integrate(q, s * v), v)
+        ),
+        step,
+    )
+
+
+def agree(one: Array, other: Array) -> bool:
+    """Return whether differences by two steps tell the same."""
+    return bool(np.abs(one - other).max() <= 1e-8 * np.abs(other).max())

@@ -1,0 +1,87 @@
+"""Robots, controllers and starts of the runs that the tests of the simulation make."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Controller,
+    Dop853,
+    FramePosition,
+    Gains,
+    Obstacle,
+    PointDistance,
+    Robot,
+    TargetPosture,
+)
+from hsp_control.geometry.shapes import Sphere
+from hsp_control.trajectories import Circle, Lissajous
+
+Array = NDArray[np.float64]
+
+EXACT = Dop853(rtol=1e-12, atol=1e-12)
+ROBOTS: dict[str, tuple[str, str | None]] = {
+    "planar3r": ("planar3r", None),
+    "panda": ("panda", None),
+    "rolling ur5": ("ur5", "planar"),
+    "floating talos_arm": ("talos_arm", "free_flyer"),
+}
+
+
+@cache
+def load(name: str, gravity: bool = True) -> Robot:
+    """Return a robot, or skip if example-robot-data is asked for and not there."""
+    source, root = ROBOTS[name]
+    if source not in {"planar3r", "panda"}:
+        pytest.importorskip("example_robot_data")
+    pull = None if gravity else (0.0, 0.0, 0.0)
+    return Robot.load(source, root=root, gravity=pull)  # type: ignore[arg-type]
+
+
+def start(robot: Robot, seed: int, speed: float = 0.5) -> tuple[Array, Array]:
+    rng = np.random.default_rng(seed)
+    q = robot.integrate(robot.home(), 0.3 * rng.normal(size=robot.nv))
+    return q, speed * rng.normal(size=robot.nv)
+
+
+def distance(robot: Robot, a: tuple[Array, Array], b: tuple[Array, Array]) -> float:
+    """Return how far two states are from each other, on the manifold."""
+    apart = [robot.difference(a[0], b[0]), a[1] - b[1]]
+    return float(np.abs(apart).max())
+
+
+def order(steps: Array, errors: list[float]) -> float:
+    """Return the slope of log error over log step."""
+    return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+
+
+@cache
+def planar_controller(gain: float = 10.0) -> Controller:
+    robot = load("planar3r", gravity=False)
+    circle = Circle([1.0, 1.0], 0.9, 3.0)
+    task = FramePosition(robot, "tip", circle, Gains.from_frequency(10.0), axes="xy")
+    ball = Obstacle(
+        "ball", Sphere(0.1), Lissajous([-1, 1.7, 0], [0, 0.7, 0], [1, 3, 1])
+    )
+    field = TargetPosture(robot, planar_start()) + PointDistance(robot, ["link3"], ball)
+    return Controller(robot, [task], field, null_space_gain=gain)
+
+
+def planar_start() -> Array:
+    robot = load("planar3r", gravity=False)
+    return robot.integrate(robot.neutral(), np.array([-0.4, 0.9, 0.8]))
+
+
+@cache
+def panda_controller() -> Controller:
+    robot = load("panda")
+    x = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
+    task = FramePosition(
+        robot,
+        "panda_tcp",
+        Lissajous(x, [0.1, 0.1, 0.05], [3.0, 4.0, 5.0]),
+        Gains.from_frequency(10.0),
+    )
+    return Controller(robot, [task], TargetPosture(robot, robot.home() + 0.2))

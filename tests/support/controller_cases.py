@@ -1,0 +1,89 @@
+"""A Panda's controllers and states, and copies of what a controller returns."""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Circle,
+    ConstantMetric,
+    ControlOutput,
+    FrameOrientation,
+    FramePosition,
+    Gains,
+    IdentityMetric,
+    MassMatrixMetric,
+    Metric,
+    Robot,
+)
+from hsp_control.trajectories import (
+    HoldOrientation,
+)
+
+Array = NDArray[np.float64]
+GAINS = Gains.from_frequency(20.0)
+TCP = "panda_tcp"
+CENTER = np.array([0.35, 0.1, 0.5])
+# Below every singular value of the random states: the law is exact there.
+EXACT = 1e-4
+
+METRICS: dict[str, Callable[[int], Metric]] = {
+    "identity": lambda nv: IdentityMetric(),
+    "coordinates": lambda nv: ConstantMetric.from_coordinates(
+        np.tril(np.ones((nv, nv)))
+    ),
+    "mass_matrix": lambda nv: MassMatrixMetric(),
+}
+metrics = pytest.mark.parametrize("kind", METRICS)
+
+
+@cache
+def panda() -> Robot:
+    return Robot.load("panda")
+
+
+def circle() -> Circle:
+    return Circle(CENTER, 0.1, 2.0, normal=[0.0, 1.0, 1.0])
+
+
+def track(robot: Robot | None = None, **options: Any) -> FramePosition:
+    return FramePosition(robot or panda(), TCP, circle(), GAINS, **options)
+
+
+def hold_orientation(robot: Robot | None = None) -> FrameOrientation:
+    return FrameOrientation(robot or panda(), TCP, HoldOrientation(np.eye(3)), GAINS)
+
+
+def states(count: int, seed: int = 0) -> list[tuple[float, Array, Array]]:
+    rng = np.random.default_rng(seed)
+    return [
+        (
+            float(rng.uniform()),
+            panda().random_configuration(rng),
+            rng.standard_normal(7),
+        )
+        for _ in range(count)
+    ]
+
+
+def copied(out: ControlOutput) -> dict[str, Any]:
+    """Return copies: the arrays are the controller's own."""
+    return {
+        "tau": out.tau.copy(),
+        "acceleration": out.acceleration.copy(),
+        "null_space_error": out.null_space_error.copy(),
+        "damped": out.damped,
+        **{f"task.{k}": v.copy() for k, v in out.task._asdict().items()},
+        **{f"field.{k}": v.copy() for k, v in out.field._asdict().items()},
+    }
+
+
+def assert_same(first: dict[str, Any], second: dict[str, Any]) -> None:
+    """To the last bit."""
+    assert first.keys() == second.keys()
+    for name, value in first.items():
+        np.testing.assert_array_equal(value, second[name], err_msg=name)

@@ -1,0 +1,33 @@
+"""Robots that the law is tested on, and the pseudo-inverse by itself."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Robot,
+)
+from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse
+from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY
+
+Array = NDArray[np.float64]
+
+
+def pseudo_inverse(J: Array, W: Array | None, threshold: float) -> tuple[Array, bool]:
+    """Return the package's J# and whether it was damped; W None: the identity."""
+    m, n = J.shape
+    form, L = (IDENTITY, np.eye(n)) if W is None else (CONSTANT, np.linalg.cholesky(W))
+    B, Q, X = (np.full(shape, np.nan) for shape in ((m, n), (m, n), (m, m)))
+    damped = weighted_pseudo_inverse(J, L, form, threshold, B, Q, X)
+    return np.linalg.solve(L.T, Q.T @ X), damped
+
+
+@cache
+def load(name: str) -> Robot:
+    if name == "panda_fingers":
+        return Robot.load("panda", locked={})
+    if name not in {"planar3r", "panda"}:
+        pytest.importorskip("example_robot_data")
+    return Robot.load(name)

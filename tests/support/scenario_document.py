@@ -1,0 +1,123 @@
+"""A small schema and a good text for it, to read documents by."""
+
+from typing import Annotated, Literal
+
+import pytest
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    RootModel,
+    model_validator,
+)
+
+from hsp_control.common.exceptions import ConfigError
+from hsp_control.config.document import Document
+from hsp_control.config.validation import validate
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+class Part(BaseModel):
+    """What all parts of the small schema below share."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Gains(Part):
+    kp: Positive | list[Positive] | list[list[Positive]]
+    kd: Positive | None = None
+
+
+class Circle(Part):
+    type: Literal["circle"]
+    radius: Positive
+    center: Vector3 = [0.0, 0.0, 0.0]
+
+
+class Line(Part):
+    type: Literal["line", "segment"]
+    to: Vector3
+    via: Annotated[list[Vector3], Field(max_length=2)] = []
+
+    @model_validator(mode="after")
+    def _moves(self) -> "Line":
+        if not any(self.to):
+            raise ValueError("a line of length 0; move 'to' away from the origin")
+        return self
+
+
+Trajectory = Annotated[Circle | Line, Field(discriminator="type")]
+
+
+class Task(Part):
+    frame: Annotated[str, Field(min_length=1)]
+    trajectory: Trajectory | None = None
+    gains: Gains | None = None
+    damping: Literal["critical"] | Positive = "critical"
+
+
+class Manipulability(Part):
+    type: Literal["manipulability"]
+    weight: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
+    reference: str | None = None
+
+
+class Centering(Part):
+    type: Literal["centering"]
+    weight: float = 1.0
+    middle: list[float] | dict[str, float] | None = None
+
+
+Frames = RootModel[dict[Annotated[str, Field(pattern="^[a-z_.]+$")], Vector3]]
+
+
+class Scenario(Part):
+    robot: str
+    tasks: dict[str, Task] = {}
+    fields: list[
+        Annotated[Manipulability | Centering, Field(discriminator="type")]
+    ] = []
+    route: Trajectory | list[Trajectory] | None = None
+    frames: Frames | None = None
+    steps: int = 1
+    view: bool = False
+    integrator: Literal["euler", "rk4"] = "rk4"
+
+
+GOOD = """\
+robot: panda   # comments do not count
+tasks:
+  hand:
+    frame: panda_hand
+    gains: &soft {kp: 1e2, kd: 20}
+    trajectory:
+      type: circle
+      radius: 1e-1
+  elbow:
+    frame: panda_link4
+    gains: *soft
+    trajectory: {type: segment, to: [0, .5, -1.]}
+fields:
+- type: manipulability
+  weight: 0.5
+- {type: centering, middle: {joint: 1.5}}
+frames:
+  tool.tip: [0, 0, 0x10]
+"""
+
+
+def read(text: str, *overrides: str, model: type[BaseModel] = Scenario) -> BaseModel:
+    """Parse a text, apply the overrides and validate."""
+    document = Document.parse(text, "panda.yaml")
+    for override in overrides:
+        document.override(override)
+    return validate(document, model)
+
+
+def message(text: str, *overrides: str, model: type[BaseModel] = Scenario) -> str:
+    """Return the message of the one error that a text leads to."""
+    with pytest.raises(ConfigError) as caught:
+        read(text, *overrides, model=model)
+    return str(caught.value)

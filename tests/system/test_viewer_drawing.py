@@ -1,0 +1,328 @@
+"""Check that the view shows robots, paths and obstacles where Pinocchio puts them."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from clips import Clip
+
+from hsp_control import Obstacle, Robot, Rollout, Scene, load_experiment
+from hsp_control.geometry.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    HeightField,
+    Mesh,
+    PointCloud,
+    Shape,
+    Sphere,
+)
+from hsp_control.trajectories import Hold, UniformLine
+from hsp_control.visualization.viewer import (
+    Recorder,
+    Viewer,
+)
+from hsp_control.visualization.viewer.commands import CAMERA, CAPTION, CLIP
+from hsp_control.visualization.viewer.threejs import _Y_TO_Z
+
+MOVING = "paper/4_moving_obstacle"
+
+
+@pytest.fixture(scope="module")
+def run() -> Rollout:
+    return load_experiment(MOVING, "simulation.duration=1.5").run()
+
+
+@pytest.fixture(scope="module")
+def arm() -> Robot:
+    return Robot.load("planar3r")
+
+
+@pytest.fixture
+def recorder() -> Recorder:
+    return Recorder()
+
+
+def children(recorder: Recorder, path: str) -> list[dict[str, Any]]:
+    command = recorder.command(path, "object")
+    assert command is not None
+    return list(command["object"]["object"]["children"])
+
+
+def matrix(thing: dict[str, Any]) -> np.ndarray:
+    return np.reshape(thing["matrix"], (4, 4)).T
+
+
+# --- the robot -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["planar3r", "iiwa14", "panda"])
+def test_every_visual_stands_where_pinocchio_puts_it(name: str) -> None:
+    robot, recorder = Robot.load(name), Recorder()
+    viewer = Viewer(robot, transport=recorder)
+    geometry = pin.buildGeomFromUrdf(
+        robot.model,
+        str(robot.source.urdf),
+        pin.GeometryType.VISUAL,
+        package_dirs=[str(folder) for folder in robot.source.package_dirs],
+    )
+    data, geometry_data = robot.model.createData(), geometry.createData()
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        q = robot.random_configuration(rng)
+        state = robot.state(0.5, q, rng.standard_normal(robot.nv))
+        viewer.show(state if rng.random() < 0.5 else q)
+        pin.forwardKinematics(robot.model, data, q)
+        pin.updateGeometryPlacements(robot.model, data, geometry, geometry_data)
+        for k, item in enumerate(geometry.geometryObjects):
+            link, _, number = item.name.rpartition("_")
+            joint = robot.model.names[item.parentJoint]
+            path = f"/robot/{joint}/{link}"
+            thing = children(recorder, path)[int(number)]
+            expected = geometry_data.oMg[k].homogeneous
+            if type(item.geometry).__name__ == "Cylinder":
+                expected = expected @ _Y_TO_Z
+            shown = recorder.transform(path) @ matrix(thing)
+            np.testing.assert_allclose(shown, expected, atol=1e-12)
+
+
+def test_the_planar_arm_is_drawn_from_above(arm: Robot, recorder: Recorder) -> None:
+    Viewer(arm, transport=recorder)
+    links = recorder.paths("/robot/")
+    nodes = ("universe/base", "joint1/link1", "joint2/link2", "joint3/link3")
+    assert links == [f"/robot/{node}" for node in nodes]
+    shapes = [shape for path in links[1:] for shape in geometries(recorder, path)]
+    sizes = [s["radius"] for s in shapes if s["type"] == "SphereGeometry"]
+    assert sizes == [0.08] * 3  # the point masses
+    camera = recorder.command(CAMERA, "camera")
+    assert camera is not None
+    assert camera["direction"] == [0.0, 0.0, 1.0]
+    assert camera["up"] == [0.0, 1.0, 0.0]
+    floor = recorder.transform("/floor/shadow")[2, 3]
+    assert floor == pytest.approx(-0.12)  # below the stand
+
+
+def geometries(recorder: Recorder, path: str) -> list[dict[str, Any]]:
+    command = recorder.command(path, "object")
+    assert command is not None
+    return list(command["object"]["geometries"])
+
+
+def test_a_spatial_arm_is_seen_from_above_its_front_unless_told(
+    recorder: Recorder,
+) -> None:
+    robot = Robot.load("iiwa14")
+    Viewer(robot, transport=recorder)
+    camera = recorder.command(CAMERA, "camera")
+    assert camera is not None
+    assert camera["up"] == [0.0, 0.0, 1.0]
+    assert camera["direction"][0] > 0.0
+    assert camera["direction"][2] > 0.0
+    Viewer(robot, transport=recorder, camera=[2, 0, 0.5], target=[0, 0, 0.5])
+    camera = recorder.command(CAMERA, "camera")
+    assert camera is not None
+    assert camera["eye"] == [2.0, 0.0, 0.5]
+    assert camera["target"] == [0.0, 0.0, 0.5]
+    assert "direction" not in camera
+
+
+def test_capsules_stand_in_for_missing_meshes(
+    recorder: Recorder, caplog: pytest.LogCaptureFixture
+) -> None:
+    found = Robot.load("panda")
+    robot = Robot(found.model, replace(found.source, package_dirs=()))
+    viewer = Viewer(robot, transport=recorder)
+    assert len(caplog.records) == 1
+    assert re.match(
+        r"panda: 11 of 11 meshes are not found \(the first belongs to link "
+        r"'panda_link0'\).*pip install example-robot-data-loaders",
+        caplog.text.partition("robot_drawing.py:")[2].partition(" ")[2],
+    )
+    joints = [f"/robot/{name}/placeholder" for name in robot.model.names]
+    assert recorder.paths("/robot/") == joints
+    q = robot.random_configuration(np.random.default_rng(0))
+    viewer.show(q)
+    state = robot.state(0.0, q, np.zeros(7))
+    # The upper arm's capsule ends where the elbow is.
+    capsule = children(recorder, "/robot/panda_joint2/placeholder")[-1]
+    points = geometries(recorder, "/robot/panda_joint2/placeholder")[-1]["points"]
+    axis = [0.0, points[-1]["y"] - points[-1]["x"], 0.0]
+    pose = recorder.transform("/robot/panda_joint2") @ matrix(capsule)
+    end = pose[:3, :3] @ axis + pose[:3, 3]
+    radius = max(point["x"] for point in points)
+    elbow = state.data.oMi[3].translation
+    assert np.linalg.norm(end - elbow) < radius
+
+
+def test_a_robot_without_visuals_gets_a_body(
+    tmp_path: Path, recorder: Recorder, caplog: pytest.LogCaptureFixture
+) -> None:
+    text = Robot.load("planar3r").source.urdf.read_text()
+    bare = tmp_path / "bare.urdf"
+    bare.write_text(re.sub(r"<visual>.*?</visual>", "", text, flags=re.DOTALL))
+    Viewer(Robot.load(bare), transport=recorder)
+    assert len(recorder.paths("/robot/")) == 4
+    assert not caplog.records
+
+
+def test_two_robots_in_one_workspace_are_both_drawn(recorder: Recorder) -> None:
+    beside = pin.SE3(np.eye(3), np.array([0.0, 3.0, 0.0]))
+    arm = Robot.load("planar3r")
+    robot = Robot.combine({"left": (arm, pin.SE3.Identity()), "right": (arm, beside)})
+    Viewer(robot, transport=recorder)
+    assert len(recorder.paths("/robot/")) == 8
+    base = children(recorder, "/robot/universe/right_base")[0]
+    np.testing.assert_allclose(matrix(base)[:3, 3], [0.0, 3.0, -0.11], atol=1e-12)
+
+
+# --- the run -------------------------------------------------------------------------
+
+
+def test_paths_target_and_obstacle_follow_the_log(
+    arm: Robot, run: Rollout, recorder: Recorder
+) -> None:
+    viewer = Viewer(arm, transport=recorder)
+    viewer.draw_scene(run)
+    assert recorder.paths("/paths/") == ["/paths/tip/desired", "/paths/tip/actual"]
+    assert recorder.paths("/targets/") == ["/targets/tip"]
+    assert recorder.paths("/obstacles/") == ["/obstacles/disk"]
+    (disk,) = geometries(recorder, "/obstacles/disk")
+    assert (disk["type"], disk["radius"]) == ("SphereGeometry", 0.2)
+    desired = recorder.command("/paths/tip/desired", "object")
+    assert desired is not None
+    points = np.reshape(desired["points"], (-1, 3))[:, :2]
+    np.testing.assert_allclose(points, run["task.tip.reference"], atol=1e-6)
+
+    clip = Clip(recorder)
+    assert (clip.start, clip.end) == (run.t[0], run.t[-1])
+    data = arm.model.createData()
+    for row in (0, 37, 150):
+        t = run.t[row]
+        center = clip.value("/obstacles/disk", "position", t)
+        np.testing.assert_allclose(center, run["obstacle.disk"][row], atol=1e-6)
+        target = clip.value("/targets/tip", "position", t)[:2]
+        np.testing.assert_allclose(target, run["task.tip.reference"][row], atol=1e-6)
+        assert clip.value("/paths/tip/actual", "length", t) == pytest.approx(row)
+        pin.forwardKinematics(arm.model, data, run.q[row])
+        for joint in (1, 2, 3):
+            shown = clip.pose(f"/robot/joint{joint}", t)
+            expected = data.oMi[joint].homogeneous
+            np.testing.assert_allclose(shown, expected, atol=1e-6)
+    caption = recorder.command(CAPTION, "caption")
+    assert caption is not None
+    assert caption["title"] == run.meta["title"]
+    assert [entry["name"] for entry in caption["legend"]] == [
+        "desired path", "actual path", "disk",
+    ]  # fmt: skip
+
+
+def test_a_state_is_shown_with_what_the_run_did_then(
+    arm: Robot, run: Rollout, recorder: Recorder
+) -> None:
+    viewer = Viewer(arm, transport=recorder)
+    viewer.draw_scene(run)
+    q = arm.integrate(run.q[37], np.full(3, 0.1))
+    viewer.show(arm.state(run.t[37], q, run.v[37]))
+    sought = recorder.command(CLIP, "seek")
+    assert sought is not None
+    assert sought["time"] == run.t[37]
+    expected = arm.state(0.0, q, np.zeros(3)).data.oMi[3].homogeneous
+    np.testing.assert_array_equal(recorder.transform("/robot/joint3"), expected)
+    viewer.draw_scene(Scene())
+    assert recorder.command(CLIP, "begin") == {"type": "still", "path": CLIP}
+    viewer.show(arm.state(0.25, q, run.v[37]))
+    clock = recorder.command(CAPTION, "time")
+    assert clock is not None
+    assert clock["text"] == "t = 0.25 s"
+
+
+def test_a_new_scene_replaces_the_old(
+    arm: Robot, run: Rollout, recorder: Recorder
+) -> None:
+    viewer = Viewer(arm, transport=recorder)
+    viewer.draw_scene(run)
+    ball = Obstacle("ball", Sphere(0.1), UniformLine([1, 0, 0], [0, 2, 0]))
+    viewer.draw_scene(Scene([ball]))
+    assert recorder.paths("/paths/") == recorder.paths("/targets/") == []
+    assert recorder.paths("/obstacles/") == ["/obstacles/ball"]
+    viewer.show(arm.state(0.5, arm.home(), np.zeros(3)))
+    center = recorder.transform("/obstacles/ball")[:3, 3]
+    np.testing.assert_allclose(center, [1.0, 1.0, 0.0], atol=1e-12)
+
+
+def test_a_pose_task_shows_its_axes(recorder: Recorder) -> None:
+    experiment = load_experiment(
+        {
+            "robot": {"name": "iiwa14"},
+            "tasks": {
+                "hand": {
+                    "type": "frame_pose",
+                    "trajectory": {
+                        "type": "screw",
+                        "position": [0.5, 0.1, 0.5],
+                        "rpy": [3.0, 0.2, 0.0],
+                        "duration": 0.1,
+                    },
+                },
+            },
+            "simulation": {"duration": 0.1},
+        }
+    )
+    rollout = experiment.run()
+    viewer = Viewer(experiment.robot, transport=recorder)
+    viewer.play(rollout, speed=10.0)
+    assert len(children(recorder, "/targets/hand")) == 3
+    shown = pin.SE3(Clip(recorder).pose("/targets/hand", 0.1))
+    goal = pin.SE3(pin.rpy.rpyToMatrix(3.0, 0.2, 0.0), np.array([0.5, 0.1, 0.5]))
+    assert np.linalg.norm(pin.log6(shown.actInv(goal))) < 1e-6
+
+
+SHAPES: list[Shape] = [
+    Sphere(0.1),
+    Capsule(0.1, 0.3),
+    Cylinder(0.1, 0.3),
+    Box((0.1, 0.2, 0.3)),
+    HalfSpace(),
+    PointCloud([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]),
+    HeightField((1.0, 1.0), [[0.0, 0.1], [0.2, 0.0]]),
+]
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
+def test_every_shape_of_obstacle_is_drawn(
+    shape: Shape, arm: Robot, run: Rollout, recorder: Recorder
+) -> None:
+    viewer = Viewer(arm, transport=recorder)
+    viewer.draw_scene(Scene([Obstacle("it", shape, Hold([1.0, 0.0, 0.2]))]))
+    live = geometries(recorder, "/obstacles/it")
+    reach = shape.bounding_radius
+    about = {
+        "shape": type(shape).__name__,
+        "parameters": vars(shape),
+        "radius": reach if np.isfinite(reach) else None,
+    }
+    columns = {**run.columns, "obstacle.it": run["obstacle.disk"]}
+    viewer.draw_scene(Rollout(columns, {**run.meta, "obstacles": {"it": about}}))
+    again = geometries(recorder, "/obstacles/it")
+    assert [thing["type"] for thing in again] == [thing["type"] for thing in live]
+
+
+def test_a_mesh_is_drawn_and_one_that_is_gone_becomes_a_ball(
+    tmp_path: Path, arm: Robot, run: Rollout, recorder: Recorder
+) -> None:
+    file = tmp_path / "triangle.obj"
+    file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\n")
+    viewer = Viewer(arm, transport=recorder)
+    viewer.draw_scene(Scene([Obstacle("it", Mesh(file), Hold([1.0, 0.0, 0.2]))]))
+    (thing,) = geometries(recorder, "/obstacles/it")
+    assert len(thing["data"]["attributes"]["position"]["array"]) == 3 * 3 * 3
+    about = {"shape": "Mesh", "parameters": {"file": "gone.obj"}, "radius": 0.4}
+    columns = {**run.columns, "obstacle.it": run["obstacle.disk"]}
+    viewer.draw_scene(Rollout(columns, {**run.meta, "obstacles": {"it": about}}))
+    (thing,) = geometries(recorder, "/obstacles/it")
+    assert (thing["type"], thing["radius"]) == ("SphereGeometry", 0.4)

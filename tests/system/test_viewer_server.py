@@ -1,0 +1,424 @@
+"""Check the view's server: to this machine alone, and it leaves nothing behind."""
+
+import logging
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+import webbrowser
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+from http.client import HTTPConnection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pages import Page
+
+from hsp_control import Robot, Rollout, Scene, load_experiment
+from hsp_control.common.exceptions import ViewerError
+from hsp_control.visualization.viewer import (
+    Recorder,
+    Viewer,
+    browser,
+    server,
+)
+from hsp_control.visualization.viewer.commands import CAMERA, CLIP
+from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
+from hsp_control.visualization.viewer.pipe_protocol import (
+    DELETE,
+    SET,
+    Decoder,
+    Record,
+    encode,
+)
+from hsp_control.visualization.viewer.server import Server
+
+MOVING = "paper/4_moving_obstacle"
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+
+@pytest.fixture(scope="module")
+def run() -> Rollout:
+    return load_experiment(MOVING, "simulation.duration=1.5").run()
+
+
+@pytest.fixture(scope="module")
+def arm() -> Robot:
+    return Robot.load("planar3r")
+
+
+@pytest.fixture
+def recorder() -> Recorder:
+    return Recorder()
+
+
+@pytest.fixture
+def started() -> Iterator[Server]:
+    with_process = Server()
+    yield with_process
+    with_process.close()
+
+
+# --- the server ----------------------------------------------------------------------
+
+
+def port_of(url: str | None) -> int:
+    assert url is not None
+    return int(url.rsplit(":", 1)[1].strip("/"))
+
+
+def answers(port: int) -> bool:
+    with socket.socket() as client:
+        client.settimeout(1.0)
+        return client.connect_ex(("127.0.0.1", port)) == 0
+
+
+def gone(pid: int) -> bool:
+    """Whether a process is gone, or only waits to be collected."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return True
+    return state == "Z"
+
+
+def wait_until(condition: Any, timeout: float = 8.0) -> bool:
+    deadline = time.monotonic() + timeout
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return bool(condition())
+
+
+@LINUX
+def test_it_listens_on_the_loopback_address_alone(started: Server) -> None:
+    pid = started.process.pid
+    links = [str(link.readlink()) for link in Path(f"/proc/{pid}/fd").iterdir()]
+    inodes = {link[8:-1] for link in links if link.startswith("socket:[")}
+    listening = []
+    for table in ("tcp", "tcp6", "udp", "udp6"):
+        for line in Path(f"/proc/{pid}/net/{table}").read_text().splitlines()[1:]:
+            fields = line.split()
+            if fields[9] in inodes:
+                listening.append((table, fields[1]))
+    port = port_of(started.url)
+    assert listening == [("tcp", f"0100007F:{port:04X}")]  # 127.0.0.1, and only there
+
+
+def test_closing_leaves_nothing(arm: Robot) -> None:
+    with Viewer(arm) as viewer:
+        port = port_of(viewer.url)
+        assert answers(port)
+        viewer.show(arm.home())
+    assert isinstance(viewer.transport, Server)
+    assert viewer.transport.process.returncode is not None
+    assert not answers(port)
+    viewer.close()  # again is no error
+    with pytest.raises(ViewerError, match="the viewer is closed"):
+        viewer.show(arm.home())
+
+
+PARENT = """
+import os, sys, time
+from hsp_control.visualization.viewer.server import Server
+server = Server()
+if sys.argv[1] == "fork" and os.fork() == 0:
+    os.close(1)
+    time.sleep(30)  # holds the server's input open after its parent's death
+    os._exit(0)
+print(server.process.pid, server.url, flush=True)
+if sys.argv[1] == "exit":
+    sys.exit()
+time.sleep(60)
+"""
+
+
+ENDS = {
+    "exit": None,
+    "terminate": signal.SIGTERM,
+    "hang up": signal.SIGHUP,
+    "crash": signal.SIGSEGV,
+    "kill": signal.SIGKILL,
+    "fork": signal.SIGKILL,
+}
+
+
+@LINUX
+def test_it_ends_with_its_parent_however_that_ends() -> None:
+    with ExitStack() as stack:
+        parents = []
+        for end in ENDS:  # side by side: each imports Pinocchio first
+            command = [sys.executable, "-c", PARENT, end]
+            parent = subprocess.Popen(
+                command, stdout=subprocess.PIPE, text=True, start_new_session=True
+            )
+            stack.enter_context(parent)
+            stack.callback(end_group, parent.pid)
+            parents.append(parent)
+        for parent, sign in zip(parents, ENDS.values(), strict=True):
+            assert parent.stdout is not None
+            pid, url = parent.stdout.readline().split()
+            if sign is not None:
+                assert answers(port_of(url))
+                parent.send_signal(sign)
+            parent.wait(10)
+            deadline = time.monotonic() + 8.0
+            while not gone(int(pid)) and time.monotonic() < deadline:
+                time.sleep(0.05)
+            assert gone(int(pid))
+
+
+def end_group(leader: int) -> None:
+    with suppress(ProcessLookupError):
+        os.killpg(leader, signal.SIGKILL)
+
+
+def test_two_viewers_have_two_addresses(started: Server) -> None:
+    other = Server()
+    try:
+        assert other.url != started.url
+        assert answers(port_of(started.url))
+        assert answers(port_of(other.url))
+        port = port_of(started.url)
+        with pytest.raises(ViewerError, match=rf"cannot listen on 127\.0\.0\.1:{port}"):
+            Server(port)
+        with pytest.raises(ViewerError, match="port 70000 is not between"):
+            Server(70000)
+    finally:
+        other.close()
+
+
+@LINUX
+def test_without_a_browser_nothing_waits(
+    arm: Robot, run: Rollout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = time.monotonic()
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    with Viewer(arm, open_browser=True) as viewer:
+        viewer.play(run)
+        for _ in range(5000):  # more than any pipe holds
+            viewer.show(arm.home())
+        assert not viewer.wait_for_browser(0.0)
+    assert time.monotonic() - begin < 10.0
+
+
+def test_it_is_known_when_the_last_page_is_closed(
+    arm: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "RELOAD_TIMEOUT", 0.7)
+    with Viewer(arm) as viewer:
+        assert viewer.url is not None
+        page = Page(viewer.url)
+        assert viewer.wait_for_browser(8.0)
+        waiting = threading.Thread(target=viewer.wait_until_closed, daemon=True)
+        waiting.start()
+        waiting.join(1.5)
+        assert waiting.is_alive()
+        page.leave()
+        waiting.join(8.0)
+        assert not waiting.is_alive()
+
+
+def test_a_notebook_shows_the_page_in_a_frame(arm: Robot, recorder: Recorder) -> None:
+    with Viewer(arm) as viewer:
+        assert f'<iframe src="{viewer.url}"' in viewer._repr_html_()
+    assert "has no page" in Viewer(arm, transport=recorder)._repr_html_()
+
+
+def test_a_dead_or_stopped_server_is_an_error_not_a_wait(
+    arm: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "STALL_TIMEOUT", 0.3)
+    for sign, message in ((signal.SIGKILL, "has ended"), (signal.SIGSTOP, "for 0.3 s")):
+        viewer = Viewer(arm)
+        assert isinstance(viewer.transport, Server)
+        viewer.transport.process.send_signal(sign)
+        begin = time.monotonic()
+        with pytest.raises(ViewerError, match=message):
+            show_for(viewer, 8.0)
+        assert time.monotonic() < begin + 5.0
+        assert viewer.transport.process.returncode is not None
+
+
+def show_for(viewer: Viewer, seconds: float) -> None:
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        viewer.show(viewer.robot.home())
+
+
+def test_a_page_that_opens_late_sees_everything(arm: Robot, run: Rollout) -> None:
+    with Viewer(arm) as viewer:
+        assert viewer.url is not None
+        viewer.draw_scene(run)
+        viewer.show(arm.home())
+        viewer.transport.send([])
+        first = Page(viewer.url)
+        assert viewer.wait_for_browser(8.0)
+        kinds = [(command["type"], command.get("path")) for command in first.commands]
+        assert ("set_object", "/robot/joint3/link3") in kinds
+        assert ("trail", "/paths/tip/desired") in kinds
+        assert ("clip", CLIP) in kinds
+        assert ("camera", CAMERA) in kinds
+        assert len(kinds) == len(set(kinds)) + 1  # the background's two colours
+        viewer.draw_scene(Scene())
+        second = Page(viewer.url)
+        assert viewer.wait_for_browser(8.0)
+        assert wait_until(lambda: second.commands and first.commands[-1] == {
+            **second.commands[-1]})  # fmt: skip
+        assert ("delete", "/paths") in [
+            (c["type"], c.get("path")) for c in first.commands
+        ]
+        paths = [command.get("path", "") for command in second.commands]
+        assert not any(path.startswith("/paths") for path in paths)
+    first.join(5.0)
+    second.join(5.0)
+
+
+def test_a_slow_page_skips_what_is_out_of_date(arm: Robot) -> None:
+    with Viewer(arm) as viewer:
+        assert viewer.url is not None
+        page = Page(viewer.url, pause=0.1)
+        assert viewer.wait_for_browser(8.0)
+        before = len(page.commands)
+        q = arm.home()
+        for angle in np.linspace(0.0, 1.0, 400):
+            q = arm.integrate(arm.neutral(), np.full(3, angle))
+            viewer.show(q)
+            time.sleep(1e-3)
+        assert viewer.wait_for_browser(8.0)
+        moves = [c for c in page.commands[before:] if c["type"] == "set_transform"]
+        assert len(moves) < 3 * 100  # of 400 moves of three joints
+        last = page.last("set_transform", "/robot/joint1")["matrix"]
+        expected = arm.state(0.0, q, np.zeros(3)).data.oMi[1].homogeneous
+        np.testing.assert_array_equal(
+            np.frombuffer(last.data).reshape(4, 4).T, expected
+        )
+
+
+def test_its_files_are_for_this_machine_alone(started: Server) -> None:
+    assert started.url is not None
+    for file, text in (
+        ("", "connect();"),
+        ("page.js", "MeshCat"),
+        ("player.js", "class Player"),
+        ("player.css", ".player"),
+        ("main.min.js", ""),
+    ):
+        with urllib.request.urlopen(started.url + file) as answer:
+            assert text in answer.read().decode()
+    for path, headers in (
+        ("nothing", {}),
+        ("../server.py", {}),
+        ("", {"Host": "evil.example"}),
+    ):
+        request = urllib.request.Request(started.url + path, headers=headers)
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(request)
+        refused.value.close()
+        assert refused.value.code == (403 if headers else 404)
+
+    handshake = {
+        "Upgrade": "websocket",
+        "Connection": "Upgrade",
+        "Sec-WebSocket-Version": "13",
+        "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+    }
+    for origin, status in (("http://evil.example", 403), (started.url[:-1], 101)):
+        connection = HTTPConnection("127.0.0.1", port_of(started.url))
+        connection.request("GET", "/scene", headers={**handshake, "Origin": origin})
+        with connection.getresponse() as answer:
+            assert answer.status == status
+        connection.close()
+
+
+def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(ViewerError, match="pip install meshcat"):
+        Server()
+
+
+def test_a_server_that_cannot_start_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "meshcat_page", lambda: tmp_path)
+    with pytest.raises(ViewerError, match=r"cannot start: .*main\.min\.js"):
+        Server()
+    monkeypatch.setattr(server.sys, "executable", "/bin/false")
+    with pytest.raises(ViewerError, match="has ended"):
+        Server()
+
+
+def test_a_browser_is_opened_only_where_there_is_one(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    url, opened = "http://127.0.0.1:7000/", threading.Event()
+    monkeypatch.setattr(browser.webbrowser, "open", lambda url, new: opened.set())
+    monkeypatch.setattr(browser.sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    assert not browser.open_browser(url)
+    assert f"no display to open a browser on; the view is at {url}" in caplog.text
+    monkeypatch.setenv("DISPLAY", ":0")
+    terminal = webbrowser.GenericBrowser("w3m")
+    monkeypatch.setattr(browser.webbrowser, "get", lambda: terminal)
+    assert not browser.open_browser(url)
+    assert "w3m would take over the terminal" in caplog.text
+    assert not opened.is_set()
+    graphical = webbrowser.BackgroundBrowser("firefox")
+    monkeypatch.setattr(browser.webbrowser, "get", lambda: graphical)
+    assert browser.open_browser(url)
+    assert opened.wait(5.0)
+
+
+# --- its parts -----------------------------------------------------------------------
+
+
+def test_the_newest_word_counts_and_order_is_kept() -> None:
+    kept = LatestCommands()
+    for key, word in (("/a", b"1"), ("/a/b", b"2"), ("/ab", b"3"), ("/a", b"4")):
+        kept.put(key_of(key, "object"), word)
+    assert kept.copy().take() == [b"2", b"3", b"4"]
+    kept.drop("/a")
+    assert [item[0] for item in kept.items()] == ["/ab"]
+
+
+def test_records_survive_being_cut_anywhere() -> None:
+    records = [Record(SET, "/ä", b"x" * 300), Record(DELETE, "", b"")] * 3
+    data = b"".join(map(encode, records))
+    for size in (1, 7, 310, len(data)):
+        decoder = Decoder()
+        found = [
+            record
+            for start in range(0, len(data), size)
+            for record in decoder.feed(data[start : start + size])
+        ]
+        assert found == records
+
+
+def test_importing_the_package_pulls_in_no_viewer_and_that_no_meshcat() -> None:
+    code = """if True:
+        import sys, hsp_control
+        print(*sys.modules)
+        import hsp_control.visualization.viewer
+        print(*sys.modules)
+    """
+    run = [sys.executable, "-c", code]
+    printed = subprocess.run(run, capture_output=True, text=True, check=True).stdout
+    package, viewer = (set(line.split()) for line in printed.splitlines())
+    assert not {"tornado", "umsgpack", "hsp_control.visualization.viewer"} & package
+    assert not {"meshcat", "tornado", "zmq", "IPython", "matplotlib"} & viewer
+
+
+def test_nothing_is_printed(capfd: pytest.CaptureFixture[str], arm: Robot) -> None:
+    logging.getLogger("hsp_control").handlers.clear()
+    with Viewer(arm) as viewer:
+        viewer.show(arm.home())
+    captured = capfd.readouterr()
+    assert (captured.out, captured.err) == ("", "")

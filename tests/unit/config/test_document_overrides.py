@@ -1,0 +1,155 @@
+"""Check overrides, and where errors that are raised later are located."""
+
+import pickle
+
+import pytest
+from scenario_document import GOOD, Gains, Scenario, message
+
+from hsp_control.common.exceptions import ConfigError, FrameNotFoundError, ShapeError
+from hsp_control.config.document import Document
+from hsp_control.config.validation import validate
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+# --- overrides -----------------------------------------------------------------------
+
+
+def test_overrides_change_values_and_their_origin() -> None:
+    document = Document.parse(GOOD, "panda.yaml")
+    document.override("tasks.hand.gains.kp=[1e2, 2]")
+    document.override("fields.0.weight = 0.25")
+    document.override("frames.'tool.tip'.2=1")
+    document.override('steps="3"')
+    document.override("steps=3")
+    scenario = validate(document, Scenario)
+    assert scenario.tasks["hand"].gains == Gains(kp=[100.0, 2.0], kd=20.0)
+    assert scenario.tasks["elbow"].gains == Gains(kp=100.0, kd=20.0)  # a copy
+    assert scenario.fields[0].weight == 0.25
+    assert scenario.frames is not None
+    assert scenario.frames.root == {"tool.tip": [0.0, 0.0, 1.0]}
+    assert scenario.steps == 3
+    kp = ("tasks", "hand", "gains", "kp")
+    assert document.location(kp) == "--set tasks.hand.gains.kp=[1e2, 2]"
+    assert document.location((*kp, 1)) == "--set tasks.hand.gains.kp=[1e2, 2]"
+    assert document.mark(kp) is None
+    assert document.location(kp[:-1]) == "panda.yaml:5"
+    assert document.location(("steps",)) == "--set steps=3"
+
+
+def test_overrides_create_mappings_and_fill_empty_ones() -> None:
+    document = Document.parse("a:\nb: [~]")
+    document.override("a.b.c=")
+    document.override("b.0.c=d")
+    assert document.to_dict() == {"a": {"b": {"c": None}}, "b": [{"c": "d"}]}
+    assert document.location(("a", "b")) == "<string>:1"
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        ("steps", "needs the form key=value, for example tasks.0.gains.kp=100"),
+        ("=3", "needs the form key=value, for example tasks.0.gains.kp=100"),
+        ("a..b=3", "needs the form key=value, for example tasks.0.gains.kp=100"),
+        ("robot.name=3", "robot is 'panda', which has no keys"),
+        ("fields.2.weight=3", "fields has no entry '2' (entries: 0 to 1)"),
+        ("fields.-1.weight=3", "fields has no entry '-1' (entries: 0 to 1)"),
+        ("fields.first=3", "fields has no entry 'first' (entries: 0 to 1)"),
+        (
+            "fields.0=[1,",
+            "not YAML: while parsing a flow node, "
+            "expected the node content, but found '<stream end>'",
+        ),
+        ("steps=!!x 1", "the tag '!!x' is not allowed: plain data only"),
+        (
+            "steps=a\nb: 1",
+            "not YAML: a key is not allowed here; check the indentation, "
+            "and put text that contains ': ' in quotes",
+        ),
+        ("steps=x", "steps: 'x' is text; expected an integer"),
+        (
+            "fields.0.wieght=1",
+            "fields.0.wieght: unknown key 'wieght'; did you mean 'weight'? "
+            "(allowed: type, weight, reference)",
+        ),
+        (
+            "fields.1={type: x}",
+            "fields.1.type: unknown type 'x' (allowed: manipulability, centering)",
+        ),
+        (
+            "tasks.foot.gains.kp=1",
+            "tasks.foot: missing key 'frame'; required here: frame",
+        ),
+    ],
+)
+def test_mistakes_in_overrides(override: str, expected: str) -> None:
+    origin = f"--set {' '.join(override.split())}"
+    if expected.startswith("tasks.foot"):  # the task was created, not written
+        origin = "panda.yaml:2"
+    assert message(GOOD, override) == f"{origin}: {expected}"
+
+
+def test_long_overrides_are_cut() -> None:
+    deep = ".".join("a" * 60)
+    cut = f"--set {deep}"[:69]
+    assert message(GOOD, f"{deep}=1") == f"{cut}...: nested deeper than 50 levels"
+
+
+def test_mistakes_of_overrides_come_last() -> None:
+    assert message("robot: a\nview: 3", "steps=x") == (
+        "panda.yaml:2: view: 3 is an integer; expected true or false\n"
+        "and 1 more:\n"
+        "  --set steps=x: steps: 'x' is text; expected an integer"
+    )
+
+
+# --- errors raised later -------------------------------------------------------------
+
+
+def test_errors_raised_later_are_located() -> None:
+    document = Document.parse(GOOD, "panda.yaml")
+    with (
+        pytest.raises(FrameNotFoundError) as caught,
+        document.at("tasks"),
+        document.at("tasks", "hand", "frame"),
+    ):
+        raise FrameNotFoundError("no frame 'hnad'")
+    assert str(caught.value) == "panda.yaml:4: tasks.hand.frame: no frame 'hnad'"
+    assert caught.value.location == "panda.yaml:4"
+    copy = pickle.loads(pickle.dumps(caught.value))
+    assert (str(copy), copy.location) == (str(caught.value), "panda.yaml:4")
+
+
+def test_located_errors_stay_as_they_are() -> None:
+    document = Document.parse(GOOD, "panda.yaml")
+    with pytest.raises(ConfigError) as caught, document.at("tasks"):
+        validate(Document.parse("steps: x\nrobot: a", "other.yaml"), Scenario)
+    assert str(caught.value) == "other.yaml:1: steps: 'x' is text; expected an integer"
+
+
+def test_other_errors_pass() -> None:
+    document = Document.parse(GOOD, "panda.yaml")
+    with pytest.raises(ZeroDivisionError, match=r"^division by zero$"), document.at():
+        print(1 / 0)
+
+
+def test_errors_of_overridden_keys_name_the_override() -> None:
+    document = Document.parse(GOOD, "panda.yaml")
+    document.override("tasks.hand.gains.kp=[1, 2]")
+    with (
+        pytest.raises(ShapeError) as caught,
+        document.at("tasks", "hand", "gains", "kp"),
+    ):
+        raise ShapeError("needs 3 numbers")
+    origin = "--set tasks.hand.gains.kp=[1, 2]"
+    assert str(caught.value) == f"{origin}: tasks.hand.gains.kp: needs 3 numbers"
+
+
+def test_long_keys_are_cut() -> None:
+    error = Document.parse("a: 1").error(("a " * 50,), "is bad")
+    assert str(error) == f"<string>:1: '{'a ' * 18}a...': is bad"
+
+
+def test_errors_can_be_made_for_a_place() -> None:
+    error = Document.parse("a b: {'': 1}", "x.yaml").error(("a b", ""), "is bad")
+    assert (str(error), error.location) == ("x.yaml:1: 'a b'.'': is bad", "x.yaml:1")

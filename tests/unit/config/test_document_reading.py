@@ -1,0 +1,236 @@
+"""Check what is read from a text, and every message of one that is no YAML."""
+
+from pathlib import Path
+
+import pytest
+from scenario_document import GOOD, Gains, Line, Scenario, message
+
+from hsp_control.common.exceptions import ConfigError
+from hsp_control.config.document import Document
+from hsp_control.config.validation import validate
+from hsp_control.config.yaml_reader import MAX_SIZE, MAX_VALUES
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+# --- what is read --------------------------------------------------------------------
+
+
+def test_a_good_text_becomes_the_model() -> None:
+    scenario = validate(Document.parse(GOOD), Scenario)
+    assert scenario.tasks["hand"].gains == scenario.tasks["elbow"].gains
+    assert scenario.tasks["hand"].gains == Gains(kp=100.0, kd=20.0)
+    assert isinstance(scenario.tasks["elbow"].trajectory, Line)
+    assert scenario.frames is not None
+    assert scenario.frames.root == {"tool.tip": [0.0, 0.0, 16.0]}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1e-1", 0.1),
+        ("1e3", 1000.0),
+        ("-.5", -0.5),
+        ("5.", 5.0),
+        ("+.inf", float("inf")),
+        ("-.INF", -float("inf")),
+        ("010", 10),
+        ("0o17", 15),
+        ("0x1F", 31),
+        ("18446744073709551615", 2**64 - 1),
+        ("1_000", "1_000"),
+        ("1:30", "1:30"),
+        ("2001-01-01", "2001-01-01"),
+        ("on", "on"),
+        ("no", "no"),
+        ("True", True),
+        ("~", None),
+        ("", None),
+        ("'1'", "1"),
+        ("!!str 1", "1"),
+        ("!!float 1", 1.0),
+        ("=", "="),
+    ],
+)
+def test_scalars_are_those_of_yaml_1_2(text: str, value: object) -> None:
+    read = Document.parse(f"key: {text}").to_dict()["key"]
+    assert read == value
+    assert type(read) is type(value)
+
+
+def test_nan_is_read_so_that_the_schema_can_refuse_it() -> None:
+    read = Document.parse("key: .nan").to_dict()["key"]
+    assert read != read
+
+
+def test_every_key_path_has_a_location() -> None:
+    document = Document.parse(GOOD, "panda.yaml")
+    assert document.location(()) == "panda.yaml:1"
+    assert (
+        document.location(("tasks", "hand", "trajectory", "radius")) == "panda.yaml:8"
+    )
+    assert document.mark(("fields", 0, "weight")) == (15, 3)
+    assert document.mark(("fields", 1, "middle", "joint")) == (16, 30)
+    assert document.location(("tasks", "elbow", "gains")) == "panda.yaml:11"
+    # Behind an alias, the line to mend is where its anchor stands.
+    assert document.location(("tasks", "elbow", "gains", "kp")) == "panda.yaml:5"
+    # What is missing is missing in its nearest ancestor.
+    assert document.location(("tasks", "hand", "gains", "ki", 3)) == "panda.yaml:5"
+    assert document.location(("nothing",)) == "panda.yaml:1"
+
+
+def test_the_data_are_copies() -> None:
+    document = Document.parse("a: &x [1]\nb: *x")
+    data = document.to_dict()
+    data["a"].append(2)
+    assert data["b"] == [1]
+    assert document.to_dict() == {"a": [1], "b": [1]}
+
+
+def test_contains() -> None:
+    document = Document.parse(GOOD)
+    assert ("fields", 1, "middle", "joint") in document
+    assert ("fields", 2) not in document
+    assert ("fields", "type") not in document
+    assert ("robot", 0) not in document
+
+
+# --- what is not YAML, or more than data ---------------------------------------------
+
+
+UNREADABLE = [
+    ("", "1: is empty; a configuration must be a mapping (key: value)"),
+    ("\n# only this\n", "1: is empty; a configuration must be a mapping (key: value)"),
+    ("~", "1: is empty; a configuration must be a mapping (key: value)"),
+    ("\n- 1\n- 2", "2: is [1, 2]; a configuration must be a mapping (key: value)"),
+    ("robot", "1: is 'robot'; a configuration must be a mapping (key: value)"),
+    ("a: 1\nb:\n  c: 1\n  c: 2", "4: b.c: the key 'c' is given twice, first on line 3"),
+    ("a: 1\n'a': 2", "2: a: the key 'a' is given twice, first on line 1"),
+    ("a:\n  1: b", "2: a: a key must be text, and 1 is not; put it in quotes"),
+    ("true: b", "1: a key must be text, and true is not; put it in quotes"),
+    ("a: [{? [b] : c}]", "1: a.0: a key must be text, not a list or a mapping"),
+    (
+        "a: &x {b: 1}\nc:\n  <<: *x",
+        "3: c: merge keys (<<) are not supported; write the keys out",
+    ),
+    (
+        "a:\n- !!python/object/apply:os.system ['false']",
+        "2: a.0: the tag '!!python/object/apply:os.system' is not allowed: "
+        "plain data only",
+    ),
+    ("a: !gain 3", "1: a: the tag '!gain' is not allowed: plain data only"),
+    ("a: !!int [1]", "1: a: the tag '!!int' is not allowed: plain data only"),
+    ("!!set {a, b}", "1: the tag '!!set' is not allowed: plain data only"),
+    ("a: !!bool on", "1: a: 'on' cannot be read as true or false"),
+    ("a: !!float x", "1: a: 'x' cannot be read as a number"),
+    (
+        "a: 18446744073709551616",
+        "1: a: '18446744073709551616' cannot be read as a 64-bit integer",
+    ),
+    (
+        f"a: {'9' * 5000}",
+        f"1: a: '{'9' * 35}...' cannot be read as a 64-bit integer",
+    ),
+    ('a: "\\ud800"', r"1: a: '\ud800' cannot be read as text"),
+    ("a: 1\n\tb: 2", "2: not YAML: a tab in the indentation; use spaces"),
+    (
+        "a: b: c",
+        "1: not YAML: a key is not allowed here; check the indentation, "
+        "and put text that contains ': ' in quotes",
+    ),
+    (
+        "a:\n  b: 1\n c: 2",
+        "3: not YAML: the indentation does not match the lines above",
+    ),
+    ("a: *b", "1: not YAML: found undefined alias 'b'"),
+    (
+        "a: @home",
+        "1: not YAML: while scanning for the next token, "
+        "found character '@' that cannot start any token",
+    ),
+    (
+        "a: [1,\nb: 2\n",
+        "3: not YAML: while parsing a flow sequence from line 1, "
+        "expected ',' or ']', but got '<stream end>'",
+    ),
+    (
+        "a: 1\n---\nb: 2",
+        "2: not YAML: expected a single document in the stream from line 1, "
+        "but found another document",
+    ),
+    ("a: 1\nb: \x07", "2: not YAML: the character U+0007 is not allowed"),
+    (
+        'a:\n  "\\UFFFFFFFF"',
+        "2: not YAML: an escape sequence or a version number is out of range",
+    ),
+    ("a: &x [1, *x]", "1: a.1: an alias inside the value that it refers to"),
+    ("a:\n  " + "[" * 60, "2: nested deeper than 50 levels"),
+    (
+        "a: &a {b: &b {c: &c [1]}}\nd:\n  "
+        + "".join(f"{{x{i}: " for i in range(48))
+        + "*a"
+        + "}" * 48,
+        "1: nested deeper than 50 levels",
+    ),
+    (
+        "a: [" + "1, " * MAX_VALUES,
+        f"1: more than {MAX_VALUES} values (aliases expanded)",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "expected"), UNREADABLE)
+def test_what_cannot_be_read(text: str, expected: str) -> None:
+    assert message(text) == f"panda.yaml:{expected}"
+
+
+def test_aliases_do_not_grow_without_bound() -> None:
+    laughs = ["a0: &a0 [ha, ha, ha, ha, ha, ha, ha, ha, ha, ha]"]
+    laughs += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 30)]
+    expected = f"panda.yaml:1: more than {MAX_VALUES} values (aliases expanded)"
+    assert message("\n".join(laughs)) == expected
+
+
+def test_size_is_bounded() -> None:
+    too_large = "panda.yaml: larger than 1 MB, the limit for a configuration"
+    assert message("#" * (MAX_SIZE + 1)) == too_large
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        ("pnda.yaml", None, ": no such file; did you mean 'panda.yaml'?"),
+        ("x.yaml", None, ": no such file"),
+        ("folder", None, ": is a folder; give a file"),
+        ("a\0b", None, ": cannot be read: embedded null byte"),
+        ("latin.yaml", b"a: 1\nb: caf\xe9", ":2: not UTF-8 text (byte 0xe9)"),
+        (
+            "large.yaml",
+            b"#" * (MAX_SIZE + 1),
+            ": larger than 1 MB, the limit for a configuration",
+        ),
+        (
+            "list.yaml",
+            b"- a",
+            ":1: is ['a']; a configuration must be a mapping (key: value)",
+        ),
+    ],
+)
+def test_files_that_cannot_be_read(
+    tmp_path: Path, name: str, content: bytes | None, expected: str
+) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "panda.yaml").write_text(GOOD, encoding="utf-8")
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(ConfigError) as caught:
+        Document.read(tmp_path / name)
+    assert str(caught.value) == f"{tmp_path / name}{expected}"
+
+
+def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    path = tmp_path / "bom.yaml"
+    path.write_bytes(b"\xef\xbb\xbfa: 1\r\nb: 2\r\n")
+    document = Document.read(path)
+    assert document.to_dict() == {"a": 1, "b": 2}
+    assert document.location(("b",)) == f"{path}:2"

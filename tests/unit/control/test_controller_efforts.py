@@ -1,0 +1,249 @@
+"""Check what the controller returns, without memory, near singularities too."""
+
+import numpy as np
+import oracles
+import pinocchio as pin
+from controller_cases import (
+    EXACT,
+    METRICS,
+    assert_same,
+    copied,
+    hold_orientation,
+    metrics,
+    panda,
+    states,
+    track,
+)
+
+from hsp_control import (
+    Controller,
+    IdentityMetric,
+    MassMatrixMetric,
+    Rest,
+    TargetPosture,
+    Uncontrolled,
+)
+from hsp_control.null_space.metrics import MetricSample
+
+# --- what it returns -----------------------------------------------------------------
+
+
+@metrics
+def test_effort_is_m_a_plus_n(kind: str) -> None:
+    """Equation (7), with M and N by plain Pinocchio."""
+    field = TargetPosture(panda(), panda().home())
+    controller = Controller(panda(), [track()], field, metric=METRICS[kind](7))
+    model, data = panda().model, panda().model.createData()
+    for t, q, v in states(5):
+        out = controller.compute(panda().state(t, q, v))
+        M = pin.crba(model, data, q).copy()
+        N = pin.rnea(model, data, q, v, np.zeros(7)).copy()
+        expected = M @ out.acceleration + N
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(out.tau, expected, rtol=0, atol=1e-13 * scale)
+        # The plant answers with that acceleration; cond(M) is below 1e4.
+        a = panda().forward_dynamics(q, v, out.tau)
+        size = np.abs(out.acceleration).max()
+        np.testing.assert_allclose(a, out.acceleration, rtol=0, atol=1e-11 * size)
+
+
+def test_tasks_are_stacked_in_order() -> None:
+    tasks = [hold_orientation(), track(axes="xyz", name="origin")]
+    controller = Controller(panda(), tasks, singularity_threshold=EXACT)
+    t, q, v = states(1)[0]
+    state = panda().state(t, q, v)
+    out = controller.compute(state)
+    assert controller.task_rows == {
+        "panda_tcp_orientation": slice(0, 3),
+        "origin": slice(3, 6),
+    }
+    for task in tasks:
+        where = controller.task_rows[task.name]
+        for stacked, own in zip(out.task, task.evaluate(state), strict=True):
+            np.testing.assert_array_equal(stacked[where], own)
+    residual = out.task.jacobian @ out.acceleration + out.task.jacobian_dot @ v
+    scale = np.abs(out.task.acceleration).max()
+    np.testing.assert_allclose(
+        residual, out.task.acceleration, rtol=0, atol=1e-12 * scale
+    )
+
+
+def test_order_of_tasks_does_not_matter() -> None:
+    """One level: the same law whichever comes first."""
+    field = TargetPosture(panda(), panda().home())
+    first = Controller(panda(), [track(), hold_orientation()], field)
+    second = Controller(panda(), [hold_orientation(), track()], field)
+    for t, q, v in states(5):
+        state = panda().state(t, q, v)
+        a, b = first.compute(state), second.compute(state)
+        # Six rows near singularities: condition numbers up to 1e3.
+        scale = 1e-11 * np.abs(a.acceleration).max()
+        np.testing.assert_allclose(a.acceleration, b.acceleration, rtol=0, atol=scale)
+        np.testing.assert_allclose(
+            a.null_space_error, b.null_space_error, rtol=0, atol=1e-11
+        )
+
+
+def test_defaults_are_rest_the_identity_and_ten() -> None:
+    plain = Controller(panda(), [track()])
+    said = Controller(
+        panda(), [track()], Rest(panda()), metric=IdentityMetric(), null_space_gain=10.0
+    )
+    state = panda().state(*states(1)[0])
+    assert_same(copied(plain.compute(state)), copied(said.compute(state)))
+    np.testing.assert_array_equal(plain.null_space_gain, 10.0 * np.eye(7))
+
+
+def test_gain_as_number_list_and_matrix() -> None:
+    state = panda().state(*states(1)[0])
+    outputs = [
+        copied(Controller(panda(), [track()], null_space_gain=gain).compute(state))
+        for gain in (6.0, 7 * [6.0], 6.0 * np.eye(7))
+    ]
+    assert_same(outputs[0], outputs[1])
+    assert_same(outputs[0], outputs[2])
+
+
+@metrics
+def test_uncontrolled_leaves_self_motion_alone(kind: str) -> None:
+    """φ_N = 0, the paper's first simulation: a = J#(a_x - J'v) and no more."""
+    metric = METRICS[kind](7)
+    controller = Controller(
+        panda(),
+        [track()],
+        Uncontrolled(panda()),
+        metric=metric,
+        singularity_threshold=EXACT,
+    )
+    for t, q, v in states(5):
+        state = panda().state(t, q, v)
+        out = controller.compute(state)
+        sample, W = out.task, metric.evaluate(state, MetricSample.allocate(7)).W
+        J_sharp = oracles.pseudo_inverse(sample.jacobian, W)
+        expected = J_sharp @ (sample.acceleration - sample.jacobian_dot @ v)
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(
+            out.acceleration, expected, rtol=0, atol=1e-11 * scale
+        )
+        # e_N is reported all the same, for g = 0: the self-motion that nobody holds.
+        e_N = -(v - J_sharp @ sample.jacobian @ v)
+        np.testing.assert_allclose(out.null_space_error, e_N, rtol=0, atol=1e-11)
+        assert np.abs(e_N).max() > 0.1
+
+
+@metrics
+def test_diagnosis(kind: str) -> None:
+    metric = METRICS[kind](7)
+    field = TargetPosture(panda(), panda().home(), weights=2.0)
+    controller = Controller(
+        panda(), [track(), hold_orientation()], field, metric=metric
+    )
+    for t, q, v in states(3, seed=1):
+        state = panda().state(t, q, v)
+        out = copied(controller.compute(state))
+        diagnosis = controller.diagnose(state)
+        W = metric.evaluate(state, MetricSample.allocate(7)).W
+        J, e_N = out["task.jacobian"], out["null_space_error"]
+        whitened = J @ np.linalg.inv(np.linalg.cholesky(W)).T
+        expected = np.linalg.svd(whitened)[1]
+        np.testing.assert_allclose(
+            diagnosis.singular_values, expected, rtol=0, atol=1e-13 * expected[0]
+        )
+        np.testing.assert_allclose(
+            diagnosis.manipulability,
+            np.linalg.det(J @ np.linalg.solve(W, J.T)),
+            rtol=1e-9,
+        )
+        np.testing.assert_allclose(
+            diagnosis.null_space_norm, np.sqrt(e_N @ W @ e_N), rtol=1e-13
+        )
+        assert diagnosis.field_value == field.value(state)
+        # To look changes nothing.
+        again = controller.diagnose(state)
+        np.testing.assert_array_equal(again.singular_values, diagnosis.singular_values)
+        assert_same(copied(controller.compute(state)), out)
+
+
+# --- no memory -----------------------------------------------------------------------
+
+
+@metrics
+def test_same_state_same_effort(kind: str) -> None:
+    """Whatever was computed before: elsewhere, near a singularity, or an error."""
+    tasks = [track(), hold_orientation()]
+    field = TargetPosture(panda(), panda().home())
+    controller = Controller(panda(), tasks, field, metric=METRICS[kind](7))
+    fresh = Controller(panda(), tasks, field, metric=METRICS[kind](7))
+    somewhere, *others = states(6, seed=2)
+    state = panda().state(*somewhere)
+    expected = copied(controller.compute(state))
+    assert_same(copied(controller.compute(state)), expected)
+    for t, q, v in others:
+        controller.compute(panda().state(t, q, v))
+        controller.diagnose(panda().state(t, q, v))
+    upright = panda().state(0.0, np.zeros(7), np.ones(7))
+    assert controller.compute(upright).damped
+    controller.flow(0.7, others[0][1])
+    assert_same(copied(controller.compute(state)), expected)
+    # Another controller of the same tasks and field does not disturb, nor a new state.
+    assert_same(copied(fresh.compute(panda().state(*somewhere))), expected)
+    assert_same(copied(controller.compute(state)), expected)
+
+
+def test_states_take_turns() -> None:
+    """Two robots of one kind, one controller: each state gets its own effort."""
+    field = TargetPosture(panda(), panda().home())
+    controller = Controller(panda(), [track()], field, metric=MassMatrixMetric())
+    first, second = (panda().state(*where) for where in states(2, seed=3))
+    a, b = copied(controller.compute(first)), copied(controller.compute(second))
+    for _ in range(3):
+        assert_same(copied(controller.compute(first)), a)
+        assert_same(copied(controller.compute(second)), b)
+    assert np.abs(a["tau"] - b["tau"]).max() > 1.0
+
+
+# --- near singularities --------------------------------------------------------------
+
+
+@metrics
+def test_singular_posture_gives_a_bounded_effort(kind: str) -> None:
+    """The Panda upright cannot move its hand up: damped, bounded and smooth there."""
+    tasks = [track(), hold_orientation()]
+    field = TargetPosture(panda(), panda().home())
+    threshold = 0.05
+    controller = Controller(
+        panda(),
+        tasks,
+        field,
+        metric=METRICS[kind](7),
+        singularity_threshold=threshold,
+    )
+    v = 0.1 * np.ones(7)
+    direction = np.random.default_rng(4).standard_normal(7)
+    outputs = [
+        copied(controller.compute(panda().state(0.0, h * direction, v)))
+        for h in (0.0, 1e-9, 1e-6)
+    ]
+    for out in outputs:
+        assert out["damped"]
+        assert np.isfinite(out["tau"]).all()
+    sample = outputs[0]
+    wanted = sample["task.acceleration"] - sample["task.jacobian_dot"] @ v
+    state = panda().state(0.0, np.zeros(7), v)
+    metric = METRICS[kind](7).evaluate(state, MetricSample.allocate(7))
+    uncontrolled = Controller(
+        panda(),
+        tasks,
+        Uncontrolled(panda()),
+        metric=METRICS[kind](7),
+        singularity_threshold=threshold,
+    )
+    a = uncontrolled.compute(state).acceleration
+    bound = 1.09 / threshold * np.linalg.norm(wanted)
+    assert np.sqrt(a @ metric.W @ a) <= bound
+    # Continuous across the singular posture: a jump would be of a's own size. J# may
+    # turn by 2/threshold² = 800 a radian, times the whitening's 30 in the mass matrix.
+    size = np.abs(outputs[0]["acceleration"]).max()
+    for out, h in zip(outputs[1:], (1e-9, 1e-6), strict=True):
+        moved = np.abs(out["acceleration"] - outputs[0]["acceleration"]).max()
+        assert moved <= 1e5 * h * size

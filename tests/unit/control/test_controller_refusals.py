@@ -1,0 +1,409 @@
+"""Check what the controller refuses, and that NaN never comes out of it."""
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from controller_cases import (
+    CENTER,
+    GAINS,
+    TCP,
+    assert_same,
+    circle,
+    copied,
+    hold_orientation,
+    panda,
+    states,
+    track,
+)
+from numpy.typing import NDArray
+
+from hsp_control import (
+    ConstantMetric,
+    Controller,
+    FramePosition,
+    FunctionCost,
+    FunctionField,
+    HspControlError,
+    JointPosture,
+    Metric,
+    NullSpaceField,
+    Rest,
+    Robot,
+    RobotState,
+    Task,
+    Trajectory,
+    simulate,
+)
+from hsp_control.common.exceptions import (
+    ControllerError,
+    FieldError,
+    GainError,
+    MetricError,
+    NonFiniteError,
+    TrajectoryError,
+)
+from hsp_control.null_space.fields import FieldSample
+from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.metrics.metric import VARYING
+from hsp_control.tasks import TaskSample
+from hsp_control.trajectories import (
+    CallableTrajectory,
+    TrajectorySample,
+)
+
+Array = NDArray[np.float64]
+
+
+# --- what it refuses -----------------------------------------------------------------
+
+
+def indefinite_gain() -> Array:
+    """Return K_N = [[1, 1.5], [0, 1]] ⊕ I: it decays for W = I but not in W1."""
+    K_N = np.eye(7)
+    K_N[0, 1] = 1.5
+    return K_N
+
+
+W1 = np.array([100.0, 1, 1, 1, 1, 1, 1])
+
+
+@pytest.mark.parametrize(
+    ("tasks", "options", "error", "message"),
+    [
+        (list, {}, ControllerError, "a controller needs at least one task"),
+        (
+            lambda: [track(axes="xyz"), track(name=TCP)],
+            {},
+            ControllerError,
+            "two tasks are called 'panda_tcp'; give them distinct names",
+        ),
+        (
+            lambda: [track(Robot.load("panda"))],
+            {},
+            ControllerError,
+            r"task 'panda_tcp' was built for another robot object \(panda\)",
+        ),
+        (
+            lambda: [track()],
+            {"field": lambda: Rest(Robot.load("panda"))},
+            ControllerError,
+            r"field 'rest' was built for another robot object \(panda\); build it with",
+        ),
+        (
+            lambda: [track(), hold_orientation(), track(name="again")],
+            {},
+            ControllerError,
+            r"the tasks have 9 rows \(panda_tcp: 3, panda_tcp_orientation: 3, again: 3"
+            r"\); panda has only 7 degrees of freedom",
+        ),
+        (
+            lambda: [track()],
+            {"null_space_gain": 0.0},
+            GainError,
+            "null_space_gain is 0.0; must be greater than 0",
+        ),
+        (
+            lambda: [track()],
+            {"null_space_gain": -1.0},
+            GainError,
+            "null_space_gain is -1.0; must be greater than 0",
+        ),
+        (
+            lambda: [track()],
+            {"null_space_gain": [1.0, 1, 1, 1, 1, 1, -1]},
+            GainError,
+            r"null_space_gain is \[1.0, .*, -1.0\]; must be greater than 0",
+        ),
+        (
+            lambda: [track()],
+            {"null_space_gain": "fast"},
+            GainError,
+            "null_space_gain is 'fast'; needs numbers, a list or a matrix",
+        ),
+        (
+            lambda: [track()],
+            {"null_space_gain": np.nan},
+            GainError,
+            "null_space_gain is nan; needs finite numbers",
+        ),
+        (
+            lambda: [track()],
+            {"null_space_gain": [1.0, 2.0]},
+            GainError,
+            r"null_space_gain has shape \(2,\); needs a number, 7 numbers or a 7 × 7",
+        ),
+        (
+            lambda: [track()],
+            {"null_space_gain": np.ones((7, 7, 7))},
+            GainError,
+            r"null_space_gain has shape \(7, 7, 7\)",
+        ),
+        (
+            lambda: [track()],
+            {
+                "null_space_gain": indefinite_gain(),
+                "metric": lambda: ConstantMetric(W1),
+            },
+            GainError,
+            "the smallest eigenvalue of W K_N is -",
+        ),
+        (
+            lambda: [track()],
+            {"metric": lambda: ConstantMetric(np.eye(3))},
+            MetricError,
+            r"metric has shape \(3, 3\); the robot needs \(7, 7\)",
+        ),
+        *(
+            (
+                lambda: [track()],
+                {"singularity_threshold": value},
+                ControllerError,
+                f"singularity_threshold is {value}; must be positive",
+            )
+            for value in (0.0, -0.1, np.nan, np.inf)
+        ),
+    ],
+)
+def test_refuses(
+    tasks: Callable[[], list[Task]],
+    options: dict[str, Any],
+    error: type[Exception],
+    message: str,
+) -> None:
+    made = {
+        name: option() if callable(option) else option
+        for name, option in options.items()
+    }
+    with pytest.raises(error, match=message) as caught:
+        Controller(panda(), tasks(), **made)
+    assert isinstance(caught.value, HspControlError)
+    assert isinstance(caught.value, ValueError)
+
+
+def test_a_gain_is_judged_in_its_metric() -> None:
+    """The gain that is refused in one metric passes in another, and conversely."""
+    Controller(panda(), [track()], null_space_gain=indefinite_gain())
+    # W K_N symmetric positive definite, K_N + K_Nᵀ indefinite.
+    K_hat = np.eye(7)
+    K_hat[0, 1] = K_hat[1, 0] = 0.9
+    K_N = np.linalg.solve(np.diag(W1), K_hat)
+    assert np.linalg.eigvalsh(K_N + K_N.T)[0] < 0.0
+    Controller(panda(), [track()], null_space_gain=K_N, metric=ConstantMetric(W1))
+    with pytest.raises(GainError):
+        Controller(panda(), [track()], null_space_gain=K_N)
+
+
+def test_as_many_rows_as_freedoms_are_allowed() -> None:
+    posture = JointPosture(panda(), panda().home(), GAINS)
+    assert posture.rows == 7
+    Controller(panda(), [posture])
+
+
+# --- NaN never comes out -------------------------------------------------------------
+
+
+class Broken(Trajectory):
+    """A user's trajectory that goes wrong after half a second."""
+
+    __slots__ = ("value", "where")
+
+    def __init__(self, value: float, where: str) -> None:
+        self.value = value
+        self.where = where
+
+    @property
+    def dimension(self) -> int:
+        return 3
+
+    def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
+        out = circle().sample(t, out)
+        if t > 0.5:
+            getattr(out, self.where)[1] = self.value
+        return out
+
+
+class BrokenField(NullSpaceField):
+    """A user's field written straight into the sample, unchecked."""
+
+    def __init__(self, where: str, value: float) -> None:
+        super().__init__(panda(), "mine")
+        self.where = where
+        self.broken = value
+
+    def evaluate(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> FieldSample:
+        for array in out:
+            array[:] = 0.0
+        if state.t > 0.5:
+            getattr(out, self.where)[2] = self.broken
+        return out
+
+    def value(self, state: RobotState) -> float:
+        return 0.0
+
+
+class BrokenMetric(Metric):
+    """A user's metric that is not a number after half a second."""
+
+    form: ClassVar[int] = VARYING
+
+    def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
+        out.W_dot[0, 0] = np.nan if state.t > 0.5 else 0.0
+        return out
+
+
+class BrokenTask(FramePosition):
+    """A user's task whose arrays go wrong after half a second."""
+
+    where: str
+    broken: float
+
+    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
+        out = super().evaluate(state, out)
+        if state.t > 0.5:
+            getattr(out, self.where)[..., 1] = self.broken
+        return out
+
+
+def broken_task(where: str, value: float) -> BrokenTask:
+    task = BrokenTask(panda(), TCP, circle(), GAINS, name="mine")
+    task.where, task.broken = where, value
+    return task
+
+
+def late(wrong: Any, right: Any) -> Callable[..., Any]:
+    """Return a function of a time or a state that goes wrong after half a second."""
+    return lambda x: wrong if getattr(x, "t", x) > 0.5 else right
+
+
+def position(function: Callable[[float], Any]) -> FramePosition:
+    still = late(np.zeros(3), np.zeros(3))
+    trajectory = CallableTrajectory(function, 3, velocity=still, acceleration=still)
+    return FramePosition(panda(), TCP, trajectory, GAINS)
+
+
+Parts = dict[str, Any]
+NAN = np.full(7, np.nan)
+FAILURES: dict[str, tuple[Callable[[], Parts], type[Exception], str]] = {
+    **{
+        f"{value} in a trajectory's {where}": (
+            lambda value=value, where=where: {
+                "tasks": [
+                    FramePosition(
+                        panda(), TCP, Broken(value, where), GAINS, name="mine"
+                    )
+                ]
+            },
+            NonFiniteError,
+            r"task 'mine' is not finite at t = 0\.75 s; does its trajectory return NaN",
+        )
+        for value in (np.nan, np.inf)
+        for where in ("position", "velocity", "acceleration")
+    },
+    **{
+        f"{value} in a task's {where}": (
+            lambda value=value, where=where: {"tasks": [broken_task(where, value)]},
+            NonFiniteError,
+            r"task 'mine' is not finite at t = 0\.75 s",
+        )
+        for value in (np.nan, -np.inf)
+        for where in ("jacobian", "jacobian_dot", "acceleration")
+    },
+    "NaN from a trajectory's function": (
+        lambda: {"tasks": [position(late([0.0, np.nan, 0.0], CENTER))]},
+        TrajectoryError,
+        r"function\(0\.75\) must be finite",
+    ),
+    "too few numbers from a trajectory's function": (
+        lambda: {"tasks": [position(late([0.0, 0.0], CENTER))]},
+        TrajectoryError,
+        r"function\(0\.75\) must have shape \(3\)",
+    ),
+    **{
+        f"{value} in a field's {where}": (
+            lambda value=value, where=where: {"field": BrokenField(where, value)},
+            NonFiniteError,
+            r"field 'mine' is not finite at t = 0\.75 s",
+        )
+        for value in (np.nan, np.inf)
+        for where in ("g", "g_dot")
+    },
+    "NaN from a field's function": (
+        lambda: {"field": FunctionField(panda(), late(NAN, np.zeros(7)), name="mine")},
+        FieldError,
+        r"field 'mine' returned g = array\(.*nan.* at t = 0\.75 s; needs 7 finite",
+    ),
+    "infinity from a field's rate": (
+        lambda: {
+            "field": FunctionField(
+                panda(),
+                late(np.zeros(7), np.zeros(7)),
+                rate=late(np.full(7, np.inf), np.zeros(7)),
+                name="mine",
+            )
+        },
+        FieldError,
+        r"field 'mine' returned g' = array\(.*inf.* at t = 0\.75 s",
+    ),
+    "a field of another size": (
+        lambda: {"field": FunctionField(panda(), late(np.zeros(6), np.zeros(7)))},
+        FieldError,
+        "needs 7 finite numbers",
+    ),
+    "NaN from a cost": (
+        lambda: {"field": FunctionCost(panda(), late(np.nan, 1.0), name="mine")},
+        FieldError,
+        r"cost 'mine' returned nan at t = 0\.7",
+    ),
+    "NaN from a cost's gradient": (
+        lambda: {
+            "field": FunctionCost(
+                panda(),
+                late(1.0, 1.0),
+                gradient=late(NAN, np.zeros(7)),
+                gradient_rate=late(np.zeros(7), np.zeros(7)),
+                name="mine",
+            )
+        },
+        FieldError,
+        r"'mine'.*t = 0\.75 s",
+    ),
+    "NaN in a metric": (
+        lambda: {"metric": BrokenMetric()},
+        NonFiniteError,
+        r"the effort is not finite at t = 0\.75 s, q = \[.*\], v = \[.*\]",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", FAILURES)
+# Without the compiler (NUMBA_DISABLE_JIT=1) NumPy warns of inf - inf on the way.
+@pytest.mark.filterwarnings("ignore:invalid value encountered:RuntimeWarning")
+def test_nan_of_a_user_is_an_error_and_never_an_effort(what: str) -> None:
+    make, error, message = FAILURES[what]
+    parts = {"tasks": [track()], "field": None, "metric": None} | make()
+    controller = Controller(panda(), **parts)
+    _, q, v = states(1)[0]
+    before = copied(controller.compute(panda().state(0.25, q, v)))
+    with pytest.raises(error, match=message) as caught:
+        controller.compute(panda().state(0.75, q, v))
+    assert type(caught.value) is error
+    assert isinstance(caught.value, HspControlError)
+    # The failure leaves nothing behind: the controller goes on as if new.
+    assert_same(copied(controller.compute(panda().state(0.25, q, v))), before)
+
+
+def test_user_mistake_in_a_simulation_names_the_time() -> None:
+    """The loop stops with the cause and what had been computed."""
+    task = FramePosition(panda(), TCP, Broken(np.nan, "position"), GAINS, name="mine")
+    controller = Controller(panda(), [task])
+    with pytest.raises(
+        HspControlError, match=r"the simulation stopped: task 'mine' is not finite"
+    ) as caught:
+        simulate(controller, panda().home(), duration=1.0, log_period=0.1)
+    rollout = caught.value.rollout  # type: ignore[attr-defined]
+    assert np.isfinite(rollout.tau).all()
+    assert rollout.t[-1] == pytest.approx(0.5)

@@ -1,0 +1,168 @@
+"""Check the flow: a start on it has no transient, and robots become it."""
+
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from controller_cases import (
+    EXACT,
+    GAINS,
+    METRICS,
+    TCP,
+    circle,
+    hold_orientation,
+    metrics,
+    panda,
+    states,
+    track,
+)
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Circle,
+    Controller,
+    Dop853,
+    FramePosition,
+    FunctionField,
+    Hold,
+    Metric,
+    Robot,
+    RobotState,
+    TargetPosture,
+    simulate,
+)
+from hsp_control.common.exceptions import (
+    ControllerError,
+)
+from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.metrics.metric import CONSTANT
+
+Array = NDArray[np.float64]
+
+
+def swaying_posture(state: RobotState) -> Array:
+    """A field that moves in time: the joints follow sines about the home posture."""
+    away = panda().home() - state.q
+    return 2.0 * away + np.sin(state.t + np.arange(7.0))
+
+
+@metrics
+def test_flow_meets_the_task_and_follows_the_field(kind: str) -> None:
+    """v = J#x_d' + P g: J v = x_d', and v - g is as small as the metric can tell."""
+    metric = METRICS[kind](7)
+    field = FunctionField(panda(), swaying_posture)
+    tasks = [track(), hold_orientation()]
+    controller = Controller(
+        panda(), tasks, field, metric=metric, singularity_threshold=EXACT
+    )
+    for t, q, _ in states(3, seed=5):
+        v = controller.flow(t, q)
+        state = panda().state(t, q, v)
+        J = np.vstack([task.evaluate(state).jacobian for task in tasks])
+        rate = np.concatenate([circle().sample(t).velocity, np.zeros(3)])
+        np.testing.assert_allclose(J @ v, rate, rtol=0, atol=1e-12)
+        W = metric.evaluate(state, MetricSample.allocate(7)).W
+        null = np.linalg.svd(J)[2][6:]
+        g = swaying_posture(state)
+        # P(g - v) = 0: on the flow the null-space error has died.
+        np.testing.assert_allclose(null @ W @ (g - v), 0.0, rtol=0, atol=1e-10)
+        e_N = controller.compute(state).null_space_error
+        np.testing.assert_allclose(e_N, 0.0, rtol=0, atol=1e-11)
+
+
+@metrics
+def test_robot_becomes_the_flow(kind: str) -> None:
+    """After the transients the simulated velocity is flow(t, q), in every metric.
+
+    Started off the path and moving: exp(-20 · 2) = 4e-18 is left of both errors.
+    """
+    controller = Controller(
+        panda(),
+        [track()],
+        FunctionField(panda(), swaying_posture),
+        metric=METRICS[kind](7),
+        null_space_gain=20.0,
+        singularity_threshold=EXACT,
+    )
+    rollout = simulate(
+        controller,
+        panda().home(),
+        0.2 * np.ones(7),
+        duration=2.0,
+        log_period=0.25,
+        integrator=Dop853(rtol=1e-10, atol=1e-10),
+    )
+    gaps = [
+        np.abs(v - controller.flow(t, q)).max()
+        for t, q, v in zip(rollout.t, rollout.q, rollout.v, strict=True)
+    ]
+    # In between, both errors die like (1 + 20 t) exp(-20 t); at the end it is the
+    # integrator's tolerance that is left.
+    assert gaps[0] > 0.1
+    assert gaps[-1] < 1e-8
+    # The flow itself is not at rest: the robot follows something that moves.
+    assert np.abs(rollout.v[-1]).max() > 0.1
+
+
+def test_a_start_on_the_flow_has_no_transient() -> None:
+    """v0 = flow(0, q0) from a point of the path: e and e_N are zero from the start."""
+    field = FunctionField(panda(), swaying_posture)
+    home = panda().home()
+    start = panda().state(0.0, home, np.zeros(7)).position(TCP).copy()
+    path = Circle(
+        start - np.array([0.1, 0.0, 0.0]), 0.1, 2.0, axes=[[1, 0, 0], [0, 0, 1]]
+    )
+    task = FramePosition(panda(), TCP, path, GAINS)
+    controller = Controller(panda(), [task], field, singularity_threshold=EXACT)
+    rollout = simulate(
+        controller,
+        home,
+        controller.flow(0.0, home),
+        duration=1.0,
+        log_period=0.1,
+        integrator=Dop853(rtol=1e-10, atol=1e-10),
+    )
+    for t, q, v in zip(rollout.t, rollout.q, rollout.v, strict=True):
+        out = controller.compute(panda().state(t, q, v))
+        np.testing.assert_allclose(out.task.error, 0.0, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(out.null_space_error, 0.0, rtol=0, atol=1e-8)
+
+
+def test_hold_still() -> None:
+    """A robot at rest at its posture and its point stays there: a = 0, tau = N."""
+    home = panda().home()
+    point = panda().state(0.0, home, np.zeros(7)).position(TCP).copy()
+    task = FramePosition(panda(), TCP, Hold(point), GAINS)
+    field = TargetPosture(panda(), home)
+    for kind in METRICS:
+        controller = Controller(panda(), [task], field, metric=METRICS[kind](7))
+        state = panda().state(0.0, home, np.zeros(7))
+        out = controller.compute(state)
+        np.testing.assert_allclose(out.acceleration, 0.0, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(out.tau, state.nonlinear_effects, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(controller.flow(0.0, home), 0.0, rtol=0, atol=1e-14)
+
+
+def test_constant_form_is_asked_for_no_rate() -> None:
+    """A metric that declares itself constant is not differentiated."""
+
+    class Growing(Metric):
+        form: ClassVar[int] = CONSTANT
+
+        def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
+            out.W_dot[:] = np.nan  # nobody may read it
+            return out
+
+    controller = Controller(panda(), [track()], metric=Growing())
+    plain = Controller(panda(), [track()])
+    state = panda().state(*states(1)[0])
+    np.testing.assert_allclose(
+        controller.compute(state).tau, plain.compute(state).tau, rtol=1e-13, atol=1e-12
+    )
+
+
+def test_refuses_the_state_of_another_robot_object() -> None:
+    other = Robot.load("panda")
+    state = other.state(0.0, other.home(), np.zeros(7))
+    with pytest.raises(ControllerError, match="the state is of another robot object"):
+        Controller(panda(), [track()]).compute(state)

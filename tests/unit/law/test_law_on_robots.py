@@ -1,0 +1,418 @@
+"""Check the law on robots: the paper's equation (13), its identities, its decay.
+
+Three oracles: the paper's equation with a (J⁺)' by differences along the motion, the
+short form of `oracles.law` in plain NumPy, and the derivative of V itself.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import oracles
+import pytest
+from law_cases import load, pseudo_inverse
+from law_numbers import positive
+from numpy.typing import NDArray
+from oracles import slope
+
+from hsp_control import (
+    Circle,
+    ConstantMetric,
+    Controller,
+    ControlOutput,
+    FrameOrientation,
+    FramePosition,
+    FunctionField,
+    Gains,
+    IdentityMetric,
+    JointPosture,
+    MassMatrixMetric,
+    Metric,
+    NullSpaceField,
+    Robot,
+    RobotState,
+    TargetPosture,
+)
+from hsp_control.null_space.fields import FieldSample
+from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.metrics.metric import VARYING
+from hsp_control.trajectories import HoldOrientation
+
+Array = NDArray[np.float64]
+
+
+GAINS = Gains(16.0, 8.0)
+
+
+class Case(NamedTuple):
+    """A robot, its tasks and a field that moves in time."""
+
+    robot: Robot
+    tasks: list[Any]
+    field: NullSpaceField
+    q: Array
+    v: Array
+    posture: Array
+
+
+def moving_field(robot: Robot) -> NullSpaceField:
+    """Return a nonlinear, time-varying field whose rate is known exactly.
+
+    g_i = sin(2 w_i(q) + t), where w is a joint's rate integrated: only its rate v
+    matters. It is written for joints of one freedom; others get sin(t).
+    """
+    single = np.zeros(robot.nv)
+    for joint in robot.joints.values():
+        if joint.nv == 1:
+            single[joint.idx_v] = 2.0
+    phase = np.linspace(0.0, 1.0, robot.nv)
+
+    def angle(state: RobotState) -> Array:
+        return single * robot.joint_positions(state.q) + state.t + phase
+
+    def rate(state: RobotState) -> Array:
+        return np.cos(angle(state)) * (single * state.v + 1.0)
+
+    return FunctionField(robot, lambda s: np.sin(angle(s)), rate=rate)
+
+
+def case(name: str) -> Case:
+    """Return one of the robots that the law is tried on, at a random state."""
+    rng = np.random.default_rng(sum(map(ord, name)))
+    circle = Circle([0.4, 0.1, 0.5], 0.1, 2.0, normal=[0.0, 1.0, 1.0])
+    if name == "planar3r":
+        robot = load("planar3r")
+        path = Circle([1.0, 1.0], 1.0, 3.0)
+        tasks: list[Any] = [FramePosition(robot, "tip", path, GAINS, axes="xy")]
+    elif name == "panda":
+        robot = load("panda")
+        tasks = [FramePosition(robot, "panda_tcp", circle, GAINS)]
+    elif name == "panda_pose":  # six rows in two tasks
+        robot = load("panda")
+        tasks = [
+            FramePosition(robot, "panda_tcp", circle, GAINS),
+            FrameOrientation(robot, "panda_tcp", HoldOrientation(np.eye(3)), GAINS),
+        ]
+    elif name == "panda_fingers":  # one finger mimics the other, both in the task
+        robot = load("panda_fingers")
+        tasks = [FramePosition(robot, "panda_rightfinger", circle, GAINS)]
+    elif name == "tiago_no_hand":  # continuous joints in a chain
+        robot = load("tiago_no_hand")
+        tasks = [FramePosition(robot, "arm_tool_link", circle, GAINS)]
+    else:  # a floating root, as if it were driven
+        robot = load("solo12")
+        tasks = [
+            FramePosition(robot, "FL_FOOT", circle, GAINS),
+            FrameOrientation(robot, "base_link", HoldOrientation(np.eye(3)), GAINS),
+        ]
+    q = robot.random_configuration(rng)
+    return Case(
+        robot, tasks, moving_field(robot), q, rng.standard_normal(robot.nv), q.copy()
+    )
+
+
+CASES = ("planar3r", "panda", "panda_pose", "panda_fingers", "tiago_no_hand", "solo12")
+
+
+def coordinates(nv: int) -> Array:
+    return np.tril(np.ones((nv, nv)))
+
+
+METRICS: dict[str, Callable[[int], Metric]] = {
+    "identity": lambda nv: IdentityMetric(),
+    "diagonal": lambda nv: ConstantMetric(np.linspace(1.0, 5.0, nv)),
+    "coordinates": lambda nv: ConstantMetric.from_coordinates(coordinates(nv)),
+    "mass_matrix": lambda nv: MassMatrixMetric(),
+}
+
+
+def matrix_gain(nv: int, W: Array) -> Array:
+    """Return W⁻¹ K̂ with K̂ symmetric positive definite, far from scalar."""
+    return np.linalg.solve(W, 8.0 * positive(11, nv) + 4.0 * np.eye(nv))
+
+
+class Terms(NamedTuple):
+    """What the oracle needs, from the state, tasks, field and metric themselves."""
+
+    J: Array
+    J_dot: Array
+    W: Array
+    W_dot: Array
+    g: Array
+    g_dot: Array
+    a_x: Array
+
+
+def terms(c: Case, state: RobotState, metric: Metric) -> Terms:
+    """Return copies of the law's ingredients at a state."""
+    samples = [task.evaluate(state) for task in c.tasks]
+    sample = metric.evaluate(state, MetricSample.allocate(c.robot.nv))
+    field = c.field.evaluate(
+        state, sample, metric.form, FieldSample.allocate(c.robot.nv)
+    )
+    return Terms(
+        np.vstack([s.jacobian for s in samples]),
+        np.vstack([s.jacobian_dot for s in samples]),
+        sample.W.copy(),
+        sample.W_dot.copy(),
+        field.g.copy(),
+        field.g_dot.copy(),
+        np.concatenate([s.acceleration for s in samples]),
+    )
+
+
+def controller(c: Case, metric: Metric, gain: Any) -> Controller:
+    return Controller(
+        c.robot,
+        c.tasks,
+        c.field,
+        metric=metric,
+        null_space_gain=gain,
+        # Exact wherever these states are: the mass matrix' whitening makes J large or
+        # small by itself.
+        singularity_threshold=1e-4,
+        base="driven" if c.robot.unactuated else None,
+    )
+
+
+def step_of(v: Array) -> float:
+    """Return a step in which the joints together move by 0.001.
+
+    Near a singularity J# bends within 0.01: the differences' error h⁶ f⁽⁷⁾/140 was then
+    4e-7 of it on panda_fingers, here 1e-12; rounding is 1e-15 over the step.
+    """
+    return 0.001 / max(1.0, float(np.abs(v).sum()))
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("kind", METRICS)
+def test_controller_applies_the_short_form(name: str, kind: str) -> None:
+    """From URDF to acceleration, against the oracle in plain NumPy."""
+    c = case(name)
+    metric = METRICS[kind](c.robot.nv)
+    state = c.robot.state(0.3, c.q, c.v)
+    x = terms(c, state, metric)
+    K_N = 7.0 * np.eye(c.robot.nv)
+    out = controller(c, metric, 7.0).compute(state)
+    assert not out.damped
+    expected = oracles.law(x.J, x.J_dot, x.a_x, c.v, x.g, x.g_dot, K_N, x.W, x.W_dot)
+    # Rounding, grown by J's condition; seen: 2e-14 of a, 1e-13 of e_N.
+    size = np.abs(expected.acceleration).max()
+    np.testing.assert_allclose(
+        out.acceleration, expected.acceleration, rtol=0, atol=1e-12 * size
+    )
+    np.testing.assert_allclose(
+        out.null_space_error, expected.null_space_error, rtol=0, atol=1e-12
+    )
+    # J a + J'v = a_x: to rounding, whatever the metric's condition.
+    residual = x.J @ out.acceleration + x.J_dot @ c.v - x.a_x
+    assert np.abs(residual).max() <= 1e-12 * max(size, 1.0)
+
+
+@pytest.mark.parametrize("name", ["planar3r", "panda", "panda_pose", "tiago_no_hand"])
+def test_identity_metric_is_equation_13_as_printed(name: str) -> None:
+    """With (J⁺)' by differences along the flow, and a matrix K_N."""
+    c = case(name)
+    nv = c.robot.nv
+    metric, K_N = IdentityMetric(), matrix_gain(nv, np.eye(nv))
+    state = c.robot.state(0.3, c.q, c.v)
+    x = terms(c, state, metric)
+    J_plus_dot = slope(
+        lambda s: np.linalg.pinv(terms(c, state.ahead(s), metric).J), step_of(c.v)
+    )
+    expected = oracles.paper_law(
+        x.J, x.J_dot, J_plus_dot, x.a_x, c.v, x.g, x.g_dot, K_N
+    )
+    ours = controller(c, metric, K_N)
+    out = ours.compute(state)
+    # The differences' rounding, 1e-12 of (J⁺)'; the turning term itself is of order 1.
+    np.testing.assert_allclose(
+        out.null_space_error, expected.null_space_error, rtol=0, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        out.acceleration, expected.acceleration, rtol=0, atol=1e-9
+    )
+    without = oracles.paper_law(
+        x.J, x.J_dot, 0 * J_plus_dot, x.a_x, c.v, x.g, x.g_dot, K_N
+    )
+    assert np.abs(without.acceleration - expected.acceleration).max() > 0.1
+
+
+@pytest.mark.parametrize("name", ["planar3r", "panda"])
+def test_coordinates_metric_is_equation_13_in_those_coordinates(name: str) -> None:
+    """θ = A q with the paper's own formula there: J A⁻¹, (J A⁻¹)⁺ and its rate."""
+    c = case(name)
+    nv = c.robot.nv
+    A = coordinates(nv)
+    A_inverse = np.linalg.inv(A)
+    metric = ConstantMetric.from_coordinates(A)
+    state = c.robot.state(0.3, c.q, c.v)
+    x = terms(c, state, metric)
+    J_plus_dot = slope(
+        lambda s: np.linalg.pinv(terms(c, state.ahead(s), metric).J @ A_inverse),
+        step_of(c.v),
+    )
+    theta = oracles.paper_law(
+        x.J @ A_inverse,
+        x.J_dot @ A_inverse,
+        J_plus_dot,
+        x.a_x,
+        A @ c.v,
+        A @ x.g,
+        A @ x.g_dot,
+        7.0 * np.eye(nv),
+    )
+    out = controller(c, metric, 7.0).compute(state)
+    # 1e-11 of (J⁺)' by differences; A⁻¹ doubles it.
+    np.testing.assert_allclose(
+        out.acceleration, A_inverse @ theta.acceleration, rtol=0, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        out.null_space_error, A_inverse @ theta.null_space_error, rtol=0, atol=1e-12
+    )
+    # A cost's field is raised with the metric: -∇_θ f in the other coordinates.
+    robot = c.robot
+    cost = TargetPosture(robot, c.posture, weights=2.0)
+    sample = metric.evaluate(state, MetricSample.allocate(nv))
+    state = robot.state(0.3, robot.integrate(c.q, 0.3 * c.v), c.v)
+    g = cost.evaluate(state, sample, metric.form, FieldSample.allocate(nv)).g
+    np.testing.assert_allclose(
+        A @ g, -A_inverse.T @ cost.gradient(state), rtol=0, atol=1e-13
+    )
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("kind", METRICS)
+def test_identity_behind_the_short_form(name: str, kind: str) -> None:
+    """(J#J'J# + (J#)')J x = P W⁻¹(J'ᵀJ#ᵀW - W'J#J)x, (J#)' by differences."""
+    c = case(name)
+    metric = METRICS[kind](c.robot.nv)
+    state = c.robot.state(0.3, c.q, c.v)
+    t = terms(c, state, metric)
+    x = t.g - c.v
+
+    def J_sharp_at(s: float) -> Array:
+        there = terms(c, state.ahead(s), metric)
+        return oracles.pseudo_inverse(there.J, there.W)
+
+    J_sharp, J_sharp_dot = J_sharp_at(0.0), slope(J_sharp_at, step_of(c.v))
+    left = (J_sharp @ t.J_dot @ J_sharp + J_sharp_dot) @ t.J @ x
+    P = np.eye(c.robot.nv) - J_sharp @ t.J
+    bend = t.J_dot.T @ J_sharp.T @ t.W - t.W_dot @ J_sharp @ t.J
+    right = P @ np.linalg.solve(t.W, bend @ x)
+    # Rounding of the differences, 1e-11, and of W⁻¹: cond(M) is up to 5e6 (Tiago).
+    scale = max(1.0, np.abs(left).max()) * (1e-9 + 1e-14 * np.linalg.cond(t.W))
+    np.testing.assert_allclose(left, right, rtol=0, atol=scale)
+    assert np.abs(left).max() > 0.01  # there is something to see
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("kind", METRICS)
+def test_projector_and_error_in_the_metric(name: str, kind: str) -> None:
+    """W P = PᵀW, P² = P, P W⁻¹Jᵀ = 0; e_N = P(g - v) and ‖x‖² = ‖e_N‖² + ‖x - e_N‖²."""
+    c = case(name)
+    metric = METRICS[kind](c.robot.nv)
+    state = c.robot.state(0.3, c.q, c.v)
+    x = terms(c, state, metric)
+    ours = controller(c, metric, 7.0)
+    out = ours.compute(state)
+    J_sharp, _ = pseudo_inverse(x.J, x.W, threshold=1e-4)
+    P = np.eye(c.robot.nv) - J_sharp @ x.J
+    atol = 1e-11 * np.linalg.norm(x.W, 2)
+    np.testing.assert_allclose(x.W @ P, P.T @ x.W, rtol=0, atol=atol)
+    np.testing.assert_allclose(P @ P, P, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(P @ np.linalg.solve(x.W, x.J.T), 0.0, rtol=0, atol=1e-8)
+    e_N, asked = out.null_space_error, x.g - c.v
+    np.testing.assert_allclose(e_N, P @ asked, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(x.J @ e_N, 0.0, rtol=0, atol=1e-11)
+    rest = asked - e_N
+    whole = asked @ x.W @ asked
+    np.testing.assert_allclose(e_N @ x.W @ e_N + rest @ x.W @ rest, whole, rtol=1e-10)
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("kind", METRICS)
+@pytest.mark.parametrize("gain", ["scalar", "matrix"])
+def test_lyapunov_function_decays_as_proved(name: str, kind: str, gain: str) -> None:
+    """d/dt ½e_NᵀWe_N = -e_NᵀW K_N e_N, by differences of V along the closed loop.
+
+    A curve with the state's velocity and the law's acceleration suffices; V on it comes
+    from plain NumPy.
+    """
+    c = case(name)
+    nv = c.robot.nv
+    metric = METRICS[kind](nv)
+    state = c.robot.state(0.3, c.q, c.v)
+    W = terms(c, state, metric).W
+    K_N = 7.0 * np.eye(nv) if gain == "scalar" else matrix_gain(nv, W)
+    if metric.form == VARYING and gain == "matrix":
+        # Asked to be positive definite by itself; the identity holds for any.
+        K_N = 8.0 * positive(11, nv) + 4.0 * np.eye(nv)
+    out = controller(c, metric, K_N).compute(state)
+    a, e_N = out.acceleration.copy(), out.null_space_error.copy()
+    elsewhere = RobotState(c.robot)
+
+    def V(s: float) -> float:
+        q, v = c.robot.integrate(c.q, s * c.v), c.v + s * a
+        x = terms(c, elsewhere.update(0.3 + s, q, v), metric)
+        e = (np.eye(nv) - oracles.pseudo_inverse(x.J, x.W) @ x.J) @ (x.g - v)
+        return float(0.5 * e @ x.W @ e)
+
+    step = min(step_of(c.v), 0.1 / np.abs(a).max())
+    expected = -e_N @ W @ K_N @ e_N
+    assert abs(expected) > 0.1  # there is something to see
+    # Rounding of the differences: 1e-15 of V over 1e-4 s; seen: 1e-12 of V'.
+    np.testing.assert_allclose(slope(V, step), expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize("kind", METRICS)
+def test_law_of_a_rank_deficient_task(kind: str) -> None:
+    """The planar arm cannot leave its plane: xyz has rank 2 of 3, for ever.
+
+    The law is exact all the same, and equal to that of xy alone.
+    """
+    c = case("planar3r")
+    metric = METRICS[kind](3)
+    space = Circle([1.0, 1.0, 0.0], 1.0, 3.0, axes=np.eye(3)[:2])
+    task = FramePosition(c.robot, "tip", space, GAINS)
+    state = c.robot.state(0.3, c.q, c.v)
+    flat = controller(c, metric, 7.0).compute(state)
+    spatial = controller(c._replace(tasks=[task]), metric, 7.0).compute(state)
+    assert spatial.damped
+    assert not flat.damped
+    for name in ("tau", "acceleration", "null_space_error"):
+        # A zero row is a zero to the last bit: only rounding differs.
+        np.testing.assert_allclose(
+            getattr(spatial, name), getattr(flat, name), rtol=1e-12, atol=1e-12
+        )
+
+
+def closed_loop(out: ControlOutput) -> tuple[Array, Array]:
+    return out.acceleration.copy(), out.null_space_error.copy()
+
+
+def test_metrics_differ() -> None:
+    """None of the laws compared above is another in disguise."""
+    c = case("panda")
+    state = c.robot.state(0.3, c.q, c.v)
+    laws = [
+        closed_loop(controller(c, METRICS[kind](7), 7.0).compute(state))
+        for kind in METRICS
+    ]
+    for i, (a, e_N) in enumerate(laws):
+        for b, other in laws[:i]:
+            assert np.abs(a - b).max() > 0.1
+            assert np.abs(e_N - other).max() > 0.01
+
+
+def test_a_task_that_takes_every_freedom_leaves_no_null_space() -> None:
+    """J square: P = 0, e_N = 0, and the field changes nothing."""
+    c = case("panda")
+    task = JointPosture(c.robot, c.posture, GAINS)
+    state = c.robot.state(0.3, c.q, c.v)
+    full = c._replace(tasks=[task])
+    for kind in METRICS:
+        out = controller(full, METRICS[kind](7), 7.0).compute(state)
+        np.testing.assert_allclose(out.null_space_error, 0.0, rtol=0, atol=1e-13)
+        expected = task.evaluate(state).acceleration
+        np.testing.assert_allclose(out.acceleration, expected, rtol=0, atol=1e-11)

@@ -1,0 +1,211 @@
+"""Check the barrier of the clearance fields, far away and once per state."""
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from clearance_cases import AIR, barrier_at, load, still
+from hypothesis import given
+from hypothesis import strategies as st
+from oracles import slope
+
+from hsp_control import (
+    Cost,
+    IdentityMetric,
+    Obstacle,
+)
+from hsp_control.geometry.shapes import (
+    Sphere,
+)
+from hsp_control.null_space.fields import (
+    FieldSample,
+    ObstacleClearance,
+)
+from hsp_control.null_space.fields.barrier import CORE, barrier
+from hsp_control.null_space.metrics import MetricSample
+from hsp_control.trajectories import (
+    Hold,
+    UniformLine,
+)
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+# --- the barrier ---------------------------------------------------------------------
+
+
+@given(
+    s=st.floats(-2.0, 1.5),
+    influence=st.floats(0.01, 10.0),
+)
+def test_barrier_is_its_formula_and_its_own_derivatives(
+    s: float, influence: float
+) -> None:
+    """-(1 - s)² ln s above the core, a parabola with the same tangent below.
+
+    Differences of sixth order over a hundredth of the distance to where the formula
+    changes; at the change itself the next test looks.
+    """
+    value, first, second = barrier_at(s * influence, influence)
+    s = s * influence / influence
+    if s >= 1.0:
+        assert (value, first, second) == (0.0, 0.0, 0.0)
+        return
+    at = max(s, CORE)
+    b = -((1.0 - at) ** 2) * np.log(at)
+    b1 = 2.0 * (1.0 - at) * np.log(at) - (1.0 - at) ** 2 / at
+    b2 = -2.0 * np.log(at) + 4.0 * (1.0 - at) / at + ((1.0 - at) / at) ** 2
+    down = s - at
+    expected = [b + b1 * down + 0.5 * b2 * down**2, b1 + b2 * down, b2]
+    np.testing.assert_allclose(
+        [value, first * influence, second * influence**2], expected, rtol=1e-13
+    )
+    step = 0.01 * min(abs(s - CORE), 1.0 - s, max(s, 0.1))
+    if step > 1e-6:
+        rise = slope(lambda x: barrier_at((s + x) * influence, influence)[0], step)
+        bend = slope(lambda x: barrier_at((s + x) * influence, influence)[1], step)
+        assert rise / influence == pytest.approx(first, rel=1e-7, abs=1e-7 / influence)
+        assert bend / influence == pytest.approx(second, rel=1e-7, abs=1e-6 / influence)
+
+
+@pytest.mark.parametrize("edge", [1.0, CORE])
+@pytest.mark.parametrize("influence", [0.05, 1.0, 3.0])
+def test_barrier_is_twice_continuously_differentiable(
+    edge: float, influence: float
+) -> None:
+    """Across an edge, b, b' and b'' change by no more than their own slopes allow."""
+    tiny = 1e-7
+    below = np.array(barrier_at((edge - tiny) * influence, influence))
+    above = np.array(barrier_at((edge + tiny) * influence, influence))
+    units = influence ** np.array([0.0, 1.0, 2.0])
+    # b''' is at most 6 at the influence, and 2/s³ + 4/s² + ... = 2.6e5 at the core.
+    steepest = np.array([60.0, 3e3, 3e5]) if edge < 1.0 else np.array([1e-6, 1e-6, 7.0])
+    assert (np.abs(above - below) * units <= steepest * 2.0 * tiny).all()
+
+
+def test_barrier_grows_on_towards_contact_and_beyond() -> None:
+    """b falls and is convex in d everywhere within its influence, finite in depth."""
+    d = np.linspace(-1.0, 0.999, 4000)
+    slopes, curvatures = np.zeros((2, len(d)))
+    total = barrier(d, 1.0, slopes, curvatures)
+    assert np.isfinite(total)
+    assert (slopes < 0.0).all()
+    assert (curvatures > 0.0).all()
+    assert total == pytest.approx(sum(barrier_at(x, 1.0)[0] for x in d), rel=1e-13)
+
+
+# --- far away, and once per state ----------------------------------------------------
+
+
+def evaluate(field: Cost, state: Any) -> FieldSample:
+    """Return g and g' in the identity metric."""
+    metric = IdentityMetric()
+    nv = state.robot.nv
+    sample = metric.evaluate(state, MetricSample.allocate(nv))
+    out = FieldSample(np.full(nv, np.nan), np.full(nv, np.nan))
+    return field.evaluate(state, sample, metric.form, out)
+
+
+@pytest.mark.parametrize("gap", [0.001, 0.04, 0.06, 0.2])
+def test_exactly_zero_beyond_the_influence(gap: float) -> None:
+    """Not small but 0, near the influence's edge as well, and g' with it.
+
+    At 1 mm the differences of the rate reach in or not: the barrier's edge is so flat
+    that what they see there is below 1e-6.
+    """
+    robot = load("panda")
+    state = robot.state(0.3, robot.home(), np.linspace(-0.3, 0.3, 7))
+    ball = Obstacle("ball", Sphere(0.1), Hold([0.5, 0.5, 0.5]))
+    d = ObstacleClearance(robot, [ball]).minimum_distance(state)
+    field = ObstacleClearance(robot, [ball], influence=d - gap)
+    g, g_dot = evaluate(field, state)
+    np.testing.assert_array_equal(g, 0.0)
+    np.testing.assert_array_equal(g_dot, 0.0)
+    assert field.value(state) == 0.0
+    within = ObstacleClearance(robot, [ball], influence=d + 0.05)
+    assert np.abs(evaluate(within, state).g).max() > 1e-4
+    assert np.abs(evaluate(within, state).g_dot).max() > 1e-4
+
+
+def test_the_rate_is_zero_however_quick_the_obstacle() -> None:
+    """Out of influence g is zero in a neighbourhood, so that g' is zero exactly.
+
+    At 20 m/s a ball comes 4 cm nearer within a differences' step of 2 ms: differencing
+    would see it inside, and give a rate that is not there yet.
+    """
+    robot = load("panda")
+    start = np.array([0.5, 0.5, 0.5])
+    state = robot.state(0.0, robot.home(), np.zeros(7))
+    resting = Obstacle("ball", Sphere(0.1), Hold(start))
+    field = ObstacleClearance(robot, [resting])
+    d = field.minimum_distance(state)
+    k = int(np.argmin(field.proximity.distances))
+    n = field.proximity.witness(k)[0] - field.proximity.witness(k)[1]
+    ball = Obstacle("ball", Sphere(0.1), UniformLine(start, 20.0 * n / d))
+    for gap in (0.001, 0.03, 0.051):
+        quick = ObstacleClearance(robot, [ball], influence=d - gap)
+        np.testing.assert_array_equal(evaluate(quick, state).g, 0.0)
+        np.testing.assert_array_equal(quick.gradient_rate(state), 0.0)
+    near = ObstacleClearance(robot, [ball], influence=d + 0.01)
+    assert np.abs(near.gradient_rate(state)).max() > 0.0
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Count the calls of Pinocchio's distance computation."""
+    made: list[int] = []
+    measure = pin.computeDistances
+
+    def counting(*arguments: Any) -> Any:
+        made.append(1)
+        return measure(*arguments)
+
+    monkeypatch.setattr(pin, "computeDistances", counting)
+    return made
+
+
+def test_distances_are_measured_once_per_state(calls: list[int]) -> None:
+    """However often they are asked for; and four times more along the flow, for g'.
+
+    That is Coal's part; distances in closed form have an exact rate.
+    """
+    robot = load("panda")
+    ball = Obstacle("ball", Sphere(0.1), AIR)
+    field = ObstacleClearance(robot, [ball], influence=1.0, proxy="hulls")
+    state = still(robot)
+    for _ in range(2):
+        field.value(state)
+        field.gradient(state)
+        field.minimum_distance(state)
+        field.proximity.nearest(state)
+    assert len(calls) == 1
+    evaluate(field, state)
+    assert len(calls) == 5
+    state.update(0.0, robot.home() + 0.01, np.zeros(7))
+    field.gradient(state)
+    field.value(state)
+    assert len(calls) == 6
+    far = ObstacleClearance(robot, [ball], influence=0.01, proxy="hulls")
+    del calls[:]
+    evaluate(far, state)
+    assert len(calls) == 1
+    del calls[:]
+    evaluate(ObstacleClearance(robot, [ball], influence=1.0), state)
+    assert not calls
+
+
+def test_distances_are_those_of_the_state_that_is_asked_for() -> None:
+    """Also where a state is gone and another has taken its place in memory."""
+    robot = load("panda")
+    field = ObstacleClearance(robot, [Obstacle("ball", Sphere(0.1), AIR)])
+    rng = np.random.default_rng(13)
+    postures = [robot.random_configuration(rng) for _ in range(8)]
+    passing = [
+        field.minimum_distance(robot.state(0.0, q, np.zeros(7))) for q in postures
+    ]
+    kept = [robot.state(0.0, q, np.zeros(7)) for q in postures]
+    assert passing == [field.minimum_distance(state) for state in kept]
+    assert len(set(passing)) == len(postures)
+    first = field.minimum_distance(kept[0])
+    assert first == field.minimum_distance(kept[0]) == passing[0]

@@ -1,0 +1,181 @@
+"""Check g and g' of every field against differences, in every metric."""
+
+import numpy as np
+import pytest
+from field_cases import MEMBERS, draw, evaluate, every_field, metrics
+from field_oracles import (
+    ROBOTS,
+    TIME,
+    derivative,
+    frames_of,
+    load,
+    plain,
+    reach_gradient,
+    reach_rate,
+    reach_value,
+)
+from numpy.typing import NDArray
+
+from hsp_control import (
+    IdentityMetric,
+    MassMatrixMetric,
+)
+from hsp_control.null_space import differences
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+
+# --- the members ---------------------------------------------------------------------
+
+
+@every_field
+def test_value(name: str, which: str) -> None:
+    """The value is the cost, the sum of costs, or the vector field's norm."""
+    member = MEMBERS[which]
+    q, v = draw(name, 1)
+    field = member.build(name)
+    value = field.value(load(name).state(TIME, q, v))
+    expected = 0.0
+    for weight, oracle, is_cost in member.parts(name):
+        part = oracle(TIME, q)
+        weight = weight(TIME, q) if callable(weight) else weight
+        expected += weight * (part if is_cost else np.linalg.norm(part))
+    assert isinstance(value, float)
+    assert value == pytest.approx(expected, rel=1e-13, abs=1e-13)
+
+
+@pytest.mark.parametrize("metric_name", ["identity", "constant", "mass matrix"])
+@every_field
+def test_field_and_its_rate(name: str, which: str, metric_name: str) -> None:
+    """g = -W⁻¹∇f (or the vector itself), and g' its total derivative along the flow.
+
+    The gradient is good to 1e-13 of f by differences of eighth order here, to 1e-12
+    (`differences.gradient`) there; W⁻¹ of a mass matrix lifts either by 1e2.
+    """
+    member = MEMBERS[which]
+    robot = load(name)
+    field = member.build(name)
+    metric, W = metrics(robot)[metric_name]
+    q, v = draw(name, 2)
+    g, g_dot = evaluate(field, metric, robot.state(TIME, q, v))
+
+    expected, lowered = np.zeros(robot.nv), 1.0
+    for weight, oracle, is_cost in member.parts(name):
+        weight = weight(TIME, q) if callable(weight) else weight
+        if is_cost:
+            slope = plain(name).gradient(oracle, TIME, q)
+            expected -= weight * np.linalg.solve(W(q), slope)
+            lowered += weight * (abs(oracle(TIME, q)) + np.abs(slope).max())
+        else:
+            expected += weight * oracle(TIME, q)
+    lift = np.linalg.norm(np.linalg.inv(W(q)), 2)
+    scale = lowered * max(1.0, lift)
+    np.testing.assert_allclose(g, expected, rtol=0, atol=2e-12 * scale)
+
+    def along(s: float) -> Array:
+        state = robot.state(TIME + s, plain(name).moved(q, s * v), v)
+        return evaluate(field, metric, state).g
+
+    rate = derivative(along, 0.005)
+    scale = scale + np.abs(rate).max()
+    np.testing.assert_allclose(g_dot, rate, rtol=0, atol=member.rate_accuracy * scale)
+    if member.parts(name) and metric_name != "identity":
+        assert np.abs(g_dot).max() > 1e-3  # else nothing was tested
+
+
+@every_field
+def test_the_field_does_not_depend_on_the_velocity(name: str, which: str) -> None:
+    robot, field = load(name), MEMBERS[which].build(name)
+    q, v = draw(name, 3)
+    for metric, _ in metrics(robot).values():
+        first = evaluate(field, metric, robot.state(TIME, q, v)).g
+        second = evaluate(field, metric, robot.state(TIME, q, -2.0 * v)).g
+        np.testing.assert_allclose(first, second, rtol=0, atol=0)
+
+
+@every_field
+def test_fields_have_no_memory(name: str, which: str) -> None:
+    """The same state gives the same bits, whatever was evaluated between."""
+    robot, field = load(name), MEMBERS[which].build(name)
+    here, there = robot.state(TIME, *draw(name, 4)), robot.state(0.1, *draw(name, 5))
+    first = evaluate(field, IdentityMetric(), here)
+    evaluate(field, MassMatrixMetric(), there)
+    again = evaluate(field, IdentityMetric(), here)
+    np.testing.assert_array_equal(again.g, first.g)
+    np.testing.assert_array_equal(again.g_dot, first.g_dot)
+
+
+# --- differences ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_accuracy_of_differences(name: str) -> None:
+    """gradient: 1e-12 of f's scale; rate_along_flow: 3e-11 at 2 rad/s.
+
+    Truncation is h⁴/30 f⁽⁵⁾ = 3e-14 f⁽⁵⁾, rounding 1.5e-16 f/h = 2e-13 f.
+    """
+    robot, frame = load(name), frames_of(name)[2]
+    for seed in range(5):
+        state = robot.state(TIME, *draw(name, 10 + seed))
+        exact = reach_gradient(frame)(state)
+        found = differences.gradient(reach_value(frame), state)
+        scale = 1.0 + np.abs(exact).max() + abs(reach_value(frame)(state))
+        np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12 * scale)
+        exact = reach_rate(frame)(state)
+        found = differences.rate_along_flow(reach_gradient(frame), state)
+        scale = 1.0 + np.abs(exact).max()
+        np.testing.assert_allclose(found, exact, rtol=0, atol=3e-11 * scale)
+
+
+def test_differences_are_of_fourth_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, frame = load("panda"), "panda_tcp"
+    state = robot.state(TIME, *draw("panda", 20))
+    steps = np.array([0.2, 0.1, 0.05, 0.025])
+    exact = reach_gradient(frame)(state), reach_rate(frame)(state)
+    errors = []
+    for step in steps:
+        monkeypatch.setattr(differences, "GRADIENT_STEP", step)
+        monkeypatch.setattr(differences, "RATE_STEP", step)
+        found = (
+            differences.gradient(reach_value(frame), state),
+            differences.rate_along_flow(reach_gradient(frame), state),
+        )
+        errors.append([np.abs(a - b).max() for a, b in zip(found, exact, strict=True)])
+    orders = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    np.testing.assert_allclose(orders, 4.0, atol=0.15)
+
+
+def test_rate_along_flow_of_anything() -> None:
+    """Numbers, matrices, a state's own arrays; time alone, at rest; fast motion too."""
+    robot, frame = load("panda"), "panda_tcp"
+    q, v = draw("panda", 21)
+    state = robot.state(TIME, q, v)
+    at = state.frame(frame)
+    found = differences.rate_along_flow(lambda s: s.frame(frame).jacobian, state)
+    np.testing.assert_allclose(found, at.jacobian_dot, rtol=0, atol=1e-11)
+    found = differences.rate_along_flow(lambda s: s.position(frame), state)
+    np.testing.assert_allclose(found, at.velocity[:3], rtol=0, atol=1e-11)
+    rest = robot.state(TIME, q, np.zeros(7))
+    found = differences.rate_along_flow(lambda s: np.exp(s.t), rest)
+    assert found == pytest.approx(np.exp(TIME), rel=1e-11)
+    assert found.shape == ()
+    fast = robot.state(TIME, q, 1e4 * v)
+    found = differences.rate_along_flow(lambda s: s.position(frame), fast)
+    expected = fast.frame(frame).velocity[:3]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * 1e4)
+
+
+def test_differences_leave_the_state_as_it_was() -> None:
+    robot, frame = load("panda"), "panda_tcp"
+    q, v = draw("panda", 22)
+    state = robot.state(TIME, q, v)
+    before = state.frame(frame).jacobian.copy(), state.mass_matrix.copy()
+    differences.gradient(reach_value(frame), state)
+    differences.rate_along_flow(
+        lambda s: differences.gradient(reach_value(frame), s), state
+    )
+    np.testing.assert_array_equal(state.frame(frame).jacobian, before[0])
+    np.testing.assert_array_equal(state.mass_matrix, before[1])
+    np.testing.assert_array_equal(state.q, q)
+    assert state.t == TIME

@@ -1,0 +1,139 @@
+"""Check which pairs of links a robot keeps apart, its own and other robots'."""
+
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from clearance_cases import agree, flowing, load, still, turned
+from numpy.typing import NDArray
+from oracles import gradient
+
+from hsp_control import (
+    Robot,
+)
+from hsp_control.geometry import Proximity, link_shapes, self_pairs
+from hsp_control.null_space.fields import (
+    SelfClearance,
+)
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+
+def names(field: SelfClearance) -> set[frozenset[str]]:
+    """Return the pairs of links that are watched."""
+    links = field.proximity.links
+    return {frozenset((links[i].link, links[j].link)) for i, j in field.proximity.pairs}
+
+
+def disabled(robot: Robot) -> set[frozenset[str]]:
+    """Return the pairs that the SRDF leaves out."""
+    assert robot.source.srdf is not None
+    return {
+        frozenset((pair.attrib["link1"], pair.attrib["link2"]))
+        for pair in ElementTree.parse(robot.source.srdf).iter("disable_collisions")
+    }
+
+
+def test_pairs_of_links_that_are_watched() -> None:
+    """All pairs but neighbours, links of one joint, the SRDF's, and what overlaps."""
+    robot = load("panda")
+    links = link_shapes(robot)
+    watched = names(SelfClearance(robot))
+    without = disabled(robot)
+    parents = list(robot.model.parents)
+    expected = {
+        frozenset((a.link, b.link))
+        for i, a in enumerate(links)
+        for b in links[i + 1 :]
+        if a.joint != b.joint
+        and parents[a.joint] != b.joint
+        and parents[b.joint] != a.joint
+        and frozenset((a.link, b.link)) not in without
+    }
+    by_srdf_or_chain = {
+        frozenset((links[i].link, links[j].link)) for i, j in self_pairs(robot, links)
+    }
+    assert by_srdf_or_chain == expected
+    assert frozenset(("panda_link0", "panda_hand")) in watched
+    assert frozenset(("panda_link3", "panda_link4")) not in watched  # neighbours
+    assert frozenset(("panda_hand", "panda_leftfinger")) not in watched  # one joint
+    assert without  # the SRDF says something
+    assert not watched & without
+    assert watched <= expected
+    home = still(robot)
+    state_of = Proximity(robot, links, [], self_pairs(robot, links))
+    overlap = {
+        pair
+        for pair, d in zip(state_of.pairs, state_of.measure(home), strict=True)
+        if d <= 0.0
+    }
+    field = SelfClearance(robot)
+    assert set(field.proximity.pairs) == set(state_of.pairs) - overlap
+    assert field.minimum_distance(home) > 0.0
+
+
+def test_pairs_between_robots_are_all_kept() -> None:
+    """Neither the SRDFs nor the chains say anything about links of two robots."""
+    panda, iiwa = load("panda"), load("iiwa14")
+    beside = pin.SE3(turned(0.0, 0.0, np.pi), np.array([1.1, 0.0, 0.0]))
+    both = Robot.combine({"a": (panda, pin.SE3.Identity()), "b": (iiwa, beside)})
+    watched = names(SelfClearance(both))
+    mine = {shape.link for shape in link_shapes(panda)}
+    theirs = {shape.link for shape in link_shapes(iiwa)}
+    for a in mine:
+        for b in theirs:
+            standing = a == "panda_link0" and b == "iiwa_link_0"
+            assert (frozenset((f"a_{a}", f"b_{b}")) in watched) is not standing
+    own = {frozenset(f"a_{x}" for x in pair) for pair in names(SelfClearance(panda))}
+    own |= {frozenset(f"b_{x}" for x in pair) for pair in names(SelfClearance(iiwa))}
+    across = {pair for pair in watched if len({name[0] for name in pair}) == 2}
+    assert watched - across == own
+    assert own
+
+
+def test_pairs_that_overlap_at_home_are_left_out() -> None:
+    """Shoulders 15 cm apart, 9 cm thick: there is no keeping them clear."""
+    panda = load("panda")
+    near = pin.SE3(turned(0.0, 0.0, np.pi), np.array([-0.15, 0.0, 0.0]))
+    both = Robot.combine({"a": (panda, pin.SE3.Identity()), "b": (panda, near)})
+    field = SelfClearance(both)
+    watched = names(field)
+    assert frozenset(("a_panda_link1", "b_panda_link1")) not in watched
+    assert frozenset(("a_panda_link0", "b_panda_link1")) not in watched
+    assert frozenset(("a_panda_link1", "b_panda_hand")) in watched
+    assert field.minimum_distance(still(both)) > 0.0
+
+
+def test_each_robot_is_the_others_moving_obstacle() -> None:
+    """Gradient and rate of the pairs between two arms that both move."""
+    panda = load("panda")
+    beside = pin.SE3(turned(0.0, 0.0, np.pi), np.array([1.0, 0.1, 0.0]))
+    both = Robot.combine({"a": (panda, pin.SE3.Identity()), "b": (panda, beside)})
+    field = SelfClearance(both, influence=0.3)
+    rng = np.random.default_rng(14)
+    agreed = 0
+    while agreed < 4:
+        q, v = both.random_configuration(rng), 0.5 * rng.normal(size=14)
+        state = both.state(0.0, q, v)
+        d, pair = field.proximity.nearest(state)
+        one, two = (name[:2] for name in pair.split(" to "))
+        if not 0.06 < d < 0.25 or one == two:
+            continue
+        g, g_dot = field.gradient(state), field.gradient_rate(state)
+
+        def value(x: Array, q: Array = q, v: Array = v) -> float:
+            return field.value(both.state(0.0, both.integrate(q, x), v))
+
+        by_value = [gradient(value, 14, h) for h in (1e-3, 5e-4)]
+        by_flow = [flowing(field, state, h) for h in (1e-3, 5e-4)]
+        if not (agree(*by_value) and agree(*by_flow)):
+            continue
+        agreed += 1
+        scale = float(np.abs(g).max())
+        np.testing.assert_allclose(g, by_value[1], rtol=0, atol=1e-9 * scale)
+        scale = float(np.abs(g_dot).max())
+        np.testing.assert_allclose(g_dot, by_flow[1], rtol=0, atol=3e-8 * scale)
+        assert np.abs(g[:7]).max() > 1e-2
+        assert np.abs(g[7:]).max() > 1e-2

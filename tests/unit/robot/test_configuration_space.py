@@ -1,0 +1,260 @@
+"""Check the space of configurations: its kind, limits, home and random draws."""
+
+import re
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from refused_robots import REFUSED
+from robot_cases import BUNDLED, ROBOTS, draw, load
+
+from hsp_control import Robot
+from hsp_control.common.exceptions import (
+    ConfigurationError,
+    ShapeError,
+)
+from hsp_control.robot.description.sources import (
+    RobotSource,
+    example_robots,
+)
+
+
+def hand_built(*joints: Any) -> Robot:
+    """Return a chain of the given joints, each with a body of mass."""
+    model, parent = pin.Model(), 0
+    for number, joint in enumerate(joints):
+        placement = pin.SE3(np.eye(3), np.array([0.1, 0.2, 0.3]))
+        parent = model.addJoint(parent, joint, placement, f"j{number}")
+        inertia = pin.Inertia.FromSphere(1.0, 0.1)
+        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+    return Robot(model, RobotSource("hand_built", Path("nowhere.urdf")))
+
+
+def test_unit_blocks() -> None:
+    """Where quaternions and (cos, sin) pairs lie in q."""
+    robot = hand_built(
+        pin.JointModelFreeFlyer(),  # x y z, quaternion
+        pin.JointModelRX(),
+        pin.JointModelRUBZ(),  # (cos, sin)
+        pin.JointModelPlanar(),  # x y, (cos, sin)
+        pin.JointModelSpherical(),  # quaternion
+        pin.JointModelPY(),
+        pin.JointModelRUBX(),
+    )
+    assert robot.nq == 7 + 1 + 2 + 4 + 4 + 1 + 2
+    assert robot.unit_blocks == ((3, 4), (8, 2), (12, 2), (14, 4), (19, 2))
+    assert not robot.flat
+    # Every block is one that Pinocchio normalises, and nothing else is.
+    q = np.full(robot.nq, 3.0)
+    normalised = pin.normalize(robot.model, q)
+    changed = np.zeros(robot.nq, dtype=bool)
+    for start, size in robot.unit_blocks:
+        changed[start : start + size] = True
+    np.testing.assert_array_equal(normalised != q, changed)
+    robot.check_configuration(normalised)
+    for start, size in robot.unit_blocks:
+        spoilt = normalised.copy()
+        spoilt[start : start + size] *= 1.5
+        kind = "quaternion" if size == 4 else "(cos, sin) pair"
+        with pytest.raises(
+            ConfigurationError, match=re.escape(f"is a {kind} of norm 1.5")
+        ):
+            robot.state(0.0, spoilt, np.zeros(robot.nv))
+    # Joints added in Python have no limits unless they are given some.
+    lower, upper = robot.position_limits()
+    np.testing.assert_array_equal(lower, np.full(robot.nv, -np.inf))
+    np.testing.assert_array_equal(upper, np.full(robot.nv, np.inf))
+    rng = np.random.default_rng(0)
+    robot.check_configuration(robot.random_configuration(rng))
+    np.testing.assert_array_equal(robot.home(), robot.neutral())
+
+
+@pytest.mark.parametrize(
+    ("case", "blocks", "flat", "mimics"),
+    [
+        ("planar3r", ((0, 2), (2, 2), (4, 2)), True, False),
+        ("panda", (), True, False),
+        ("panda_fingers", (), True, True),
+        ("solo12", ((3, 4),), False, False),
+        ("talos_arm_planar", ((2, 2),), False, False),
+    ],
+)
+def test_kind_of_configuration_space(
+    case: str, blocks: tuple[tuple[int, int], ...], flat: bool, mimics: bool
+) -> None:
+    robot = load(case)
+    assert robot.unit_blocks == blocks
+    assert robot.flat is flat
+    assert robot.mimics is mimics
+
+
+@pytest.mark.parametrize("case", ROBOTS)
+def test_integrate_and_difference_undo_each_other(case: str) -> None:
+    robot, q, v, _ = draw(case, seed=23)
+    moved = robot.integrate(q, 0.5 * v)
+    robot.check_configuration(moved)
+    np.testing.assert_allclose(robot.difference(q, moved), 0.5 * v, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("case", ["planar3r", "tiago", "tiago_pro", "solo12"])
+def test_joint_positions(case: str) -> None:
+    """The log from neutral; continuous joints as angles in (-π, π]."""
+    robot, rng = load(case), np.random.default_rng(24)
+    single = [j for j in robot.joints.values() if j.nv == 1]
+    angles = np.zeros(robot.nv)
+    for joint in single:
+        angles[joint.idx_v] = rng.uniform(-3.1, 3.1)
+    q = robot.integrate(robot.neutral(), angles)
+    np.testing.assert_allclose(robot.joint_positions(q), angles, rtol=0, atol=1e-14)
+
+    turned = angles.copy()
+    for joint in single:
+        if joint.nq == 2:  # winds twice: the angle comes back
+            turned[joint.idx_v] += 4.0 * np.pi
+    q = robot.integrate(robot.neutral(), turned)
+    # 1e-14 of the sine and cosine of up to 16 rad.
+    np.testing.assert_allclose(robot.joint_positions(q), angles, rtol=0, atol=1e-14)
+
+
+def test_half_a_turn_is_pi_and_not_minus_pi() -> None:
+    robot = load("planar3r")
+    q = np.array([-1.0, 0.0, 1.0, 0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(robot.joint_positions(q), [np.pi, 0.0, np.pi / 2])
+
+
+@pytest.mark.parametrize("case", ROBOTS)
+def test_position_limits(case: str) -> None:
+    """The model's for joints with one number; none for continuous joints and roots."""
+    robot = load(case)
+    lower, upper = robot.position_limits()
+    for name, joint in robot.joints.items():
+        where = slice(joint.idx_v, joint.idx_v + joint.nv)
+        if joint.nq == 1:
+            urdf = ElementTree.parse(robot.source.urdf).find(f"joint[@name='{name}']")
+            assert urdf is not None
+            limit = urdf.find("limit")
+            assert limit is not None
+            assert lower[where] == float(limit.attrib["lower"])
+            assert upper[where] == float(limit.attrib["upper"])
+        else:
+            assert (lower[where] == -np.inf).all(), name
+            assert (upper[where] == np.inf).all(), name
+
+
+def test_planar_arm_has_no_limits() -> None:
+    """The last joint, too: Pinocchio's universe claims its place in the tables."""
+    lower, upper = load("planar3r").position_limits()
+    np.testing.assert_array_equal(lower, [-np.inf] * 3)
+    np.testing.assert_array_equal(upper, [np.inf] * 3)
+
+
+def test_home_is_the_sources_or_neutral_or_the_middle_of_the_range() -> None:
+    panda = load("panda")
+    np.testing.assert_array_equal(panda.home(), panda.source.home)
+    # One joint locked: the recommended posture no longer fits, so limits decide. The
+    # fourth joint's range, -3.0718 to -0.0698, does not contain 0; the sixth's, -0.0175
+    # to 3.7525, does, if barely.
+    locks = {"panda_joint1": 0.0, "panda_finger_joint1": 0.0}
+    shorter = Robot.load("panda", locked=locks)
+    middle = (-3.0718 - 0.0698) / 2
+    np.testing.assert_allclose(
+        shorter.home(), [0, 0, middle, 0, 0, 0], rtol=0, atol=1e-15
+    )
+    lower, upper = shorter.position_limits()
+    assert ((lower <= shorter.home()) & (shorter.home() <= upper)).all()
+    # Continuous joints: home is given as angles.
+    np.testing.assert_allclose(
+        load("planar3r").joint_positions(load("planar3r").home()),
+        np.deg2rad([30, 60, 60]),
+        rtol=0,
+        atol=1e-15,
+    )
+    # Who may fall starts as the SRDF has it stand.
+    np.testing.assert_allclose(load("solo12").home()[:7], [0, 0, 0.235, 0, 0, 0, 1])
+    np.testing.assert_allclose(load("solo12").home()[7:10], [0.1, 0.8, -1.6])
+
+
+@pytest.mark.parametrize("name", sorted({*BUNDLED, *example_robots()} - set(REFUSED)))
+def test_random_and_home_configurations_are_within_limits(name: str) -> None:
+    """For every robot that there is, with a floating root and without."""
+    robot = Robot.load(name)
+    lower, upper = robot.position_limits()
+    rng = np.random.default_rng(25)
+    drawn = [robot.random_configuration(rng) for _ in range(5)]
+    for q in (robot.home(), robot.neutral(), *drawn):
+        robot.check_configuration(q)
+    for q in (robot.home(), *drawn):
+        positions = robot.joint_positions(q)
+        assert (positions >= lower - 1e-12).all()
+        assert (positions <= upper + 1e-12).all()
+    # They differ, unless the URDF's limits are 0 and 0 (the double pendulums').
+    if (upper > lower).any():
+        assert np.abs(robot.difference(drawn[0], drawn[1])).max() > 0.0
+    # The generator decides: the same seed draws the same.
+    again = robot.random_configuration(np.random.default_rng(25))
+    np.testing.assert_array_equal(again, drawn[0])
+
+
+def test_random_configurations_fill_the_space() -> None:
+    """Continuous joints go all the way round, limited ones from end to end."""
+    rng = np.random.default_rng(26)
+    for case in ("planar3r", "panda"):
+        robot = load(case)
+        lower, upper = robot.position_limits()
+        low = np.where(np.isfinite(lower), lower, -np.pi)
+        high = np.where(np.isfinite(upper), upper, np.pi)
+        drawn = [robot.random_configuration(rng) for _ in range(400)]
+        positions = np.array([robot.joint_positions(q) for q in drawn])
+        # Of 400 uniform draws none in a given twentieth at an end: 0.95^400 = 1e-9.
+        assert (positions.min(axis=0) < low + 0.05 * (high - low)).all()
+        assert (positions.max(axis=0) > high - 0.05 * (high - low)).all()
+
+
+def test_floating_root_is_drawn_in_a_unit_box_any_way_up() -> None:
+    robot, rng = load("solo12"), np.random.default_rng(27)
+    drawn = np.array([robot.random_configuration(rng)[:7] for _ in range(400)])
+    assert np.abs(drawn[:, :3]).max() <= 1.0
+    assert drawn[:, :3].min() < -0.9
+    assert drawn[:, :3].max() > 0.9
+    # Uniform on SO(3): E[R] = 0; the mean of 400 entries of R has deviation 0.03.
+    mean = np.mean([pin.Quaternion(q).matrix() for q in drawn[:, 3:]], axis=0)
+    assert np.abs(mean).max() < 0.15
+
+
+def test_neutral_is_every_joint_at_zero() -> None:
+    for case in ROBOTS:
+        robot = load(case)
+        neutral = robot.neutral()
+        robot.check_configuration(neutral)
+        assert not robot.joint_positions(neutral).any()
+
+
+def test_equal_limits_mean_none() -> None:
+    """A URDF that leaves limits out gives 0 to 0 (double_pendulum)."""
+    robot = Robot.load("double_pendulum")
+    assert np.isinf(robot.position_limits()).all()
+    assert robot.random_configuration(np.random.default_rng(0)).all()
+
+
+def test_lists_will_do_for_integrate_and_difference() -> None:
+    robot = load("panda")
+    home, step = robot.home(), [0.1, 0, 0, 0, 0, 0, -0.2]
+    moved = robot.integrate(list(home), step)
+    np.testing.assert_array_equal(moved, robot.integrate(home, np.array(step)))
+    np.testing.assert_array_equal(
+        robot.difference(home.tolist(), moved.tolist()), robot.difference(home, moved)
+    )
+
+
+@pytest.mark.parametrize("wrong", [[0.1], np.zeros(8), "left", None])
+def test_integrate_and_difference_say_what_does_not_fit(wrong: object) -> None:
+    robot = load("panda")
+    with pytest.raises(ShapeError, match=r"^displacement (has shape|is not an array)"):
+        robot.integrate(robot.home(), wrong)
+    with pytest.raises(ShapeError, match=r"^configuration q "):
+        robot.integrate(wrong, np.zeros(7))
+    with pytest.raises(ShapeError, match=r"^configuration q "):
+        robot.difference(robot.home(), wrong)

@@ -1,0 +1,315 @@
+"""Check frames and dynamics against Pinocchio, differences, energy and MuJoCo."""
+
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+from oracles import gradient, slope
+from robot_cases import BUNDLED, ROBOTS, draw
+
+from hsp_control import Robot, RobotState
+
+Array = NDArray[np.float64]
+LWA = pin.LOCAL_WORLD_ALIGNED
+FLAT = ("planar3r", "panda", "panda_fingers", "iiwa14", "ur5", "tiago_pro")
+
+
+def frames(robot: Robot, rng: np.random.Generator) -> list[str]:
+    """Return four frames at random and the last: it often hangs on a mimic joint."""
+    chosen = rng.choice(len(robot.frame_names), 4, replace=False)
+    return [robot.frame_names[i] for i in chosen] + [robot.frame_names[-1]]
+
+
+def step_of(v: Array) -> float:
+    """Return a step [s] in which the joints together turn by 0.01 rad.
+
+    The differences of `oracles.slope` then err by 1e-14 in theory, 1e-13 by rounding.
+    """
+    return 0.01 / max(1.0, float(np.abs(v).sum()))
+
+
+# --- frames --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", ROBOTS)
+def test_frames_equal_pinocchios(case: str) -> None:
+    """Placement, J, J', velocity and classical acceleration (of v' = 0).
+
+    But for J' where joints mimic others, which Pinocchio gets wrong (by 3.6 on
+    tiago_pro); there the differences of the next tests decide.
+    """
+    robot, q, v, rng = draw(case, seed=1)
+    model, data = robot.model, robot.model.createData()
+    state = robot.state(0.3, q, v)
+    pin.computeJointJacobiansTimeVariation(model, data, q, v)
+    pin.forwardKinematics(model, data, q, v, np.zeros(robot.nv))
+    pin.updateFramePlacements(model, data)
+    for name in frames(robot, rng):
+        frame, index = state.frame(name), model.getFrameId(name)
+        # 1e-13 of entries up to 10: the same sums in another order.
+        expected = {
+            "rotation": data.oMf[index].rotation,
+            "position": data.oMf[index].translation,
+            "jacobian": pin.getFrameJacobian(model, data, index, LWA),
+            "jacobian_dot": pin.getFrameJacobianTimeVariation(model, data, index, LWA),
+            "velocity": pin.getFrameVelocity(model, data, index, LWA).vector,
+            "drift": pin.getFrameClassicalAcceleration(model, data, index, LWA).vector,
+        }
+        if robot.mimics:
+            del expected["jacobian_dot"]
+        for what, value in expected.items():
+            np.testing.assert_allclose(
+                getattr(frame, what), value, rtol=1e-13, atol=1e-13, err_msg=what
+            )
+
+
+@pytest.mark.parametrize("case", ROBOTS)
+def test_frame_jacobian_is_the_derivative_of_the_placement(case: str) -> None:
+    """J e_i by differences of position and rotation along q ⊕ s e_i."""
+    robot, q, v, rng = draw(case, seed=2)
+    state = robot.state(0.0, q, v)
+    for name in frames(robot, rng):
+        frame = state.frame(name)
+        R, J = frame.rotation.copy(), frame.jacobian.copy()
+
+        def moved(s: float, unit: Array, name: str = name, R: Array = R) -> Array:
+            there = state.displaced(0.0, s * unit).frame(name)
+            turned = pin.log3(there.rotation @ R.T)  # in world axes
+            return np.concatenate([there.position, turned])
+
+        columns = [
+            slope(lambda s, u=unit: moved(s, u), 0.01) for unit in np.eye(robot.nv)
+        ]
+        # Rounding of the differences: 2e-16 of 5 m over 0.01 rad.
+        np.testing.assert_allclose(J, np.array(columns).T, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("case", ROBOTS)
+def test_frame_rates_are_derivatives_along_the_flow(case: str) -> None:
+    """J', velocity and drift by differences along q ⊕ s v."""
+    robot, q, v, rng = draw(case, seed=3)
+    state, step = robot.state(0.0, q, v), step_of(v)
+    for name in frames(robot, rng):
+        frame = state.frame(name)
+
+        def ahead(s: float, name: str = name) -> Any:
+            return state.ahead(s).frame(name)
+
+        # Rounding: 2e-16 of J (5 m) over 0.01/Σ|v| s, up to 3e-4 s for 48 joints.
+        scale = np.abs(v).sum()
+        J_dot = slope(lambda s: ahead(s).jacobian, step)
+        np.testing.assert_allclose(
+            frame.jacobian_dot, J_dot, rtol=0, atol=1e-12 * scale
+        )
+        velocity = slope(lambda s: ahead(s).position, step)
+        np.testing.assert_allclose(frame.velocity[:3], velocity, rtol=0, atol=2e-11)
+        drift = slope(lambda s: ahead(s).velocity, step)
+        np.testing.assert_allclose(frame.drift, drift, rtol=0, atol=1e-12 * scale**2)
+        np.testing.assert_allclose(
+            frame.velocity, frame.jacobian @ v, rtol=1e-13, atol=1e-13
+        )
+
+
+def test_position_is_the_frames() -> None:
+    robot, q, v, _ = draw("panda", seed=4)
+    state = robot.state(0.0, q, v)
+    np.testing.assert_array_equal(
+        state.position("panda_hand"), state.frame("panda_hand").position
+    )
+
+
+# --- dynamics ------------------------------------------------------------------------
+
+
+def mass_matrix_by_bodies(state: RobotState) -> Array:
+    """Return Σ m J_cᵀJ_c + J_wᵀ R I Rᵀ J_w + armature, from the frames' Jacobians."""
+    robot = state.robot
+    M = np.diag(np.array(robot.model.armature[: robot.nv]))
+    for name, inertia in zip(robot.model.names, robot.model.inertias, strict=True):
+        frame = state.frame(name)
+        J_v, J_w = frame.jacobian[:3], frame.jacobian[3:]
+        J_c = J_v - pin.skew(frame.rotation @ inertia.lever) @ J_w
+        I_world = frame.rotation @ inertia.inertia @ frame.rotation.T
+        M += inertia.mass * J_c.T @ J_c + J_w.T @ I_world @ J_w
+    return M
+
+
+@pytest.mark.parametrize("case", ROBOTS)
+def test_mass_matrix_is_the_kinetic_energy_of_the_bodies(case: str) -> None:
+    robot, q, v, _ = draw(case, seed=5)
+    state = robot.state(0.0, q, v)
+    expected = mass_matrix_by_bodies(state)
+    M = state.mass_matrix
+    # 1e-13 of the largest entry, up to 80 kg m²: sums in another order.
+    atol = 1e-13 * np.abs(expected).max()
+    np.testing.assert_allclose(M, expected, rtol=0, atol=atol)
+    np.testing.assert_array_equal(M, M.T)
+    assert np.linalg.eigvalsh(M)[0] > 0.0
+
+
+@pytest.mark.parametrize("case", ROBOTS)
+def test_mass_matrix_rate_is_the_derivative_along_the_flow(case: str) -> None:
+    robot, q, v, _ = draw(case, seed=6)
+    state = robot.state(0.0, q, v)
+    expected = slope(lambda s: state.ahead(s).mass_matrix, step_of(v))
+    # Rounding: 2e-16 of M over 0.01/Σ|v| s; for mimic joints both are differences.
+    atol = 1e-12 * np.abs(state.mass_matrix).max() * np.abs(v).sum()
+    np.testing.assert_allclose(state.mass_matrix_rate, expected, rtol=0, atol=atol)
+    assert np.abs(expected).max() > 1e3 * atol  # there is something to see
+
+
+@pytest.mark.parametrize("case", ROBOTS)
+def test_nonlinear_effects_are_the_effort_of_no_acceleration(case: str) -> None:
+    robot, q, v, _ = draw(case, seed=7)
+    data = robot.model.createData()
+    expected = pin.rnea(robot.model, data, q, v, np.zeros(robot.nv))
+    effects = robot.state(0.0, q, v).nonlinear_effects
+    np.testing.assert_allclose(effects, expected, rtol=1e-13, atol=1e-12)
+
+
+def potential_energy(state: RobotState) -> float:
+    """Return -Σ m gᵀc, from the frames' placements."""
+    model, total = state.robot.model, 0.0
+    for name, inertia in zip(model.names, model.inertias, strict=True):
+        frame = state.frame(name)
+        center = frame.position + frame.rotation @ inertia.lever
+        total -= inertia.mass * model.gravity.linear @ center
+    return total
+
+
+@pytest.mark.parametrize("case", FLAT)
+def test_nonlinear_effects_are_lagranges(case: str) -> None:
+    """N = M'v - ½ ∇(vᵀMv) + ∇U, all by differences of M and U (flat spaces only)."""
+    robot, q, v, _ = draw(case, seed=8)
+    state = robot.state(0.0, q, v)
+
+    def lagrangian(displacement: Array) -> float:
+        there = state.displaced(0.0, displacement)
+        return float(0.5 * v @ there.mass_matrix @ v) - potential_energy(there)
+
+    M_dot = slope(lambda s: state.ahead(s).mass_matrix, step_of(v))
+    expected = M_dot @ v - gradient(lagrangian, robot.nv, 0.01)
+    # Rounding of the differences: 2e-16 of U (up to 400 J) over 0.01 rad, and M'.
+    scale = max(400.0, np.abs(state.mass_matrix).max() * np.abs(v).sum() ** 2)
+    np.testing.assert_allclose(
+        state.nonlinear_effects, expected, rtol=0, atol=1e-12 * scale
+    )
+
+
+@pytest.mark.parametrize("case", ROBOTS)
+def test_inverse_dynamics_is_m_a_plus_n_and_forward_dynamics_undoes_it(
+    case: str,
+) -> None:
+    robot, q, v, rng = draw(case, seed=9)
+    state, a = robot.state(0.0, q, v), rng.standard_normal(robot.nv)
+    tau = state.inverse_dynamics(a)
+    expected = state.mass_matrix @ a + state.nonlinear_effects
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(tau, expected, rtol=0, atol=1e-13 * scale)
+    np.testing.assert_allclose(
+        robot.inverse_dynamics(q, v, a), tau, rtol=0, atol=1e-13 * scale
+    )
+    # Solving loses what the condition number says: at most 1e6 here.
+    back = robot.forward_dynamics(q, v, tau)
+    cond = np.linalg.cond(state.mass_matrix)
+    np.testing.assert_allclose(back, a, rtol=0, atol=1e-14 * cond + 1e-12)
+
+
+def test_forward_dynamics_of_a_fixed_robot_is_aba() -> None:
+    robot, q, v, rng = draw("panda", seed=10)
+    tau = rng.standard_normal(7)
+    expected = pin.aba(robot.model, robot.model.createData(), q, v, tau)
+    np.testing.assert_array_equal(robot.forward_dynamics(q, v, tau), expected)
+
+
+def test_mimic_fingers_carry_both_fingers_inertia() -> None:
+    """G = ∂(free joints)/∂(own freedoms) gives M = GᵀM_f G, N = GᵀN_f, J = J_f G."""
+    robot, q, v, _ = draw("panda_fingers", seed=11)
+    free = Robot.load("panda", locked={}, mimic=False)
+    G = np.vstack([np.eye(8), np.eye(8)[7]])
+    state = robot.state(0.0, q, v)
+    other = free.state(0.0, np.append(q, q[7]), G @ v)
+    frame, same = (s.frame("panda_rightfinger") for s in (state, other))
+    pairs = [
+        (state.mass_matrix, G.T @ other.mass_matrix @ G),
+        (state.mass_matrix_rate, G.T @ other.mass_matrix_rate @ G),
+        (state.nonlinear_effects, G.T @ other.nonlinear_effects),
+        (frame.jacobian, same.jacobian @ G),
+        (frame.jacobian_dot, same.jacobian_dot @ G),
+        (frame.drift, same.drift),
+    ]
+    for actual, expected in pairs:
+        # 1e-11: the mass matrix' rate is by differences where joints mimic others.
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-11)
+
+
+# --- a second engine -----------------------------------------------------------------
+
+
+def mujoco_model(robot: Robot) -> Any:
+    """Return MuJoCo's own reading of the URDF, without what only MuJoCo adds."""
+    mujoco = pytest.importorskip("mujoco")
+    tree = ElementTree.parse(robot.source.urdf)
+    for link in tree.getroot().findall("link"):
+        for tag in ("visual", "collision"):
+            for shape in link.findall(tag):
+                link.remove(shape)
+    text = ElementTree.tostring(tree.getroot(), encoding="unicode")
+    model = mujoco.MjModel.from_xml_string(text)
+    model.dof_damping[:] = 0.0
+    model.dof_frictionloss[:] = 0.0
+    model.jnt_limited[:] = 0
+    model.eq_active0[:] = 0
+    return model
+
+
+@pytest.mark.parametrize("name", BUNDLED)
+@pytest.mark.parametrize("seed", range(3))
+def test_dynamics_equal_mujocos(name: str, seed: int) -> None:
+    """M, N, forward dynamics, J and J' of the last body, by another engine."""
+    mujoco = pytest.importorskip("mujoco")
+    robot = Robot.load(name, locked={}, mimic=False)
+    model = mujoco_model(robot)
+    data = mujoco.MjData(model)
+    names = [
+        mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, i)
+        for i in range(model.njnt)
+    ]
+    assert names == list(robot.joint_names)
+    rng = np.random.default_rng(seed)
+    q = robot.random_configuration(rng)
+    v, tau = rng.standard_normal((2, robot.nv))
+    data.qpos[:], data.qvel[:], data.qfrc_applied[:] = robot.joint_positions(q), v, tau
+    mujoco.mj_forward(model, data)
+    state = robot.state(0.0, q, v)
+
+    # MuJoCo lifts the point masses' inertia to 1e-12 kg m²; the rest is rounding.
+    M = np.zeros((robot.nv, robot.nv))
+    if hasattr(data, "qM"):  # MuJoCo 3
+        mujoco.mj_fullM(model, M, data.qM)
+    else:
+        mujoco.mj_fullM(model, data, M)
+    np.testing.assert_allclose(state.mass_matrix, M, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(
+        state.nonlinear_effects, data.qfrc_bias, rtol=0, atol=1e-11
+    )
+    acceleration = robot.forward_dynamics(q, v, tau)
+    scale = np.abs(acceleration).max()
+    np.testing.assert_allclose(acceleration, data.qacc, rtol=0, atol=1e-9 * scale)
+
+    body = model.nbody - 1
+    link = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body)
+    frame, point = state.frame(link), data.xpos[body].copy()
+    np.testing.assert_allclose(frame.position, point, rtol=0, atol=1e-13)
+    for function, expected in (
+        (mujoco.mj_jac, frame.jacobian),
+        (mujoco.mj_jacDot, frame.jacobian_dot),
+    ):
+        linear, angular = np.zeros((2, 3, robot.nv))
+        function(model, data, linear, angular, point, body)
+        np.testing.assert_allclose(
+            np.vstack([linear, angular]), expected, rtol=0, atol=1e-12
+        )

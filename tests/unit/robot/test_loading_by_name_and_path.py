@@ -1,0 +1,258 @@
+"""Check robots loaded by name and by path, and their roots."""
+
+import importlib.util
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from refused_robots import LATE_LEADER, NO_LEADER, REFUSED
+from robot_texts import ARM, BUNDLED, INERTIA, assert_same_placements, link, placements
+
+from hsp_control import Robot
+from hsp_control.common import resources
+from hsp_control.common.exceptions import (
+    ModelError,
+    RobotNotFoundError,
+)
+from hsp_control.common.resources import bundled_robots
+from hsp_control.robot.description.loading import load_model
+from hsp_control.robot.description.sources import example_robots, find_robot
+
+# Of example-robot-data: name, root by default, nq, nv.
+EXAMPLES = [
+    ("ur5", "fixed", 6, 6),
+    ("talos_arm", "fixed", 7, 7),
+    ("kinova", "fixed", 9, 6),  # three continuous joints
+    ("tiago", "fixed", 50, 48),  # two continuous wheels
+    ("double_pendulum_continuous", "fixed", 4, 2),
+    ("baxter", "fixed", 17, 17),  # 19 joints, two of them mimic
+    ("solo12", "free_flyer", 19, 18),
+    ("talos", "free_flyer", 39, 38),
+]
+
+# Robots of example-robot-data that are refused, and why. (cassie is not listed at all:
+# it is no URDF.)
+REFUSED_WITHOUT_MIMIC = {"romeo": r"no mass moves with LFinger21, .*\(24 in all\)"}
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    def write_file(text: str | bytes, name: str = "arm.urdf") -> Path:
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return write_file
+
+
+def example(name: str) -> Robot:
+    pytest.importorskip("example_robot_data")
+    return Robot.load(name)
+
+
+# --- by name -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", BUNDLED)
+def test_bundled_robot(name: str) -> None:
+    robot = Robot.load(name)
+    assert robot.source.origin == "bundled"
+    assert robot.name == name
+    assert robot.nv == (3 if name == "planar3r" else 7)
+    assert robot.source.root == "fixed"
+    assert robot.source.end_effector in robot.frame_names
+    # The source's home is what home() gives, and it is where the README says.
+    np.testing.assert_allclose(
+        robot.joint_positions(robot.home()), robot.source.home, rtol=0, atol=1e-15
+    )
+
+
+def test_bundled_robots_come_before_those_of_example_robot_data() -> None:
+    """Both have a panda; the bundled one locks its fingers."""
+    assert set(BUNDLED) <= set(bundled_robots())
+    assert Robot.load("panda").source.origin == "bundled"
+    if example_robots():
+        assert example_robots()["panda"].origin == "example-robot-data"
+
+
+@pytest.mark.parametrize(("name", "root", "nq", "nv"), EXAMPLES)
+def test_example_robot(name: str, root: str, nq: int, nv: int) -> None:
+    robot = example(name)
+    assert (robot.source.root, robot.nq, robot.nv) == (root, nq, nv)
+    assert robot.source.origin == "example-robot-data"
+    assert robot.source.package_dirs[0].name == "share"
+    assert (robot.source.package_dirs[0] / "example-robot-data").is_dir()
+
+
+@pytest.mark.parametrize("name", sorted(example_robots()))
+@pytest.mark.parametrize("mimic", [True, False])
+def test_every_example_robot_loads_or_says_why_not(name: str, mimic: bool) -> None:
+    """Nothing but ModelError, and of exactly the robots that are known for it."""
+    reason = REFUSED.get(name)
+    if not mimic and reason in {LATE_LEADER, NO_LEADER}:
+        reason = REFUSED_WITHOUT_MIMIC.get(name)
+    source = find_robot(name)
+    if source.origin == "bundled":
+        source = example_robots()[name]
+    if reason is not None:
+        with pytest.raises(ModelError, match=reason):
+            load_model(source, mimic=mimic)
+        return
+    robot = Robot(load_model(source, mimic=mimic), source)
+    plain = pin.buildModelFromUrdf(str(source.urdf), mimic=mimic)
+    extra = 6 if source.root == "free_flyer" else 0
+    assert robot.nv == plain.nv + extra
+    # The root comes first, then the URDF's joints without those that only follow.
+    assert len(robot.dof_names) == robot.nv
+    assert len(robot.joint_names) == len(robot.joints)
+    last = list(robot.joints.values())[-1]
+    assert last.idx_v + last.nv == robot.nv
+    assert last.idx_q + last.nq == robot.nq
+
+
+def test_sdf_only_robot_is_not_listed() -> None:
+    pytest.importorskip("example_robot_data")
+    assert len(example_robots()) >= 70
+    assert "cassie" not in example_robots()
+
+
+def test_sdf_only_robot_is_refused_by_name() -> None:
+    pytest.importorskip("example_robot_data")
+    with pytest.raises(RobotNotFoundError, match=r"'cassie' .* has no URDF"):
+        Robot.load("cassie")
+
+
+def test_without_example_robot_data(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bundled robots still load; the error for others says what to install."""
+    real = importlib.util.find_spec
+
+    def find_spec(name: str, package: str | None = None) -> Any:
+        return None if name == "example_robot_data" else real(name, package)
+
+    monkeypatch.setattr(importlib.util, "find_spec", find_spec)
+    assert example_robots() == {}
+    assert Robot.load("panda").nv == 7
+    with pytest.raises(RobotNotFoundError, match="pip install example-robot-data-loa"):
+        find_robot("talos_arm")
+
+
+def test_bundled_folder_of_a_wheel(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a wheel the data lie inside the package; a folder without a URDF is none."""
+    arm = tmp_path / "data" / "robots" / "arm"
+    arm.mkdir(parents=True)
+    (arm / "arm.urdf").write_text(ARM)
+    (tmp_path / "data" / "robots" / "empty").mkdir()
+    monkeypatch.setattr(resources, "_PACKAGE", tmp_path)
+    assert bundled_robots() == {"arm": arm}
+    assert Robot.load("arm").joint_names == ("shoulder", "elbow")
+
+
+def test_bundle_without_a_home_and_with_all_settings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm = tmp_path / "robots" / "arm"
+    arm.mkdir(parents=True)
+    (arm / "arm.urdf").write_text(ARM)
+    (arm / "robot.yaml").write_text("locked: {elbow: 0.5}\nhome: [1]\n")
+    monkeypatch.setattr(resources, "_PACKAGE", tmp_path / "package")
+    robot = Robot.load("arm")
+    assert robot.joint_names == ("shoulder",)
+    np.testing.assert_array_equal(robot.home(), [1.0])
+    assert Robot.load("arm", locked={}).nv == 2
+    (arm / "robot.yaml").write_text("")
+    assert Robot.load("arm").nv == 2
+
+
+# --- by path -------------------------------------------------------------------------
+
+
+def test_path_as_text_as_path_and_in_the_home_folder(
+    write: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write(ARM)
+    monkeypatch.setenv("HOME", str(path.parent))
+    for name in (path, str(path), "~/arm.urdf"):
+        robot = Robot.load(name)
+        assert robot.name == "arm"
+        assert robot.source.origin == "file"
+        assert robot.joint_names == ("shoulder", "elbow")
+    monkeypatch.chdir(path.parent)
+    assert Robot.load("arm.urdf").nv == 2  # no separator: the ending tells
+    write(ARM, "arm.xml")
+    assert Robot.load("arm.xml").nv == 2
+    write(ARM, "without_ending")
+    assert Robot.load("./without_ending").nv == 2
+
+
+def test_model_is_the_urdfs(write: Callable[..., Path]) -> None:
+    """What comes out is Pinocchio's own reading of the file."""
+    path = write(ARM)
+    assert Robot.load(path).model == pin.buildModelFromUrdf(str(path))
+
+
+def test_meshes_may_be_missing(write: Callable[..., Path]) -> None:
+    """Visuals are no business of dynamics: their files are never opened."""
+    shapes = "".join(
+        f'<{tag}><geometry><mesh filename="{place}"/></geometry></{tag}>'
+        for tag in ("visual", "collision")
+        for place in ("package://nowhere/hand.stl", "file:///nowhere/hand.dae")
+    )
+    with_meshes = Robot.load(write(ARM.replace(INERTIA, INERTIA + shapes)))
+    without = Robot.load(write(ARM, "plain.urdf"))
+    q = np.array([0.3, -0.4])
+    assert_same_placements(
+        placements(with_meshes.model, q), placements(without.model, q)
+    )
+
+
+def test_package_folders_of_a_file(
+    write: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`package://` is looked up above the file, then along ROS_PACKAGE_PATH."""
+    path = write(ARM)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", "/opt/one:/opt/two")
+    folders = find_robot(path).package_dirs
+    assert folders[0] == path.resolve().parent
+    assert path.resolve().parents[2] in folders
+    assert folders[-2:] == (Path("/opt/one"), Path("/opt/two"))
+    monkeypatch.delenv("ROS_PACKAGE_PATH")
+    assert Path("/opt/one") not in find_robot(path).package_dirs
+
+
+# --- roots ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("root", "nq", "nv"), [("fixed", 2, 2), ("planar", 6, 5), ("free_flyer", 9, 8)]
+)
+def test_root(root: Any, nq: int, nv: int, write: Callable[..., Path]) -> None:
+    text = ARM.replace(link("base", ""), link("base"))  # a root must move some mass
+    robot = Robot.load(write(text), root=root)
+    fixed = Robot.load(write(text))
+    assert (robot.nq, robot.nv) == (nq, nv)
+    # All stands where the root puts it. The pose by Pinocchio's own conventions.
+    angles = np.array([0.4, -0.7])
+    if root == "fixed":
+        pose, q = pin.SE3.Identity(), angles
+    elif root == "planar":
+        pose = pin.SE3(pin.rpy.rpyToMatrix(0, 0, 0.6), np.array([1.0, -2.0, 0.0]))
+        q = np.concatenate([[1.0, -2.0, np.cos(0.6), np.sin(0.6)], angles])
+    else:
+        pose = pin.SE3(pin.rpy.rpyToMatrix(0.1, -0.5, 0.6), np.array([1.0, -2.0, 0.5]))
+        q = np.concatenate([pin.SE3ToXYZQUAT(pose), angles])
+    standing = placements(fixed.model, angles)
+    moved = {name: pose.homogeneous @ M for name, M in standing.items()}
+    assert_same_placements(moved, placements(robot.model, q))
+    np.testing.assert_array_equal(robot.check_configuration(q), q)
+
+
+def test_source_names_the_root_unless_told_otherwise() -> None:
+    assert example("solo12").nv == 18
+    assert Robot.load("solo12", root="fixed").nv == 12
+    assert Robot.load("solo12", root="planar").nv == 15
+    assert Robot.load("talos_arm", root="free_flyer").nv == 13

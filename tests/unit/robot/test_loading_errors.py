@@ -1,0 +1,297 @@
+"""Check every error of a robot that cannot be loaded."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from places import ROOT
+from robot_texts import ARM, INERTIA, gripper, joint, link, robot_xml
+
+from hsp_control import HspControlError, Robot, ToolFrame
+from hsp_control.common.exceptions import (
+    FrameNotFoundError,
+    JointNotFoundError,
+    ModelError,
+    NonFiniteError,
+    RobotNotFoundError,
+    ShapeError,
+)
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    def write_file(text: str | bytes, name: str = "arm.urdf") -> Path:
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return write_file
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("pnada", "no robot 'pnada'; did you mean 'panda'?"),
+        ("PANDA", "did you mean 'panda'?"),
+        ("planar", "did you mean 'planar3r'?"),
+        ("xyzzy", "no robot 'xyzzy' (give a path to a .urdf file, or one of: "),
+        ("robots/panda/", "is a folder; give a .urdf file in it (it contains panda."),
+        ("/nowhere/arm.urdf", "/nowhere/arm.urdf: no such file"),
+        ("arm_without_folder.urdf", "arm_without_folder.urdf: no such file"),
+    ],
+)
+def test_robot_not_found(
+    name: str, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(ROOT)
+    with pytest.raises(RobotNotFoundError, match=re.escape(message)) as caught:
+        Robot.load(name)
+    assert isinstance(caught.value, FileNotFoundError)
+    assert isinstance(caught.value, HspControlError)
+
+
+def test_missing_file_names_its_neighbour(write: Callable[..., Path]) -> None:
+    path = write(ARM)
+    with pytest.raises(RobotNotFoundError, match=r"no such file; .* mean 'arm\.urdf'"):
+        Robot.load(path.with_name("amr.urdf"))
+    with pytest.raises(RobotNotFoundError, match="is a folder"):
+        Robot.load(path.parent)
+
+
+def test_file_that_may_not_be_read(
+    write: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: Any) -> Any:
+        raise PermissionError(13, "Permission denied")
+
+    path = write(ARM)
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(RobotNotFoundError, match=r"arm\.urdf: Permission denied"):
+        Robot.load(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('<robot name="r">\n  <link name="a">\n</robot>', r":3:3: malformed XML: mism"),
+        ("", r"arm\.urdf:1:1: malformed XML: no element found"),
+        (b"\xff\xfe\x00\x00binary", r"arm\.urdf:1:\d+: malformed XML"),
+        (
+            '<?xml version="1.0" encoding="no-such"?>' + ARM,
+            "malformed XML: unknown enc",
+        ),
+        ("<mujoco/>", "the top element is <mujoco>; in a URDF it is <robot>"),
+        ("<sdf version='1.6'/>", "the top element is <sdf>"),
+        ("<robot/>", "Pinocchio cannot build a model: No name given for the robot"),
+        ("<robot name='r'/>", "Pinocchio cannot build a model"),
+        (
+            ARM.replace('lower="-3" upper="3"', 'lower="3" upper="-3"', 1),
+            "joint 'shoulder': its lower limit 3 is above its upper limit -3",
+        ),
+        (robot_xml(link("a")), "the robot has no moving joint"),
+        (
+            robot_xml(link("a"), link("b"), joint("j", "a", "b", "fixed")),
+            "the robot has no moving joint",
+        ),
+        (robot_xml(link("a"), joint("j", "a", "b")), "Pinocchio cannot build a model"),
+        (robot_xml(link("b"), joint("j", "a", "b")), "Pinocchio cannot build a model"),
+        (robot_xml(link("a"), link("b")), "Pinocchio cannot build a model"),
+        (robot_xml(link("a"), link("a")), "Pinocchio cannot build a model"),
+        (
+            ARM.replace('type="revolute"', 'type="bent"'),
+            "Pinocchio cannot build a model",
+        ),
+        (ARM.replace("<limit", "<limits"), "Pinocchio cannot build a model"),
+        (
+            robot_xml(ARM, joint("loop", "lower", "base")),
+            "Pinocchio cannot build a model",
+        ),
+        (
+            ARM.replace("</joint>", '<mimic joint="ghost"/></joint>', 1),
+            "joint 'shoulder' mimics 'ghost', which is not a moving joint; load its",
+        ),
+        (
+            gripper().replace(
+                '"follower" type="revolute"', '"follower" type="continuous"'
+            ),
+            "build a model: Mimicking and .* different sizes; load .*mimic=False",
+        ),
+    ],
+)
+def test_file_that_is_no_robot(
+    text: str | bytes, message: str, write: Callable[..., Path]
+) -> None:
+    path = write(text)
+    with pytest.raises(ModelError, match=message) as caught:
+        Robot.load(path)
+    assert str(path) in str(caught.value)
+
+
+def test_hint_to_load_mimic_joints_as_free_ones_helps(
+    write: Callable[..., Path],
+) -> None:
+    path = write(ARM.replace("</joint>", '<mimic joint="elbow"/></joint>', 1))
+    message = "'shoulder' mimics 'elbow', which comes after it in the tree.*mimic=False"
+    with pytest.raises(ModelError, match=message):
+        Robot.load(path)
+    assert Robot.load(path, mimic=False).nv == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("bravo7_gripper", {}),
+        ("falcon_bravo7_gripper", {}),
+        ("bluevolta_bravo7_gripper", {}),
+        ("romeo", {"mimic": False}),
+    ],
+)
+def test_hint_to_lock_joints_that_move_no_mass_helps(
+    name: str, options: dict[str, Any]
+) -> None:
+    """The message's own words, read as YAML, are the cure."""
+    pytest.importorskip("example_robot_data")
+    with pytest.raises(ModelError, match="lock the joints: locked: ") as caught:
+        Robot.load(name, **options)
+    hint = yaml.safe_load(str(caught.value).split("lock the joints: ")[1])
+    robot = Robot.load(name, **hint, **options)
+    assert not set(hint["locked"]) & set(robot.joint_names)
+
+
+@pytest.mark.parametrize("last", ["wrist", "a_joint"])
+def test_joint_that_moves_no_mass_is_named(
+    last: str, write: Callable[..., Path]
+) -> None:
+    """A last joint with a massless link; the cure that is named helps."""
+    path = write(
+        robot_xml(
+            link("base", ""),
+            link("upper"),
+            link("hand", ""),
+            joint("shoulder", "base", "upper"),
+            joint(last, "upper", "hand"),
+        )
+    )
+    message = rf"no mass moves with {last}, .*, or lock .*: locked: {{{last}: 0\.0}}"
+    with pytest.raises(ModelError, match=message):
+        Robot.load(path)
+    assert Robot.load(path, locked={last: 0.0}).joint_names == ("shoulder",)
+
+
+def test_massless_link_between_heavy_ones_is_no_error(
+    write: Callable[..., Path],
+) -> None:
+    assert Robot.load(write(ARM.replace(INERTIA, "", 1))).nv == 2
+
+
+def test_root_that_moves_no_mass(write: Callable[..., Path]) -> None:
+    """Two point masses on one line: to roll about it takes no effort."""
+    point = '<inertial><mass value="2"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" '
+    point += 'iyz="0" izz="0"/></inertial>'
+    slide = joint("slide", "base", "slider", "prismatic").replace("0 0 1", "1 0 0")
+    slide = slide.replace('xyz="0.5 0.1 0.2" rpy="0.3 0.2 0.1"', 'xyz="1 0 0"')
+    path = write(robot_xml(link("base", point), link("slider", point), slide))
+    assert Robot.load(path).nv == 1
+    message = r"no mass moves with root_joint, .* an inertia, or root: fixed$"
+    with pytest.raises(ModelError, match=message):
+        Robot.load(path, root="free_flyer")
+
+
+def test_root_and_joint_that_do_the_same(write: Callable[..., Path]) -> None:
+    """A massless base that yaws about its first joint's axis: two joints for one."""
+    text = robot_xml(
+        link("base", ""), link("upper"), joint("shoulder", "base", "upper")
+    )
+    path = write(text.replace(' rpy="0.3 0.2 0.1"', ""))
+    assert Robot.load(path).nv == 1
+    with pytest.raises(ModelError, match=r"no mass moves with (root_joint|shoulder),"):
+        Robot.load(path, root="planar")
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        (
+            {"root": "free_flier"},
+            ModelError,
+            "root 'free_flier' is not one of fixed, planar, free_flyer; "
+            "did you mean 'free_flyer'?",
+        ),
+        (
+            {"locked": {"sholder": 0.0}},
+            JointNotFoundError,
+            "cannot lock 'sholder': no such joint; did you mean 'shoulder'? "
+            "(the model has shoulder, elbow)",
+        ),
+        (
+            {"locked": {"universe": 0.0}},
+            JointNotFoundError,
+            "cannot lock 'universe': no such joint",
+        ),
+        (
+            {"locked": {"shoulder": 0.0, "elbow": 1.0}},
+            ModelError,
+            "every joint is locked; at least one must be left to control",
+        ),
+        (
+            {"locked": {"elbow": float("nan")}},
+            NonFiniteError,
+            "cannot lock joint 'elbow' at nan; needs a finite number",
+        ),
+        (
+            {"root": "free_flyer", "locked": {"root_joint": 0.0}},
+            ModelError,
+            "cannot lock 'root_joint': it has 6 degrees of freedom, only joints with "
+            "one can be locked; for a fixed base use root: fixed",
+        ),
+        (
+            {"tool_frames": {"pen": ToolFrame("lowr")}},
+            FrameNotFoundError,
+            "tool frame 'pen': no parent frame 'lowr'; did you mean 'lower'? "
+            "(the model has universe, ",
+        ),
+        (
+            {"tool_frames": {"lower": ToolFrame("lower")}},
+            ModelError,
+            "cannot add tool frame 'lower': the model has a frame with this name",
+        ),
+        (
+            {"tool_frames": {"elbow": ToolFrame("lower")}},  # joints are frames, too
+            ModelError,
+            "cannot add tool frame 'elbow': the model has a frame with this name",
+        ),
+        (
+            {"tool_frames": {"pen": ToolFrame("lower", (1.0, 2.0))}},
+            ShapeError,
+            "translation of 'pen' has shape (2,); needs 3 numbers",
+        ),
+        (
+            {"tool_frames": {"pen": ToolFrame("lower", rpy=(0.0, np.inf, 0.0))}},
+            NonFiniteError,
+            "rpy of 'pen' is [0.0, inf, 0.0]; needs finite numbers",
+        ),
+        (
+            {"gravity": (0.0, -9.81)},
+            ShapeError,
+            "gravity has shape (2,); needs 3 numbers",
+        ),
+        (
+            {"gravity": (0.0, 0.0, float("nan"))},
+            NonFiniteError,
+            "gravity is [0.0, 0.0, nan]; needs finite numbers",
+        ),
+    ],
+)
+def test_option_that_does_not_fit(
+    options: dict[str, Any],
+    error: type[Exception],
+    message: str,
+    write: Callable[..., Path],
+) -> None:
+    with pytest.raises(error, match=re.escape(message)) as caught:
+        Robot.load(write(ARM), **options)
+    assert isinstance(caught.value, HspControlError)

@@ -1,0 +1,292 @@
+"""Check mimic and locked joints, tool frames, gravity and the likely hand."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from robot_texts import (
+    BUNDLED,
+    assert_same_placements,
+    gripper,
+    joint,
+    link,
+    placements,
+    robot_xml,
+)
+
+from hsp_control import Robot, ToolFrame
+from hsp_control.common.exceptions import (
+    ModelError,
+)
+from hsp_control.robot.description.loading import end_effector_frame
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    def write_file(text: str | bytes, name: str = "arm.urdf") -> Path:
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return write_file
+
+
+def full_configuration(model: pin.Model, values: dict[str, float]) -> np.ndarray:
+    """Return q of an unreduced model with one-freedom joints, others at zero."""
+    displacement = np.zeros(model.nv)
+    for name, value in values.items():
+        displacement[model.joints[model.getJointId(name)].idx_v] = value
+    return pin.integrate(model, pin.neutral(model), displacement)
+
+
+# --- mimic joints --------------------------------------------------------------------
+
+
+def test_mimic_fingers_of_the_panda() -> None:
+    """Fingers unlocked: one freedom with mimic, two without; locked by default."""
+    locked, leading, free = (
+        Robot.load("panda"),
+        Robot.load("panda", locked={}),
+        Robot.load("panda", locked={}, mimic=False),
+    )
+    assert [r.nv for r in (locked, leading, free)] == [7, 8, 9]
+    assert [r.mimics for r in (locked, leading, free)] == [False, True, False]
+    assert leading.joint_names[-1] == "panda_finger_joint1"
+    assert free.joint_names[-1] == "panda_finger_joint2"
+    q = np.array([0.1, -0.2, 0.3, -1.4, 0.5, 1.6, 0.7, 0.03])
+    assert_same_placements(
+        placements(leading.model, q), placements(free.model, np.append(q, 0.03))
+    )
+
+
+@pytest.mark.parametrize("kind", ["revolute", "continuous", "prismatic"])
+@pytest.mark.parametrize("multiplier", [1.0, 2.0, -1.5])
+def test_follower_is_at_multiplier_times_leader_plus_offset(
+    kind: str, multiplier: float, write: Callable[..., Path]
+) -> None:
+    path = write(gripper(kind, multiplier))
+    robot, free = Robot.load(path), Robot.load(path, mimic=False)
+    assert (robot.nv, free.nv) == (2, 3)
+    q = robot.integrate(robot.neutral(), np.array([0.4, -0.7]))
+    values = {"shoulder": 0.4, "elbow": -0.7, "follower": multiplier * 0.4 + 0.3}
+    assert_same_placements(
+        placements(robot.model, q),
+        placements(free.model, full_configuration(free.model, values)),
+    )
+
+
+# --- locked joints -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "locks"),
+    [
+        (
+            "panda",
+            {"panda_joint3": 0.7, "panda_joint5": -1.1, "panda_finger_joint1": 0.0},
+        ),
+        ("planar3r", {"joint2": 2.5}),  # continuous
+        ("planar3r", {"joint1": -1.5, "joint3": 4.0}),  # beyond half a turn
+        ("kinova", {"j2s6s200_joint_1": -2.0, "j2s6s200_joint_3": 1.0}),
+    ],
+)
+def test_locked_joint_stands_where_it_is_told(
+    name: str, locks: dict[str, float]
+) -> None:
+    """Bodies stand as in the whole robot, and M is the rest of the whole M."""
+    if name not in BUNDLED:
+        pytest.importorskip("example_robot_data")
+    robot = Robot.load(name, locked=locks)
+    whole = pin.buildModelFromUrdf(str(robot.source.urdf))
+    rest = [joint for joint in robot.joint_names if joint not in locks]
+    assert rest == list(robot.joint_names)
+    rng = np.random.default_rng(0)
+    values = dict(zip(rest, rng.uniform(-1.0, 1.0, robot.nv), strict=True))
+    q = robot.integrate(robot.neutral(), np.array(list(values.values())))
+    q_whole = full_configuration(whole, locks | values)
+    assert_same_placements(placements(robot.model, q), placements(whole, q_whole))
+
+    kept = [whole.joints[whole.getJointId(joint)].idx_v for joint in rest]
+    M = pin.crba(whole, whole.createData(), q_whole)[np.ix_(kept, kept)]
+    # 1e-12 of 1 to 10 kg m²: inertias of locked links are merged in another order.
+    actual = pin.crba(robot.model, robot.model.createData(), q)
+    np.testing.assert_allclose(actual, M, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "continuous", "prismatic"])
+@pytest.mark.parametrize("value", [0.0, 0.9])
+def test_locking_a_leader_locks_its_follower(
+    kind: str, value: float, write: Callable[..., Path]
+) -> None:
+    path = write(gripper(kind))
+    robot = Robot.load(path, locked={"shoulder": value})
+    free = Robot.load(path, mimic=False)
+    assert robot.joint_names == ("elbow",)
+    assert not robot.mimics
+    values = {"shoulder": value, "elbow": -0.7, "follower": -1.5 * value + 0.3}
+    assert_same_placements(
+        placements(robot.model, np.array([-0.7])),
+        placements(free.model, full_configuration(free.model, values)),
+    )
+
+
+def test_locking_another_joint_leaves_mimic_joints_at_work(
+    write: Callable[..., Path],
+) -> None:
+    path = write(gripper())
+    robot = Robot.load(path, locked={"elbow": 0.8})
+    free = Robot.load(path, mimic=False)
+    assert robot.joint_names == ("shoulder",)
+    assert robot.mimics
+    values = {"shoulder": 0.4, "elbow": 0.8, "follower": -1.5 * 0.4 + 0.3}
+    assert_same_placements(
+        placements(robot.model, np.array([0.4])),
+        placements(free.model, full_configuration(free.model, values)),
+    )
+
+
+def test_followers_may_be_named_if_they_agree_with_their_leader(
+    write: Callable[..., Path],
+) -> None:
+    """So that one list of locks serves with and without mimic, as the Panda's does."""
+    path = write(gripper())
+    locks = {"shoulder": 0.4, "follower": -1.5 * 0.4 + 0.3}
+    assert Robot.load(path, locked=locks).joint_names == ("elbow",)
+    assert Robot.load(path, locked=locks, mimic=False).joint_names == ("elbow",)
+    with pytest.raises(
+        ModelError, match=r"cannot lock 'follower' at 0\.4: it mimics 'shoulder', "
+        r"which puts it at -0\.3"
+    ):  # fmt: skip
+        Robot.load(path, locked={"shoulder": 0.4, "follower": 0.4})
+    with pytest.raises(ModelError, match="it mimics 'shoulder'; lock 'shoulder'"):
+        Robot.load(path, locked={"follower": 0.4})
+
+
+def test_an_empty_list_of_locks_unlocks() -> None:
+    assert Robot.load("panda", locked={}).nv == 8
+    assert Robot.load("panda", locked={"panda_joint1": 0.0}).nv == 7
+
+
+# --- tool frames and gravity ---------------------------------------------------------
+
+
+def test_tool_frames_are_fixed_to_their_parents() -> None:
+    tools = {
+        "pen": ToolFrame("panda_hand", (0.01, -0.02, 0.3), (0.1, 0.2, -0.3)),
+        "tip": ToolFrame("pen", (0.0, 0.0, 0.05)),  # a tool on a tool
+        "camera": ToolFrame("universe", (1.0, 2.0, 3.0)),
+    }
+    robot = Robot.load("panda", tool_frames=tools)
+    assert robot.frame_names[-3:] == ("pen", "tip", "camera")
+    rng = np.random.default_rng(1)
+    state = robot.state(0.0, robot.random_configuration(rng), rng.standard_normal(7))
+
+    def placement(name: str) -> pin.SE3:
+        frame = state.frame(name)
+        return pin.SE3(frame.rotation, frame.position)
+
+    # URDF's rpy: Rz(yaw) Ry(pitch) Rx(roll).
+    turn = (
+        pin.utils.rotate("z", -0.3) @ pin.utils.rotate("y", 0.2)
+        @ pin.utils.rotate("x", 0.1)
+    )  # fmt: skip
+    pen = placement("panda_hand") * pin.SE3(turn, np.array([0.01, -0.02, 0.3]))
+    tip = pen * pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.05]))
+    for expected, name in ((pen, "pen"), (tip, "tip")):
+        actual = placement(name)
+        np.testing.assert_allclose(
+            actual.homogeneous, expected.homogeneous, rtol=0, atol=1e-14
+        )
+        # It moves with its parent: v_tool = v_parent + w × (p_tool - p_parent).
+        hand = state.frame("panda_hand")
+        arm = actual.translation - hand.position
+        v, w = hand.velocity[:3], hand.velocity[3:]
+        np.testing.assert_allclose(
+            state.frame(name).velocity,
+            np.concatenate([v + np.cross(w, arm), w]),
+            rtol=0,
+            atol=1e-13,
+        )
+    np.testing.assert_array_equal(state.frame("camera").position, [1.0, 2.0, 3.0])
+    assert not state.frame("camera").jacobian.any()
+
+
+def test_gravity() -> None:
+    """At rest N is the weight: N_i = -Σ_k m_k gᵀ ∂c_k/∂q_i, by the centre of mass."""
+    q, rest = Robot.load("panda").home(), np.zeros(7)
+    for gravity in (None, (0.0, 0.0, -9.81), (1.0, -2.0, 3.0), (0.0, 0.0, 0.0)):
+        robot = Robot.load("panda", gravity=gravity)
+        g = np.array((0.0, 0.0, -9.81) if gravity is None else gravity)
+        data = robot.model.createData()
+        J_com = pin.jacobianCenterOfMass(robot.model, data, q)
+        weight = -data.mass[0] * g @ J_com
+        effects = robot.state(0.0, q, rest).nonlinear_effects
+        np.testing.assert_allclose(effects, weight, rtol=0, atol=1e-12)
+
+
+def test_gravity_with_locked_joints_and_tools() -> None:
+    robot = Robot.load(
+        "panda",
+        locked={"panda_joint1": 0.3},
+        gravity=(0.0, 1.0, 0.0),
+        tool_frames={"pen": ToolFrame("panda_hand")},
+    )
+    np.testing.assert_array_equal(robot.model.gravity.linear, [0.0, 1.0, 0.0])
+    np.testing.assert_array_equal(robot.model.gravity.angular, [0.0, 0.0, 0.0])
+
+
+# --- the likely hand -----------------------------------------------------------------
+
+
+def chain(*names: str) -> str:
+    """Return links and joints of a serial chain; the first link must exist."""
+    pairs = pairwise(names)
+    return "".join(link(b) + joint(f"{a}-{b}", a, b) for a, b in pairs)
+
+
+@pytest.mark.parametrize(
+    ("parts", "expected"),
+    [
+        # A chain ends at its last link, be it welded to the last that moves.
+        ([chain("base", "a", "b")], "b"),
+        ([chain("base", "a", "b"), link("tool"), joint("weld", "b", "tool", "fixed")],
+         "tool"),
+        # The longest chain, and the last of equals.
+        ([chain("base", "a", "b"), chain("base", "x", "y", "z")], "z"),
+        ([chain("base", "x", "y", "z"), chain("base", "a", "b", "c")], "z"),
+        # A fork in the second half is a hand with fingers; one in the first is not.
+        ([chain("base", "a", "b", "c", "d", "e"), chain("d", "f")], "d"),
+        ([chain("base", "a", "b", "c", "d", "e"), chain("a", "f")], "e"),
+        # A finger that is welded on is none to track.
+        ([chain("base", "a", "b"), link("left_finger"),
+          joint("weld", "b", "left_finger", "fixed")], "b"),
+    ],
+)  # fmt: skip
+def test_end_effector_frame(
+    parts: list[str], expected: str, write: Callable[..., Path]
+) -> None:
+    path = write(robot_xml(link("base", ""), *parts))
+    assert end_effector_frame(Robot.load(path).model) == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("planar3r", "tip"),
+        ("panda", "panda_tcp"),
+        ("iiwa14", "iiwa_link_ee"),
+        ("ur5", "tool0"),
+        ("xarm7", "link_eef"),
+        ("kinova", "j2s6s200_end_effector"),
+    ],
+)
+def test_end_effector_frame_of_known_arms(name: str, expected: str) -> None:
+    if name not in BUNDLED:
+        pytest.importorskip("example_robot_data")
+    robot = Robot.load(name)
+    assert end_effector_frame(robot.model) == expected
+    if name in BUNDLED:  # what the bundle says, found by itself
+        assert robot.source.end_effector == expected

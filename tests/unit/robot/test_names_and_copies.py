@@ -1,0 +1,134 @@
+"""Check the names of frames and joints, and that copies of a robot equal it."""
+
+import copy
+import pickle
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from robot_cases import ROBOTS, assert_equal_terms, by_pickle, draw, everything, load
+
+from hsp_control import Robot
+from hsp_control.common.exceptions import (
+    FrameNotFoundError,
+    JointNotFoundError,
+    ModelError,
+)
+from hsp_control.robot.description.loading import load_model
+from hsp_control.robot.description.sources import (
+    find_robot,
+)
+
+# --- names ---------------------------------------------------------------------------
+
+
+def test_unknown_frame() -> None:
+    robot, q, v, _ = draw("panda", seed=22)
+    message = (
+        "no frame 'panda_hnad'; did you mean 'panda_hand'? (the model has universe"
+    )
+    for ask in (robot.frame_id, robot.state(0.0, q, v).frame):
+        with pytest.raises(FrameNotFoundError, match=re.escape(message)) as caught:
+            ask("panda_hnad")
+        assert isinstance(caught.value, LookupError)
+    with pytest.raises(FrameNotFoundError, match="did you mean 'panda_hand'"):
+        robot.frame_id("hand")
+
+
+@pytest.mark.parametrize(
+    ("joint", "hint"),
+    [
+        ("panda_joint8", "; did you mean 'panda_joint"),
+        ("panda_finger_joint1", "; did you mean 'panda_joint"),  # locked
+        ("universe", " (the model has panda_joint1, "),  # Pinocchio's, not a joint
+        ("panda_hand", " (the model has panda_joint1, "),  # a frame
+    ],
+)
+def test_unknown_joint(joint: str, hint: str) -> None:
+    with pytest.raises(JointNotFoundError, match=re.escape(f"no joint {joint!r}")) as e:
+        load("panda").velocity_index(joint)
+    assert hint in str(e.value)
+    assert isinstance(e.value, LookupError)
+
+
+def test_names_of_joints_and_freedoms() -> None:
+    """One name a freedom, in the order of velocities; the universe is no joint."""
+    assert load("planar3r").joint_names == ("joint1", "joint2", "joint3")
+    assert load("planar3r").dof_names == ("joint1", "joint2", "joint3")
+    fingers = load("panda_fingers")  # the follower has no freedom
+    assert fingers.joint_names[-2:] == ("panda_joint7", "panda_finger_joint1")
+    assert len(fingers.dof_names) == fingers.nv == 8
+
+    solo = load("solo12")
+    assert solo.joint_names[:2] == ("root_joint", "FL_HAA")
+    assert solo.dof_names[:7] == (
+        *(f"root_joint.{axis}" for axis in ("x", "y", "z", "roll", "pitch", "yaw")),
+        "FL_HAA",
+    )
+    assert len(solo.dof_names) == solo.nv
+    assert solo.velocity_index("root_joint") == slice(0, 6)
+    assert solo.velocity_index("FL_HAA") == slice(6, 7)
+
+    planar = load("talos_arm_planar")
+    assert planar.dof_names[:3] == (
+        "root_joint.x",
+        "root_joint.y",
+        "root_joint.yaw",
+    )
+    assert planar.velocity_index("root_joint") == slice(0, 3)
+
+
+def test_repr() -> None:
+    assert repr(load("planar3r")) == "Robot('planar3r', nq=6, nv=3)"
+
+
+# --- persistence ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", ROBOTS)
+@pytest.mark.parametrize("duplicate", [by_pickle, copy.deepcopy])
+def test_pickle_and_deep_copy_round_trip(
+    case: str, duplicate: Callable[[Robot], Robot]
+) -> None:
+    """The other robot is another object that says the same, to the last bit."""
+    robot, q, v, _ = draw(case, seed=28)
+    if robot.mimics and duplicate is by_pickle:
+        # Pinocchio would restore a model that ends the process when it is used.
+        with pytest.raises(
+            ModelError, match=r"mimic joints cannot be pickled; .*False"
+        ):
+            pickle.dumps(robot)
+        return
+    other = duplicate(robot)
+    assert other is not robot
+    assert other.model is not robot.model
+    assert other.source == robot.source
+    assert repr(other) == repr(robot)
+    for name in ("joint_names", "dof_names", "frame_names", "unit_blocks"):
+        assert getattr(other, name) == getattr(robot, name)
+    np.testing.assert_array_equal(other.home(), robot.home())
+    frame = robot.frame_names[-1]
+    assert_equal_terms(
+        everything(other.state(0.0, q, v), frame),
+        everything(robot.state(0.0, q, v), frame),
+    )
+    np.testing.assert_array_equal(
+        other.forward_dynamics(q, v, v), robot.forward_dynamics(q, v, v)
+    )
+
+
+def test_joint_coordinates() -> None:
+    """θ = A q: the planar arm's absolute angles; none for other robots."""
+    A = load("planar3r").joint_coordinates
+    assert A is not None
+    np.testing.assert_array_equal(A @ [1.0, 2.0, 4.0], [1.0, 3.0, 7.0])
+    assert load("panda").joint_coordinates is None
+
+
+def test_robot_of_a_given_model() -> None:
+    """`Robot.load` adds nothing to the constructor."""
+    source = find_robot("panda")
+    robot, loaded = Robot(load_model(source), source), load("panda")
+    assert robot.model == loaded.model
+    assert robot.source == loaded.source

@@ -1,0 +1,318 @@
+"""Check that one state can be moved, asked in any order and fed wrong numbers."""
+
+import gc
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from robot_cases import ROBOTS, assert_equal_terms, draw, everything, load
+
+from hsp_control import HspControlError, RobotState
+from hsp_control.common.exceptions import (
+    ConfigurationError,
+    NonFiniteError,
+    ShapeError,
+)
+
+Array = NDArray[np.float64]
+
+
+# --- one state, many moves -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", ROBOTS)
+def test_update_moves_everything(case: str) -> None:
+    """A used state that is moved equals a fresh one there, to the last bit."""
+    robot, q, v, rng = draw(case, seed=12)
+    frame = robot.frame_names[-1]
+    used = robot.state(0.0, q, v)
+    everything(used, frame)
+    for _ in range(3):
+        q, v = robot.random_configuration(rng), rng.standard_normal(robot.nv)
+        t = float(rng.uniform())
+        assert used.update(t, q, v) is used
+        assert used.t == t
+        np.testing.assert_array_equal(used.q, q)
+        np.testing.assert_array_equal(used.v, v)
+        fresh = robot.state(t, q, v)
+        assert_equal_terms(everything(used, frame), everything(fresh, frame))
+
+
+@pytest.mark.parametrize("case", ["panda", "panda_fingers", "solo12"])
+def test_order_of_questions_does_not_matter(case: str) -> None:
+    """Pinocchio's algorithms share one memory: none may spoil what another wrote."""
+    robot, q, v, _ = draw(case, seed=13)
+    name = robot.frame_names[-1]
+    a = np.ones(robot.nv)
+    questions: dict[str, Callable[[RobotState], Array]] = {
+        "mass_matrix": lambda s: s.mass_matrix,
+        "mass_matrix_rate": lambda s: s.mass_matrix_rate,
+        "nonlinear_effects": lambda s: s.nonlinear_effects,
+        "effort": lambda s: s.inverse_dynamics(a),
+        "jacobian": lambda s: s.frame(name).jacobian,
+        "jacobian_dot": lambda s: s.frame(name).jacobian_dot,
+    }
+    alone = {
+        what: question(robot.state(0.0, q, v)).copy()
+        for what, question in questions.items()
+    }
+    # One call may leave a Jacobian that another recomputes: equal up to rounding only.
+    for order in itertools.permutations(questions):
+        state = robot.state(0.0, q, v)
+        first = {what: questions[what](state) for what in order}
+        for what in order:
+            for answer in (first[what], questions[what](state)):
+                np.testing.assert_allclose(
+                    answer, alone[what], rtol=1e-13, atol=1e-13, err_msg=what
+                )
+
+
+def test_a_second_frame_does_not_move_the_first() -> None:
+    robot, q, v, _ = draw("panda", seed=14)
+    state = robot.state(0.0, q, v)
+    hand = state.frame("panda_hand")
+    before = [hand.position.copy(), hand.rotation.copy(), hand.jacobian.copy()]
+    state.frame("panda_link4")
+    state.frame("panda_hand")
+    for array, kept in zip(
+        (hand.position, hand.rotation, hand.jacobian), before, strict=True
+    ):
+        np.testing.assert_array_equal(array, kept)
+
+
+@pytest.mark.parametrize("case", ["planar3r", "panda", "panda_fingers", "solo12"])
+def test_companion_states_do_not_disturb(case: str) -> None:
+    """`displaced` and `ahead` are states elsewhere; the state itself stays."""
+    robot, q, v, rng = draw(case, seed=15)
+    name = robot.frame_names[-1]
+    state = robot.state(0.5, q, v)
+    before = everything(state, name)
+    displacement = rng.standard_normal(robot.nv)
+    companion = state.displaced(0.25, displacement)
+    assert companion is not state
+    assert companion.t == 0.75
+    np.testing.assert_array_equal(companion.q, robot.integrate(q, displacement))
+    np.testing.assert_array_equal(companion.v, v)
+    there = robot.state(0.75, robot.integrate(q, displacement), v)
+    assert_equal_terms(everything(companion, name), everything(there, name))
+
+    # A companion's companion is a third state: nested differences work.
+    again = companion.displaced(0.25, -displacement)
+    assert again is not companion
+    assert companion.t == 0.75
+    np.testing.assert_array_equal(companion.q, there.q)
+
+    ahead = state.ahead(0.01)
+    assert ahead.t == 0.51
+    np.testing.assert_array_equal(ahead.q, robot.integrate(q, 0.01 * v))
+    np.testing.assert_array_equal(ahead.v, v)
+    assert state.t == 0.5
+    np.testing.assert_array_equal(state.q, q)
+    # Untouched, not merely recomputable: what was handed out still reads the same.
+    assert_equal_terms(everything(state, name), before)
+
+
+def test_states_of_one_robot_are_apart() -> None:
+    robot, q, v, rng = draw("panda", seed=16)
+    first = robot.state(0.0, q, v)
+    before = everything(first, "panda_hand")
+    second = robot.state(1.0, robot.random_configuration(rng), 2 * v)
+    everything(second, "panda_hand")
+    robot.forward_dynamics(second.q, second.v, v)
+    assert_equal_terms(everything(first, "panda_hand"), before)
+
+
+def test_a_state_copies_what_it_is_given() -> None:
+    robot, q, v, _ = draw("panda", seed=17)
+    state = robot.state(0.0, q, v)
+    kept = q.copy()
+    q[:] = 0.0
+    v[:] = 0.0
+    np.testing.assert_array_equal(state.q, kept)
+    assert state.v.any()
+
+
+def test_arrays_outlive_the_state_that_they_came_from() -> None:
+    """They are views into Pinocchio's memory, which they must keep alive."""
+    robot, rng = load("panda"), np.random.default_rng(18)
+    held = []
+    for _ in range(50):
+        q, v = robot.random_configuration(rng), rng.standard_normal(7)
+        frame = robot.state(0.0, q, v).frame("panda_hand")
+        M = robot.state(0.0, q, v).mass_matrix
+        held.append((frame, frame.position.copy(), frame.rotation.copy(), M, M.copy()))
+        gc.collect(0)
+        np.full(2000, np.nan)  # would land in memory that had been freed
+    for frame, position, rotation, M, M_kept in held:
+        np.testing.assert_array_equal(frame.position, position)
+        np.testing.assert_array_equal(frame.rotation, rotation)
+        np.testing.assert_array_equal(M, M_kept)
+
+
+# --- borders -------------------------------------------------------------------------
+
+
+def poisoned(vector: Array, value: float, place: int = 1) -> Array:
+    copied = vector.copy()
+    copied[place] = value
+    return copied
+
+
+BAD_STATES: dict[str, tuple[Callable[[Array, Array], tuple[Any, Any, Any]], Any, str]]
+BAD_STATES = {
+    "NaN in q": (
+        lambda q, v: (0.0, poisoned(q, np.nan), v),
+        NonFiniteError,
+        r"configuration q\[1\] is nan; needs finite numbers",
+    ),
+    "infinity in q": (
+        lambda q, v: (0.0, poisoned(q, -np.inf), v),
+        NonFiniteError,
+        r"configuration q\[1\] is -inf; needs finite numbers",
+    ),
+    "NaN in v": (
+        lambda q, v: (0.0, q, poisoned(v, np.nan)),
+        NonFiniteError,
+        r"velocity v\[1\] is nan; needs finite numbers",
+    ),
+    "infinities that cancel": (
+        lambda q, v: (0.0, q, poisoned(poisoned(v, np.inf), -np.inf, 2)),
+        NonFiniteError,
+        r"velocity v\[1\] is inf; needs finite numbers",
+    ),
+    "NaN in t": (
+        lambda q, v: (np.nan, q, v),
+        NonFiniteError,
+        "time t is nan; needs a finite number of seconds",
+    ),
+    "infinite t": (
+        lambda q, v: (np.inf, q, v),
+        NonFiniteError,
+        "time t is inf; needs a finite number of seconds",
+    ),
+    "short q": (
+        lambda q, v: (0.0, q[:-1], v),
+        ShapeError,
+        r"configuration q has shape \(18,\); solo12 needs \(19,\) "
+        r"\(nq = 19, nv = 18\)",
+    ),
+    "q where v belongs": (
+        lambda q, v: (0.0, q, q),
+        ShapeError,
+        r"velocity v has shape \(19,\); solo12 needs \(18,\)",
+    ),
+    "v where q belongs": (
+        lambda q, v: (0.0, v, v),
+        ShapeError,
+        r"configuration q has shape \(18,\); solo12 needs \(19,\)",
+    ),
+    "column": (
+        lambda q, v: (0.0, q[:, None], v),
+        ShapeError,
+        r"configuration q has shape \(19, 1\)",
+    ),
+    "words": (
+        lambda q, v: (0.0, ["a"] * 19, v),
+        ShapeError,
+        "configuration q is not an array of 19 numbers",
+    ),
+    "nothing": (
+        lambda q, v: (0.0, q, {}),
+        ShapeError,
+        "velocity v is not an array of 18 numbers",
+    ),
+    "quaternion of norm 2": (
+        lambda q, v: (0.0, np.concatenate([q[:3], 2 * q[3:7], q[7:]]), v),
+        ConfigurationError,
+        r"q\[3:7\] = \[.*\] is a quaternion of norm 2; needs norm 1",
+    ),
+    "quaternion of norm 0": (
+        lambda q, v: (0.0, np.concatenate([q[:3], 0 * q[3:7], q[7:]]), v),
+        ConfigurationError,
+        "is a quaternion of norm 0; needs norm 1",
+    ),
+}
+
+
+# Without the compiler (NUMBA_DISABLE_JIT=1) NumPy warns of inf - inf on the way.
+@pytest.mark.filterwarnings("ignore:invalid value encountered:RuntimeWarning")
+@pytest.mark.parametrize("what", BAD_STATES)
+def test_bad_state_is_refused_and_leaves_the_old_one(what: str) -> None:
+    robot, q, v, _ = draw("solo12", seed=19)
+    spoil, error, message = BAD_STATES[what]
+    state = robot.state(0.5, q, v)
+    name = robot.frame_names[-1]
+    before = everything(state, name)
+    with pytest.raises(error, match=message) as caught:
+        state.update(*spoil(q, v))
+    assert isinstance(caught.value, HspControlError)
+    assert isinstance(caught.value, ValueError)
+    with pytest.raises(error, match=message):
+        robot.state(*spoil(q, v))
+    # Half a move would leave terms that disagree with q and v.
+    assert state.t == 0.5
+    np.testing.assert_array_equal(state.q, q)
+    np.testing.assert_array_equal(state.v, v)
+    assert_equal_terms(everything(state, name), before)
+
+
+@pytest.mark.parametrize("norm", [0.0, 0.9, 1.0 + 2e-6, 1.1])
+def test_cosine_and_sine_off_the_circle(norm: float) -> None:
+    robot = load("planar3r")
+    q, v = robot.neutral(), np.zeros(3)
+    q[2:4] *= norm
+    message = rf"q\[2:4\] = \[.*\] is a \(cos, sin\) pair of norm {norm:.6g}; needs"
+    with pytest.raises(ConfigurationError, match=message):
+        RobotState(robot).update(0.0, q, v)
+    with pytest.raises(ConfigurationError, match=message):
+        robot.check_configuration(q)
+
+
+def test_rounding_off_the_circle_passes() -> None:
+    """Integrators drift by rounding; 1e-7 is no error, and is kept as given."""
+    robot = load("planar3r")
+    q = robot.neutral()
+    q[2:4] *= 1.0 + 1e-7
+    np.testing.assert_array_equal(RobotState(robot).update(0.0, q, np.zeros(3)).q, q)
+
+
+@pytest.mark.parametrize(
+    "convert",
+    [
+        list,
+        tuple,
+        lambda x: np.asfortranarray(np.vstack([x, x]).T)[:, 0],
+        lambda x: np.vstack([x, x]).T[:, 1],  # not contiguous
+        lambda x: np.repeat(x, 2)[::2],
+    ],
+)
+def test_any_sequence_of_numbers_will_do(convert: Callable[[Array], Any]) -> None:
+    robot, q, v, _ = draw("solo12", seed=20)
+    name = robot.frame_names[-1]
+    expected = everything(robot.state(0.1, q, v), name)
+    state = RobotState(robot).update(0.1, convert(q), convert(v))
+    assert_equal_terms(everything(state, name), expected)
+    state = robot.state(0.1, convert(q), convert(v))
+    assert_equal_terms(everything(state, name), expected)
+
+
+@pytest.mark.parametrize("kind", [int, np.float32])
+def test_other_kinds_of_numbers_will_do(kind: type) -> None:
+    robot = load("panda")
+    q, v = np.arange(7, dtype=kind), np.ones(7, dtype=kind)
+    expected = robot.state(0.0, q.astype(float), v.astype(float))
+    actual = RobotState(robot).update(0, q, v)
+    assert actual.q.dtype == np.float64
+    assert_equal_terms(
+        everything(actual, "panda_hand"), everything(expected, "panda_hand")
+    )
+
+
+def test_a_frame_that_can_only_be_read_is_no_obstacle() -> None:
+    robot, q, v, _ = draw("panda", seed=21)
+    q.setflags(write=False)
+    v.setflags(write=False)
+    np.testing.assert_array_equal(RobotState(robot).update(0.0, q, v).q, q)

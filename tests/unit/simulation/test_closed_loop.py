@@ -1,0 +1,237 @@
+"""Check the closed loop: sampled and continuous control, time, and progress."""
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from closed_loops import (
+    EXACT,
+    distance,
+    load,
+    order,
+    panda_controller,
+    planar_controller,
+    planar_start,
+    start,
+)
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Controller,
+    Dop853,
+    FramePose,
+    FramePosition,
+    Gains,
+    RigidBodyPlant,
+    Rk4,
+    Robot,
+    Rollout,
+    TargetPosture,
+    simulate,
+)
+from hsp_control.trajectories import ComposedPose, Lissajous, Spin
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def planar_run() -> Rollout:
+    """Return 0.5 s of the planar arm, logged every 10 ms."""
+    return simulate(planar_controller(), planar_start(), duration=0.5, integrator=EXACT)
+
+
+@pytest.mark.parametrize("which", ["planar3r", "panda"])
+def test_sampled_control_converges_in_first_order(which: str) -> None:
+    """Held efforts deviate from the continuous law in proportion to the period.
+
+    Slopes by regression over 8, 4, 2 and 1 ms; 1.01 to 1.04 are found.
+    """
+    controller = planar_controller() if which == "planar3r" else panda_controller()
+    robot = controller.robot
+    q0 = planar_start() if which == "planar3r" else robot.home()
+    options: Any = {"duration": 0.32, "log_period": 0.08}
+    exact = simulate(controller, q0, integrator=EXACT, **options)
+    periods = np.array([8e-3, 4e-3, 2e-3, 1e-3])
+    deviations = []
+    for period in periods:
+        run = simulate(
+            controller, q0, control_period=period, integrator=Rk4(4e-3), **options
+        )
+        deviations.append(
+            [
+                np.abs(run["joint_positions"] - exact["joint_positions"]).max(),
+                np.abs(run.v - exact.v).max(),
+                np.abs(run["null_space_error"] - exact["null_space_error"]).max(),
+            ]
+        )
+    for column in np.array(deviations).T:
+        assert order(periods, list(column)) == pytest.approx(1.0, abs=0.1)
+
+
+class Spy(RigidBodyPlant):
+    """A plant that writes down what it is asked."""
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__(robot)
+        self.calls: list[tuple[float, Array]] = []
+
+    def acceleration(self, t: float, q: Array, v: Array, tau: Array) -> Array:
+        self.calls.append((t, tau.copy()))
+        return super().acceleration(t, q, v, tau)
+
+
+def test_sampled_control_holds_the_effort() -> None:
+    """One effort a period, from beginning to end; the first is the logged one."""
+    plant = Spy(planar_controller().robot)
+    run = simulate(
+        planar_controller(),
+        planar_start(),
+        duration=0.04,
+        log_period=0.01,
+        control_period=0.0025,
+        integrator=Rk4(0.001),
+        plant=plant,
+    )
+    times = np.array([t for t, _ in plant.calls])
+    efforts = np.array([tau for _, tau in plant.calls])
+    changes = 1 + np.flatnonzero(np.abs(np.diff(efforts, axis=0)).max(axis=1) > 0.0)
+    np.testing.assert_allclose(
+        times[[0, *changes]], 0.0025 * np.arange(16), rtol=0, atol=1e-12
+    )
+    assert len(plant.calls) == 16 * 3 * 4  # 3 steps of 0.83 ms, 4 stages
+    np.testing.assert_array_equal(efforts[[0, *changes]][::4], run.tau[:4])
+
+
+def test_continuous_control_is_evaluated_in_every_stage() -> None:
+    plant = Spy(planar_controller().robot)
+    simulate(
+        planar_controller(),
+        planar_start(),
+        duration=0.02,
+        integrator=Rk4(0.01),
+        plant=plant,
+    )
+    efforts = np.array([tau for _, tau in plant.calls])
+    assert len(efforts) == 8
+    assert len(np.unique(efforts, axis=0)) == 8
+
+
+def test_the_plant_may_be_another_robot() -> None:
+    """A task error that dies on the model itself remains on an arm under gravity."""
+    pytest.importorskip("example_robot_data")
+    model, real = Robot.load("ur5"), Robot.load("ur5", gravity=(0.0, 0.0, -9.0))
+    q0 = model.random_configuration(np.random.default_rng(1))
+    x = model.state(0.0, q0, np.zeros(6)).position("tool0").copy()
+    circle = Lissajous(x, [0.02, 0.02, 0.02], [1.0, 1.0, 1.0])
+    task = FramePosition(model, "tool0", circle, Gains.from_frequency(10.0))
+    controller = Controller(model, [task])
+    runs = [
+        simulate(controller, q0, duration=1.0, log_period=0.1, plant=plant)
+        for plant in (None, RigidBodyPlant(real))
+    ]
+    ends = [np.abs(run["task.tool0.error"][-1]).max() for run in runs]
+    assert ends[0] < 1e-3
+    assert ends[1] > 3e-3
+
+
+LEFT = np.array([1.0, -0.5, 1.0])
+
+
+def test_a_floating_robot_follows_the_law() -> None:
+    """Order 4 on the manifold with a pose task, and the error's own exponential.
+
+    The hand is led through 2.4 rad in 0.6 s, at a root that turns with it.
+    """
+    robot = load("floating talos_arm", gravity=False)
+    frame = "gripper_left_base_link"
+    q0, v0 = start(robot, 8, speed=0.3)
+    here = robot.state(0.0, q0, v0).frame(frame)
+    axis = np.array([1.0, -2.0, 2.0]) / 3.0
+    path = ComposedPose(
+        Lissajous(here.position + 0.1 * LEFT, [0.2, 0.1, 0.2], [3.0, 4.0, 5.0]),
+        Spin(pin.exp3(np.array([0.5, 0.8, -0.3])) @ here.rotation, axis, 4.0),
+    )
+    task = FramePose(robot, frame, path, Gains.from_frequency(6.0))
+    controller = Controller(
+        robot,
+        [task],
+        TargetPosture(robot, robot.home()),
+        null_space_gain=6.0,
+        base="driven" if robot.unactuated else None,
+    )
+    options: Any = {"duration": 0.6, "log_period": 0.1}
+    exact = simulate(controller, q0, v0, integrator=EXACT, **options)
+    e, e_dot = exact[f"task.{task.name}.error"], exact[f"task.{task.name}.error_rate"]
+    t = exact.t[:, None]
+    expected = (e[0] + (e_dot[0] + 6.0 * e[0]) * t) * np.exp(-6.0 * t)
+    assert np.linalg.norm(e[0, 3:]) > 0.9
+    np.testing.assert_allclose(e, expected, rtol=0, atol=1e-9)
+    assert (
+        np.linalg.norm(robot.difference(q0, exact.q[-1])[3:6]) > 0.5
+    )  # the root turned
+    norm = exact["null_space_norm"]
+    np.testing.assert_allclose(norm, norm[0] * np.exp(-6.0 * exact.t), rtol=1e-8)
+
+    steps = np.array([0.02, 0.01, 0.005])
+    errors = []
+    for step in steps:
+        run = simulate(controller, q0, v0, integrator=Rk4(step), **options)
+        errors.append(
+            distance(robot, (run.q[-1], run.v[-1]), (exact.q[-1], exact.v[-1]))
+        )
+    assert order(steps, errors) == pytest.approx(4.0, abs=0.3)
+
+
+def test_dop853_is_the_default(planar_run: Rollout) -> None:
+    run = simulate(planar_controller(), planar_start(), duration=0.1)
+    same = simulate(
+        planar_controller(), planar_start(), duration=0.1, integrator=Dop853(1e-9, 1e-9)
+    )
+    np.testing.assert_array_equal(run.q, same.q)
+    np.testing.assert_allclose(run.v, planar_run.v[:11], rtol=0, atol=1e-7)
+
+
+def test_a_run_can_be_repeated(planar_run: Rollout) -> None:
+    """Bit for bit, with other things computed between; nothing is shared."""
+    planar_controller().compute(
+        planar_controller().robot.state(3.0, planar_start(), np.ones(3))
+    )
+    again = simulate(
+        planar_controller(), planar_start(), duration=0.5, integrator=EXACT
+    )
+    assert list(again.columns) == list(planar_run.columns)
+    for name, column in planar_run.columns.items():
+        np.testing.assert_array_equal(column, again[name], err_msg=name)
+        assert not np.shares_memory(column, again[name])
+
+
+def test_time_starts_when_it_is_told() -> None:
+    """Half of a run, and the other half from where it ended, are the whole."""
+    controller, q0 = planar_controller(), planar_start()
+    options: Any = {"duration": 0.2, "integrator": Rk4(0.005)}
+    first = simulate(controller, q0, start_time=1.0, **options)
+    second = simulate(controller, first.q[-1], first.v[-1], start_time=1.2, **options)
+    whole = simulate(controller, q0, start_time=1.0, **{**options, "duration": 0.4})
+    np.testing.assert_allclose(first.t, 1.0 + 0.01 * np.arange(21), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(second.v[-1], whole.v[-1], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(second.tau[0], first.tau[-1], rtol=0, atol=1e-10)
+    late = simulate(controller, q0, start_time=0.0, **options)
+    assert np.abs(late.tau[0] - first.tau[0]).max() > 0.1
+
+
+def test_the_start_is_not_changed() -> None:
+    q0, v0 = planar_start(), np.zeros(3)
+    before = q0.copy()
+    simulate(planar_controller(), q0, v0, duration=0.02)
+    np.testing.assert_array_equal(q0, before)
+    np.testing.assert_array_equal(v0, 0.0)
+
+
+def test_progress(planar_run: Rollout) -> None:
+    fractions: list[float] = []
+    simulate(
+        planar_controller(), planar_start(), duration=0.1, on_progress=fractions.append
+    )
+    np.testing.assert_allclose(fractions, np.linspace(0.0, 1.0, 11), atol=1e-15)

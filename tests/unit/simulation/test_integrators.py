@@ -1,0 +1,282 @@
+"""Check integrators: orders of convergence, invariants, charts, shortened steps."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from closed_loops import (
+    EXACT,
+    ROBOTS,
+    distance,
+    load,
+    order,
+    planar_controller,
+    planar_start,
+    start,
+)
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Dop853,
+    Rk4,
+    Robot,
+    SemiImplicitEuler,
+    simulate,
+)
+from hsp_control.common.exceptions import (
+    LogError,
+    SimulationError,
+)
+from hsp_control.robot import integrators
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+
+def falling(robot: Robot) -> Callable[[float, Array, Array], Array]:
+    """Return the dynamics without a controller, tau = 0."""
+    nothing = np.zeros(robot.nv)
+    return lambda t, q, v: robot.forward_dynamics(q, v, nothing)
+
+
+@pytest.mark.parametrize(
+    ("method", "expected", "longest"),
+    [(Rk4, 4.0, 0.02), (SemiImplicitEuler, 1.0, 0.002)],
+)
+@pytest.mark.parametrize("name", ROBOTS)
+def test_order_of_an_integrator(
+    name: str, method: Any, expected: float, longest: float
+) -> None:
+    """A robot that falls freely, root and all, for 0.2 s: slope by regression."""
+    robot = load(name)
+    q0, v0 = start(robot, 1, speed=1.0)
+    dynamics = falling(robot)
+    exact = Dop853(1e-13, 1e-13).advance(robot, dynamics, 0.0, 0.2, q0, v0)
+    steps = longest / np.array([1.0, 2.0, 4.0, 8.0])
+    errors = [
+        distance(robot, method(h).advance(robot, dynamics, 0.0, 0.2, q0, v0), exact)
+        for h in steps
+    ]
+    assert errors[-1] < errors[0]
+    assert order(steps, errors) == pytest.approx(expected, abs=0.2)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_dop853_keeps_its_tolerance(name: str) -> None:
+    """In one call for the whole second, and a tenth of the tolerance is a tenth off."""
+    robot = load(name)
+    q0, v0 = start(robot, 2, speed=1.0)
+    dynamics = falling(robot)
+    exact = Rk4(0.5e-3).advance(robot, dynamics, 0.0, 0.5, q0, v0)
+    size = 1.0 + np.abs(exact[1]).max()
+    errors = []
+    for tolerance in (1e-5, 1e-7, 1e-9):
+        found = Dop853(tolerance, tolerance).advance(robot, dynamics, 0.0, 0.5, q0, v0)
+        errors.append(distance(robot, found, exact))
+        assert errors[-1] < 20.0 * tolerance * size
+    assert errors[0] > errors[1] > errors[2]
+
+
+@pytest.mark.parametrize(
+    ("integrator", "drift"),
+    [(Dop853(1e-12, 1e-12), 1e-9), (Rk4(1e-3), 1e-7), (SemiImplicitEuler(1e-3), 0.05)],
+)
+@pytest.mark.parametrize("name", ROBOTS)
+def test_energy_is_kept_without_effort(
+    name: str, integrator: Any, drift: float
+) -> None:
+    """Kinetic and potential energy by plain Pinocchio, over 0.5 s of free fall."""
+    robot = load(name)
+    model, data = robot.model, robot.model.createData()
+
+    def energy(q: Array, v: Array) -> float:
+        return float(
+            pin.computeKineticEnergy(model, data, q, v)
+            + pin.computePotentialEnergy(model, data, q)
+        )
+
+    q, v = start(robot, 3)
+    before = energy(q, v)
+    exchanged = pin.computePotentialEnergy(model, data, q)
+    for k in range(5):
+        t = 0.1 * k
+        q, v = integrator.advance(robot, falling(robot), t, t + 0.1, q, v)
+        assert energy(q, v) == pytest.approx(before, abs=drift * max(1.0, abs(before)))
+    if robot.model.gravity.linear[2] and name != "planar3r":
+        exchanged -= pin.computePotentialEnergy(model, data, q)
+        assert abs(exchanged) > 0.1  # it did fall
+
+
+def test_momentum_of_a_tumbling_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No gravity: linear and angular momentum stay, though the chart is laid anew.
+
+    Two seconds at 4 rad/s are 8 rad; a chart about the start is singular at 2 pi.
+    """
+    robot = load("floating talos_arm", gravity=False)
+    model, data = robot.model, robot.model.createData()
+    laid = []
+
+    class Counted(integrators.Chart):
+        def __init__(self, robot: Robot, base: Array) -> None:
+            laid.append(1)
+            super().__init__(robot, base)
+
+    monkeypatch.setattr(integrators, "Chart", Counted)
+    q, v = start(robot, 4)
+    v[3:6] = [2.5, -2.0, 2.4]
+
+    def momentum(q: Array, v: Array) -> Array:
+        h = pin.computeCentroidalMomentum(model, data, q, v).vector
+        return np.asarray(h)
+
+    before = momentum(q, v)
+    q, v = EXACT.advance(robot, falling(robot), 0.0, 2.0, q, v)
+    assert len(laid) > 5
+    np.testing.assert_allclose(momentum(q, v), before, rtol=0, atol=1e-9)
+    assert robot.check_configuration(q) is not None
+
+
+def test_whole_turns_need_new_charts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rolling robot turns 10 rad; in one chart it would be stuck at 2 pi.
+
+    The chart of a rigid motion (δ ↦ base ⊕ δ) is singular where the turn is whole.
+    """
+    robot = load("rolling ur5", gravity=False)
+    q0, v0 = start(robot, 4, speed=0.2)
+    v0[:3] = [0.5, -0.3, 5.0]
+    dynamics = falling(robot)
+    exact = Rk4(1e-3).advance(robot, dynamics, 0.0, 2.0, q0, v0)
+    found = EXACT.advance(robot, dynamics, 0.0, 2.0, q0, v0)
+    assert distance(robot, found, exact) < 1e-8
+
+    class StuckError(Exception):
+        pass
+
+    evaluations: list[float] = []
+
+    def counted(t: float, q: Array, v: Array) -> Array:
+        evaluations.append(t)
+        if len(evaluations) > 4000:  # four times what it takes with new charts
+            raise StuckError
+        return dynamics(t, q, v)
+
+    EXACT.advance(robot, counted, 0.0, 2.0, q0, v0)
+    evaluations.clear()
+    monkeypatch.setattr(integrators, "CHART_RADIUS", np.inf)
+    with pytest.raises(StuckError):
+        EXACT.advance(robot, counted, 0.0, 2.0, q0, v0)
+    assert evaluations[-1] == pytest.approx(2.0 * np.pi / 5.0, abs=1e-2)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_chart_is_the_manifold(name: str) -> None:
+    """y' of the chart is the motion's: d/dt (base ⊕ δ) moves with v."""
+    robot = load(name)
+    base, _ = start(robot, 5)
+    rng = np.random.default_rng(6)
+    chart = integrators.Chart(robot, base)
+    y, a = 0.8 * rng.normal(size=2 * robot.nv), rng.normal(size=robot.nv)
+    rate = chart.rate(y, a)
+    np.testing.assert_array_equal(rate[robot.nv :], a)
+    h = 1e-4
+    ahead, behind = (chart.point(y + s * h * rate)[0] for s in (1.0, -1.0))
+    v = robot.difference(behind, ahead) / (2.0 * h)
+    np.testing.assert_allclose(v, y[robot.nv :], rtol=0, atol=1e-7)
+
+
+def test_steps_are_equal_and_none_is_longer() -> None:
+    """An interval of 10 ms by steps of 3 ms: four of 2.5 ms, and it ends at its end."""
+    robot = load("planar3r")
+    q, v = start(robot, 7)
+    for method, stages in ((SemiImplicitEuler, 1), (Rk4, 4)):
+        times: list[float] = []
+
+        def dynamics(t: float, q: Array, v: Array, times: list[float] = times) -> Array:
+            times.append(t)
+            return np.zeros(3)
+
+        method(0.003).advance(robot, dynamics, 1.0, 1.01, q, v)
+        starts = [1.0, 1.0025, 1.005, 1.0075]
+        np.testing.assert_allclose(times[::stages], starts, rtol=0, atol=1e-14)
+        assert len(times) == 4 * stages
+    assert integrators.number_of_steps(0.3, 0.1) == 3  # 0.3/0.1 is 2.9999999999999996
+    assert integrators.number_of_steps(0.1, 0.3) == 1
+
+
+def test_trials_that_stray_are_shortened() -> None:
+    """A trial step of 2 s overflows in its stages, before it could be judged."""
+    options: Any = {"duration": 2.0, "integrator": EXACT}
+    exact = simulate(planar_controller(), planar_start(), **options)
+    for log_period in (0.1, 2.0):
+        run = simulate(
+            planar_controller(), planar_start(), log_period=log_period, **options
+        )
+        np.testing.assert_allclose(run.v[-1], exact.v[-1], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "failure",
+    [SimulationError, ZeroDivisionError, OverflowError, np.linalg.LinAlgError],
+)
+def test_trials_that_fail_are_shortened(failure: type[Exception]) -> None:
+    """Where the dynamics cannot be computed, a shorter step need not go."""
+    robot = load("planar3r")
+
+    def swing(t: float, q: Array, v: Array) -> Array:
+        if np.abs(v).max() > 1.1:
+            raise failure("too far")
+        return -np.sin(t) * np.ones(3)
+
+    q, v = EXACT.advance(robot, swing, 0.0, 3.0, robot.neutral(), np.ones(3))
+    np.testing.assert_allclose(v, np.cos(3.0), rtol=0, atol=1e-10)
+    expected = robot.integrate(robot.neutral(), np.sin(3.0) * np.ones(3))
+    np.testing.assert_allclose(q, expected, rtol=0, atol=1e-10)
+
+
+def test_dynamics_that_fail_for_good_say_why() -> None:
+    robot = load("planar3r")
+
+    def fails_with(failure: Exception) -> Callable[[float, Array, Array], Array]:
+        def dynamics(t: float, q: Array, v: Array) -> Array:
+            if t > 0.4:
+                raise failure
+            return np.zeros(3)
+
+        return dynamics
+
+    def run(failure: Exception) -> None:
+        q, v = robot.neutral(), np.ones(3)
+        EXACT.advance(robot, fails_with(failure), 0.0, 1.0, q, v)
+
+    with pytest.raises(LogError, match=r"^mine$"):
+        run(LogError("mine"))
+    message = r"^the integrator failed at t = 0.4 s: by nothing$"
+    with pytest.raises(SimulationError, match=message):
+        run(ZeroDivisionError("by nothing"))
+    with pytest.raises(KeyError, match=r"yours"):  # no business of the integrator's
+        run(KeyError("yours"))
+
+
+def test_dop853_gives_up_at_a_pole() -> None:
+    """v' = v² reaches infinity at t = 1: no step is small enough."""
+    robot = load("planar3r")
+    message = r"^the integrator failed at t = (1|0\.99\d*) s: .*step size"
+    with pytest.raises(SimulationError, match=message):
+        EXACT.advance(
+            robot, lambda t, q, v: v * v, 0.0, 2.0, robot.neutral(), np.ones(3)
+        )
+
+
+@pytest.mark.parametrize("value", [0.0, -0.001, np.nan, np.inf])
+def test_integrators_refuse_steps_that_are_none(value: float) -> None:
+    for build, name in (
+        (lambda: Rk4(value), "step"),
+        (lambda: SemiImplicitEuler(value), "step"),
+        (lambda: Dop853(rtol=value), "rtol"),
+        (lambda: Dop853(atol=value), "atol"),
+    ):
+        message = rf"^integrator: {name} is {value}; must be positive$"
+        with pytest.raises(SimulationError, match=message):
+            build()

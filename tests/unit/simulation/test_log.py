@@ -1,0 +1,400 @@
+"""Check the log of a run: its columns, its file, and which files are refused."""
+
+import io
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from closed_loops import EXACT, load, panda_controller, planar_controller, planar_start
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Controller,
+    FramePosition,
+    Gains,
+    JointPosture,
+    MassMatrixMetric,
+    Obstacle,
+    Rk4,
+    Rollout,
+    Scene,
+    simulate,
+)
+from hsp_control.common.exceptions import (
+    LogError,
+    ShapeError,
+)
+from hsp_control.geometry.shapes import Sphere
+from hsp_control.trajectories import Hold, Lissajous
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def planar_run() -> Rollout:
+    """Return 0.5 s of the planar arm, logged every 10 ms."""
+    return simulate(planar_controller(), planar_start(), duration=0.5, integrator=EXACT)
+
+
+# --- the log's columns ---------------------------------------------------------------
+
+
+def test_columns(planar_run: Rollout) -> None:
+    """Every column is described, of the length of t, and says what the state says."""
+    run, controller = planar_run, planar_controller()
+    robot = controller.robot
+    assert set(run.meta["columns"]) == set(run.columns)
+    for name, column in run.columns.items():
+        assert len(column) == len(run.t) == 51
+        assert set(run.meta["columns"][name]) == {"unit", "meaning"}
+    np.testing.assert_allclose(run.t, 0.01 * np.arange(51), rtol=0, atol=1e-15)
+    for i in (0, 13, 50):
+        state = robot.state(run.t[i], run.q[i], run.v[i])
+        output = controller.compute(state)
+        np.testing.assert_array_equal(run.tau[i], output.tau)
+        np.testing.assert_array_equal(run["acceleration"][i], output.acceleration)
+        np.testing.assert_array_equal(run["field.g"][i], output.field.g)
+        np.testing.assert_array_equal(run["task.tip.error"][i], output.task.error)
+        np.testing.assert_array_equal(
+            run["null_space_error"][i], output.null_space_error
+        )
+        J = state.frame("tip").jacobian[:2]
+        np.testing.assert_allclose(
+            run["manipulability"][i], np.linalg.det(J @ J.T), rtol=1e-12
+        )
+        np.testing.assert_allclose(
+            run["singular_values"][i], np.linalg.svd(J)[1], rtol=1e-12
+        )
+        for point, frame in enumerate(("joint1", "joint2", "joint3", "tip")):
+            np.testing.assert_allclose(
+                run["skeleton"][i, point], state.position(frame), rtol=0, atol=1e-14
+            )
+    assert run.meta["robot"]["skeleton_parents"] == [-1, 0, 1, 2]
+    assert run.meta["metric"] == "IdentityMetric"
+    assert run.meta["null_space_gain"] == (10.0 * np.eye(3)).tolist()
+
+
+def test_the_norm_is_that_of_the_metric() -> None:
+    robot = load("panda")
+    controller = Controller(
+        robot,
+        panda_controller().tasks,
+        panda_controller().field,
+        metric=MassMatrixMetric(),
+    )
+    run = simulate(controller, robot.home(), duration=0.02, integrator=Rk4(0.001))
+    for i in range(3):
+        e_N = run["null_space_error"][i]
+        M = robot.state(0.0, run.q[i], run.v[i]).mass_matrix
+        expected = np.sqrt(e_N @ M @ e_N)
+        np.testing.assert_allclose(run["null_space_norm"][i], expected, rtol=1e-12)
+
+
+def test_joint_positions_of_continuous_joints_wind_up() -> None:
+    """Joints that are led to 17 and -34 rad have gone there, not to some of ±pi."""
+    robot = load("planar3r", gravity=False)
+    away = Lissajous([0.0, 0.0, 0.0], [20.0, -40.0, 0.1], [0.5, 0.5, 1.0])
+    task = JointPosture(
+        robot, robot.neutral(), Gains.from_frequency(10.0), displacement=away
+    )
+    run = simulate(
+        Controller(robot, [task]), robot.neutral(), [10.0, -20.0, 0.1], duration=2.0
+    )
+    expected = np.array([away.sample(t).position for t in run.t])
+    assert np.abs(expected[-1]).max() > 30.0
+    np.testing.assert_allclose(run["joint_positions"], expected, rtol=0, atol=1e-7)
+
+
+def test_obstacles_are_logged() -> None:
+    center = Lissajous([-1, 1.7, 0], [0, 0.75, 0], [0, 3, 0])
+    scene = Scene([Obstacle("disk", Sphere(0.2), center)])
+    run = simulate(planar_controller(), planar_start(), duration=0.1, scene=scene)
+    expected = np.array([center.sample(t).position for t in run.t])
+    np.testing.assert_array_equal(run["obstacle.disk"], expected)
+    assert run.meta["obstacles"]["disk"]["radius"] == 0.2
+    assert "obstacle.disk" in run.meta["columns"]
+
+
+def test_a_run_can_be_measured_afterwards(planar_run: Rollout) -> None:
+    """`measure` gives what the log has, and what it has not, at every row."""
+    run, robot = planar_run, load("planar3r", gravity=False)
+    tip = run.measure(robot, lambda state: state.position("tip"))
+    np.testing.assert_array_equal(tip, run["skeleton"][:, -1])
+    speed = run.measure(robot, lambda state: state.v @ state.v)
+    np.testing.assert_array_equal(speed, [v @ v for v in run.v])
+    np.testing.assert_array_equal(run.measure(robot, lambda state: state.t), run.t)
+    with pytest.raises(ShapeError, match=r"panda needs \(7,\)"):
+        run.measure(load("panda"), lambda state: state.t)
+
+
+@pytest.mark.parametrize(
+    ("name", "efforts"),
+    [("planar3r", "N·m"), ("rolling ur5", "N or N·m")],
+)
+def test_efforts_have_the_units_of_their_joints(name: str, efforts: str) -> None:
+    """In the joints' order: a root or a rail that comes first pushes, in newtons."""
+    robot = load(name)
+    q0 = robot.integrate(robot.home(), np.full(robot.nv, 0.3))
+    start = robot.state(0.0, q0, np.zeros(robot.nv)).position(robot.end_effector)
+    gains = Gains.from_frequency(5.0)
+    task = FramePosition(robot, robot.end_effector, Hold(start[:2]), gains, axes="xy")
+    run = simulate(Controller(robot, [task]), q0, duration=0.01)
+    assert run.meta["columns"]["tau"]["unit"] == efforts
+
+
+# --- the log's file ------------------------------------------------------------------
+
+
+def strict(text: str) -> Any:
+    """Parse JSON as the standard has it, without NaN and Infinity."""
+
+    def refuse(name: str) -> Any:
+        raise ValueError(f"{name} is not JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def same(a: Rollout, b: Rollout) -> bool:
+    return (
+        list(a.columns) == list(b.columns)
+        and all(np.array_equal(a[name], b[name]) for name in a.columns)
+        and a.meta == b.meta
+    )
+
+
+def test_round_trip(planar_run: Rollout, tmp_path: Path) -> None:
+    path = planar_run.save(tmp_path / "logs" / "run.npz")  # makes the folder
+    assert path == tmp_path / "logs" / "run.npz"
+    assert [file.name for file in path.parent.iterdir()] == ["run.npz"]
+    loaded = Rollout.load(str(path))
+    assert same(loaded, planar_run)
+    assert all(loaded[n].dtype == planar_run[n].dtype for n in loaded.columns)
+    assert loaded.config is None
+    assert repr(loaded) == "Rollout(51 rows, 0 to 0.5 s, completed)"
+
+
+def test_numpy_alone_reads_it(planar_run: Rollout, tmp_path: Path) -> None:
+    """No pickle inside; the names that always exist; the description is strict JSON."""
+    path = planar_run.save(tmp_path / "run.npz")
+    with np.load(path, allow_pickle=False) as archive:
+        columns = {name: archive[name] for name in archive.files}
+    assert {"meta", "t", "q", "v", "tau"} <= set(columns)
+    assert all(column.dtype != object for column in columns.values())
+    meta = strict(str(columns.pop("meta")))
+    assert meta["format"] == "hsp_control rollout 1"
+    assert meta["status"] == "completed"
+    assert {"columns", "robot", "tasks", "versions"} <= set(meta)
+    assert set(meta["columns"]) == set(columns)
+    assert meta["robot"]["dofs"] == ["joint1", "joint2", "joint3"]
+    for name, column in columns.items():
+        np.testing.assert_array_equal(column, planar_run[name], err_msg=name)
+
+
+def test_meta_is_the_user_s_too(tmp_path: Path) -> None:
+    run = simulate(
+        planar_controller(),
+        planar_start(),
+        duration=0.01,
+        meta={"config": {"title": "φ_N = 0, “quoted”"}, "note": [1, None, True]},
+    )
+    loaded = Rollout.load(run.save(tmp_path / "a name with spaces"))
+    assert loaded.config == {"title": "φ_N = 0, “quoted”"}
+    assert loaded.meta["note"] == [1, None, True]
+
+
+def test_a_column_that_is_not_there(planar_run: Rollout) -> None:
+    assert "task.tip.error" in planar_run
+    assert "task.tip.eror" not in planar_run
+    message = (
+        r"^the log has no column 'task.tip.eror'; did you mean 'task.tip.error'\? "
+        r"\(it has t, q, v, tau, "
+    )
+    with pytest.raises(LogError, match=message):
+        planar_run["task.tip.eror"]
+
+
+@pytest.fixture
+def short_log(tmp_path: Path) -> tuple[Rollout, bytes, Path]:
+    """Return a log of three rows, the bytes of its file, and a place for others."""
+    run = simulate(planar_controller(), planar_start(), duration=0.02)
+    data = run.save(tmp_path / "whole.npz").read_bytes()
+    return run, data, tmp_path / "other.npz"
+
+
+def test_a_log_cut_short_is_refused(short_log: tuple[Rollout, bytes, Path]) -> None:
+    """At every 50th byte, and at the last few."""
+    _, data, path = short_log
+    ends = {*range(0, len(data), 50), *range(len(data) - 25, len(data))}
+    for end in sorted(ends):
+        path.write_bytes(data[:end])
+        with pytest.raises(LogError, match=r"other.npz: not a complete .npz log"):
+            Rollout.load(path)
+
+
+def test_a_log_with_a_wrong_byte_is_refused_or_whole(
+    short_log: tuple[Rollout, bytes, Path],
+) -> None:
+    """Some bytes do not matter (dates); no other may change what is read."""
+    run, data, path = short_log
+    refused = 0
+    places = range(3, len(data), 50)
+    for place in places:
+        broken = bytearray(data)
+        broken[place] ^= 0xFF
+        path.write_bytes(broken)
+        try:
+            loaded = Rollout.load(path)
+        except LogError:
+            refused += 1
+        else:
+            assert same(loaded, run), place
+    assert refused > 0.7 * len(places)
+
+
+def npz(**arrays: Any) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()
+
+
+def meta(**changes: Any) -> Any:
+    return np.array(json.dumps({"format": "hsp_control rollout 1", **changes}))
+
+
+ROW: Any = {name: np.zeros((2, 1)) for name in ("q", "v", "tau")}
+FOREIGN: dict[str, tuple[Callable[[], bytes], str]] = {
+    "empty": (lambda: b"", r"not a complete .npz log"),
+    "text": (lambda: b"t, q, v\n0, 1, 2\n", r"not a complete .npz log"),
+    "png": (lambda: b"\x89PNG\r\n\x1a\n" + bytes(range(256)), r"not a complete .npz"),
+    "zip": (lambda: b"PK\x03\x04" + bytes(100), r"not a complete .npz log"),
+    "npy": (lambda: npy(np.zeros(3)), r"not a complete .npz log"),
+    "pickle": (
+        lambda: npz(meta=meta(), t=np.array([{}], dtype=object)),
+        r"not a complete .npz log .*pickle",
+    ),
+    "no meta": (
+        lambda: npz(t=np.zeros(2), **ROW),
+        r"not a log of hsp_control: it has no text entry 'meta' \(it has t, q, v, ",
+    ),
+    "meta of numbers": (
+        lambda: npz(meta=np.zeros(3), t=np.zeros(2), **ROW),
+        r"not a log of hsp_control: it has no text entry 'meta'",
+    ),
+    "meta not JSON": (
+        lambda: npz(meta=np.array("{"), t=np.zeros(2), **ROW),
+        r"its entry 'meta' is not JSON: ",
+    ),
+    "meta a list": (
+        lambda: npz(meta=np.array("[1, 2]"), t=np.zeros(2), **ROW),
+        r"its format is \[1, 2\]; this version reads 'hsp_control rollout 1'",
+    ),
+    "another format": (
+        lambda: npz(meta=meta(format="hsp_control rollout 2"), t=np.zeros(2), **ROW),
+        r"its format is 'hsp_control rollout 2'; this version reads",
+    ),
+    "no format": (
+        lambda: npz(meta=np.array("{}"), t=np.zeros(2), **ROW),
+        r"its format is None; this version reads",
+    ),
+    "column": (lambda: npz(meta=meta(), **ROW), r"the log lacks the column 't'"),
+    "described column": (
+        lambda: npz(meta=meta(columns={"e": {}}), t=np.zeros(2), **ROW),
+        r"the log lacks the column 'e'",
+    ),
+    "lengths": (
+        lambda: npz(meta=meta(), t=np.zeros(3), **ROW),
+        r"the log's columns differ in length",
+    ),
+    "number for a column": (
+        lambda: npz(meta=meta(), t=np.zeros(2), extra=np.array(1.0), **ROW),
+        r"the log's columns differ in length",
+    ),
+}
+
+
+def npy(array: Array) -> bytes:
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("which", FOREIGN)
+def test_foreign_files(which: str, tmp_path: Path) -> None:
+    make, message = FOREIGN[which]
+    path = tmp_path / "foreign.npz"
+    path.write_bytes(make())
+    with pytest.raises(LogError, match=rf"foreign.npz: {message}"):
+        Rollout.load(path)
+
+
+def test_no_such_file(short_log: tuple[Rollout, bytes, Path]) -> None:
+    _, _, path = short_log
+    message = r"whloe.npz: no such file; did you mean 'whole.npz'\?$"
+    with pytest.raises(LogError, match=message):
+        Rollout.load(path.with_name("whloe.npz"))
+    with pytest.raises(LogError, match=r"gone.npz: no such file$"):
+        Rollout.load(path.parent / "nowhere" / "gone.npz")
+    with pytest.raises(LogError, match=r"not a complete .npz log"):
+        Rollout.load(path.parent)  # a folder
+
+
+def test_places_where_nothing_can_be_written(
+    short_log: tuple[Rollout, bytes, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder that is a file, a file that is a folder, a full disk."""
+    run, data, path = short_log
+    path.write_bytes(b"a file")
+    with pytest.raises(
+        LogError, match=r"run.npz: cannot write the log: (File ex|Not a)"
+    ):
+        run.save(path / "run.npz")
+    with pytest.raises(
+        LogError, match=r"run.npz: cannot write the log: (Not a|File ex)"
+    ):
+        run.save(path / "deeper" / "run.npz")
+    folder = path.with_name("folder.npz")
+    folder.mkdir()
+    with pytest.raises(
+        LogError, match=r"folder.npz: cannot write the log: Is a direct"
+    ):
+        run.save(folder)
+    assert sorted(file.name for file in path.parent.iterdir()) == [
+        "folder.npz",
+        "other.npz",
+        "whole.npz",
+    ]
+
+    def full(*_: Any, **__: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", full)
+    whole = path.with_name("whole.npz")
+    with pytest.raises(
+        LogError, match=r"whole.npz: cannot write the log: No space left"
+    ):
+        run.save(whole)
+    assert whole.read_bytes() == data  # the old one is still there, and nothing else
+    assert not list(path.parent.glob(".*.part"))
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is locked for root")
+def test_a_locked_folder(short_log: tuple[Rollout, bytes, Path]) -> None:
+    run, _, path = short_log
+    folder = path.with_name("locked")
+    folder.mkdir(mode=0o500)
+    with pytest.raises(LogError, match=r"cannot write the log: Permission denied$"):
+        run.save(folder / "run.npz")
+
+
+def test_saving_over_a_log_replaces_it(
+    planar_run: Rollout, short_log: tuple[Rollout, bytes, Path]
+) -> None:
+    _, _, path = short_log
+    whole = path.with_name("whole.npz")
+    planar_run.save(whole)
+    assert len(Rollout.load(whole)) == 51

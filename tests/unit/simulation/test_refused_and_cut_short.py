@@ -1,0 +1,262 @@
+"""Check which runs are refused, and what is kept of a run that ends early."""
+
+import signal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from closed_loops import EXACT, load, planar_controller, planar_start
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Controller,
+    FunctionField,
+    HspControlError,
+    Rk4,
+    RobotState,
+    Rollout,
+    SemiImplicitEuler,
+    simulate,
+)
+from hsp_control.common.exceptions import (
+    ConfigurationError,
+    NonFiniteError,
+    ShapeError,
+    SimulationError,
+)
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def planar_run() -> Rollout:
+    """Return 0.5 s of the planar arm, logged every 10 ms."""
+    return simulate(planar_controller(), planar_start(), duration=0.5, integrator=EXACT)
+
+
+# --- what is refused -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"duration": 0.0}, r"^duration is 0.0 s; must be positive$"),
+        ({"duration": -1.0}, r"^duration is -1.0 s; must be positive$"),
+        ({"duration": np.nan}, r"^duration is nan s; must be positive$"),
+        ({"duration": np.inf}, r"^duration is inf s; must be positive$"),
+        ({"duration": 0.1, "log_period": 0.0}, r"^log_period is 0.0 s; must be pos"),
+        (
+            {"duration": 0.105},
+            r"^duration = 0.105 s is not a whole multiple of log_period = 0.01 s$",
+        ),
+        (
+            {"duration": 0.005},
+            r"^duration = 0.005 s is not a whole multiple of log_period = 0.01 s$",
+        ),
+        (
+            {"duration": 0.1, "control_period": 0.003},
+            r"^log_period = 0.01 s is not a whole multiple of control_period = 0.003",
+        ),
+        (
+            {"duration": 0.1, "control_period": 0.02},
+            r"^log_period = 0.01 s is not a whole multiple of control_period = 0.02 s$",
+        ),
+        (
+            {"duration": 1e300, "log_period": 1e-300},
+            r"^duration = 1e\+300 s is inf times log_period = 1e-300 s; at most ",
+        ),
+        (
+            {"duration": 0.1, "control_period": -0.001},
+            r"^control_period is -0.001 s; mu",
+        ),
+        (
+            {"duration": 0.1, "control_period": 0.0},
+            r"^control_period is 0.0 s; must be",
+        ),
+    ],
+)
+def test_times_that_do_not_fit(options: dict[str, float], message: str) -> None:
+    with pytest.raises(SimulationError, match=message) as caught:
+        simulate(planar_controller(), planar_start(), **options)  # type: ignore
+    assert caught.value.rollout is None
+
+
+def test_times_that_fit_but_for_rounding() -> None:
+    """0.3/0.1 is 2.9999999999999996, 0.07/0.01 is 7.000000000000001."""
+    run = simulate(planar_controller(), planar_start(), duration=0.3, log_period=0.1)
+    assert len(run) == 4
+    run = simulate(
+        planar_controller(), planar_start(), duration=0.07, control_period=0.01 / 3
+    )
+    assert len(run) == 8
+
+
+@pytest.mark.parametrize(
+    ("q0", "v0", "kind", "message"),
+    [
+        ([0.0] * 3, None, ShapeError, r"^configuration q has shape \(3,\); planar3r "),
+        (
+            [0.0] * 6,
+            None,
+            ConfigurationError,
+            r"^q\[0:2\] = .* of norm 0; needs norm 1",
+        ),
+        ([np.nan] * 6, None, NonFiniteError, r"^configuration q\[0\] is nan"),
+        (None, [0.0] * 6, ShapeError, r"^velocity v0 has shape \(6,\); planar3r needs"),
+        (None, [0.0, np.inf, 0.0], NonFiniteError, r"^velocity v0\[1\] is inf"),
+        (None, "fast", ShapeError, r"^velocity v0 is not an array of 3 numbers$"),
+    ],
+)
+def test_starts_that_are_none(q0: Any, v0: Any, kind: Any, message: str) -> None:
+    with pytest.raises(kind, match=message):
+        simulate(
+            planar_controller(), planar_start() if q0 is None else q0, v0, duration=0.1
+        )
+
+
+# --- what is kept --------------------------------------------------------------------
+
+
+def simulate_until_interrupted(*arguments: Any, **options: Any) -> Rollout:
+    """Simulate; a Ctrl-C that gets through fails the test, not the session."""
+    try:
+        return simulate(*arguments, **options)
+    except KeyboardInterrupt:
+        pytest.fail("the Ctrl-C got through")
+
+
+@pytest.mark.parametrize("row", [0, 1, 17, 50])
+def test_ctrl_c_keeps_what_was_computed(row: int, planar_run: Rollout) -> None:
+    """Interrupted at row k: k + 1 rows, the same as the whole run's."""
+
+    def interrupt(fraction: float) -> None:
+        if round(fraction * 50) == row:
+            raise KeyboardInterrupt
+
+    run = simulate_until_interrupted(
+        planar_controller(),
+        planar_start(),
+        duration=0.5,
+        integrator=EXACT,
+        on_progress=interrupt,
+    )
+    assert run.status == "interrupted"
+    assert run.meta["message"] == "stopped by the user"
+    assert len(run) == row + 1
+    for name, column in run.columns.items():
+        np.testing.assert_array_equal(column, planar_run[name][: row + 1], err_msg=name)
+
+
+@pytest.mark.parametrize("control_period", [None, 0.005])
+def test_ctrl_c_in_the_middle_of_a_row(
+    control_period: float | None, tmp_path: Path
+) -> None:
+    """A signal comes at any moment: here inside the controller. Whole rows are kept."""
+    robot = load("planar3r", gravity=False)
+
+    def pressed(state: RobotState) -> Array:
+        if state.t > 0.083:
+            signal.raise_signal(signal.SIGINT)
+        return np.zeros(3)
+
+    field = FunctionField(robot, pressed, rate=lambda state: np.zeros(3))
+    controller = Controller(robot, planar_controller().tasks, field)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        run = simulate_until_interrupted(
+            controller, planar_start(), duration=0.5, control_period=control_period
+        )
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert run.status == "interrupted"
+    assert len(run) == 9
+    assert len({len(column) for column in run.columns.values()}) == 1
+    assert Rollout.load(run.save(tmp_path / "run.npz")).status == "interrupted"
+
+
+def test_ctrl_c_before_the_first_row() -> None:
+    robot = load("planar3r", gravity=False)
+    built = []
+
+    def pressed(state: RobotState) -> Array:
+        if built:
+            raise KeyboardInterrupt
+        return np.zeros(3)
+
+    field = FunctionField(robot, pressed)
+    controller = Controller(robot, planar_controller().tasks, field)
+    built.append(True)
+    run = simulate_until_interrupted(controller, planar_start(), duration=0.5)
+    assert run.status == "interrupted"
+    assert len(run) == 0
+    assert repr(run) == "Rollout(0 rows, empty, interrupted)"
+
+
+@pytest.mark.parametrize(
+    ("options", "least"),
+    [
+        # K_N h = 20 and the loop blows up; 2 is the limit (theory.md §8).
+        ({"control_period": 0.01}, 2),
+        ({"control_period": 0.01, "integrator": SemiImplicitEuler(0.01)}, 2),
+        ({"integrator": SemiImplicitEuler(0.01)}, 2),
+        ({"integrator": Rk4(0.01)}, 1),
+    ],
+)
+def test_divergence_keeps_the_rollout(
+    options: dict[str, Any], least: int, tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(9)
+    with pytest.raises(SimulationError, match=r"^the simulation stopped: ") as caught:
+        simulate(
+            planar_controller(2000.0),
+            planar_start(),
+            rng.normal(size=3),
+            duration=1.0,
+            **options,
+        )
+    run = caught.value.rollout
+    assert isinstance(run, Rollout)
+    assert run.status == "diverged"
+    assert run.meta["message"] in str(caught.value)
+    assert least <= len(run) < 101
+    assert all(np.isfinite(run[name]).all() for name in ("t", "q", "v", "tau"))
+    loaded = Rollout.load(run.save(tmp_path / "run.npz"))
+    np.testing.assert_array_equal(loaded.v, run.v)
+
+
+def test_a_runaway_is_told_with_its_speed() -> None:
+    message = (
+        r"^the simulation stopped: the motion diverged before t = 0.0\d+ s: a joint "
+        r"moves at [\d.e+]+ rad/s \(or m/s\). Possible causes: a singularity, "
+    )
+    with pytest.raises(SimulationError, match=message):
+        simulate(
+            planar_controller(2000.0),
+            planar_start(),
+            np.ones(3),
+            duration=1.0,
+            control_period=0.01,
+        )
+
+
+def test_an_error_on_the_way_keeps_the_rollout() -> None:
+    """A field that returns NaN at some time is named; the rows before are kept."""
+    robot = load("planar3r", gravity=False)
+    field = FunctionField(
+        robot,
+        lambda state: np.full(3, np.nan if state.t > 0.25 else 0.0),
+        rate=lambda state: np.zeros(3),
+        name="mine",
+    )
+    controller = Controller(robot, planar_controller().tasks, field)
+    with pytest.raises(
+        SimulationError, match=r"^the simulation stopped: field 'mine' returned g = "
+    ) as caught:
+        simulate(controller, planar_start(), duration=0.5, meta={"name": "this"})
+    run = caught.value.rollout
+    assert isinstance(run, Rollout)
+    assert len(run) == 26
+    assert run.meta["name"] == "this"
+    assert isinstance(caught.value.__cause__, HspControlError)

@@ -1,0 +1,107 @@
+"""The package's face: its names, and what importing it and starting `hsp` costs."""
+
+import ast
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hsp_control
+
+HEAVY = {"numba", "numpy", "pinocchio", "scipy", "pydantic", "matplotlib"}
+
+
+def imported(code: str, **environment: str) -> set[str]:
+    """Return the modules that a fresh interpreter has imported after some code."""
+    tail = "\nimport sys, json; print(json.dumps(sorted(sys.modules)), file=sys.stderr)"
+    ran = subprocess.run(
+        [sys.executable, "-c", code + tail],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return set(json.loads(ran.stderr.splitlines()[-1]))
+
+
+def test_types_and_names_agree() -> None:
+    """What a type checker reads is what is looked up at run time."""
+    tree = ast.parse(Path(hsp_control.__file__).read_text(encoding="utf-8"))
+    seen = {
+        (name.name, node.module)
+        for block in tree.body
+        if isinstance(block, ast.If)
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for name in node.names
+    }
+    assert seen == {(name, room) for name, room in hsp_control._HOMES.items()}
+
+
+def test_all_names_exist_and_are_listed() -> None:
+    assert len(set(hsp_control.__all__)) == len(hsp_control.__all__)
+    for name in hsp_control.__all__:
+        assert getattr(hsp_control, name) is not None
+    assert set(hsp_control.__all__) <= set(dir(hsp_control))
+    with pytest.raises(AttributeError, match="has no attribute 'Robto'"):
+        _ = hsp_control.Robto
+
+
+@pytest.mark.process
+def test_importing_the_package_imports_nothing_heavy() -> None:
+    assert not imported("import hsp_control") & HEAVY
+
+
+@pytest.mark.process
+def test_no_part_of_scipy_that_is_rarely_used_comes_with_the_names() -> None:
+    code = "import hsp_control as h\nfor name in h.__all__: getattr(h, name)"
+    rare = {"scipy.optimize", "scipy.integrate", "scipy.spatial", "scipy.stats"}
+    assert not imported(code) & (rare | {"matplotlib", "meshcat", "tornado"})
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("words", [["--help"], ["--version"], ["chekc"], ["run"]])
+def test_hsp_answers_without_the_engine(words: list[str]) -> None:
+    code = (
+        f"from hsp_control.cli import main\ntry: main({words})\nexcept SystemExit: pass"
+    )
+    assert not imported(code) & HEAVY
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("hsp ch", "check "),
+        ("hsp check panda_ob", "panda_obstacle "),
+        ("hsp run paper/4", "paper/4_moving_obstacle "),
+        ("hsp robots pl", "planar3r "),
+        ("hsp sweep --sch", "--scheduler "),
+    ],
+)
+def test_a_shell_completes_without_the_engine(
+    line: str, offered: str, tmp_path: Path
+) -> None:
+    answer = tmp_path / "answer"
+    code = (
+        "import os\n"
+        "end = os._exit\n"
+        "def leave(status): raise SystemExit\n"
+        "os._exit = leave\n"
+        "from hsp_control.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "os._exit = end"
+    )
+    found = imported(
+        code,
+        _ARGCOMPLETE="1",
+        COMP_LINE=line,
+        COMP_POINT=str(len(line)),
+        _ARGCOMPLETE_STDOUT_FILENAME=str(answer),
+    )
+    assert answer.read_text().strip("\013") == offered
+    assert not found & HEAVY

@@ -1,0 +1,381 @@
+"""Check that what is drawn is what the log says, predictions of e_N among it."""
+
+import matplotlib as mpl
+import numpy as np
+import pinocchio as pin
+import pytest
+from drawn_logs import (
+    GAINS,
+    PAPER,
+    Arm,
+    both,
+    changed,
+    drawn,
+    legend_texts,
+    lines,
+    planar,
+    spatial,
+)
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
+
+import hsp_control.visualization.plots as plots
+from hsp_control import (
+    ConstantMetric,
+    Controller,
+    FramePosition,
+    Hold,
+    Obstacle,
+    Rest,
+    Robot,
+    Rollout,
+    Scene,
+    simulate,
+)
+from hsp_control.geometry.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    HeightField,
+    PointCloud,
+    Shape,
+    Sphere,
+)
+from hsp_control.simulation import log_series
+from hsp_control.simulation.decay import predicted_decay
+from hsp_control.trajectories import (
+    Circle as Round,
+)
+from hsp_control.trajectories import (
+    Spin,
+)
+from hsp_control.visualization import palette
+from hsp_control.visualization.plots import (
+    logged_geometry,
+    obstacles,
+    paths,
+    views,
+)
+
+pytestmark = pytest.mark.filterwarnings("error")
+A = np.tril(np.ones((3, 3)))
+SHADOW = mpl.colors.to_rgba(palette.SHADOW)
+NAMES = ("uncontrolled", "rest", "obstacle", "space", "pose", "several", "posture")
+
+
+@pytest.fixture(scope="module")
+def logs() -> dict[str, Rollout]:
+    return {name: planar(number) for name, number in PAPER.items()} | spatial()
+
+
+@pytest.fixture(params=NAMES)
+def log(logs: dict[str, Rollout], request: pytest.FixtureRequest) -> Rollout:
+    return logs[request.param]
+
+
+def named(axes: Axes, label: str) -> np.ndarray:
+    """Return x and y of the one line whose label begins so, shape (N, 2)."""
+    found = [line for line in axes.lines if str(line.get_label()).startswith(label)]
+    assert len(found) == 1, (label, [line.get_label() for line in axes.lines])
+    return np.column_stack(found[0].get_data())
+
+
+def sample_inside(shape: Shape, rng: np.random.Generator) -> np.ndarray:
+    """Return points of a shape in its own frame, extreme ones among them."""
+    directions = rng.standard_normal((200, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    match shape:
+        case Sphere():
+            return shape.radius * directions
+        case Capsule():
+            ends = rng.choice([-0.5, 0.5], 200)[:, None] * [0.0, 0.0, shape.length]
+            return shape.radius * directions + ends
+        case Box():
+            return rng.choice([-0.5, 0.5], (200, 3)) * shape.size
+        case Cylinder():
+            angle = rng.uniform(0.0, 2.0 * np.pi, 200)
+            ring = shape.radius * np.stack([np.cos(angle), np.sin(angle)])
+            height = rng.choice([-0.5, 0.5], 200) * shape.length
+            return np.column_stack([*ring, height])
+        case PointCloud():
+            return np.asarray(shape.points)
+        case HeightField():
+            return shape._vertices()
+    raise AssertionError(shape)
+
+
+# --- what is drawn is what the log says ----------------------------------------------
+
+
+def test_joints_are_absolute_angles_of_the_planar_arm(logs: dict[str, Rollout]) -> None:
+    log = logs["uncontrolled"]
+    expected = log["joint_positions"] @ A.T
+    for k, (t, y) in enumerate(lines(drawn(plots.draw_joint_positions, log))):
+        np.testing.assert_array_equal(t, log.t)
+        np.testing.assert_allclose(y, expected[:, k], rtol=1e-14)
+    own = lines(drawn(plots.draw_joint_positions, log, absolute=False))
+    for k, (_, y) in enumerate(own):
+        np.testing.assert_array_equal(y, log["joint_positions"][:, k])
+    assert len(own) == 3
+
+
+def test_curves_over_time_are_columns(log: Rollout) -> None:
+    efforts = lines(drawn(plots.draw_efforts, log))
+    values = lines(drawn(plots.draw_singular_values, log))
+    for found, column in ((efforts, log.tau), (values, log["singular_values"])):
+        assert len(found) == column.shape[1]
+        for k, (t, y) in enumerate(found):
+            np.testing.assert_array_equal(t, log.t)
+            np.testing.assert_array_equal(y, column[:, k])
+    axes = drawn(plots.draw_field_value, log)
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), log["field.value"])
+    axes = drawn(plots.draw_null_space_error, log)
+    np.testing.assert_array_equal(named(axes, "actual")[:, 1], log["null_space_norm"])
+
+
+def test_the_minimum_of_manipulability_is_marked(log: Rollout) -> None:
+    axes = drawn(plots.draw_manipulability, log)
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), log["manipulability"])
+    t, least = named(axes, "minimum")[0]
+    assert least == log["manipulability"].min()
+    assert log["manipulability"][log.t == t] == least
+    assert axes.get_ylim()[0] == 0.0
+
+
+def test_metres_and_radians_of_a_pose_are_apart(logs: dict[str, Rollout]) -> None:
+    log = logs["pose"]
+    axes = drawn(plots.draw_task_errors, log)
+    error = log["task.panda_tcp.error"]
+    for label, rows in (
+        ("panda_tcp position [m]", slice(3)),
+        ("panda_tcp orientation [rad]", slice(3, 6)),
+    ):
+        norm = np.linalg.norm(error[:, rows], axis=1)
+        np.testing.assert_allclose(named(axes, label)[:, 1], norm, rtol=1e-14)
+    assert axes.get_ylabel().endswith("[m, rad]")
+    assert axes.get_yscale() == "log"
+
+
+def test_each_type_of_task_has_its_unit(logs: dict[str, Rollout]) -> None:
+    units = {
+        part.label: part.unit
+        for name in ("several", "posture")
+        for part in log_series.task_errors(logs[name])
+    }
+    assert units == {
+        "xz": "m",
+        "panda_tcp_pointing tan of half the angle": "–",
+        "posture": "rad",
+        "turn": "rad",
+    }
+    robot = logs["posture"].meta["robot"] | {"units": ["rad"] * 7}
+    told = changed(logs["posture"], robot=robot)
+    assert log_series.task_errors(told)[0].unit == "rad"
+    assert log_series.effort_unit(told) == "N·m"
+
+
+def test_paths_are_the_logs_in_the_plane_of_the_robot(logs: dict[str, Rollout]) -> None:
+    log = logs["obstacle"]
+    axes = drawn(plots.draw_end_effector, log)
+    for label, column in (
+        ("desired", "task.tip.reference"),
+        ("actual", "task.tip.actual"),
+    ):
+        np.testing.assert_array_equal(named(axes, label), log[column])
+    centers = log["obstacle.disk"][:, :2]
+    (path,) = (line for line in axes.lines if line.get_color() == palette.OBSTACLE)
+    np.testing.assert_array_equal(path.get_xydata(), centers)
+    disks = [patch for patch in axes.patches if isinstance(patch, Circle)]
+    assert [disk.center for disk in disks] == [tuple(centers[-1]), tuple(centers[0])]
+    assert legend_texts(axes)[-1] == "obstacle"
+    assert {disk.radius for disk in disks} == {0.2}
+    assert axes.get_aspect() == 1.0
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")
+
+
+def test_a_path_in_space_is_seen_from_a_slant(logs: dict[str, Rollout]) -> None:
+    log = logs["space"]
+    axes = drawn(plots.draw_end_effector, log)
+    view = views.oblique()
+    np.testing.assert_allclose(view.rows @ view.rows.T, np.eye(2), atol=1e-15)
+    for label in ("desired", "actual"):
+        column = "reference" if label == "desired" else "actual"
+        page = np.column_stack(view.project(log[f"task.panda_tcp.{column}"]))
+        np.testing.assert_array_equal(named(axes, label), page)
+    texts = {text.get_text() for text in axes.texts}
+    assert {"x [m]", "y [m]", "z [m]"} <= texts
+    front = drawn(plots.draw_end_effector, log, names="yz")
+    reference = log["task.panda_tcp.reference"]
+    np.testing.assert_array_equal(named(front, "desired"), reference[:, 1:])
+
+
+def test_tracked_axes_come_from_the_log(logs: dict[str, Rollout]) -> None:
+    (path,) = logged_geometry.task_paths(logs["several"])
+    assert path.axes == "xz"
+    desired = path.desired[:, [0, 2]]
+    np.testing.assert_array_equal(desired, logs["several"]["task.xz.reference"])
+    np.testing.assert_array_equal(path.desired[:, 1], path.actual[:, 1])
+    assert paths.path_view(logs["several"]).names == "xz"
+
+
+def test_frames_show_the_skeleton_at_their_time(logs: dict[str, Rollout]) -> None:
+    log = logs["obstacle"]
+    axes = drawn(plots.draw_frame, log, 70)
+    skeleton = log["skeleton"][70, :, :2]
+    assert axes.get_title(loc="left") == "t = 0.70 s"
+    (disk,) = (patch for patch in axes.patches if isinstance(patch, Circle))
+    assert disk.center == tuple(log["obstacle.disk"][70, :2])
+    points = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
+    np.testing.assert_array_equal(np.concatenate(points), skeleton)
+    links = np.array([skeleton[[k - 1, k]] for k in (1, 2, 3)])
+    found = next(line for line in axes.lines if line.get_color() == palette.LINK)
+    np.testing.assert_array_equal(found.get_xydata().reshape(3, 3, 2)[:, :2], links)
+
+
+def test_frames_are_even_in_time_or_where_they_are_asked_for(
+    logs: dict[str, Rollout],
+) -> None:
+    log = logs["rest"]
+    rows = log_series.chosen_rows(log)
+    assert len(rows) == 8
+    assert (rows[0], rows[-1]) == (0, 100)
+    assert np.ptp(np.diff(rows)) <= 1
+    assert log_series.chosen_rows(log, times=[0.25, -3.0, 99.0, 0.251]) == [
+        0,
+        25,
+        100,
+    ]
+    together = drawn(plots.draw_superimposed, log, rows)
+    arms = [line for line in together.lines if len(line.get_xdata()) == 9]
+    np.testing.assert_array_equal(
+        [arm.get_xydata()[-2] for arm in arms], log["skeleton"][rows, -1, :2]
+    )
+    brightness = [sum(mpl.colors.to_rgb(arm.get_color())) for arm in arms]
+    assert sorted(brightness, reverse=True) == brightness
+
+
+def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
+    turned = Spin(pin.utils.rotate("x", 0.5), [0.0, 0.0, 1.0], 2.0)
+    bumps = [[0.0, 0.1], [0.1, 0.0]]
+    scene = Scene(
+        [
+            Obstacle("ball", Sphere(0.1), Hold([0.5, 0.0, 0.5])),
+            Obstacle("rod", Capsule(0.05, 0.3), Hold([0.4, 0.3, 0.5]), turned),
+            Obstacle("crate", Box((0.1, 0.2, 0.3)), Hold([0.5, 0.3, 0.2]), turned),
+            Obstacle("can", Cylinder(0.05, 0.2), Hold([0.5, -0.3, 0.2])),
+            Obstacle("cloud", PointCloud([[0, 0, 0], [0.1, 0, 0]]), Hold([0, 0.4, 1])),
+            Obstacle("land", HeightField((0.2, 0.2), bumps), Hold([0.2, 0.0, 0.0])),
+            Obstacle("table", Box((9.0, 9.0, 0.1)), Hold([0.0, 0.0, -0.1])),
+            Obstacle("floor", HalfSpace(), Hold([0.0, 0.0, 0.0])),
+        ]
+    )
+    arm = Arm()
+    task = FramePosition(arm.robot, arm.tcp, arm.circle([1.0, 0.0, 1.0]), GAINS)
+    log = arm.run(task, scene=scene)
+    found = {body.name: body for body in obstacles.logged_obstacles(log)}
+    assert [name for name, body in found.items() if body.oversized] == [
+        "table",
+        "floor",
+    ]
+    assert [name for name, body in found.items() if body.moves] == ["rod", "crate"]
+    rng = np.random.default_rng(5)
+    for name, body in found.items():
+        if name in ("table", "floor"):
+            continue
+        shape, row = scene[name].shape, 30
+        inside = sample_inside(shape, rng)
+        placement = scene[name].placement(log.t[row])
+        world_points = inside @ placement.rotation.T + placement.translation
+        low, high = (
+            body.enclosing_points().min(axis=0),
+            body.enclosing_points().max(axis=0),
+        )
+        assert np.all(world_points >= low - 1e-9)
+        assert np.all(world_points <= high + 1e-9)
+        for view in (views.oblique(), views.plane("xz")):
+            corners = body.outline(view, row)  # anticlockwise
+            edges = np.roll(corners, -1, axis=0) - corners
+            page = np.column_stack(view.project(world_points))
+            off = page[:, None] - corners
+            left = edges[:, 0] * off[..., 1] - edges[:, 1] * off[..., 0]
+            assert np.all(left >= -1e-3 * np.linalg.norm(edges, axis=1))
+    everything = logged_geometry.enclosing_points(log)
+    assert np.ptp(everything, axis=0).max() < 2.0  # the table does not shrink the arm
+    for view in ("xz", "xy"):
+        axes = drawn(plots.draw_end_effector, log, names=view)
+        floors = [p for p in axes.patches if p.get_facecolor() == SHADOW]
+        assert len(floors) == (view == "xz")  # seen edge-on
+    for figure in both(log):
+        figure.canvas.draw()
+
+
+def test_a_mesh_is_a_dashed_ball_around_it(logs: dict[str, Rollout]) -> None:
+    about = {"shape": "Mesh", "parameters": {"file": "a.stl"}, "radius": 0.3}
+    (body,) = obstacles.logged_obstacles(
+        changed(logs["obstacle"], obstacles={"disk": about})
+    )
+    assert (body.radius, body.exact) == (0.3, False)
+
+
+# --- the prediction of e_N -----------------------------------------------------------
+
+
+def test_a_scalar_gain_predicts_a_line_and_the_log_lies_on_it(
+    logs: dict[str, Rollout],
+) -> None:
+    log = logs["obstacle"]
+    norm = log["null_space_norm"]
+    predicted = named(drawn(plots.draw_null_space_error, log), "predicted")
+    np.testing.assert_allclose(predicted[:, 1], norm[0] * np.exp(-10.0 * log.t))
+    np.testing.assert_allclose(predicted[:, 1], norm, rtol=1e-3)
+    late = changed(log, columns={"t": log.t + 5.0})  # the clock need not start at 0
+    np.testing.assert_allclose(predicted_decay(late).slow, predicted[:, 1])
+
+
+def test_a_matrix_gain_predicts_a_band_and_the_log_lies_in_it(
+    logs: dict[str, Rollout],
+) -> None:
+    robot = Robot.load("planar3r", gravity=(0, 0, 0))
+    task = FramePosition(robot, "tip", Round([1, 1], 1, 3), GAINS, axes="xy")
+    q0 = robot.integrate(robot.neutral(), np.array([-0.44, 0.9, 0.9]))
+    controller = Controller(
+        robot,
+        [task],
+        Rest(robot),
+        null_space_gain=[5.0, 10.0, 15.0],
+        metric=ConstantMetric.from_coordinates(A),
+    )
+    run = simulate(controller, q0, [1.0, 0.0, -1.0], duration=1.0)
+    for log in (run, logs["space"]):
+        decay, norm = predicted_decay(log), log["null_space_norm"]
+        assert decay.gains[0] < decay.gains[1]
+        assert np.all(norm <= decay.slow * (1.0 + 1e-6))
+        assert np.all(norm >= decay.fast * (1.0 - 1e-6))
+        texts = legend_texts(drawn(plots.draw_null_space_error, log))
+        assert texts[0].startswith("predicted: between exp(−")
+    assert predicted_decay(logs["space"]).gains == pytest.approx((5.0, 15.0))
+    untold = changed(run, metric_matrix=None)
+    (unknown, *_) = legend_texts(drawn(plots.draw_null_space_error, untold))[::-1]
+    assert unknown == "no prediction: $K_N$ is a matrix, $W$ not in the log"
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("uncontrolled", "no prediction: self-motion is not controlled"),
+        ("rest", "no prediction: starts with $e_N$ = 0"),
+    ],
+)
+def test_no_prediction_where_there_is_none(
+    logs: dict[str, Rollout], name: str, why: str
+) -> None:
+    axes = drawn(plots.draw_null_space_error, logs[name])
+    assert legend_texts(axes) == [r"actual $\Vert e_N \Vert_W$", why]
+    assert axes.get_ylim()[1] >= 1e-6  # rounding does not fill the axis
+
+
+def test_a_constant_metric_is_read_from_the_log(logs: dict[str, Rollout]) -> None:
+    np.testing.assert_array_equal(log_series.constant_metric(logs["rest"]), A.T @ A)
+    varying = changed(logs["rest"], metric="MassMatrixMetric", metric_matrix=None)
+    assert log_series.constant_metric(varying) is None
