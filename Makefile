@@ -52,6 +52,9 @@ bench: $(STAMP) ## compare with other controllers, in .venv-peers (TSID builds: 
 fuzz: $(STAMP) ## random states, mutated files, faults, soak: hours; writes docs/fuzz.md
 	@PYTHONPATH=tests nice $(BIN)/python -m campaigns $(ARGS)
 
+mutants: $(STAMP) ## break the code on purpose in some eighty places, report what no test notices
+	@PYTHONPATH=tests/support $(BIN)/python tests/mutants.py $(ARGS)
+
 wheel-test: $(STAMP) ## build the wheel, install it elsewhere, use it from there
 	@dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; mkdir "$$dir/cwd"; \
 	echo "Building the wheel and installing it into a fresh environment ..."; \
@@ -92,7 +95,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help figures animations demo test lint coverage fuzz wheel-test format constraints clean
+.PHONY: help figures animations demo test lint coverage fuzz mutants wheel-test format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

@@ -1,10 +1,10 @@
-"""Kernels with their arguments, called one after the other without Python in between.
+"""Native calls: kernels with their arguments, run without Python in between.
 
-To take an array apart for compiled code costs 6 ns, to enter it 50, to be a step of a
-loop in Python 60: for kernels of 0.1 µs with ten arrays that is more than what they do.
-`bind` takes the arguments apart once, into words of memory, and compiles a function
-that puts them together again: it has the same signature whatever the kernel's, so that
-`run` can call it by its address.
+From Python, each array argument costs 6 ns, the entry into compiled code 50 ns, and one
+step of a loop 60 ns. For a kernel of 0.1 µs with ten arrays that is more than its work.
+`bind` packs the arguments once into words of memory, and compiles an adapter that reads
+them there. All adapters have one signature, whatever the kernel's, so that `run` can
+call them by their addresses.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import callback, is_compiled, kernel
 
 FOREVER = -np.inf, np.inf
-"""From when until when a call is made [s], unless something else is said."""
+"""The window of time of a call that is always made [s]."""
 
 
 _ARRAY = ("meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides")
@@ -33,15 +33,15 @@ _ARRAY = ("meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides")
 
 
 class NativeCall(partial[float]):
-    """A kernel with its arguments: a call of no argument, or of the time.
+    """A kernel with its arguments: a call without arguments, or of the time.
 
-    It is a `partial` because nothing is called faster from Python.
+    It is a `partial` because Python calls nothing faster.
 
     Attributes:
-        row: The code's address and that of the words, as `run` takes them.
-        words: The arguments, as the code takes them.
-        recipe: What makes it, and of what: copies are made anew, of the copied arrays.
-            It also keeps the arrays alive.
+        row: The addresses of the adapter and of the words, as `run` reads them.
+        words: The packed arguments.
+        recipe: A function and its arguments that make this call. It keeps the arrays
+            alive, and copies and pickles use it to bind the copied arrays.
     """
 
     row: tuple[int, int]
@@ -52,7 +52,7 @@ class NativeCall(partial[float]):
     def of(
         cls, kernel: Callable[..., Any], arguments: tuple[Any, ...], timed: bool
     ) -> Self:
-        """Pack the arguments and find the code."""
+        """Pack the arguments, and compile or load the adapter."""
         kinds, words = zip(*map(_packed, arguments), strict=True)
         table = np.concatenate(words)
         address = _adapter(kernel, kinds, timed)
@@ -72,8 +72,8 @@ class Timed(NamedTuple):
 
     Attributes:
         call: The call.
-        start: From when it is made [s].
-        end: Until when [s].
+        start: Start of its window of time [s].
+        end: End of its window [s].
     """
 
     call: NativeCall
@@ -84,12 +84,13 @@ class Timed(NamedTuple):
 def bind(
     function: Callable[..., Any], *arguments: Any, timed: bool = False
 ) -> Callable[..., Any]:
-    """Return a call of a kernel with these very arguments, decided once.
+    """Return a call of a kernel with these arguments.
 
     Args:
         function: The kernel; it returns nothing or one number.
-        arguments: Its arguments. Arrays are followed, numbers stay as they are.
-        timed: Whether the last argument, the time, is left to the call.
+        arguments: Arrays, numbers, and tuples or records of them. The call reads and
+            writes the memory of these arrays each time; numbers are constants.
+        timed: Whether the kernel has one more argument, the time, given to the call.
     """
     if not (AVAILABLE and is_compiled(function)):
         return partial(function, *arguments)
@@ -97,7 +98,7 @@ def bind(
 
 
 def sequence(calls: Sequence[Timed]) -> Callable[[float], float]:
-    """Return one call, of the time, of several; it returns what the last returned."""
+    """Return one call of the time that makes several; it returns the last result."""
     when = np.array([[each.start, each.end] for each in calls])
     call = NativeCall(_entry(), np.array([each.call.row for each in calls]), when)
     call.recipe = sequence, (calls,)

@@ -1,4 +1,4 @@
-"""What a step does, decided once: calls that know where they read and write."""
+"""Step plans: the calls of a step, decided once, that know where to read and write."""
 
 from collections.abc import Callable, Iterable, Iterator
 from itertools import groupby
@@ -10,13 +10,13 @@ from hsp_control.common.native import FOREVER, NativeCall, Timed, sequence
 
 
 class StepPlan(NamedTuple):
-    """An evaluation at whatever a state then is, taken apart into its calls.
+    """The calls that evaluate one part of a controller, at whatever the state is.
 
-    Asking at every step what is to be called costs as much as the small kernels do.
+    To find out at every step what to call would cost as much as the small kernels do.
 
     Attributes:
-        follow: Bring references up to a time [s].
-        write: Read the state, and write.
+        follow: Calls of the time [s] that update references.
+        write: Calls without arguments that read the state and write the results.
     """
 
     follow: tuple[Callable[[float], object], ...] = ()
@@ -27,8 +27,8 @@ class CallSequence:
     """Several calls as one.
 
     Attributes:
-        calls: Them.
-        result: Which of them says what is returned.
+        calls: The calls, in order.
+        result: The index of the call whose result is returned.
     """
 
     def __init__(self, *calls: Callable[..., Any], result: int = -1) -> None:
@@ -37,42 +37,42 @@ class CallSequence:
         self.result = result
 
     def __call__(self, *arguments: float) -> Any:
-        """Make the calls."""
+        """Make the calls in order."""
         return [call(*arguments) for call in self.calls][self.result]
 
 
 class TimeWindow:
-    """A call of the time that is made only from one time until another.
+    """A call of the time that is made only within a window of time.
 
     Attributes:
-        call: It.
-        start: From when it is made [s].
-        end: Until when [s].
+        call: The call.
+        start: Start of the window [s].
+        end: End of the window [s]; at the end it is not made.
     """
 
     def __init__(
         self, call: Callable[[float], object], start: float, end: float
     ) -> None:
-        """Keep the call and its times."""
+        """Keep the call and its window."""
         self.call, self.start, self.end = call, start, end
 
     def __call__(self, t: float) -> None:
-        """Make the call, if it is time."""
+        """Make the call if the time is within the window."""
         if self.start <= t < self.end:
             self.call(t)
 
 
 def steps(
-    bounds: Iterable[StepPlan], last: Callable[[], Any]
+    plans: Iterable[StepPlan], last: Callable[[], Any]
 ) -> list[Callable[[float], Any]]:
-    """Return what to call with the time, in turn: all of the bounds, and then ``last``.
+    """Return the calls of a step, each to be given the time: all plans, then ``last``.
 
-    References come before what reads them. Native calls that follow one another become
-    one call.
+    All references are updated before anything reads them. Native calls that follow one
+    another become one call.
     """
-    bounds = list(bounds)
-    parts = [p for b in bounds for follow in b.follow for p in _parts(follow)]
-    for write in [*(write for b in bounds for write in b.write), last]:
+    plans = list(plans)
+    parts = [part for p in plans for follow in p.follow for part in _parts(follow)]
+    for write in [*(write for p in plans for write in p.write), last]:
         parts += [
             part if isinstance(part.call, NativeCall) else _Part(_whenever(part.call))
             for part in _parts(write)
@@ -95,7 +95,7 @@ class _Part(NamedTuple):
 def _parts(
     call: Callable[..., Any], start: float = -np.inf, end: float = np.inf
 ) -> Iterator[_Part]:
-    """Yield what a call consists of, and when."""
+    """Yield the single calls of a call, each with its window of time."""
     if isinstance(call, CallSequence):
         for each in call.calls:
             yield from _parts(each, start, end)

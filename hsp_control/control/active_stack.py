@@ -83,7 +83,7 @@ class ActiveStack:
     ) -> Outcome:
         """Resolve contacts, tasks and field; `resolution` holds the results."""
         t, outcome = state.t, 0.0
-        for step in self._steps(state, metric, field):
+        for step in self._steps.get(state, metric, field):
             outcome = step(t)
         return OUTCOMES[int(outcome)]
 

@@ -1,4 +1,4 @@
-"""The controller: tasks, a null-space field and a metric make one effort."""
+"""The controller: from tasks, a null-space field and a metric to one effort."""
 
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
@@ -22,6 +22,7 @@ from hsp_control.control.composition import (
     levels_of,
 )
 from hsp_control.law import Outcome, Resolution
+from hsp_control.law.outcome import DAMPED, EXACT, NOT_FINITE
 from hsp_control.null_space.fields import FieldSample, NullSpaceField, Rest
 from hsp_control.null_space.fields.crossfade import crossfade
 from hsp_control.null_space.metrics import IdentityMetric, Metric
@@ -40,18 +41,18 @@ class ControlOutput:
     what must outlive it.
 
     Attributes:
-        tau: Effort M a + N, less what contacts bear, shape (nv,) [N·m or N].
+        tau: Effort M a + N minus the contact forces' share, shape (nv,) [N·m or N].
         acceleration: a, shape (nv,).
         task: All tasks stacked: J, J', e, e', a_x.
         field: g and g', shape (nv,) each.
         null_space_error: e_N = (I - J#J)(g - v), shape (nv,).
-        damped: Whether a task is so near a singularity that the law was bounded
-            rather than exact.
-        forces: At the points of the contacts that bear, in the axes of each (two
-            tangents, normal), shape (3 points,) [N]; see
+        damped: Whether a task is so near a singularity that its inverse is bounded,
+            and the law not exact.
+        forces: Forces at the points of the active contacts, in the axes of each
+            contact (two tangents, normal), shape (3 points,) [N]; see
             `ActiveStack.support`.
-        status: How much of the law could be delivered.
-        relaxation: By how much the worst limit is missed, where limits contradict each
+        status: What the limits left of the law's acceleration.
+        relaxation: The largest violation of a limit, where limits contradict each
             other [rad/s² or m/s²].
     """
 
@@ -67,7 +68,7 @@ class ControlOutput:
 
 
 class Diagnostics(NamedTuple):
-    """What one would plot beside the effort.
+    """Quantities to plot beside the effort.
 
     Attributes:
         field_value: The field's cost f, or its norm.
@@ -95,20 +96,20 @@ class Controller:
     """Computes tau = M a + N with the law of Hsu, Hauser and Sastry over a metric.
 
     Wherever the stacked Jacobian keeps its rank and no limit binds: every task's error
-    obeys e'' + Kv e' + Kp e = 0, and V = ½ e_NᵀW e_N obeys V' = -e_NᵀW K_N e_N. It has
-    no memory, but for the last effort where its rate is limited (see `applied`): the
-    same state gives the same effort.
+    obeys e'' + Kv e' + Kp e = 0, and V = ½ e_NᵀW e_N obeys V' = -e_NᵀW K_N e_N. The
+    same state gives the same effort: its only memory is the last effort, used where
+    the effort rate is limited (see `applied`).
 
     Attributes:
         robot: The robot.
         levels: The tasks of each level, the highest priority first.
-        tasks: All of them, in the same order.
+        tasks: All tasks, in the same order.
         field: The null-space field.
         metric: The joint-space metric.
         null_space_gain: K_N, shape (nv, nv) [1/s].
-        contacts: Where a floating base may rest.
-        limits: What the efforts and the motion are kept within, if anything.
-        schedules: When each task counts, by name; those not named always do.
+        contacts: The contacts that may support a floating base.
+        limits: The limits on efforts and motion, if any.
+        schedules: When each task is active, by name; tasks without one always are.
     """
 
     def __init__(
@@ -131,25 +132,25 @@ class Controller:
             robot: The robot.
             tasks: One task or more, with distinct names, stacked at one level; or a
                 list of such lists, the highest priority first.
-            field: Where self-motion shall go; None: to rest.
+            field: The field g that the self-motion follows; None: `Rest`, g = 0.
             null_space_gain: K_N > 0 [1/s]: scalar, shape (nv,) or (nv, nv).
             metric: Joint-space metric; None: identity.
             singularity_threshold: Singular value of the stacked Jacobian (in the
                 metric) below which its inverse is bounded instead of exact. For
                 positions about 3 % of the arm's reach [m]; efforts on the way into a
                 singularity grow with its inverse cube.
-            limits: What efforts and motion are kept within; None: no limits.
-            contacts: Where a robot with a free-flyer root may rest.
-            base: What else moves such a root: ``flying``, nothing when no contact
-                bears; ``driven``, something that delivers the root's effort, as a wind
-                tunnel or a simulator may.
-            schedules: When tasks count, by name; all others always do.
+            limits: Limits on efforts and motion; None: no limits.
+            contacts: The contacts that may support a robot with a free-flyer root.
+            base: What else moves such a root: ``flying``, nothing while no contact is
+                active; ``driven``, something else delivers the root's effort, for
+                example a simulator.
+            schedules: When tasks are active, by name; all others always are.
 
         Raises:
             ControllerError: If tasks, field and robot do not belong together, or the
-                tasks of one level have more rows than the robot has freedoms.
-            ContactError: If a floating base has neither contact nor word of what else
-                moves it, or a fixed one has.
+                tasks of one level have more rows than the robot has dofs.
+            ContactError: If a floating base has neither contacts nor ``base``, or a
+                fixed base has either.
             GainError: If K_N does not make the null-space error decay.
             MetricError: If the metric does not fit the robot.
         """
@@ -197,13 +198,13 @@ class Controller:
 
         Args:
             state: The robot's state.
-            modifier: What is done about the law's acceleration before it is delivered
-                within the limits; None: nothing.
+            modifier: Changes the law's acceleration before the limits are applied;
+                None: nothing does.
 
         Raises:
-            NonFiniteError: If a task or the field gave something that is not finite;
-                an effort that is not finite is never returned.
-            ControllerError: If the state is another robot's.
+            NonFiniteError: If a task or the field contains NaN or inf; a non-finite
+                effort is never returned.
+            ControllerError: If the state belongs to another robot.
         """
         if state.robot is not self.robot:
             raise ControllerError(
@@ -221,7 +222,7 @@ class Controller:
         else:
             outcome = active.resolve(state, self.metric, self.field)
             a = active.resolution.acceleration
-        if outcome is Outcome.NOT_FINITE:
+        if outcome is NOT_FINITE:
             self._explain_non_finite(state)
         offset = None
         if modifier is not None:
@@ -237,41 +238,39 @@ class Controller:
         output.task = active.rows
         output.field = resolution.problem.field
         output.null_space_error = resolution.null_space_error
-        output.damped = outcome is Outcome.DAMPED
+        output.damped = outcome is DAMPED
         output.forces = forces
         output.status, output.relaxation = status, relaxation
         return output
 
     def applied(self, tau: Array, period: float) -> None:
-        """Take note of an effort that goes out, and of when the next one will.
+        """Store the effort that was sent to the robot, for the limit on its rate.
 
-        Only where the rate of efforts is limited does it matter.
+        Without such a limit it has no effect.
 
         Args:
-            tau: Effort, shape (nv,).
+            tau: Effort, shape (nv,) [N·m or N].
             period: Time until the next effort [s].
         """
         self._actuation.applied(tau, period)
 
     def restart(self) -> None:
-        """Forget the last effort and all offsets: what follows is another run."""
+        """Forget the last effort and all task offsets, before another run."""
         self._actuation.forget()
         for task in self.tasks:
             task.offset[:] = 0.0
 
     def _scheduled(self, state: RobotState) -> tuple[Array, Outcome]:
-        """Return the law's acceleration with what the schedules have on.
+        """Return the law's acceleration for the tasks that are active, and its outcome.
 
-        And whether the law is exact.
-
-        A task that comes or goes has a weight between 0 and 1. With w1 ≥ w2 ≥ ... the
+        A task that fades in or out has a weight between 0 and 1. With w1 ≥ w2 ≥ ... the
         weights of such tasks, the acceleration is
 
             (1 - w1) a{} + (w1 - w2) a{1} + (w2 - w3) a{1, 2} + ...
 
-        with a{...} the law for the tasks that always count and those in the braces. It
-        is continuous in the weights, and since the tasks in all sets are linear in a,
-        those keep their exact error equation throughout.
+        with a{...} the law for the tasks of weight 1 and those in the braces. It is
+        continuous in the weights. The rows of the tasks in all sets are linear in a, so
+        that these tasks keep their exact error equation throughout.
         """
         t = state.t
         weights = {
@@ -285,7 +284,7 @@ class Controller:
         shares = [1.0, *(weights[name] for name in coming), 0.0]
         mixed = self._mixed
         mixed[:] = 0.0
-        outcome = Outcome.EXACT
+        outcome = EXACT
         for k, (share, following) in enumerate(pairwise(shares)):
             active = self._stack_without(state, off - set(coming[:k]))
             self._active = active
@@ -298,7 +297,7 @@ class Controller:
         return a, outcome
 
     def _stack_without(self, state: RobotState, off: Set[str]) -> ActiveStack:
-        """Return the stack of the contacts that bear now, without some tasks."""
+        """Return the stack of the contacts that are active now, without some tasks."""
         bearing = tuple(c for c in self.contacts if c.schedule.active(state.t))
         key = (tuple(c.name for c in bearing), frozenset(off))
         if key not in self._stacks:
@@ -329,7 +328,7 @@ class Controller:
         return self._active
 
     def stack(self, state: RobotState) -> TaskSample:
-        """Return the rows of all contacts and tasks that count at a state."""
+        """Return the rows of all active contacts and tasks at a state."""
         self._scheduled(state)
         return self.active_stack.rows
 
@@ -348,7 +347,7 @@ class Controller:
 
     @property
     def task_rows(self) -> dict[str, slice]:
-        """Where each task's rows stand in the last output's stack, by name."""
+        """The rows of each task in the last output's stack, by name."""
         return self.active_stack.task_rows
 
     @property
@@ -357,7 +356,7 @@ class Controller:
         return self.active_stack.resolution.problem.field
 
     def diagnose(self, state: RobotState) -> Diagnostics:
-        """Return what one would plot, after `compute` at the same state."""
+        """Return quantities to plot, after `compute` at the same state."""
         active = self.active_stack
         resolution = active.resolution
         singular_values, manipulability = resolution.spectrum(active.first_task_row)
@@ -371,8 +370,9 @@ class Controller:
     def flow(self, t: float, q: Array) -> Array:
         """Return v = J# x_d' + P g, shape (nv,): the robot once both errors have died.
 
-        The law makes the robot this first-order flow (law.md §2, Liégeois 1977), so it
-        previews a field, and a start with this velocity has no transient.
+        The law makes the robot this first-order flow (docs/law.md, Equations (7) and
+        (13) over a metric; Liégeois 1977), so it previews a field, and a start with
+        this velocity has no transient.
         """
         state = self.robot.state(t, q, np.zeros(self.robot.nv))
         self.compute(state)
@@ -400,16 +400,17 @@ class Controller:
     def add_task(
         self, task: Task, *, start: float, ramp: float, level: int | None = None
     ) -> None:
-        """Let a task come, without a jump in effort.
+        """Add a task that fades in without a jump in effort.
 
         Args:
             task: The task, with a name of its own.
-            start: When it begins to count [s].
-            ramp: How long it takes to count in full [s].
-            level: Its level, 0 the highest; None: the lowest there is.
+            start: When it begins to fade in [s].
+            ramp: How long it fades in [s].
+            level: Its level, 0 the highest; None: the lowest existing one.
 
         Raises:
-            ControllerError: If it does not belong here, or there is no such level.
+            ControllerError: If it belongs to another robot, its name is used already,
+                or there is no such level.
         """
         levels = [list(each) for each in self.levels]
         if level is not None and not 0 <= level <= len(levels):
@@ -428,12 +429,12 @@ class Controller:
         self._timeless = False
 
     def remove_task(self, name: str, *, start: float, ramp: float) -> None:
-        """Let a task go, without a jump in effort.
+        """Remove a task, which fades out without a jump in effort.
 
         Args:
             name: The task.
-            start: When it begins to fade [s].
-            ramp: How long it takes to fade [s].
+            start: When it begins to fade out [s].
+            ramp: How long it fades out [s].
 
         Raises:
             ControllerError: If there is no such task.
@@ -445,13 +446,13 @@ class Controller:
     def change_gains(
         self, name: str, gains: Gains, *, start: float, ramp: float
     ) -> None:
-        """Let a task's gains change smoothly; its error equation holds throughout.
+        """Change a task's gains smoothly; its error equation holds throughout.
 
         Args:
             name: The task.
-            gains: The gains it shall have.
+            gains: The new gains.
             start: When they begin to change [s].
-            ramp: How long they take [s].
+            ramp: How long they change [s].
 
         Raises:
             ControllerError: If there is no such task.
@@ -462,21 +463,21 @@ class Controller:
         self._ramps.append(GainRamp(task, gains, start, ramp))
 
     def change_field(self, field: NullSpaceField, *, start: float, ramp: float) -> None:
-        """Let another field take over smoothly; Proposition 2 holds throughout.
+        """Change to another field smoothly; Proposition 2 holds throughout.
 
-        On the way the field is a `crossfade`, whose exact rate the law is told, so that
-        the null-space error goes on decaying as if nothing happened. A change that
-        comes before the last one has ended begins at whatever the field then is.
+        In between the field is a `crossfade` with its exact rate, so that the
+        null-space error decays as if nothing had happened. A change that begins before
+        the last one has ended starts from the field at that time.
 
         Args:
-            field: The field that it shall be.
-            start: When it begins to take over, now or later [s].
+            field: The new field.
+            start: When the change begins, now or later [s].
             ramp: How long it takes [s].
 
         Raises:
-            ControllerError: If the field is another robot's.
-            FieldError: If the ramp takes no time, or one of the two fields leaves the
-                null space uncontrolled: there is no way between g and no g.
+            ControllerError: If the field belongs to another robot.
+            FieldError: If the ramp is not positive, or one of the two fields leaves the
+                null space uncontrolled: nothing lies between a field and none.
         """
         check_parts(self.robot, self.levels, field)
         self.field = crossfade(self.field, field, start=start, duration=ramp)

@@ -112,7 +112,7 @@ class ClosedFormDistances:
         self._cores = np.zeros((len(pairs), 3, 3))
         self._scratch = np.zeros((40, 3))
         self.measurements: Indices = np.zeros(1, dtype=np.int64)
-        self.compile = IdentityCache(self._compile)
+        self._plans = IdentityCache(self._plan)
         self._derivatives = IdentityCache(self.derivatives)
 
     def measure(self, state: RobotState, distances: Array) -> None:
@@ -123,8 +123,11 @@ class ClosedFormDistances:
         for write in plan.write:
             write()
 
-    def _compile(self, state: RobotState, distances: Array) -> StepPlan:
+    def compile(self, state: RobotState, distances: Array) -> StepPlan:
         """Return the step plan of `measure` for this state and this array."""
+        return self._plans.get(state, distances)
+
+    def _plan(self, state: RobotState, distances: Array) -> StepPlan:
         measure = bind(
             _measure,
             self.measurements,
@@ -168,7 +171,7 @@ class ClosedFormDistances:
             gradient: Is overwritten with the sum, shape (nv,).
             rate: Is overwritten with the rate of the sum, shape (nv,).
         """
-        self._derivatives(state, slopes, curvatures, gradient, rate)()
+        self._derivatives.get(state, slopes, curvatures, gradient, rate)()
 
     def derivatives(
         self,

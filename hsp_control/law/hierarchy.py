@@ -14,7 +14,7 @@ so that V' = -e_NᵀW K_N e_N as long as the stack keeps its rank, conflicts inc
 Where the stack has full rank this *is* the law of `law.py`, to rounding, which then
 serves: it costs a tenth. (Its least singular value bounds those of all levels from
 below, by the interlacing of Schur complements, so that the two meet where they change
-over.) ``law.md`` §4.
+over.) ``docs/law.md``, Priorities.
 """
 
 from typing import NamedTuple

@@ -6,7 +6,8 @@
     a = J#(a_x - J'v) + (I - J#J) u                                               (7)
 
 With W = I, P u is equation (13), since J⁺J'J⁺ + (J⁺)' = P J'ᵀ(JJᵀ)⁻¹: no derivative of
-a pseudo-inverse is needed. ``law.md`` §2 has the proof for every metric.
+a pseudo-inverse is needed. ``docs/law.md``, Equations (7) and (13) over a metric,
+has the proof for every metric.
 """
 
 from hsp_control.common.arrays import Array

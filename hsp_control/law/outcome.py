@@ -14,5 +14,6 @@ class Outcome(IntEnum):
     """The acceleration contains NaN or inf."""
 
 
-OUTCOMES = tuple(Outcome)
-"""By number: a native call returns floats."""
+OUTCOMES = EXACT, DAMPED, NOT_FINITE = tuple(Outcome)
+"""By number: a native call returns floats. And by name, for the step: up to Python 3.11
+`Outcome.EXACT` takes 80 ns."""

@@ -32,10 +32,10 @@ def weighted_pseudo_inverse(
 ) -> bool:
     """Write the factors of J# = W⁻¹Jᵀ q(JW⁻¹Jᵀ); return whether it was damped.
 
-    q(x) = 1/x for x ≥ threshold² and (2 - x/threshold²)/threshold² below it (law.md
-    §4): continuously differentiable, exactly the inverse while every singular value of
-    J L⁻ᵀ is above the threshold, and bounded: ‖J# in whitened coordinates‖ ≤
-    1.09/threshold. Rank loss is a special case.
+    q(x) = 1/x for x ≥ threshold² and (2 - x/threshold²)/threshold² below it
+    (docs/law.md, Near singularities): continuously differentiable, exactly the inverse
+    while every singular value of J L⁻ᵀ is above the threshold, and bounded: ‖J# in
+    whitened coordinates‖ ≤ 1.09/threshold. Rank loss is a special case.
 
     Args:
         J: Task Jacobian, shape (m, nv), m ≤ nv.

@@ -23,7 +23,8 @@ from hsp_control.null_space.fields import FieldSample
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.tasks import TaskSample
 
-_EXACT, _DAMPED, _NOT_FINITE = map(int, Outcome)
+_EXACT, _DAMPED, _NOT_FINITE = map(int, OUTCOMES)
+"""What kernels return."""
 
 
 class Resolved(NamedTuple):

@@ -125,7 +125,8 @@ class StopSettings:
         """Check that the sampled safe stop is stable at this period [s].
 
         With one period of delay a rate k is stable for k h < 1 and a natural frequency
-        ω for ω h < 0.43 (law.md §7); half of it is the margin for model errors.
+        ω for ω h < 0.43 (docs/robustness.md); half of it is the margin for model
+        errors.
 
         Raises:
             LiveError: If a gain is too large.

@@ -1,6 +1,7 @@
 """Placements of joints and frames, Jacobians, their exact rates and drift."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +13,58 @@ from hsp_control.common.native import bind
 from hsp_control.robot.matrix_view import matrix_view
 
 
+class FrameMotion(NamedTuple):
+    """A frame's placement, Jacobian and motion, as one argument of a kernel.
+
+    In the axes of the frame that it is relative to: the world's, unless said otherwise.
+    Linear rows come before angular rows.
+
+    Attributes:
+        jacobian: J, where J v = (velocity of the origin, angular velocity), shape
+            (6, nv).
+        jacobian_dot: J' = dJ/dt along v, exact, shape (6, nv).
+        rotation: Rotation matrix from the frame's axes, shape (3, 3).
+        position: The frame's origin [m], shape (3,).
+        velocity: J v, shape (6,) [m/s, rad/s].
+    """
+
+    jacobian: Array
+    jacobian_dot: Array
+    rotation: Array
+    position: Array
+    velocity: Array
+
+    @classmethod
+    def allocate(cls, nv: int) -> "FrameMotion":
+        """Return zeros."""
+        matrices = np.zeros((6, nv)), np.zeros((6, nv)), np.zeros((3, 3))
+        return cls(*matrices, np.zeros(3), np.zeros(6))
+
+
+class _Carrier(NamedTuple):
+    """The joint that carries a frame.
+
+    Attributes:
+        J_world: The Jacobian of all joints at the world's origin, (6, nv_extended).
+        J_world_dot: Its rate.
+        R_joint: Rotation of the joint, shape (3, 3).
+        p_joint: Origin of the joint [m], shape (3,).
+        R_local: Rotation of the frame in the joint, shape (3, 3).
+        p_local: Origin of the frame in the joint [m], shape (3,).
+        columns: The columns of J_world that move the joint.
+        dofs: The indices in v of these columns.
+    """
+
+    J_world: Array
+    J_world_dot: Array
+    R_joint: Array
+    p_joint: Array
+    R_local: Array
+    p_local: Array
+    columns: Indices
+    dofs: Indices
+
+
 class FrameKinematics:
     """Placement and motion of a frame, in world axes, linear rows before angular rows.
 
@@ -19,6 +72,7 @@ class FrameKinematics:
 
     Attributes:
         compute: Updates the attributes below to the state, if they are not up to date.
+        motion: The first five of them, as a record.
         rotation: Rotation matrix from frame axes to world axes, shape (3, 3).
         position: The frame's origin in the world [m], shape (3,).
         jacobian: J, where J v = (velocity of the origin, angular velocity), shape
@@ -33,6 +87,7 @@ class FrameKinematics:
         "drift",
         "jacobian",
         "jacobian_dot",
+        "motion",
         "position",
         "rotation",
         "velocity",
@@ -52,29 +107,27 @@ class FrameKinematics:
         """
         nv, frame = model.nv, model.frames[index]
         joint = data.oMi[frame.parentJoint]  # its arrays are views of data
-        self.rotation: Array = np.zeros((3, 3))
-        self.position: Array = np.zeros(3)
-        self.jacobian: Array = np.zeros((6, nv))
-        self.jacobian_dot: Array = np.zeros((6, nv))
-        self.velocity: Array = np.zeros(6)
+        self.motion = motion = FrameMotion.allocate(nv)
+        self.jacobian, self.jacobian_dot = motion.jacobian, motion.jacobian_dot
+        self.rotation, self.position = motion.rotation, motion.position
+        self.velocity = motion.velocity
         self.drift: Array = np.zeros(6)
-        self.compute: Callable[[], object] = bind(
-            frame_kinematics,
-            stamp,
-            np.array([-1]),
+        carrier = _Carrier(
             matrix_view(data.J),
             matrix_view(data.dJ),
             joint.rotation,
             joint.translation,
             np.ascontiguousarray(frame.placement.rotation),
             frame.placement.translation.copy(),
-            v,
             *joint_support(model, frame.parentJoint),
-            self.rotation,
-            self.position,
-            self.jacobian,
-            self.jacobian_dot,
-            self.velocity,
+        )
+        self.compute: Callable[[], object] = bind(
+            frame_kinematics,
+            stamp,
+            np.array([-1]),
+            carrier,
+            v,
+            motion,
             self.drift,
         )
 
@@ -83,20 +136,9 @@ class FrameKinematics:
 def frame_kinematics(
     stamp: Indices,
     computed: Indices,
-    J_world: Array,
-    J_world_dot: Array,
-    R_joint: Array,
-    p_joint: Array,
-    R_local: Array,
-    p_local: Array,
+    carrier: _Carrier,
     v: Array,
-    columns: Indices,
-    dofs: Indices,
-    R: Array,
-    p: Array,
-    J: Array,
-    J_dot: Array,
-    velocity: Array,
+    motion: FrameMotion,
     drift: Array,
 ) -> None:
     """Write the placement of a frame that is fixed to a joint, and its motion.
@@ -110,6 +152,8 @@ def frame_kinematics(
     if computed[0] == stamp[0]:
         return
     computed[0] = stamp[0]
+    J_world, J_world_dot, R_joint, p_joint, R_local, p_local, columns, dofs = carrier
+    J, J_dot, R, p, velocity = motion
     for i in range(3):
         p[i] = p_joint[i]
         for j in range(3):

@@ -29,8 +29,9 @@ class Decay(NamedTuple):
 
 
 def predicted_decay(rollout: Rollout) -> Decay:
-    """Return ‖e_N(0)‖_W exp(-K_N t), law.md §2, or bounds for a matrix K_N.
+    """Return ‖e_N(0)‖_W exp(-K_N t), or bounds for a matrix K_N.
 
+    ``docs/law.md``, Equations (7) and (13) over a metric, Proposition 2.
     V' = -e_NᵀW K_N e_N lies between -2V times the largest and -2V times the smallest
     eigenvalue of the symmetric part of W K_N relative to W.
     """

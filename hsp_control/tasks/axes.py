@@ -7,7 +7,8 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import TaskError
 from hsp_control.common.kernels import kernel
-from hsp_control.tasks.task import add_feedback
+from hsp_control.tasks.task import Feedback, TaskSample, add_feedback
+from hsp_control.trajectories import TrajectorySample
 
 
 def axis_indices(axes: str | Sequence[str]) -> Indices:
@@ -29,23 +30,17 @@ def track_axes(
     J_point_dot: Array,
     position: Array,
     velocity: Array,
-    x_d: Array,
-    x_d_dot: Array,
-    x_d_ddot: Array,
-    Kp: Array,
-    Kv: Array,
-    offset: Array,
-    J: Array,
-    J_dot: Array,
-    e: Array,
-    e_dot: Array,
-    a_x: Array,
+    desired: TrajectorySample,
+    feedback: Feedback,
+    out: TaskSample,
 ) -> None:
     """Write a point's sample: e = x_d - x, a_x = x_d'' + Kv e' + Kp e + offset.
 
     The rows of the point's Jacobian, (3 or more, nv), and its position and velocity
     are in world axes; ``axes`` selects m of them.
     """
+    x_d, x_d_dot, x_d_ddot = desired
+    J, J_dot, e, e_dot, a_x = out
     for k in range(axes.shape[0]):
         i = axes[k]
         for j in range(J.shape[1]):
@@ -53,4 +48,4 @@ def track_axes(
             J_dot[k, j] = J_point_dot[i, j]
         e[k] = x_d[k] - position[i]
         e_dot[k] = x_d_dot[k] - velocity[i]
-    add_feedback(x_d_ddot, Kp, Kv, offset, e, e_dot, a_x)
+    add_feedback(x_d_ddot, feedback, e, e_dot, a_x)

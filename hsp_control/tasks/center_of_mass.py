@@ -66,11 +66,9 @@ class CenterOfMass(CompiledTask):
             mass.jacobian_dot,
             mass.position,
             mass.velocity,
-            *desired,
-            self.Kp,
-            self.Kv,
-            self.offset,
-            *out,
+            desired,
+            self.feedback,
+            out,
         )
         centroidal = partial(getattr, state, "centroidal")
         return StepPlan((self.trajectory.follow(desired),), (centroidal, write))

@@ -21,10 +21,16 @@ from hsp_control.common.rotations import (
     rotate_back,
 )
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.kinematics import FrameKinematics
+from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import TaskSample, add_feedback, copy_rows, default_name
+from hsp_control.tasks.task import (
+    Feedback,
+    TaskSample,
+    add_feedback,
+    copy_rows,
+    default_name,
+)
 from hsp_control.trajectories import OrientationSample, OrientationTrajectory
 from hsp_control.trajectories.following import Follower
 
@@ -78,16 +84,11 @@ class FrameOrientation(FrameTask):
         desired = OrientationSample.allocate()
         write = bind(
             _frame_orientation,
-            frame.jacobian,
-            frame.jacobian_dot,
-            frame.rotation,
-            frame.velocity[3:],
-            *desired,
-            self.Kp,
-            self.Kv,
-            self.offset,
+            frame.motion,
+            desired,
+            self.feedback,
             np.zeros((ORIENTATION_SCRATCH, 3)),
-            *out,
+            out,
         )
         return self.trajectory.follow(desired), write
 
@@ -184,27 +185,19 @@ def orientation_acceleration(
 
 @kernel
 def _frame_orientation(
-    J_frame: Array,
-    J_frame_dot: Array,
-    R: Array,
-    w: Array,
-    R_d: Array,
-    w_d: Array,
-    w_d_dot: Array,
-    Kp: Array,
-    Kv: Array,
-    offset: Array,
+    frame: FrameMotion,
+    desired: OrientationSample,
+    feedback: Feedback,
     scratch: Array,
-    J: Array,
-    J_dot: Array,
-    e: Array,
-    e_dot: Array,
-    a_x: Array,
+    out: TaskSample,
 ) -> None:
     """Write the sample: the angular acceleration for which e'' = -Kv e' - Kp e."""
-    copy_rows(J_frame, J_frame_dot, 3, J, J_dot)
+    R, w = frame.rotation, frame.velocity[3:]
+    R_d, w_d, w_d_dot = desired
+    J, J_dot, e, e_dot, a_x = out
+    copy_rows(frame.jacobian, frame.jacobian_dot, 3, J, J_dot)
     orientation_error(R, w, R_d, w_d, scratch, e, e_dot)
     for i in range(3):
         a_x[i] = 0.0
-    add_feedback(a_x, Kp, Kv, offset, e, e_dot, a_x)
+    add_feedback(a_x, feedback, e, e_dot, a_x)
     orientation_acceleration(R, w, w_d, w_d_dot, e, e_dot, scratch, a_x)

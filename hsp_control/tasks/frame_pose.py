@@ -10,7 +10,7 @@ from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.rotations import quaternion_from_rotation
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.kinematics import FrameKinematics
+from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.frame_orientation import (
     ORIENTATION_SCRATCH,
     orientation_acceleration,
@@ -18,7 +18,13 @@ from hsp_control.tasks.frame_orientation import (
 )
 from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import TaskSample, add_feedback, copy_rows, default_name
+from hsp_control.tasks.task import (
+    Feedback,
+    TaskSample,
+    add_feedback,
+    copy_rows,
+    default_name,
+)
 from hsp_control.trajectories import PoseSample, PoseTrajectory
 from hsp_control.trajectories.following import Follower
 
@@ -68,17 +74,11 @@ class FramePose(FrameTask):
         desired = np.zeros((8, 3))
         write = bind(
             pose_error_equation,
-            frame.jacobian,
-            frame.jacobian_dot,
-            frame.rotation,
-            frame.position,
-            frame.velocity,
+            frame.motion,
             desired,
-            self.Kp,
-            self.Kv,
-            self.offset,
+            self.feedback,
             np.zeros((ORIENTATION_SCRATCH, 3)),
-            *out,
+            out,
         )
         return self.trajectory.follow(PoseSample.over(desired)), write
 
@@ -106,27 +106,19 @@ class FramePose(FrameTask):
 
 @kernel
 def pose_error_equation(
-    J_frame: Array,
-    J_frame_dot: Array,
-    R: Array,
-    position: Array,
-    velocity: Array,
+    frame: FrameMotion,
     desired: Array,
-    Kp: Array,
-    Kv: Array,
-    offset: Array,
+    feedback: Feedback,
     scratch: Array,
-    J: Array,
-    J_dot: Array,
-    e: Array,
-    e_dot: Array,
-    a_x: Array,
+    out: TaskSample,
 ) -> None:
     """Write the sample of a pose task; gains may couple position and orientation.
 
     ``desired`` has shape (8, 3): x, x', x'', R (three rows), ω, ω', see
     `PoseSample.over`.
     """
+    J_frame, J_frame_dot, R, position, velocity = frame
+    J, J_dot, e, e_dot, a_x = out
     copy_rows(J_frame, J_frame_dot, 0, J, J_dot)
     for i in range(3):
         e[i] = desired[0, i] - position[i]
@@ -136,5 +128,5 @@ def pose_error_equation(
     R_d, w_d, w_d_dot = desired[3:6], desired[6], desired[7]
     w, angle, angle_dot, turning = velocity[3:], e[3:], e_dot[3:], a_x[3:]
     orientation_error(R, w, R_d, w_d, scratch, angle, angle_dot)
-    add_feedback(a_x, Kp, Kv, offset, e, e_dot, a_x)
+    add_feedback(a_x, feedback, e, e_dot, a_x)
     orientation_acceleration(R, w, w_d, w_d_dot, angle, angle_dot, scratch, turning)

@@ -76,11 +76,9 @@ class FramePosition(FrameTask):
             frame.jacobian_dot,
             frame.position,
             frame.velocity,
-            *desired,
-            self.Kp,
-            self.Kv,
-            self.offset,
-            *out,
+            desired,
+            self.feedback,
+            out,
         )
         return self.trajectory.follow(desired), write
 

@@ -14,7 +14,7 @@ from hsp_control.common.step_plan import StepPlan
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.configuration_space import joint_displacements
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import CompiledTask, TaskSample, add_feedback
+from hsp_control.tasks.task import CompiledTask, Feedback, TaskSample, add_feedback
 from hsp_control.trajectories import Trajectory, TrajectorySample
 from hsp_control.trajectories.following import stay
 
@@ -98,12 +98,10 @@ class JointPosture(CompiledTask):
             state.v,
             self._reference,
             self._rows,
-            *sample,
-            self.Kp,
-            self.Kv,
-            self.offset,
+            sample,
+            self.feedback,
             np.zeros(self.robot.nv),
-            *out,
+            out,
         )
         follow = stay if displacement is None else displacement.follow(sample)
         return StepPlan((follow,), (write,))
@@ -137,20 +135,14 @@ def _joint_posture(
     v: Array,
     reference: Array,
     joints: Indices,
-    displacement: Array,
-    displacement_dot: Array,
-    displacement_ddot: Array,
-    Kp: Array,
-    Kv: Array,
-    offset: Array,
+    desired: TrajectorySample,
+    feedback: Feedback,
     away: Array,
-    J: Array,
-    J_dot: Array,
-    e: Array,
-    e_dot: Array,
-    a_x: Array,
+    out: TaskSample,
 ) -> None:
     """Write the sample: e = displacement - (q ⊖ reference), within ±π if continuous."""
+    displacement, displacement_dot, displacement_ddot = desired
+    J, J_dot, e, e_dot, a_x = out
     joint_displacements(q, reference, joints, away)
     for k in range(joints.shape[0]):
         for j in range(J.shape[1]):
@@ -161,4 +153,4 @@ def _joint_posture(
         if joints[k, 2] == 2:
             e[k] = atan2(sin(e[k]), cos(e[k]))
         e_dot[k] = displacement_dot[k] - v[i]
-    add_feedback(displacement_ddot, Kp, Kv, offset, e, e_dot, a_x)
+    add_feedback(displacement_ddot, feedback, e, e_dot, a_x)

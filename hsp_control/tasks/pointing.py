@@ -12,10 +12,10 @@ from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.rotations import cross, rotate, rotate_back
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.kinematics import FrameKinematics
+from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.frame_task import FrameTask
 from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import TaskSample, add_feedback, default_name
+from hsp_control.tasks.task import Feedback, TaskSample, add_feedback, default_name
 from hsp_control.trajectories import OrientationSample, OrientationTrajectory
 from hsp_control.trajectories.following import Follower
 
@@ -91,16 +91,11 @@ class Pointing(FrameTask):
             _pointing,
             self.axis,
             self._normals,
-            frame.jacobian,
-            frame.jacobian_dot,
-            frame.rotation,
-            frame.velocity[3:],
-            *desired,
-            self.Kp,
-            self.Kv,
-            self.offset,
+            frame.motion,
+            desired,
+            self.feedback,
             np.zeros((14, 3)),
-            *out,
+            out,
         )
         return self.trajectory.follow(desired), write
 
@@ -119,22 +114,11 @@ class Pointing(FrameTask):
 def _pointing(
     axis: Array,
     normals: Array,
-    J_frame: Array,
-    J_frame_dot: Array,
-    R: Array,
-    w: Array,
-    R_d: Array,
-    w_d: Array,
-    w_d_dot: Array,
-    Kp: Array,
-    Kv: Array,
-    offset: Array,
+    frame: FrameMotion,
+    desired: OrientationSample,
+    feedback: Feedback,
     scratch: Array,
-    J: Array,
-    J_dot: Array,
-    e: Array,
-    e_dot: Array,
-    a_x: Array,
+    out: TaskSample,
 ) -> None:
     """Write the sample.
 
@@ -148,6 +132,10 @@ def _pointing(
     where s Qᵀu = -Qᵀ(Kv Q n' + Kp n_xy) for u = -Kv y' - Kp y. Only the terms of
     second order in n' grow towards the antipode; they are kept bounded.
     """
+    J_frame, J_frame_dot, R = frame.jacobian, frame.jacobian_dot, frame.rotation
+    w = frame.velocity[3:]
+    R_d, w_d, w_d_dot = desired
+    J, J_dot, e, e_dot, a_x = out
     m, c0, c1 = scratch[0], scratch[1], scratch[2]
     w_rel, m_rel, n, n_dot, n_ddot_free, turn, moved = (
         scratch[3],
@@ -205,9 +193,10 @@ def _pointing(
         e_dot[k] = e_dot_scaled[k] / s
         zero[k] = 0.0
     _stereographic(n, e)
-    add_feedback(zero, Kp, Kv, zero, e_scaled, e_dot_scaled, wanted)
+    gains = Feedback(feedback.Kp, feedback.Kv, zero)
+    add_feedback(zero, gains, e_scaled, e_dot_scaled, wanted)
     for k in range(2):
-        wanted[k] += s * offset[k]
+        wanted[k] += s * feedback.offset[k]
 
     # The tangent vectors R_dᵀc0 and R_dᵀc1: w' along c1 accelerates n along the first,
     # w' along c0 against the second.

@@ -1,7 +1,5 @@
 """The task of a frame's pose relative to another frame, as for two hands on a part."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hsp_control.common.arrays import Array
@@ -11,36 +9,12 @@ from hsp_control.common.native import bind
 from hsp_control.common.rotations import quaternion_from_rotation
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.kinematics import FrameKinematics
+from hsp_control.robot.kinematics import FrameMotion
 from hsp_control.tasks.frame_orientation import ORIENTATION_SCRATCH
 from hsp_control.tasks.frame_pose import pose_error_equation
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.task import CompiledTask, TaskSample, default_name
 from hsp_control.trajectories import PoseSample, PoseTrajectory
-
-
-class RelativeKinematics(NamedTuple):
-    """The motion of a frame relative to a reference frame, in the reference's axes.
-
-    Attributes:
-        jacobian: J, linear before angular rows, shape (6, nv).
-        jacobian_dot: J', shape (6, nv).
-        rotation: Reference ← frame, shape (3, 3).
-        position: The frame's origin [m], shape (3,).
-        velocity: J v [m/s, rad/s], shape (6,).
-    """
-
-    jacobian: Array
-    jacobian_dot: Array
-    rotation: Array
-    position: Array
-    velocity: Array
-
-    @classmethod
-    def allocate(cls, nv: int) -> "RelativeKinematics":
-        """Return zeros."""
-        matrices = np.zeros((6, nv)), np.zeros((6, nv)), np.zeros((3, 3))
-        return cls(*matrices, np.zeros(3), np.zeros(6))
 
 
 class RelativePose(CompiledTask):
@@ -95,19 +69,17 @@ class RelativePose(CompiledTask):
 
     def _step_plan(self, state: RobotState, out: TaskSample) -> StepPlan:
         frame, reference = state.frame(self.frame), state.frame(self.reference)
-        desired, relative = np.zeros((8, 3)), RelativeKinematics.allocate(self.robot.nv)
+        desired, relative = np.zeros((8, 3)), FrameMotion.allocate(self.robot.nv)
         relate = bind(
-            _relative_kinematics, *_kinematics(frame, reference), state.v, *relative
+            _relative_kinematics, frame.motion, reference.motion, state.v, relative
         )
         write = bind(
             pose_error_equation,
-            *relative,
+            relative,
             desired,
-            self.Kp,
-            self.Kv,
-            self.offset,
+            self.feedback,
             np.zeros((ORIENTATION_SCRATCH, 3)),
-            *out,
+            out,
         )
         follow = self.trajectory.follow(PoseSample.over(desired))
         return StepPlan((follow,), (frame.compute, reference.compute, relate, write))
@@ -130,46 +102,16 @@ class RelativePose(CompiledTask):
             actual[3:] *= -1.0
         return desired, actual
 
-    def _relative(self, state: RobotState) -> RelativeKinematics:
-        frames = state.frame(self.frame), state.frame(self.reference)
-        relative = RelativeKinematics.allocate(self.robot.nv)
-        _relative_kinematics(*_kinematics(*frames), state.v, *relative)
+    def _relative(self, state: RobotState) -> FrameMotion:
+        frame, reference = state.frame(self.frame), state.frame(self.reference)
+        relative = FrameMotion.allocate(self.robot.nv)
+        _relative_kinematics(frame.motion, reference.motion, state.v, relative)
         return relative
-
-
-_PairKinematics = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
-
-
-def _kinematics(frame: FrameKinematics, reference: FrameKinematics) -> _PairKinematics:
-    """Return J, J', R and p of the frame, then those of the reference."""
-    return (
-        frame.jacobian,
-        frame.jacobian_dot,
-        frame.rotation,
-        frame.position,
-        reference.jacobian,
-        reference.jacobian_dot,
-        reference.rotation,
-        reference.position,
-    )
 
 
 @kernel
 def _relative_kinematics(
-    J_f: Array,
-    J_f_dot: Array,
-    R_f: Array,
-    p_f: Array,
-    J_r: Array,
-    J_r_dot: Array,
-    R_r: Array,
-    p_r: Array,
-    v: Array,
-    J: Array,
-    J_dot: Array,
-    R: Array,
-    p: Array,
-    velocity: Array,
+    frame: FrameMotion, reference: FrameMotion, v: Array, out: FrameMotion
 ) -> None:
     """Write the kinematics of frame f relative to frame r, in the axes of r.
 
@@ -177,6 +119,9 @@ def _relative_kinematics(
     (angular rows of J_r) × d: J = R_rᵀ K. Since (R_rᵀ)' = -R_rᵀ[w_r]×,
     J' = R_rᵀ(K' - w_r × K).
     """
+    J_f, J_f_dot, R_f, p_f, _ = frame
+    J_r, J_r_dot, R_r, p_r, _ = reference
+    J, J_dot, R, p, velocity = out
     n = v.shape[0]
     for i in range(3):
         p[i] = 0.0

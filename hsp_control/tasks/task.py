@@ -54,6 +54,20 @@ class TaskSample(NamedTuple):
         return TaskSample(*(array[start:stop] for array in self))
 
 
+class Feedback(NamedTuple):
+    """Kv e' + Kp e + offset: a task's feedback, as one argument of a kernel.
+
+    Attributes:
+        Kp: Position gain, shape (m, m) [1/s²].
+        Kv: Velocity gain, shape (m, m) [1/s].
+        offset: Added acceleration, shape (m,), see `Task`.
+    """
+
+    Kp: Array
+    Kv: Array
+    offset: Array
+
+
 class Task(ABC):
     """e'' + Kv e' + Kp e + offset = 0: a task with an exactly linear error equation.
 
@@ -163,6 +177,11 @@ class Task(ABC):
         be m.
         """
 
+    @property
+    def feedback(self) -> Feedback:
+        """The gains and the offset, for kernels."""
+        return Feedback(self.Kp, self.Kv, self.offset)
+
     def _out(self, out: TaskSample | None) -> TaskSample:
         """Return ``out``, or a new sample if it is None."""
         return TaskSample.allocate(self.rows, self.robot.nv) if out is None else out
@@ -195,7 +214,7 @@ class CompiledTask(Task):
         """Return J, J', e, e' and a_x at a state; see `Task.evaluate`."""
         if out is None:
             out = TaskSample.allocate(self.rows, self.robot.nv)
-        plan = self._compiled(state, out)
+        plan = self._compiled.get(state, out)
         for follow in plan.follow:
             follow(state.t)
         for write in plan.write:
@@ -222,14 +241,13 @@ def copy_rows(
 @kernel
 def add_feedback(
     feed_forward: Array,
-    Kp: Array,
-    Kv: Array,
-    offset: Array,
+    feedback: Feedback,
     e: Array,
     e_dot: Array,
     out: Array,
 ) -> None:
     """Write feed_forward + offset + Kv e' + Kp e; ``out`` may be ``feed_forward``."""
+    Kp, Kv, offset = feedback
     for i in range(e.shape[0]):
         total = feed_forward[i] + offset[i]
         for j in range(e.shape[0]):

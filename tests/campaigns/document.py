@@ -55,8 +55,8 @@ def _states(found: dict[str, dict[str, Any]]) -> str:
 
 def _files(found: dict[str, dict[str, Any]]) -> str:
     rows = [
-        "| mutated | cases | fine | one clear error | tracebacks | unclear | crashes | "
-        "hangs | slowest [s] |",
+        "| mutated | cases | success | one clear error | tracebacks | unclear | "
+        "crashes | hangs | slowest [s] |",
         "|---|--:|--:|--:|--:|--:|--:|--:|--:|",
     ]
     names = {"yaml": "configurations", "urdf": "URDFs and meshes", "logs": "logs"}
@@ -72,7 +72,7 @@ def _files(found: dict[str, dict[str, Any]]) -> str:
 
 
 def _faults(found: dict[str, dict[str, Any]]) -> str:
-    rows = ["| fault | cases | what came of it | wrong |", "|---|--:|---|--:|"]
+    rows = ["| fault | cases | result | wrong |", "|---|--:|---|--:|"]
     names = {
         "full_disk": "a disk that fills while a log is saved over another",
         "cut_log": "a log cut at a random byte",

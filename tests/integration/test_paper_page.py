@@ -100,7 +100,7 @@ def log_channels(number: int, run: Rollout) -> dict[str, float]:
         "largest self-motion from 5 s on": run["null_space_norm"][late].max(),
         "largest ‖e_N‖": run["null_space_norm"].max(),
         "‖e_N‖ at the end": run["null_space_norm"][-1],
-        "least det(J Jᵀ)": det.min(),
+        "smallest det(J Jᵀ)": det.min(),
         "at": run.t[det.argmin()],
         "largest effort": np.abs(run.tau).max(),
         "largest drift of an angle from one turn to the next": drift(run),

@@ -731,7 +731,7 @@ def test_proposition_3_q_converges_to_the_constrained_minimum(
 
 @pytest.mark.parametrize(("which", "metric"), HELD_RUNS)
 def test_proposition_3_the_cost_falls(which: str, metric: str) -> None:
-    """f' = -‖Pg‖²_W + gᵀW e_N while the end effector is held (law.md §2).
+    """f' = -‖Pg‖²_W + gᵀW e_N while the end effector is held (docs/law.md).
 
     Once e_N has died f falls monotonically, to rounding.
     """

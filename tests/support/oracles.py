@@ -45,7 +45,8 @@ def pseudo_inverse(J: Array, W: Array) -> Array:
 def bounded_pseudo_inverse(J: Array, W: Array, threshold: float) -> Array:
     """Return J# with J's spectrum in the metric inverted by s q(s²), for any rank.
 
-    q(x) = 1/x from threshold² on, (2 - x/threshold²)/threshold² below (law.md §4).
+    q(x) = 1/x from threshold² on, (2 - x/threshold²)/threshold² below:
+    ``docs/law.md``, Near singularities.
     """
     L = np.linalg.cholesky(W)
     U, s, Vt = np.linalg.svd(J @ np.linalg.inv(L).T, full_matrices=False)
@@ -75,7 +76,7 @@ def law(
     W: Array,
     W_dot: Array,
 ) -> Law:
-    """Return the law over a metric in its short form, law.md §2."""
+    """Return the law over a metric in the short form of ``docs/law.md``."""
     W_inverse = np.linalg.inv(W)
     Lambda = np.linalg.inv(J @ W_inverse @ J.T)
     J_sharp = W_inverse @ J.T @ Lambda

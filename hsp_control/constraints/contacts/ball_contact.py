@@ -18,7 +18,7 @@ class BallContact(Contact):
 
     The material point in contact, at -r n from the centre, does not slip; it is another
     point at the next moment. Holding the centre still instead adds a null-space error
-    of 0.2 rad/s on Solo (theory.md §7).
+    of 0.2 rad/s on Solo.
 
     Attributes:
         radius: r [m].

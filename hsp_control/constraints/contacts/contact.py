@@ -21,9 +21,9 @@ class Contact(ABC):
     """A part of the robot that rests on a plane of the world.
 
     Its rows keep it still, J a + J'v = -Kd J v: damping without stiffness, since
-    stiffness would fight the small slip of a real contact (theory.md §7). Forces act at
-    its points. Each force lies within a friction pyramid inscribed in the Coulomb
-    friction cone, so it pushes and never pulls.
+    stiffness would fight the small slip of a real contact. Forces act at its points.
+    Each force lies within a friction pyramid inscribed in the Coulomb friction cone, so
+    it pushes and never pulls.
 
     To implement one: call ``super().__init__``, set `rows`, write `constrain` and
     `arms`.

@@ -18,7 +18,7 @@ class SurfaceContact(Contact):
 
     Forces act at its corners, so that the centre of pressure stays within the sole and
     the yaw moment is limited by friction. Separate limits on the centre of pressure and
-    on the yaw moment let feet slide by centimetres (theory.md §7).
+    on the yaw moment let feet slide by centimetres.
 
     Attributes:
         points: The corners in the frame, shape (k, 3) [m].

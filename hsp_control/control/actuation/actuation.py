@@ -16,7 +16,8 @@ tasks, the lowest priority first. The constraints are affine in (δ, f):
     holding     ∇G·a ≤ the bound from the barriers of `StaticEffort`
     null space  |P δ| ≤ λ s, see `null_space_rows`
 
-If a* violates no constraint it is the optimum, and no QP is solved. ``law.md`` §5, §6.
+If a* violates no constraint it is the optimum, and no QP is solved. ``docs/law.md``,
+Contacts and floating bases, and Limits.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -37,7 +38,7 @@ from hsp_control.constraints.limits.acceleration_bounds import (
 )
 from hsp_control.control.actuation.deviation_cost import deviation_cost, null_space_rows
 from hsp_control.control.actuation.qp import Rows, solve, stacked
-from hsp_control.control.actuation.status import Status
+from hsp_control.control.actuation.status import EXACT, Status
 from hsp_control.control.actuation.support import Support
 from hsp_control.law import Resolution
 from hsp_control.robot import Robot, RobotState
@@ -161,7 +162,7 @@ class Actuation:
             effort_ok = within(wanted, self._tau_lower, self._tau_upper)
         forces, tau = self._no_forces, wanted
         if self._only_box_limits and motion_ok and effort_ok:
-            return wanted, a, forces, Status.EXACT, 0.0
+            return wanted, a, forces, EXACT, 0.0
         if support.size:
             support.update(state)
             forces, tau = support.minimum_norm_forces(self.base, wanted)
@@ -172,7 +173,7 @@ class Actuation:
         if motion_ok and forces_ok and within(tau, self._tau_lower, self._tau_upper):
             if self._floating:
                 tau[self.base] = 0.0
-            return tau, a, forces, Status.EXACT, 0.0
+            return tau, a, forces, EXACT, 0.0
         if motion_ok and support.size:
             shared = self._redistribute(wanted, forces, support)
             if shared is not None:
@@ -188,7 +189,7 @@ class Actuation:
             0, `MOTION` if a violates its bounds, `EFFORT` if the effort without
             contacts does (read from Pinocchio's data), or the sum of both.
         """
-        return 0.0 if self.limits is None else self._check(state, a)()
+        return 0.0 if self.limits is None else self._check.get(state, a)()
 
     def _compile_check(self, state: RobotState, a: Array) -> Callable[[], float]:
         assert self.limits is not None

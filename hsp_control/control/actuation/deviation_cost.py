@@ -20,7 +20,7 @@ from hsp_control.null_space.metrics.metric import IDENTITY
 _ONE_LEVEL, _SEVERAL_LEVELS = 1e-6, 1e-8
 """Cost of null-space deviation relative to the first level, with one level and with
 several. The smaller it is, the stricter the priorities; at 1e-6 an error of 1e-3 m/s²
-remains in the task (theory.md §6)."""
+remains in the task (docs/limits.md)."""
 
 
 class DeviationCost(NamedTuple):

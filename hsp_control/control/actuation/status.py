@@ -14,3 +14,7 @@ class Status(IntEnum):
     """The nearest acceleration within the limits; all of them are kept."""
     RELAXED = 3
     """The limits contradict each other: they are relaxed as little as possible."""
+
+
+EXACT = Status.EXACT
+"""For the step: up to Python 3.11 `Status.EXACT` takes 80 ns."""

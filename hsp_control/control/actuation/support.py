@@ -107,7 +107,7 @@ class Support:
             base,
             self.inverse_cost,
             wanted,
-            *self._scratch(base),
+            *self._scratch.get(base),
             self._forces,
             self._tau,
         )

@@ -6,7 +6,7 @@
 The friction feed-forward and the observer's estimate r are an offset of the effort of
 the model, M a + N + friction - r; the controller's limits hold for the sum. The two do
 not cancel each other: the observer gets the effort sent *less* the feed-forward, which
-friction takes (theory.md §8).
+friction takes.
 """
 
 from collections import deque

@@ -18,9 +18,8 @@ class FrictionFeedForward:
     """Adds the friction effort at the desired velocity.
 
     The desired velocity is v_d = J# x_d' + P g, the velocity of the robot once both
-    errors of the law are zero (law.md §2). Measurement noise cancels in it, and a
-    sticking joint is pushed in the desired direction. The Coulomb part is smoothed near
-    zero velocity:
+    errors of the law are zero. Measurement noise cancels in it, and a sticking joint is
+    pushed in the desired direction. The Coulomb part is smoothed near zero velocity:
 
         tau = c tanh(v_d / v_s) + D v_d
 

@@ -2,7 +2,7 @@
 
 The law makes each task's error, and the null space, a linear system. Sampled, delayed
 and filtered, this system has a spectral radius. It is exact for an exact model, and the
-nonlinear robot agrees closely with it (theory.md §8; ``docs/robustness.md``).
+nonlinear robot agrees closely with it (``docs/robustness.md``).
 """
 
 from collections.abc import Callable

@@ -51,21 +51,21 @@ class CompiledCost(Cost):
 
     def value(self, state: RobotState) -> float:
         """Return f."""
-        return float(self._own_derivatives(state)())
+        return float(self._own_derivatives.get(state)())
 
     def gradient(self, state: RobotState) -> Array:
         """Return ∇f, exact, shape (nv,)."""
-        self._own_derivatives(state)()
+        self._own_derivatives.get(state)()
         return self._own[0].copy()
 
     def gradient_rate(self, state: RobotState) -> Array:
         """Return (∇f)', exact, shape (nv,)."""
-        self._own_derivatives(state)()
+        self._own_derivatives.get(state)()
         return self._own[1].copy()
 
     def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
         """Write ∇f and (∇f)'; see `Cost.differentiate`."""
-        self._derivatives(state, gradient, rate)()
+        self._derivatives.get(state, gradient, rate)()
 
     def _compile_own(self, state: RobotState) -> Derivatives:
         """Return the call that writes into the cost's own arrays."""

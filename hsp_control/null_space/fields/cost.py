@@ -86,7 +86,7 @@ class Cost(NullSpaceField):
             FieldError: If the gradient or its rate is not nv finite numbers.
         """
         self.differentiate(state, out.g, out.g_dot)
-        if not self._descent(metric, form, out)():
+        if not self._descent.get(metric, form, out)():
             raise FieldError(
                 f"cost {self.name!r} has the gradient {self.gradient(state)!r} and the "
                 f"gradient rate {self.gradient_rate(state)!r} at t = {state.t:.6g} s; "

@@ -160,7 +160,7 @@ class WeightedSum(NullSpaceField):
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
         """Write the weighted sums of g and g'; see `NullSpaceField.evaluate`."""
-        for weight, field, sample, weights, add in self._compiled(out):
+        for weight, field, sample, weights, add in self._compiled.get(out):
             field.evaluate(state, metric, form, sample)
             weights[:] = weight.sample(state)
             add()

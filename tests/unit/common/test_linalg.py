@@ -359,10 +359,12 @@ def arguments(name: str) -> tuple[Any, ...]:
             *(np.zeros((6, n)), np.zeros(n)),
         ),
         "frame_kinematics": (
-            *(np.array([2]), np.array([1]), *world),
-            *(np.eye(3), normal(18, 3), turned, normal(22, 3)),
-            *(normal(19, n - 1), index, shared, np.zeros((3, 3)), np.zeros(3)),
-            *(np.zeros((6, n - 1)), np.zeros((6, n - 1)), np.zeros(6), np.zeros(6)),
+            *(np.array([2]), np.array([1])),
+            kinematics._Carrier(
+                *(*world, np.eye(3), normal(18, 3), turned, normal(22, 3)),
+                *(index, shared),
+            ),
+            *(normal(19, n - 1), kinematics.FrameMotion.allocate(n - 1), np.zeros(6)),
         ),
         "_copy_valid": (
             *(0.5, np.array([0.6, 0.8, 3.0]), sample[0], np.zeros(3), np.zeros(n)),

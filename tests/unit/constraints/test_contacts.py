@@ -32,6 +32,7 @@ from hsp_control import (
     JointPosture,
     Limits,
     PointContact,
+    Rk4,
     Robot,
     RobotState,
     Schedule,
@@ -48,6 +49,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.constraints.contacts.unactuated import UnactuatedRows
 from hsp_control.control.actuation import Status
+from hsp_control.control.actuation.support import Support
 from hsp_control.simulation.plants import ContactPlant, RigidContact
 from hsp_control.tasks import TaskSample
 from hsp_control.trajectories import HoldPose
@@ -255,6 +257,56 @@ def test_effort_and_forces_are_one_solution(seed: int) -> None:
     tangential = np.linalg.norm(forces[:, :2], axis=1)
     assert (tangential <= 0.7 * forces[:, 2] + 1e-5).all()
     assert (np.abs(out.tau) <= controller.limits.effort).all()  # type: ignore[union-attr]
+
+
+def test_forces_are_permitted_up_to_the_friction_cone() -> None:
+    """The pyramid touches the cone from within at its edges, with each contact's μ."""
+    frictions = (0.3, 0.9)
+    contacts = [
+        PointContact(solo(), foot, friction=mu)
+        for foot, mu in zip(FEET, frictions, strict=False)
+    ]
+    support = Support(contacts, solo().nv, 20.0)
+    for k, mu in enumerate(frictions):
+        for x, y in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
+            forces = np.array([0.0, 0.0, 5.0, 0.0, 0.0, 5.0])
+            tangential = 5.0 * mu * np.array([x, y]) / np.sqrt(2.0)
+            forces[3 * k : 3 * k + 2] = (1.0 - 1e-12) * tangential
+            assert support.permits(forces)
+            forces[3 * k : 3 * k + 2] = (1.0 + 1e-9) * tangential
+            assert not support.permits(forces)
+    assert not support.permits(np.array([0.0, 0.0, -1.0, 0.0, 0.0, 5.0]))  # it pulls
+
+
+def test_the_log_says_how_much_friction_is_used() -> None:
+    """The largest ‖f_t‖/(μ f_n) of a sole's corners, each sole with its own μ."""
+    robot, frictions = talos(), (0.4, 0.9)
+    contacts = [
+        sole(frame, friction=mu) for frame, mu in zip(SOLES, frictions, strict=True)
+    ]
+    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+    aside = state.centroidal.position + np.array([0.002, 0.005, 0.0])
+    controller = Controller(
+        robot, [CenterOfMass(robot, Hold(aside), GAINS)], contacts=contacts
+    )
+    log = simulate(
+        controller,
+        robot.home(),
+        duration=0.002,
+        log_period=0.001,
+        control_period=0.001,
+        integrator=Rk4(0.001),
+        plant=ContactPlant(robot, [RigidContact(frame) for frame in SOLES]),
+    )
+    for k in range(len(log)):
+        out = controller.compute(robot.state(log.t[k], log.q[k], log.v[k]))
+        for frame, mu, forces in zip(
+            SOLES, frictions, out.forces.reshape(2, 4, 3), strict=True
+        ):
+            ratios = [np.hypot(x, y) / (mu * z) for x, y, z in forces if z > 1e-3]
+            assert 0.01 < max(ratios) <= 1.0
+            used = log[f"contact.{frame}.friction_used"][k]
+            assert used == pytest.approx(max(ratios), rel=1e-6)
 
 
 def test_propositions_hold_for_a_humanoid() -> None:

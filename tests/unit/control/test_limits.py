@@ -81,6 +81,20 @@ def test_bounds_are_the_barriers() -> None:
     np.testing.assert_allclose(a_lower, expected, rtol=1e-14)
 
 
+@given(seeds)
+def test_position_bounds_are_the_barriers_of_both_limits(seed: int) -> None:
+    """h'' + 2αh' + α²h ≥ 0 for the room h to either limit, also beyond it."""
+    robot, rng = panda(), np.random.default_rng(seed)
+    limits = Limits(robot, velocity=None, position_margin=0.0, bandwidth=8.0)
+    lower, upper = robot.position_limits()
+    q = lower + (upper - lower) * rng.uniform(-0.1, 1.1, 7)
+    v = rng.normal(0.0, 2.0, 7)
+    a_lower, a_upper = bounds(limits, q, v)
+    for a, h, side in ((a_lower, q - lower, 1.0), (a_upper, upper - q, -1.0)):
+        barrier = side * a + 16.0 * side * v + 64.0 * h
+        np.testing.assert_allclose(barrier, 0.0, rtol=0, atol=1e-11)
+
+
 def test_too_fast_is_slowed_down_more_steeply() -> None:
     """Beyond the guarded speed the barrier is four times as steep."""
     limits = Limits(panda(), velocity=1.0, position=None, bandwidth=8.0)
@@ -307,6 +321,32 @@ def test_least_violation_is_the_least() -> None:
         )
         least = np.abs(oracle(H, np.zeros(10), rows)[5:]).max()
         assert relaxation == pytest.approx(least, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("kept", "relaxed"),
+    [
+        ("contacts", "distances"),
+        ("contacts", "motion"),
+        ("distances", "motion"),
+        ("motion", "holding"),
+    ],
+)
+def test_what_is_dearer_is_relaxed_less(kept: str, relaxed: str) -> None:
+    """One asks for x = 1, the other for x = -1: contacts, distances, motion, holding.
+
+    The violations of a quadratic cost are in inverse proportion to the costs.
+    """
+    hard = Rows(np.eye(1), np.full(1, -9.0), np.full(1, 9.0))
+    soft = {
+        kept: Rows(np.eye(1), np.ones(1), np.ones(1)),
+        relaxed: Rows(np.eye(1), -np.ones(1), -np.ones(1)),
+    }
+    for order in (soft, dict(reversed(soft.items()))):
+        _, x, relaxation = _relax(hard, order)
+        assert x is not None
+        assert abs(x[0] - 1.0) < 0.11 * abs(x[0] + 1.0)
+        assert relaxation == pytest.approx(abs(x[0] + 1.0), rel=1e-6)
 
 
 def test_effort_rate_needs_to_know_what_went_out() -> None:

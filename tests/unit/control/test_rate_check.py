@@ -86,7 +86,7 @@ def rate(gain: float, **options: Any) -> LinearLoop:
     ],
 )  # fmt: skip
 def test_the_limits_of_theory(make: Any, limit: float) -> None:
-    """theory.md §8, in units of 1/h, to five digits."""
+    """Closed forms of the limits, in units of 1/h, to five digits."""
     assert make(limit * (1.0 - 1e-5) / H).radius() <= 1.0 + 1e-9
     assert make(limit * (1.0 + 1e-5) / H).radius() > 1.0 + 1e-7
 

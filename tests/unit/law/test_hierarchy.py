@@ -35,7 +35,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def lexicographic(x: Numbers, levels: list[int]) -> tuple[Array, Array]:
-    """Return a and e_N by explicit projectors: law.md §4 with pseudo-inverses."""
+    """Return a and e_N of ``docs/law.md``, Priorities, by explicit projectors."""
     n, start = len(x.v), 0
     W_inverse = np.linalg.inv(x.W)
     Q, a = W_inverse, np.zeros(n)

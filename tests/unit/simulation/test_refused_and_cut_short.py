@@ -197,7 +197,7 @@ def test_ctrl_c_before_the_first_row() -> None:
 @pytest.mark.parametrize(
     ("options", "least"),
     [
-        # K_N h = 20 and the loop blows up; 2 is the limit (theory.md §8).
+        # K_N h = 20: the loop diverges; 2 is the limit (docs/law.md, Sampled control).
         ({"control_period": 0.01}, 2),
         ({"control_period": 0.01, "integrator": SemiImplicitEuler(0.01)}, 2),
         ({"integrator": SemiImplicitEuler(0.01)}, 2),

@@ -10,10 +10,13 @@ from hypothesis import strategies as st
 
 from hsp_control import (
     Gains,
+    JointPosture,
+    Robot,
 )
 from hsp_control.common.exceptions import (
     GainError,
 )
+from hsp_control.tasks.gain_ramp import GainRamp
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -30,6 +33,20 @@ def test_gains_in_three_forms() -> None:
     Kp, Kv = Gains([1.0, 2.0], [[3.0, 0.5], [0.1, 4.0]]).matrices(2)
     np.testing.assert_array_equal(Kp, np.diag([1.0, 2.0]))
     np.testing.assert_array_equal(Kv, [[3.0, 0.5], [0.1, 4.0]])
+
+
+def test_a_ramp_leads_both_gains_to_the_new_ones() -> None:
+    """Unchanged before it, the mean of both half-way, exactly the new ones after it."""
+    robot = Robot.load("planar3r")
+    old, new = Gains([4.0, 5.0, 6.0], 7.0), Gains(40.0, [10.0, 20.0, 30.0])
+    task = JointPosture(robot, robot.neutral(), old)
+    first, last = old.matrices(3), new.matrices(3)
+    half = [0.5 * (a + b) for a, b in zip(first, last, strict=True)]
+    ramp = GainRamp(task, new, start=1.0, ramp=0.5)
+    for t, expected in ((0.0, first), (1.0, first), (1.25, half), (1.5, last)):
+        assert ramp.apply(t) is (t == 1.5)
+        np.testing.assert_allclose(task.Kp, expected[0], rtol=1e-14)
+        np.testing.assert_allclose(task.Kv, expected[1], rtol=1e-14)
 
 
 def test_matrices_are_copies() -> None:

@@ -1,0 +1,618 @@
+"""The edits of ``make mutants``, room by room, and the tests that ought to see them."""
+
+from typing import NamedTuple
+
+
+class Mutant(NamedTuple):
+    """One edit that makes the code wrong and keeps it running.
+
+    Attributes:
+        name: What is wrong then.
+        file: The edited file, from the checkout's folder.
+        old: The text that is replaced; it stands in the file once.
+        new: What replaces it.
+        tests: Arguments of pytest: the tests that should go red.
+    """
+
+    name: str
+    file: str
+    old: str
+    new: str
+    tests: str
+
+
+PACKAGE = "hsp_control/"
+COMMON, ROBOT, SHAPES = PACKAGE + "common/", PACKAGE + "robot/", PACKAGE + "geometry/"
+PATHS, TASKS = PACKAGE + "trajectories/", PACKAGE + "tasks/"
+FIELDS = PACKAGE + "null_space/fields/"
+METRICS = PACKAGE + "null_space/metrics/"
+CONTACTS = PACKAGE + "constraints/contacts/"
+LIMITS = PACKAGE + "constraints/limits/"
+LAW, CONTROL = PACKAGE + "law/", PACKAGE + "control/"
+ACTUATION, COMPENSATION = CONTROL + "actuation/", CONTROL + "compensation/"
+SIMULATION, LIVE = PACKAGE + "simulation/", PACKAGE + "live/"
+PLANTS = SIMULATION + "plants/"
+CONFIG, CLI = PACKAGE + "config/", PACKAGE + "cli/"
+
+UNIT = "tests/unit/"
+EVERY_FIELD = UNIT + "null_space/test_every_field.py -k "
+EVERY_SHAPE = UNIT + "null_space/test_clearance_rates.py -k "
+EVERY_TASK = UNIT + "tasks/test_every_task.py -k "
+EVERY_PATH = UNIT + "trajectories/test_trajectories.py -k "
+ON_NUMBERS = UNIT + "law/test_law_on_numbers.py -k "
+ON_ROBOTS = UNIT + "law/test_law_on_robots.py -k "
+OF_LEVELS = UNIT + "law/test_hierarchy.py -k "
+OF_CONTACTS = UNIT + "constraints/test_contacts.py -k "
+OF_LIMITS = UNIT + "control/test_limits.py -k "
+OF_COMPENSATION = UNIT + "control/test_compensation.py -k "
+OF_IMPERFECTIONS = UNIT + "simulation/test_imperfections.py -k "
+
+MUTANTS = (
+    # ---------------------------------------------------------------------- common
+    Mutant(
+        "kept kernels: a called kernel may change",
+        COMMON + "kernel_cache.py",
+        "yield from _function(function, seen)",
+        "yield function.__name__.encode()",
+        UNIT + "common/test_kernel_cache.py -k only_an_edit",
+    ),
+    # ---------------------------------------------------------------- trajectories
+    Mutant(
+        "circle's acceleration with the rate once",
+        PATHS + "circle.py",
+        "acceleration[i] = -rate * rate * radial",
+        "acceleration[i] = -rate * radial",
+        EVERY_PATH + "test_rates_are_those_of_the_motion",
+    ),
+    Mutant(
+        "blend's velocity without s'",
+        PATHS + "blend.py",
+        "velocity[i] = v + s_dot * gap + s * gap_dot",
+        "velocity[i] = v + s * gap_dot",
+        EVERY_PATH + "test_rates_are_those_of_the_motion",
+    ),
+    Mutant(
+        "spline's coefficients without k!",
+        PATHS + "spline.py",
+        "* widths**k / factorial(k)",
+        "* widths**k",
+        EVERY_PATH + "spline",
+    ),
+    # ----------------------------------------------------------------------- robot
+    Mutant(
+        "centre of mass: momentum for velocity",
+        ROBOT + "centroidal.py",
+        "velocity[i] += J[i, j] * v[j]",
+        "velocity[i] += A[i, j] * v[j]",
+        EVERY_TASK + "panda-mass",
+    ),
+    Mutant(
+        "angular momentum: A' about a point at rest",
+        ROBOT + "centroidal.py",
+        "A_dot[4, j] - (z * px - x * pz)",
+        "A_dot[4, j]",
+        EVERY_TASK + "angular_momentum",
+    ),
+    # -------------------------------------------------------------------- geometry
+    Mutant(
+        "clearance: gradient's moment backwards",
+        SHAPES + "closed_form.py",
+        "change += J[a, c] * force[a] + J[3 + a, c] * moment[a]",
+        "change += J[a, c] * force[a] - J[3 + a, c] * moment[a]",
+        EVERY_SHAPE + "panda-sphere",
+    ),
+    Mutant(
+        "clearance: rate without the curvature",
+        SHAPES + "closed_form.py",
+        "slope * n_dot[a] + curvature * d_dot * n[a]",
+        "slope * n_dot[a]",
+        EVERY_SHAPE + "panda-sphere",
+    ),
+    Mutant(
+        "clearance: obstacles at rest",
+        SHAPES + "closed_form.py",
+        "twist[0, a] += own[12 + a]",
+        "twist[0, a] += 0.0 * own[12 + a]",
+        EVERY_SHAPE + "panda-capsule",
+    ),
+    # ----------------------------------------------------------------------- tasks
+    Mutant(
+        "position: e' without the reference's rate",
+        TASKS + "axes.py",
+        "e_dot[k] = x_d_dot[k] - velocity[i]",
+        "e_dot[k] = -velocity[i]",
+        EVERY_TASK + "panda-position",
+    ),
+    Mutant(
+        "orientation without its transport term",
+        TASKS + "frame_orientation.py",
+        "out[i] += w_d_dot[i] - term[i]",
+        "out[i] += w_d_dot[i]",
+        EVERY_TASK + "panda-orientation",
+    ),
+    Mutant(
+        "pose without the reference's acceleration",
+        TASKS + "frame_pose.py",
+        "a_x[i] = desired[2, i]",
+        "a_x[i] = 0.0",
+        EVERY_TASK + "panda-pose",
+    ),
+    Mutant(
+        "pointing: rows' rate without w × c",
+        TASKS + "pointing.py",
+        "J_dot[k, j] += turn[i] * J_frame[3 + i, j]",
+        "J_dot[k, j] += 0.0 * turn[i] * J_frame[3 + i, j]",
+        EVERY_TASK + "panda-direction",
+    ),
+    Mutant(
+        "posture: e' without the reference's rate",
+        TASKS + "joint_posture.py",
+        "e_dot[k] = displacement_dot[k] - v[i]",
+        "e_dot[k] = -v[i]",
+        EVERY_TASK + "panda-posture",
+    ),
+    Mutant(
+        "relative pose: the reference turns backwards",
+        TASKS + "relative_pose.py",
+        "lz -= wx * ky - wy * kx",
+        "lz += wx * ky - wy * kx",
+        EVERY_TASK + "seen",
+    ),
+    Mutant(
+        "angular momentum: the error grows",
+        TASKS + "angular_momentum.py",
+        "out.error_rate[:] = -self.rate * out.error",
+        "out.error_rate[:] = self.rate * out.error",
+        EVERY_TASK + "angular_momentum",
+    ),
+    Mutant(
+        "gains: Kv is not ramped",
+        TASKS + "gain_ramp.py",
+        "w * self._to[1]",
+        "w * self._from[1]",
+        UNIT + "tasks/test_gains.py",
+    ),
+    # ------------------------------------------------------------------ null space
+    Mutant(
+        "joint centering: gradient uphill",
+        FIELDS + "joint_centering.py",
+        "gradient[i] = stiffness[k] * away",
+        "gradient[i] = -stiffness[k] * away",
+        EVERY_FIELD + "joint_centering",
+    ),
+    Mutant(
+        "joint centering: rate without stiffness",
+        FIELDS + "joint_centering.py",
+        "rate[i] = stiffness[k] * v[i]",
+        "rate[i] = v[i]",
+        EVERY_FIELD + "joint_centering",
+    ),
+    Mutant(
+        "limit barrier: the upper limit attracts",
+        FIELDS + "limit_barrier.py",
+        "(slope_lower - slope_upper) / unit[k]",
+        "(slope_lower + slope_upper) / unit[k]",
+        EVERY_FIELD + "limit_barrier",
+    ),
+    Mutant(
+        "limit barrier: rate in another unit",
+        FIELDS + "limit_barrier.py",
+        "/ (unit[k] * unit[k])",
+        "/ unit[k]",
+        EVERY_FIELD + "limit_barrier",
+    ),
+    Mutant(
+        "target posture: d for sin d",
+        FIELDS + "target_posture.py",
+        "gradient[i] = weights[i] * sin(d)",
+        "gradient[i] = weights[i] * d",
+        EVERY_FIELD + "target_posture",
+    ),
+    Mutant(
+        "target posture: rate without cos d",
+        FIELDS + "target_posture.py",
+        "rate[i] = weights[i] * cos(d) * v[i]",
+        "rate[i] = weights[i] * v[i]",
+        EVERY_FIELD + "target_posture",
+    ),
+    Mutant(
+        "equal joint angles: only one joint is pushed",
+        FIELDS + "equal_joint_angles.py",
+        "gradient[j] += slope",
+        "gradient[j] += 0.0 * slope",
+        EVERY_FIELD + "equal_joint_angles",
+    ),
+    Mutant(
+        "equal joint angles: rate's sign",
+        FIELDS + "equal_joint_angles.py",
+        "rate[i] -= slope_dot",
+        "rate[i] += slope_dot",
+        EVERY_FIELD + "equal_joint_angles",
+    ),
+    Mutant(
+        "manipulability: gradient uphill",
+        FIELDS + "manipulability.py",
+        "slope[i, j] *= outer",
+        "slope[i, j] *= -outer",
+        EVERY_FIELD + "manipulability",
+    ),
+    Mutant(
+        "manipulability: rate without that of f",
+        FIELDS + "manipulability.py",
+        "outer * slope_rate[i, j] + outer_rate * slope[i, j]",
+        "outer * slope_rate[i, j]",
+        EVERY_FIELD + "manipulability",
+    ),
+    Mutant(
+        "inverse condition: gradient's second term",
+        FIELDS + "conditioning.py",
+        "inner = J[i, j] / size - Z[i, j] / stretch",
+        "inner = J[i, j] / size + Z[i, j] / stretch",
+        EVERY_FIELD + "inverse_condition",
+    ),
+    Mutant(
+        "inverse condition: rate without that of f",
+        FIELDS + "conditioning.py",
+        "2.0 * (phi_dot * inner + phi * inner_dot)",
+        "2.0 * phi * inner_dot",
+        EVERY_FIELD + "inverse_condition",
+    ),
+    Mutant(
+        "transmission: gradient uphill",
+        FIELDS + "transmission.py",
+        "slope[i, j] = outer * change",
+        "slope[i, j] = -outer * change",
+        EVERY_FIELD + "transmission",
+    ),
+    Mutant(
+        "transmission: rate of a direction at rest",
+        FIELDS + "transmission.py",
+        "(y_dot[i] * z[j] + y[i] * z_dot[j])",
+        "(y[i] * z_dot[j])",
+        EVERY_FIELD + "transmission",
+    ),
+    Mutant(
+        "point distance: the obstacle attracts",
+        FIELDS + "point_distance.py",
+        "gradient[i] += scale * J[a, i] * r",
+        "gradient[i] -= scale * J[a, i] * r",
+        EVERY_FIELD + "point_distance",
+    ),
+    Mutant(
+        "point distance: rate with 2 for 4",
+        FIELDS + "point_distance.py",
+        "r_dot - 4.0 * nearing / square * r",
+        "r_dot - 2.0 * nearing / square * r",
+        EVERY_FIELD + "point_distance",
+    ),
+    Mutant(
+        "weight: the ramp's rate without its duration",
+        FIELDS + "weight.py",
+        "slope = 30.0 * s * s * (1.0 - s) ** 2 / self.duration",
+        "slope = 30.0 * s * s * (1.0 - s) ** 2",
+        UNIT + "null_space/test_weights.py -k ramp_and_its_rate",
+    ),
+    Mutant(
+        "g' without W'",
+        FIELDS + "cost.py",
+        "g_dot[i] += W_dot[i, j] * g[j]",
+        "g_dot[i] += 0.0 * W_dot[i, j] * g[j]",
+        EVERY_FIELD + "target_posture",
+    ),
+    Mutant(
+        "M' without Cᵀ",
+        METRICS + "mass_matrix.py",
+        "W_dot[i, j] = C[i, j] + C[j, i]",
+        "W_dot[i, j] = C[i, j]",
+        ON_ROBOTS + "applies_the_short_form",
+    ),
+    Mutant(
+        "metric of coordinates: A Aᵀ for AᵀA",
+        METRICS + "constant.py",
+        "return cls(matrix.T @ matrix)",
+        "return cls(matrix @ matrix.T)",
+        ON_ROBOTS + "coordinates_metric",
+    ),
+    # ----------------------------------------------------------------- constraints
+    Mutant(
+        "contact: its velocity grows",
+        CONTACTS + "contact.py",
+        "a[k] = -damping * total",
+        "a[k] = damping * total",
+        OF_CONTACTS + "rows_are_the_velocity",
+    ),
+    Mutant(
+        "floating base: rows at rest",
+        CONTACTS + "unactuated.py",
+        "(U.T @ M_dot + U_dot.T @ M) / self._mass",
+        "(U.T @ M_dot) / self._mass",
+        OF_CONTACTS + "unactuated_rows",
+    ),
+    Mutant(
+        "velocity limit ignored",
+        LIMITS + "acceleration_bounds.py",
+        "rising = 2.0 * bandwidth * (velocity[i] - v[i])",
+        "rising = np.inf",
+        OF_LIMITS + "bounds_are_the_barriers",
+    ),
+    Mutant(
+        "position barrier: damping drives",
+        LIMITS + "acceleration_bounds.py",
+        "low = -bandwidth * bandwidth * (position - lower[i]) - damping",
+        "low = -bandwidth * bandwidth * (position - lower[i]) + damping",
+        OF_LIMITS + "position_bounds",
+    ),
+    Mutant(
+        "minimum distance counted from contact",
+        LIMITS + "minimum_distance.py",
+        "h = d - self.minimum",
+        "h = d",
+        OF_LIMITS + "distance_rows",
+    ),
+    Mutant(
+        "static effort: slope's sign",
+        LIMITS + "static_effort.py",
+        "return -side[:, None] * slope[i], b",
+        "return side[:, None] * slope[i], b",
+        UNIT + "control/test_deviation_cost.py -k static_rows",
+    ),
+    # ------------------------------------------------------------------------- law
+    Mutant(
+        "law without J'",
+        LAW + "law.py",
+        "a_x[k] - drift[k] - missing[k]",
+        "a_x[k] - missing[k]",
+        ON_NUMBERS + "short_form",
+    ),
+    Mutant(
+        "law without g'",
+        LAW + "law.py",
+        "u[i] += g_dot[i] - bent[i]",
+        "u[i] -= bent[i]",
+        ON_NUMBERS + "short_form",
+    ),
+    Mutant(
+        "law without J'ᵀ",
+        LAW + "law.py",
+        "multiply_transposed(J_dot, w, bent)",
+        "multiply_transposed(J, w, bent)",
+        ON_NUMBERS + "short_form",
+    ),
+    Mutant(
+        "law without W'",
+        LAW + "law.py",
+        "bent[i] -= u[i]",
+        "bent[i] -= 0.0 * u[i]",
+        ON_NUMBERS + "short_form",
+    ),
+    Mutant(
+        "e_N of W' not halved",
+        LAW + "law.py",
+        "lowered[i] = x[i] - 0.5 * e_N[i]",
+        "lowered[i] = x[i] - e_N[i]",
+        ON_NUMBERS + "short_form",
+    ),
+    Mutant(
+        "K_N transposed",
+        LAW + "law.py",
+        "multiply(K_N, e_N, u)",
+        "multiply_transposed(K_N, e_N, u)",
+        ON_NUMBERS + "short_form",
+    ),
+    Mutant(
+        "inverse not bounded in the singularity",
+        LAW + "pseudo_inverse.py",
+        "inverse = 1.0 / x if x >= floor else (2.0 - x / floor) / floor",
+        "inverse = 1.0 / x",
+        UNIT + "law/test_pseudo_inverse.py -k bound",
+    ),
+    Mutant(
+        "levels: a lower one disturbs a higher one",
+        LAW + "hierarchy.py",
+        "Q[i, j] -= total",
+        "Q[i, j] -= 0.5 * total",
+        OF_LEVELS + "conflict_leaves_the_upper_level_exact",
+    ),
+    Mutant(
+        "levels: the field without W'",
+        LAW + "hierarchy.py",
+        "Y[i] += W_dot[i, j] * (x[j] - 0.5 * e_N[j])",
+        "Y[i] += 0.0 * W_dot[i, j] * (x[j] - 0.5 * e_N[j])",
+        OF_LEVELS + "recursion",
+    ),
+    # --------------------------------------------------------------------- control
+    Mutant(
+        "effort limit ignored",
+        ACTUATION + "actuation.py",
+        "self._tau_upper[:] = self.limits.effort",
+        "self._tau_upper[:] = np.inf",
+        OF_LIMITS + "contradiction",
+    ),
+    Mutant(
+        "effort rate ignored",
+        ACTUATION + "actuation.py",
+        "step = self.limits.effort_rate * period",
+        "step = self.limits.effort_rate * np.inf",
+        OF_LIMITS + "effort_rate_needs",
+    ),
+    Mutant(
+        "distances give way before motion",
+        ACTUATION + "actuation.py",
+        '"distances": 30.0',
+        '"distances": 0.03',
+        OF_LIMITS + "relaxed",
+    ),
+    Mutant(
+        "friction cone with 2μ",
+        ACTUATION + "support.py",
+        "side = contact.friction / np.sqrt(2.0)",
+        "side = 2.0 * contact.friction / np.sqrt(2.0)",
+        OF_CONTACTS + "friction_cone",
+    ),
+    Mutant(
+        "predictor: its lead time dropped",
+        COMPENSATION + "command.py",
+        "return t + predictor.effort_delay * period, q, v",
+        "return t, q, v",
+        OF_COMPENSATION + "at_which_its_effort_acts",
+    ),
+    Mutant(
+        "predictor: leads by the sensors' delay too",
+        COMPENSATION + "command.py",
+        "return t + predictor.effort_delay * period, q, v",
+        "return t + predictor.periods * period, q, v",
+        OF_COMPENSATION + "at_which_its_effort_acts",
+    ),
+    Mutant(
+        "predictor: one period too short",
+        COMPENSATION + "command.py",
+        "islice(self._under_way, 1, None)",
+        "islice(self._under_way, 2, None)",
+        OF_COMPENSATION + "predictor",
+    ),
+    Mutant(
+        "observer adds what it should cancel",
+        COMPENSATION + "command.py",
+        "offset = offset - own.momentum_observer.cancelled",
+        "offset = offset + own.momentum_observer.cancelled",
+        OF_COMPENSATION + "what_is_cancelled",
+    ),
+    Mutant(
+        "velocity filter at half its cut-off",
+        COMPENSATION + "velocity_filter.py",
+        "pole = exp(-2.0 * pi * self.cutoff * period)",
+        "pole = exp(-pi * self.cutoff * period)",
+        OF_COMPENSATION + "half_of_the_power",
+    ),
+    Mutant(
+        "friction feed-forward brakes",
+        COMPENSATION + "friction_feed_forward.py",
+        "return np.asarray(coulomb + friction.viscous * v)",
+        "return -np.asarray(coulomb + friction.viscous * v)",
+        OF_COMPENSATION + "known_friction",
+    ),
+    Mutant(
+        "integral action winds up",
+        COMPENSATION + "integral_action.py",
+        "grows = e * integral >= 0.0 if saturated else False",
+        "grows = False",
+        OF_COMPENSATION + "unwinds",
+    ),
+    Mutant(
+        "rate check: drives without delay",
+        COMPENSATION + "linear_loop.py",
+        "self.share * drives[0]",
+        "self.share * drives[-1]",
+        UNIT + "control/test_rate_check.py -k limits_of_theory",
+    ),
+    # ------------------------------------------------------------------ simulation
+    Mutant(
+        "RK4: weights of k3 and k4 swapped",
+        ROBOT + "integrators.py",
+        "(k1 + 2 * k2 + 2 * k3 + k4)",
+        "(k1 + 2 * k2 + k3 + 2 * k4)",
+        UNIT + "simulation/test_integrators.py -k test_order",
+    ),
+    Mutant(
+        "the effort of the period before is held",
+        SIMULATION + "loops.py",
+        "q, v = plant.advance(t, stop, tau)",
+        "q, v = plant.advance(t, stop, held if t > times[0] else tau)\n"
+        "            held = tau",
+        UNIT + "simulation/test_closed_loop.py -k sampled_control_holds",
+    ),
+    Mutant(
+        "the row's period for the control period",
+        SIMULATION + "loops.py",
+        "period = (end - start) / periods",
+        "period = end - start",
+        OF_COMPENSATION + "third_order",
+    ),
+    Mutant(
+        "drives: delay one period short",
+        PLANTS + "drives/effort_delay.py",
+        "while len(self._queue) <= self.periods:",
+        "while len(self._queue) < max(self.periods, 1):",
+        OF_IMPERFECTIONS + "a_late_drive",
+    ),
+    Mutant(
+        "payload: inertia of a ball halved",
+        PLANTS + "model_changes/payload.py",
+        "inertia = 0.4 * self.mass",
+        "inertia = 0.2 * self.mass",
+        OF_IMPERFECTIONS + "payload",
+    ),
+    Mutant(
+        "friction without sticking",
+        PLANTS + "sticking_plant.py",
+        "if rest > c[i]:",
+        "if rest > 0.0:",
+        OF_IMPERFECTIONS + "a_cart_slides",
+    ),
+    Mutant(
+        "log: friction_used without μ",
+        SIMULATION + "recorder.py",
+        "ratios = tangential[loaded] / (contact.friction * local[loaded, 2])",
+        "ratios = tangential[loaded] / local[loaded, 2]",
+        OF_CONTACTS + "how_much_friction",
+    ),
+    Mutant(
+        "journal: checksum ignored",
+        SIMULATION + "journal.py",
+        "if len(payload) < length or zlib.crc32(payload, zlib.crc32(kind)) != check:",
+        "if len(payload) < length:",
+        UNIT + "simulation/test_journal.py -k changed_byte",
+    ),
+    Mutant(
+        "salvage: checksum ignored",
+        SIMULATION + "salvage.py",
+        "if len(packed) != entry.size or zlib.crc32(packed) != entry.checksum:",
+        "if len(packed) != entry.size:",
+        UNIT + "simulation/test_log.py -k salvage",
+    ),
+    # ------------------------------------------------------------------------ live
+    Mutant(
+        "packets: checksum ignored",
+        LIVE + "packets.py",
+        "!= zlib.crc32(body):",
+        "!= zlib.crc32(body) and not body:",
+        UNIT + "live/test_live_udp.py -k one_bit",
+    ),
+    Mutant(
+        "watchdog one period early",
+        LIVE + "simulated_robot.py",
+        "if self._missing > self.watchdog:",
+        "if self._missing >= self.watchdog:",
+        UNIT + "live/test_safe_stop.py -k watchdog_counts",
+    ),
+    Mutant(
+        "safe stop: damping drives",
+        LIVE + "safe_stop.py",
+        "braking = -settings.damping * (state.mass_matrix @ v)",
+        "braking = settings.damping * (state.mass_matrix @ v)",
+        UNIT + "live/test_safe_stop.py -k takes_energy",
+    ),
+    # -------------------------------------------------------------- config and cli
+    Mutant(
+        "configuration: unknown keys accepted",
+        CONFIG + "models/base.py",
+        'extra="forbid"',
+        'extra="ignore"',
+        UNIT + "config/test_experiment.py -k every_mistake",
+    ),
+    Mutant(
+        "command line: --set ignored",
+        CLI + "commands.py",
+        "options.config, *options.overrides, strict=strict",
+        "options.config, strict=strict",
+        UNIT + "cli/test_cli.py -k a_log_that_numpy_alone",
+    ),
+    Mutant(
+        "command line: --strict ignored",
+        CLI + "commands.py",
+        "    strict = options.strict or bool(options.allow)",
+        "    strict = bool(options.allow)",
+        "tests/integration/test_trust.py -k refused",
+    ),
+)
+"""All of them, from the lowest room to the highest."""

@@ -1,0 +1,106 @@
+"""The mutants fit the code, and their runner says truly what became of each."""
+
+from pathlib import Path
+
+import mutants
+import pytest
+from mutant_list import MUTANTS, Mutant
+from places import ROOT
+
+every_mutant = pytest.mark.parametrize("mutant", MUTANTS, ids=lambda m: m.name)
+
+# --- the list ------------------------------------------------------------------------
+
+
+@every_mutant
+def test_the_edit_fits_one_place_and_is_still_python(mutant: Mutant) -> None:
+    text = (ROOT / mutant.file).read_text(encoding="utf-8")
+    changed = mutants.mutated(mutant, text)
+    assert changed != text
+    compile(changed, mutant.file, "exec")
+
+
+@every_mutant
+def test_the_tests_that_should_see_it_exist(mutant: Mutant) -> None:
+    """Files that exist; with -k, a word of one test's or parameter's name in them."""
+    files, _, word = mutant.tests.partition(" -k ")
+    assert files
+    assert all((ROOT / file).is_file() for file in files.split())
+    assert " " not in word
+
+
+def test_names_are_unique_and_fit_the_table() -> None:
+    names = [mutant.name for mutant in MUTANTS]
+    assert len(set(names)) == len(names)
+    assert max(map(len, names)) <= 44
+
+
+def test_the_names_can_be_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert mutants.main(["law", "without", "--list"]) == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert "law without J'" in listed
+    assert "K_N transposed" not in listed
+    assert mutants.main(["--list"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == len(MUTANTS)
+
+
+# --- the runner ----------------------------------------------------------------------
+
+CODE = "def area(a, b):\n    unused = a + b\n    return a * b\n"
+TESTS = """from code_under_test import area
+
+
+def test_area():
+    assert area(2.0, 3.0) == 6.0
+"""
+CAUGHT, SURVIVING, BREAKING, ELSEWHERE = (
+    Mutant(name, "code_under_test.py", old, new, tests)
+    for name, old, new, tests in (
+        ("half an area", "a * b", "0.5 * a * b", "test_area.py"),
+        ("another sum", "a + b", "a - b", "test_area.py"),
+        ("a test that is not there", "a * b", "a / b", "test_area.py -k volume"),
+        ("code that is not there", "a ** b", "a * b", "test_area.py"),
+    )
+)
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """Return a folder with one function and one test."""
+    (tmp_path / "code_under_test.py").write_text(CODE)
+    (tmp_path / "test_area.py").write_text(TESTS)
+    return tmp_path
+
+
+@pytest.mark.process
+def test_the_runner_tells_who_was_caught(
+    checkout: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each is tried alone, and the code is afterwards what it was."""
+    found = list(mutants.tried(checkout, [CAUGHT, SURVIVING, BREAKING]))
+    assert found == [
+        ("half an area", "caught"),
+        ("another sum", "SURVIVED"),
+        ("a test that is not there", "BROKEN"),
+    ]
+    first, second, third = capsys.readouterr().out.splitlines()
+    assert first.split()[:2] == ["1/3", "caught"]
+    assert first.endswith("FAILED test_area.py::test_area")
+    assert "SURVIVED" in second
+    assert "BROKEN" in third
+    assert (checkout / "code_under_test.py").read_text() == CODE
+
+
+@pytest.mark.process
+def test_code_that_cannot_be_imported_catches_nothing(checkout: Path) -> None:
+    """A mutant must be noticed by a test that ran, not by a file that did not."""
+    (checkout / "code_under_test.py").write_text("def area(a, b:\n")
+    assert mutants.run(checkout, "test_area.py").word == "BROKEN"
+
+
+def test_an_edit_that_does_not_fit_is_an_error(checkout: Path) -> None:
+    with pytest.raises(ValueError, match=r"code that is not there: 0 places in code_"):
+        list(mutants.tried(checkout, [ELSEWHERE]))
+    twice = CAUGHT._replace(old="a, b", name="both")
+    with pytest.raises(ValueError, match=r"both: 2 places"):
+        mutants.mutated(twice, CODE + CODE)
