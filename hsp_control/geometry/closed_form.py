@@ -14,7 +14,7 @@ gradient; the product rule gives its rate.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import coal
 import numpy as np
@@ -40,6 +40,7 @@ from hsp_control.geometry.signed_distance import (
 )
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import joint_support
+from hsp_control.robot.robot import WorldKinematics
 from hsp_control.trajectories.following import stay
 
 MOTION_SIZE = 18
@@ -105,8 +106,13 @@ class ClosedFormDistances:
             end += len(own_columns)
         for k, (kind, _) in enumerate(solids):
             self._kinds[len(links) + k] = kind, -1 - k, 0, 0
-        self._columns = np.concatenate(columns)
-        self._dofs = np.concatenate(dofs)
+        self._bodies = _Bodies(
+            self._kinds,
+            self._sizes,
+            self._motion,
+            np.concatenate(columns),
+            np.concatenate(dofs),
+        )
         self._used: Indices = used[self._kinds[used, 0] == SEGMENT]
         self._segments = np.zeros((len(rows), 2, 3))
         self._cores = np.zeros((len(pairs), 3, 3))
@@ -132,9 +138,7 @@ class ClosedFormDistances:
             _measure,
             self.measurements,
             state.world.placements,
-            self._motion,
-            self._kinds,
-            self._sizes,
+            self._bodies,
             self._used,
             self._pairs,
             self._places,
@@ -182,17 +186,10 @@ class ClosedFormDistances:
         rate: Array,
     ) -> Callable[[], Any]:
         """Return the bound kernel of `differentiate` for these arguments."""
-        world = state.world
         return bind(
             _differentiate,
-            world.jacobian,
-            world.jacobian_dot,
-            world.v,
-            self._motion,
-            self._kinds,
-            self._sizes,
-            self._columns,
-            self._dofs,
+            state.world,
+            self._bodies,
             self._pairs,
             self._places,
             self._segments,
@@ -228,13 +225,30 @@ def _obstacle(shape: Shape) -> tuple[int, list[float]]:
     return HALF_SPACE, [0.0] * 7
 
 
+class _Bodies(NamedTuple):
+    """Links, then obstacles.
+
+    Attributes:
+        kinds: Kind, joint (-1 - k for the k-th obstacle), and where the columns of the
+            joint begin and end, shape (n, 4).
+        sizes: Segment and radius, or half sizes, in the body's own frame, shape (n, 7).
+        motion: Placement and velocity of the obstacles, see `Obstacle.follow`.
+        columns: The columns of the joints' Jacobian that move each link.
+        dofs: The indices in v of these columns.
+    """
+
+    kinds: Indices
+    sizes: Array
+    motion: Array
+    columns: Indices
+    dofs: Indices
+
+
 @kernel
 def _measure(
     measurements: Indices,
     placements: Array,
-    motion: Array,
-    kinds: Indices,
-    sizes: Array,
+    bodies: _Bodies,
     used: Indices,
     pairs: Indices,
     places: Indices,
@@ -245,6 +259,7 @@ def _measure(
 ) -> None:
     """Write the segments in the world, and the distance and (x, y, n) of each pair."""
     measurements[0] += 1
+    kinds, sizes, motion = bodies.kinds, bodies.sizes, bodies.motion
     for k in range(used.shape[0]):
         i = used[k]
         _place(placements, motion, sizes, i, kinds[i, 1], segments)
@@ -313,14 +328,8 @@ def _to_solid(
 
 @kernel
 def _differentiate(
-    J: Array,
-    J_dot: Array,
-    v: Array,
-    motion: Array,
-    kinds: Indices,
-    sizes: Array,
-    columns: Indices,
-    dofs: Indices,
+    world: WorldKinematics,
+    bodies: _Bodies,
     pairs: Indices,
     places: Indices,
     segments: Array,
@@ -334,6 +343,7 @@ def _differentiate(
 
     ``slopes`` are b' and ``curvatures`` b'', of all pairs of the `Proximity`.
     """
+    kinds, sizes, motion = bodies.kinds, bodies.sizes, bodies.motion
     for p in range(gradient.shape[0]):
         gradient[p] = rate[p] = 0.0
     core, core_dot = scratch[0:3], scratch[3:6]  # x, y and n
@@ -353,8 +363,8 @@ def _differentiate(
         if slope == 0.0 and curvature == 0.0:
             continue
         i, j = pairs[k, 0], pairs[k, 1]
-        _twist(J, v, motion, kinds, i, columns, dofs, twist_i)
-        _twist(J, v, motion, kinds, j, columns, dofs, twist_j)
+        _twist(world, bodies, i, twist_i)
+        _twist(world, bodies, j, twist_j)
         if kinds[j, 0] == SEGMENT:
             _between_segments(segments, i, j, twist_i, twist_j, work, core, core_dot)
         else:
@@ -370,53 +380,18 @@ def _differentiate(
         for a in range(3):
             n_dot[a] = slope * n_dot[a] + curvature * d_dot * n[a]
             n[a] *= slope
-        _add_force(
-            J,
-            J_dot,
-            kinds,
-            i,
-            columns,
-            dofs,
-            x,
-            x_dot,
-            n,
-            n_dot,
-            work,
-            gradient,
-            rate,
-        )
+        _add_force(world, bodies, i, x, x_dot, n, n_dot, work, gradient, rate)
         if kinds[j, 1] >= 0:
             for a in range(3):
                 n[a], n_dot[a] = -n[a], -n_dot[a]
-            _add_force(
-                J,
-                J_dot,
-                kinds,
-                j,
-                columns,
-                dofs,
-                y,
-                y_dot,
-                n,
-                n_dot,
-                work,
-                gradient,
-                rate,
-            )
+            _add_force(world, bodies, j, y, y_dot, n, n_dot, work, gradient, rate)
 
 
 @kernel
-def _twist(
-    J: Array,
-    v: Array,
-    motion: Array,
-    kinds: Indices,
-    i: int,
-    columns: Indices,
-    dofs: Indices,
-    twist: Array,
-) -> None:
+def _twist(world: WorldKinematics, bodies: _Bodies, i: int, twist: Array) -> None:
     """Write a body's twist at the world's origin: linear velocity, angular velocity."""
+    J, v, kinds, motion = world.jacobian, world.v, bodies.kinds, bodies.motion
+    columns, dofs = bodies.columns, bodies.dofs
     for a in range(3):
         twist[0, a] = twist[1, a] = 0.0
     for p in range(kinds[i, 2], kinds[i, 3]):
@@ -514,12 +489,9 @@ def _to_moving_solid(
 
 @kernel
 def _add_force(
-    J: Array,
-    J_dot: Array,
-    kinds: Indices,
+    world: WorldKinematics,
+    bodies: _Bodies,
     i: int,
-    columns: Indices,
-    dofs: Indices,
     x: Array,
     x_dot: Array,
     force: Array,
@@ -529,6 +501,8 @@ def _add_force(
     rate: Array,
 ) -> None:
     """Add J(x)ᵀ force and its rate; J is the linear Jacobian of a point of a link."""
+    J, J_dot = world.jacobian, world.jacobian_dot
+    kinds, columns, dofs = bodies.kinds, bodies.columns, bodies.dofs
     moment, moment_dot, turned = work[0], work[1], work[2]
     cross(x, force, moment)
     cross(x_dot, force, moment_dot)
