@@ -27,10 +27,14 @@ demo: $(STAMP) ## run the paper's moving obstacle, plot it, say where it is
 	@echo "The log and the figures are in out/demo:" && ls out/demo
 
 ##@ Check
+quick: $(STAMP) ## what to run after every edit: a minute of CPU
+	@$(BIN)/python -m pytest tests/unit -m "not slow and not process and not browser" \
+	  $(ARGS)
+
 test: $(STAMP) ## run the tests
 	@$(BIN)/python -m pytest -n $(WORKERS) $(ARGS)
 
-lint: $(STAMP) ## ruff, mypy --strict and the floors of the architecture
+lint: $(STAMP) ## ruff, mypy --strict and the layers of the architecture
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@$(BIN)/mypy --strict
@@ -52,7 +56,7 @@ bench: $(STAMP) ## compare with other controllers, in .venv-peers (TSID builds: 
 fuzz: $(STAMP) ## random states, mutated files, faults, soak: hours; writes docs/fuzz.md
 	@PYTHONPATH=tests nice $(BIN)/python -m campaigns $(ARGS)
 
-mutants: $(STAMP) ## break the code on purpose in some eighty places, report what no test notices
+mutants: $(STAMP) ## break the code on purpose, report what no test notices
 	@PYTHONPATH=tests/support $(BIN)/python tests/mutants.py $(ARGS)
 
 wheel-test: $(STAMP) ## build the wheel, install it elsewhere, use it from there
@@ -71,6 +75,9 @@ wheel-test: $(STAMP) ## build the wheel, install it elsewhere, use it from there
 ##@ Keep
 figures: $(STAMP) ## draw the documents' figures anew, into docs/figures
 	@$(BIN)/python docs/make_figures.py
+
+screenshots: $(STAMP) ## photograph the page of every configuration, into out/screenshots
+	@HSP_PICTURES=all $(BIN)/python -m pytest tests/system/test_browser.py -k picture
 
 animations: $(STAMP) ## film the README's animations anew, into docs/figures (needs Chromium)
 	@$(BIN)/python docs/make_animations.py
@@ -95,7 +102,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help figures animations demo test lint coverage fuzz mutants wheel-test format constraints clean
+.PHONY: help figures screenshots animations demo quick test lint coverage fuzz mutants wheel-test format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

@@ -46,7 +46,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("words", nargs="*", help="parts of names; default: all")
     parser.add_argument("--list", action="store_true", help="print the names")
     options = parser.parse_args(arguments)
-    chosen = [m for m in MUTANTS if all(word in m.name for word in options.words)]
+    chosen = [
+        mutant
+        for mutant in MUTANTS
+        if not options.words or any(word in mutant.name for word in options.words)
+    ]
     if options.list:
         print(*(mutant.name for mutant in chosen), sep="\n")
         return 0
@@ -68,13 +72,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def tried(copy: Path, mutants: Sequence[Mutant]) -> Iterator[tuple[str, str]]:
     """Try each mutant in a copy of the checkout; yield its name and the verdict."""
+    sound: dict[str, Verdict] = {}
     for number, mutant in enumerate(mutants, start=1):
+        if mutant.tests not in sound:
+            sound[mutant.tests] = run(copy, mutant.tests)
         file = copy / mutant.file
         text = file.read_text(encoding="utf-8")
         file.write_text(mutated(mutant, text), encoding="utf-8")
         start = perf_counter()
         verdict = run(copy, mutant.tests)
         file.write_text(text, encoding="utf-8")
+        if sound[mutant.tests].word != "SURVIVED":
+            verdict = Verdict("BROKEN", "its tests do not pass without the edit")
         print(
             f"{number:3d}/{len(mutants)} {verdict.word:9} {mutant.name:44} "
             f"{perf_counter() - start:4.0f} s  {verdict.detail}",

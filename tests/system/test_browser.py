@@ -35,6 +35,8 @@ from hsp_control.visualization.viewer.export.clip_reduction import (
 )
 from hsp_control.visualization.viewer.export.encoding import find_ffmpeg
 
+pytestmark = pytest.mark.browser
+
 sync_api = pytest.importorskip("playwright.sync_api")
 
 SCREENSHOTS = ROOT / "out" / "screenshots"
@@ -402,8 +404,17 @@ QUICK = (*COARSE, "simulation.duration=4")
 SHOWN = {"paper": (), "whole_body": ("simulation.duration=0.6",)}
 
 
-@pytest.mark.parametrize("name", bundled_configs())
-def test_every_configuration_has_its_picture(
+ALL_PICTURES = os.environ.get("HSP_PICTURES") == "all"  # `make screenshots`
+EACH_KIND = (
+    "paper/4_moving_obstacle",
+    "panda_obstacle",
+    "tiago_reach",
+    "whole_body/talos_circle",
+)
+
+
+@pytest.mark.parametrize("name", bundled_configs() if ALL_PICTURES else EACH_KIND)
+def test_a_configuration_has_its_picture(
     name: str, browser: Any, tmp_path: Path
 ) -> None:
     overrides = SHOWN.get(name.partition("/")[0], QUICK)

@@ -16,6 +16,8 @@ from hsp_control.common.exceptions import LogError
 from hsp_control.common.resources import bundled_robots
 from hsp_control.simulation import Rollout
 
+pytestmark = pytest.mark.process
+
 SEED = 2
 """Not the campaigns' own: these are other cases."""
 

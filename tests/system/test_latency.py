@@ -25,6 +25,8 @@ from hsp_control.live.latency import (
 from hsp_control.live.latency.periodic import StepTimes, run_periodic
 from hsp_control.visualization.plots import latency_figure
 
+pytestmark = pytest.mark.process
+
 MOVING = "paper/4_moving_obstacle"
 compiles = pytest.mark.skipif(
     bool(numba.config.DISABLE_JIT), reason="nothing is compiled"

@@ -24,6 +24,8 @@ from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.live import Faults, Phase, Tolerance, run_loop
 
+pytestmark = pytest.mark.process
+
 PATIENT = {"missing": 1000, "age": 5.0, "watchdog": 1000}
 """For a machine on which other tests run: what is shown here is not punctuality."""
 CONFIG: dict[str, Any] = {

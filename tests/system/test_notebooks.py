@@ -19,6 +19,8 @@ from nbclient.exceptions import CellExecutionError
 from places import ROOT
 from traitlets.config import Config
 
+pytestmark = pytest.mark.process
+
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
 NAMES = [path.stem for path in NOTEBOOKS]

@@ -30,6 +30,8 @@ from hsp_control.visualization.viewer.commands import (
 )
 from hsp_control.visualization.viewer.mesh_files import collada_object
 
+pytestmark = pytest.mark.browser
+
 sync_api = pytest.importorskip("playwright.sync_api")
 
 OPTIONS = [

@@ -20,6 +20,8 @@ from hsp_control.sweeps import (
     sweeping,
 )
 
+pytestmark = pytest.mark.process
+
 
 @pytest.mark.parametrize(
     ("arguments", "message"),

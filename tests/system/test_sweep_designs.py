@@ -21,6 +21,8 @@ from hsp_control.sweeps.factor import factors
 from hsp_control.sweeps.spelling import values
 from hsp_control.visualization.plots import sweep_figure
 
+pytestmark = pytest.mark.process
+
 # --- values and designs --------------------------------------------------------------
 
 

@@ -29,6 +29,8 @@ from hsp_control.sweeps.journal import Journal, journal_of
 from hsp_control.sweeps.metrics import Measure
 from hsp_control.sweeps.row import Row
 
+pytestmark = pytest.mark.process
+
 # Some tenths of a second each, also where kernels are not compiled.
 SECONDS = 0.3 if numba.config.DISABLE_JIT else 3
 SLOWER = [QUICK[1], f"simulation.duration={SECONDS}"]

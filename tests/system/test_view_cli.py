@@ -13,6 +13,8 @@ from hsp_control import Rollout
 from hsp_control.cli import main
 from hsp_control.visualization.viewer import browser, server
 
+pytestmark = pytest.mark.process
+
 MOVING = "paper/4_moving_obstacle"
 SHORT = ["--set", "simulation.duration=0.2"]
 

@@ -30,6 +30,8 @@ from hsp_control.visualization.viewer import (
 from hsp_control.visualization.viewer.commands import CAMERA, CAPTION, CLIP
 from hsp_control.visualization.viewer.threejs import _Y_TO_Z
 
+pytestmark = pytest.mark.process
+
 MOVING = "paper/4_moving_obstacle"
 
 

@@ -18,6 +18,8 @@ from hsp_control.visualization.viewer import (
 from hsp_control.visualization.viewer.commands import CAMERA, CLIP
 from hsp_control.visualization.viewer.motion import motion_of
 
+pytestmark = pytest.mark.process
+
 MOVING = "paper/4_moving_obstacle"
 
 

@@ -40,6 +40,8 @@ from hsp_control.visualization.viewer.pipe_protocol import (
 )
 from hsp_control.visualization.viewer.server import Server
 
+pytestmark = pytest.mark.process
+
 MOVING = "paper/4_moving_obstacle"
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 

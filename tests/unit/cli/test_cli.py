@@ -34,6 +34,7 @@ def test_run_leaves_a_log_that_numpy_alone_reads(
     assert meta["columns"]["tau"]["unit"] == "N·m"
 
 
+@pytest.mark.slow
 def test_plot_draws_beside_the_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -46,6 +47,7 @@ def test_plot_draws_beside_the_log(
     assert all(figure.stat().st_size > 10_000 for figure in figures)
 
 
+@pytest.mark.slow
 def test_plot_draws_relative_angles_when_asked(tmp_path: Path) -> None:
     main(["run", MOVING, "--out", str(tmp_path), *SHORT])
     log, folders = str(tmp_path / "4_moving_obstacle.npz"), ("absolute", "relative")
@@ -72,6 +74,7 @@ def test_check_warns_of_a_singular_start(capsys: pytest.CaptureFixture[str]) -> 
     assert "singular at the start" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_robots_lists_what_can_be_loaded(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["robots"]) == 0
     rows = capsys.readouterr().out.splitlines()
@@ -117,6 +120,7 @@ def test_bad_usage_ends_with_status_2() -> None:
     assert caught.value.code == 2
 
 
+@pytest.mark.slow
 def test_a_diverging_run_keeps_its_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -132,6 +136,7 @@ def test_a_diverging_run_keeps_its_log(
         assert json.loads(str(columns["meta"]))["status"] == "diverged"
 
 
+@pytest.mark.process
 def test_ctrl_c_keeps_what_was_computed(tmp_path: Path) -> None:
     main(["run", MOVING, "--out", str(tmp_path / "short"), *SHORT])  # compiles
     command = [sys.executable, "-m", "hsp_control", "run", MOVING, "--out"]
@@ -155,6 +160,7 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path: Path) -> None:
         assert len(columns["t"]) > 1
 
 
+@pytest.mark.slow
 def test_ctrl_c_does_not_wait_for_a_row_that_never_comes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -183,6 +189,7 @@ def test_ctrl_c_does_not_wait_for_a_row_that_never_comes(
     assert len(log) == 1
 
 
+@pytest.mark.slow
 def test_a_log_is_written_whatever_is_pressed_meanwhile() -> None:
     with DeferredInterrupt() as interrupts:
         interrupts.ignore_first()
@@ -191,6 +198,7 @@ def test_a_log_is_written_whatever_is_pressed_meanwhile() -> None:
     assert interrupts.requested
 
 
+@pytest.mark.process
 def test_the_module_is_the_command() -> None:
     ran = subprocess.run(
         [sys.executable, "-m", "hsp_control", "--version"],

@@ -175,6 +175,7 @@ def everything() -> dict[str, list[float]]:
     return {name: values.tolist() for name, values in results.items()}
 
 
+@pytest.mark.process
 def test_all_tasks_and_fields_are_the_same_without_the_compiler() -> None:
     """The very same functions, as plain Python: there is no second implementation."""
     if not hasattr(kernels.kernel(lambda: None), "py_func"):
@@ -250,6 +251,7 @@ def test_what_is_bound_to_one_state_or_sample_is_not_given_to_another() -> None:
 # -- formulas and Coal -----------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [*SHAPES, "self"])
 def test_formulas_agree_with_coal_and_with_differences(kind: str) -> None:
     """Distances and gradients with Coal's, rates with differences along the flow.
@@ -357,6 +359,7 @@ VECTOR = 8 * JOINTS
 """Bytes of the smallest array of freedoms; objects of Python hold fewer."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", tasks(Robot.load("panda"), "panda_tcp"))
 def test_no_allocation_in_a_task(name: str, chain: Robot) -> None:
     robot = chain
@@ -373,6 +376,7 @@ def test_no_allocation_in_a_task(name: str, chain: Robot) -> None:
     assert left < 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [*fields(Robot.load("panda"), "panda_tcp"), *SHAPES, "self"]
 )
@@ -399,6 +403,7 @@ def test_no_allocation_in_a_field(name: str, chain: Robot) -> None:
     assert left < 50
 
 
+@pytest.mark.slow
 def test_a_step_allocates_what_pinocchio_returns_and_nothing_else(
     chain: Robot,
 ) -> None:
@@ -426,6 +431,7 @@ def test_a_step_allocates_what_pinocchio_returns_and_nothing_else(
     assert left < 50
 
 
+@pytest.mark.slow
 def test_allocations_are_seen() -> None:
     """Both tests can fail: a vector of freedoms is seen, and what stays is seen."""
     kept = []

@@ -452,6 +452,7 @@ def step_results() -> dict[str, list[float]]:
     return results
 
 
+@pytest.mark.process
 def test_a_controller_step_is_the_same_without_the_compiler() -> None:
     """NUMBA_DISABLE_JIT=1 runs the very same functions, as plain Python."""
     environment = os.environ | {

@@ -91,6 +91,7 @@ def test_a_bound_call_is_the_kernel(
     np.testing.assert_array_equal(bound, direct)
 
 
+@pytest.mark.slow
 @compiled
 def test_a_call_keeps_its_arrays_alive_and_lets_them_go() -> None:
     log = np.zeros(4)

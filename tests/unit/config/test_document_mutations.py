@@ -87,18 +87,21 @@ PLAIN = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(mutated())
 @settings(max_examples=400, deadline=None)
 def test_mutated_texts(text: str) -> None:
     check(text)
 
 
+@pytest.mark.slow
 @given(st.dictionaries(st.sampled_from(list(Scenario.model_fields)), PLAIN))
 @settings(max_examples=200, deadline=None)
 def test_mutated_data(data: dict[str, object]) -> None:
     check(yaml.safe_dump({"robot": "a", **data}))
 
 
+@pytest.mark.slow
 @given(
     st.sampled_from(["tasks.hand.gains.kp", "fields.0", "fields.0.type", "route", "a"]),
     PLAIN,
@@ -108,6 +111,7 @@ def test_mutated_overrides(path: str, value: object) -> None:
     check(GOOD, f"{path}={yaml.safe_dump(value, default_flow_style=True)}")
 
 
+@pytest.mark.slow
 @given(st.text())
 @settings(max_examples=100, deadline=None)
 @example("fields.\u00b2=1")

@@ -179,11 +179,13 @@ UNREADABLE = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "expected"), UNREADABLE)
 def test_what_cannot_be_read(text: str, expected: str) -> None:
     assert message(text) == f"panda.yaml:{expected}"
 
 
+@pytest.mark.slow
 def test_aliases_do_not_grow_without_bound() -> None:
     laughs = ["a0: &a0 [ha, ha, ha, ha, ha, ha, ha, ha, ha, ha]"]
     laughs += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 30)]

@@ -75,6 +75,7 @@ def changed(path: str, value: object) -> dict:
     return data
 
 
+@pytest.mark.slow
 def test_every_bundled_configuration_follows_the_exported_schema() -> None:
     schema = json_schema()
     jsonschema.Draft202012Validator.check_schema(schema)

@@ -30,6 +30,7 @@ def errors(rollout: Rollout) -> np.ndarray:
     return np.max([np.abs(error).max(axis=1) for error in tasks], axis=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FIXED_BASE)
 def test_a_configuration_runs_on_mujoco_with_the_same_tracking(name: str) -> None:
     """As written, for 1 s: no task is off by more than 0.15 mm on either engine.

@@ -106,6 +106,7 @@ CONTACTS: dict[str, Callable[[], Contact]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", CONTACTS)
 @given(seeds)
 @settings(max_examples=10)
@@ -452,6 +453,7 @@ def test_a_contact_is_released_without_a_jump() -> None:
     assert out.forces.size == 12  # one sole is left
 
 
+@pytest.mark.slow
 def test_tasks_come_and_go_without_a_jump() -> None:
     """On a Panda: a task is added, its gains change, it is removed; always exact."""
     robot = Robot.load("panda")

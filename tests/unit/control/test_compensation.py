@@ -130,6 +130,7 @@ def test_without_compensators_it_is_the_controller_to_the_last_bit() -> None:
         q, v = plant.advance(ours.t[k], end, tau)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*EVERYTHING, "all"])
 def test_a_run_repeats_itself_and_its_compensators_travel(name: str) -> None:
     compensation = (
@@ -393,6 +394,7 @@ def test_a_lasting_error_dies_and_the_null_space_keeps_its_own() -> None:
     assert norms[1] > 0.5 * norms[0] > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mass", "tolerance"), [(0.5, 0.01), (2.0, 0.07)])
 @pytest.mark.parametrize("rate", [2.0, 5.0])
 def test_a_payload_s_error_dies_as_the_linear_equation_says(
@@ -433,6 +435,7 @@ def test_a_payload_s_error_dies_as_the_linear_equation_says(
     assert np.abs(error[-1]).max() < (0.05 if rate == 2.0 else 1e-3) * size
 
 
+@pytest.mark.slow
 def test_too_much_integral_action_is_lost_with_a_payload() -> None:
     """2 kg at the hand leave 0.3 of the feedback: as little as Ki/(Kv Kp) = 12/40."""
     loaded = RigidBodyPlant(changed(PANDA, [Payload("panda_tcp", 2.0)]))

@@ -153,6 +153,7 @@ def run(controller: Controller, q0: Array, duration: float) -> Rollout:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_null_space_error_stays_bounded(seed: int) -> None:
     """‖e_N‖ ≤ ‖s‖ throughout, and at each step |P δ| ≤ λ s, where limits bind."""
@@ -232,6 +233,7 @@ def test_what_bears_a_contact_is_left_out() -> None:
     assert len(A) == len(fewer) + 2
 
 
+@pytest.mark.slow
 def test_an_arm_goes_where_it_can_be_held() -> None:
     """A target that its shoulder cannot hold: it comes to rest before it."""
     robot = panda()

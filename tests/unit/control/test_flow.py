@@ -70,6 +70,7 @@ def test_flow_meets_the_task_and_follows_the_field(kind: str) -> None:
         np.testing.assert_allclose(e_N, 0.0, rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow
 @metrics
 def test_robot_becomes_the_flow(kind: str) -> None:
     """After the transients the simulated velocity is flow(t, q), in every metric.

@@ -242,6 +242,7 @@ def violations(rollout: Rollout, limits: Limits) -> dict[str, float]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_no_limit_is_violated(seed: int) -> None:
     """Limit-rich rollouts; benchmarks/limit_rollouts.py runs a thousand of them."""
@@ -273,6 +274,7 @@ def test_no_limit_is_violated(seed: int) -> None:
     assert max(worst.values()) <= 1e-8, worst
 
 
+@pytest.mark.slow
 def test_a_joint_limit_is_approached_and_not_crossed() -> None:
     """A posture beyond the limit: the joint comes to rest before it, and stays."""
     robot = panda()
@@ -454,6 +456,7 @@ def test_distance_rows_are_its_second_derivative() -> None:
     np.testing.assert_allclose(A @ a - b, barrier[chosen], rtol=0, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_things_stay_apart() -> None:
     """A ball swings into the elbow: without the limit it hits, with it it does not."""
     robot = panda()

@@ -184,6 +184,7 @@ def test_the_linear_loop_is_the_chain_link_by_link(
     assert np.abs(missed).max() > 1e3 * np.abs(residuals).max()
 
 
+@pytest.mark.slow
 def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
     """The weightless arm agrees: 10 % beside what is told its motion dies or grows."""
     robot = Robot.load("panda", gravity=[0.0, 0.0, 0.0])

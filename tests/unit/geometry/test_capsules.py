@@ -39,6 +39,7 @@ def volume(first: Array, second: Array, radius: float) -> float:
     return np.pi * radius**2 * (length + 4.0 / 3.0 * radius)
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(
     cloud=st.integers(1, 12).flatmap(
@@ -138,6 +139,7 @@ def corners(shape: LinkShape) -> Array:
     return vertices @ shape.placement.rotation.T + shape.placement.translation
 
 
+@pytest.mark.slow
 def test_capsules_hold_every_vertex_of_a_mesh() -> None:
     """The UR5's links, more tightly than a ball about their mean.
 
@@ -165,6 +167,7 @@ def test_capsules_hold_every_vertex_of_a_mesh() -> None:
         assert true - 0.15 < safe <= true + 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "iiwa14", "ur5"])
 def test_beads_cover_their_capsule_and_stand_out_little(name: str) -> None:
     """No farther apart than the radius r: the cover is √1.25 r thick at the most."""

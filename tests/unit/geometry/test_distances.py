@@ -113,6 +113,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Shape]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("link", "other"),
     [

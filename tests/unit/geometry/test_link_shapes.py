@@ -137,6 +137,7 @@ FLAT = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("proxy", ["capsules", "spheres", "hulls", "meshes"])
 @pytest.mark.parametrize("which", FLAT)
 def test_flat_meshes_are_links_too(which: str, proxy: Any, tmp_path: Path) -> None:

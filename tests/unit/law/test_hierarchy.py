@@ -56,6 +56,7 @@ def lexicographic(x: Numbers, levels: list[int]) -> tuple[Array, Array]:
     return a + Q @ (x.W @ (x.g_dot + x.K_N @ e_N) - bend), e_N
 
 
+@pytest.mark.slow
 @forms
 @given(seeds, st.lists(st.integers(1, 3), min_size=2, max_size=3))
 def test_compatible_levels_are_one_stack(
@@ -68,6 +69,7 @@ def test_compatible_levels_are_one_stack(
         np.testing.assert_array_equal(first, second)
 
 
+@pytest.mark.slow
 @forms
 @given(seeds, st.lists(st.integers(1, 3), min_size=2, max_size=4))
 def test_recursion_is_the_stacked_law(form: int, seed: int, levels: list[int]) -> None:
@@ -90,6 +92,7 @@ def test_recursion_is_the_stacked_law(form: int, seed: int, levels: list[int]) -
     np.testing.assert_allclose(other, e_N, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 @forms
 @given(seeds, st.integers(1, 3), st.integers(1, 3))
 def test_conflict_leaves_the_upper_level_exact(

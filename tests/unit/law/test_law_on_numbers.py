@@ -28,6 +28,7 @@ forms = pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
 rows = st.integers(1, 6)
 
 
+@pytest.mark.slow
 @forms
 @given(seeds, rows)
 def test_law_equals_its_short_form(form: int, seed: int, m: int) -> None:
@@ -43,6 +44,7 @@ def test_law_equals_its_short_form(form: int, seed: int, m: int) -> None:
     np.testing.assert_allclose(phi_N(x, form), phi, rtol=1e-11, atol=1e-10)
 
 
+@pytest.mark.slow
 @forms
 @given(seeds, rows)
 def test_task_is_met_whatever_the_field_asks(form: int, seed: int, m: int) -> None:
@@ -55,6 +57,7 @@ def test_task_is_met_whatever_the_field_asks(form: int, seed: int, m: int) -> No
     np.testing.assert_allclose(x.J @ e_N, 0.0, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 @forms
 @given(seeds, rows)
 def test_uncontrolled_acceleration_is_the_smallest(
@@ -69,6 +72,7 @@ def test_uncontrolled_acceleration_is_the_smallest(
     np.testing.assert_allclose(null @ x.W @ a, 0.0, rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow
 @forms
 @given(seeds, st.integers(2, 6))
 def test_law_does_not_depend_on_the_rows(form: int, seed: int, m: int) -> None:
@@ -92,6 +96,7 @@ def test_law_does_not_depend_on_the_rows(form: int, seed: int, m: int) -> None:
     assert np.abs(wrong - phi_N(x, form)).max() > 1e-3
 
 
+@pytest.mark.slow
 @forms
 @given(seeds, st.integers(1, 5), st.data())
 def test_redundant_rows_change_nothing(

@@ -330,6 +330,7 @@ def test_projector_and_error_in_the_metric(name: str, kind: str) -> None:
     np.testing.assert_allclose(e_N @ x.W @ e_N + rest @ x.W @ rest, whole, rtol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("kind", METRICS)
 @pytest.mark.parametrize("gain", ["scalar", "matrix"])

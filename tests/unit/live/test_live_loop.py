@@ -142,6 +142,7 @@ def test_the_controller_receives_the_applied_effort() -> None:
 # --- the robot's interface -----------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_tau_less_gravity_is_the_same_motion() -> None:
     plain, compensating = Rig(), None
     run_loop(law(), plain, duration=0.3)
@@ -156,6 +157,7 @@ def test_tau_less_gravity_is_the_same_motion() -> None:
     assert np.abs(relieved[-1]).max() < 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compensates", [True, False])
 def test_what_is_sent_keeps_rate_and_effort(compensates: bool) -> None:
     most, rate = 60.0, 200.0
@@ -224,6 +226,7 @@ TRICKS: dict[str, tuple[dict[int, Trick], str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", TRICKS)
 def test_a_state_that_is_none_ends_in_the_safe_stop(kind: str, tmp_path: Path) -> None:
     tricks, reason = TRICKS[kind]
@@ -273,6 +276,7 @@ def raising(error: Exception) -> Trick:
     return trick
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [HardwareError("the cable"), OSError(5, "gone")])
 def test_a_robot_that_cannot_be_read_is_left_at_once(error: Exception) -> None:
     rig = Rig(tricks=always(raising(error), 200))
@@ -313,6 +317,7 @@ def bad_field(t: float, what: Any) -> FunctionField:
     return FunctionField(panda(), g, rate=lambda _: np.zeros(7))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", [np.nan, ZeroDivisionError("by zero")])
 def test_a_law_that_fails_ends_in_the_safe_stop(what: Any, tmp_path: Path) -> None:
     controller = law()
@@ -354,6 +359,7 @@ def call_from(t: float, what: Callable[[], object]) -> Callable[[float], None]:
     return on_period
 
 
+@pytest.mark.slow
 def test_the_operator_s_stop_and_ctrl_c(tmp_path: Path) -> None:
     requests, rig = OperatorRequests(), Rig()
     on_period = call_from(0.1, requests.stop)
@@ -376,6 +382,7 @@ def test_a_second_ctrl_c_leaves_it_to_the_robot() -> None:
     assert rig.robot.phase is Phase.HOLDING
 
 
+@pytest.mark.slow
 def test_what_a_change_raises_stops_it() -> None:
     requests, rig = OperatorRequests(), Rig()
     gains = Gains.from_frequency(5.0)
@@ -438,6 +445,7 @@ EVENTS = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=12)
 @given(events=EVENTS, compensates=st.booleans())
 def test_whatever_comes_it_ends_and_no_effort_is_beyond_limits(
@@ -467,6 +475,7 @@ def test_whatever_comes_it_ends_and_no_effort_is_beyond_limits(
 # --- changes while it runs -----------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
     controller, requests, rig = law(), OperatorRequests(), Rig()
     q = start()

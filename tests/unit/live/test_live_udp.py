@@ -202,6 +202,7 @@ def test_nobody_to_send_to_and_nowhere_to_listen() -> None:
     link.close()
 
 
+@pytest.mark.slow
 @given(
     offset=st.floats(-1e6, 1e6),
     drift=st.floats(-1e-5, 1e-5),
@@ -222,6 +223,7 @@ def test_age_is_what_a_packet_waited_longer_than_the_quickest(
 # --- a robot at the other end, both in this process ----------------------------------
 
 
+@pytest.mark.slow
 def test_a_served_robot_runs_stops_and_says_why() -> None:
     hardware = UdpHardware(panda(), PERIOD)
     assert isinstance(hardware, Hardware)
@@ -251,6 +253,7 @@ def test_a_served_robot_runs_stops_and_says_why() -> None:
     link.close()
 
 
+@pytest.mark.slow
 def test_efforts_that_answer_old_states_are_nobody_s() -> None:
     """All efforts come, in order, and too late: that is silence."""
     receiver, robot = Link(7), watched(watchdog=10)
@@ -272,6 +275,7 @@ def test_efforts_that_answer_old_states_are_nobody_s() -> None:
     link.close()
 
 
+@pytest.mark.slow
 def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
     hardware = UdpHardware(panda(), PERIOD)
     link = Link(hardware.session, peer=hardware.address)

@@ -64,6 +64,7 @@ def test_a_share_of_the_damping_brakes_where_clipped_damping_would_drive() -> No
     assert driven > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "factor"), [(0, 0.6), (1, 1.0), (2, 1.6)])
 def test_it_stops_a_robot_that_is_not_the_model(seed: int, factor: float) -> None:
     """Wrong masses: it comes to rest, and the hold keeps it within gravity's error."""
@@ -135,6 +136,7 @@ def test_the_share_is_the_greatest_that_fits(seed: int) -> None:
             assert (more > most).any()
 
 
+@pytest.mark.slow
 @given(seed=seeds, compensates=st.booleans())
 def test_the_limiter_keeps_both_limits_where_both_can_be(
     seed: int, compensates: bool

@@ -84,6 +84,7 @@ OBSTACLES: dict[str, Callable[[Path], Obstacle]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", OBSTACLES)
 @pytest.mark.parametrize("name", ["panda", "iiwa14"])
 def test_gradient_and_rate_for_every_shape(
@@ -299,6 +300,7 @@ def run(
     return norm, norm[0] * np.exp(-GAIN * rollout.t), rollout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", LOOPS)
 def test_the_null_space_error_is_exponential_beside_a_moving(which: str) -> None:
     """‖e_N‖ = ‖e_N(0)‖ exp(-K_N t), to 1e-6 of its start, while the obstacle passes.
@@ -326,6 +328,7 @@ class Frozen(ObstacleClearance):
         return rate_at_one_time(self, state)
 
 
+@pytest.mark.slow
 def test_without_the_obstacles_velocity_it_is_not() -> None:
     field = Frozen(load("panda"), [LOOPS["ball"]], influence=0.3)
     norm, expected, _ = run(field, 0.6, Rk4(0.005))

@@ -94,6 +94,7 @@ def test_limit_barrier_is_zero_in_the_middle_and_finite_beyond_a_limit() -> None
         np.testing.assert_allclose(inner, outer, rtol=1e-4, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_target_posture_is_smooth_all_the_way_round() -> None:
     """Three turns through pi: slope and rate change by no more than their bounds.
 

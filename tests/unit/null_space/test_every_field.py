@@ -84,6 +84,7 @@ def test_field_and_its_rate(name: str, which: str, metric_name: str) -> None:
         assert np.abs(g_dot).max() > 1e-3  # else nothing was tested
 
 
+@pytest.mark.slow
 @every_field
 def test_the_field_does_not_depend_on_the_velocity(name: str, which: str) -> None:
     robot, field = load(name), MEMBERS[which].build(name)

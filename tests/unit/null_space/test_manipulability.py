@@ -119,6 +119,7 @@ def hand(name: str) -> str:
     return ARMS[name] if name in ARMS else OTHERS[name][2]
 
 
+@pytest.mark.slow
 def test_no_arm_is_left_out() -> None:
     """Every fixed-base robot that loads with 6 or 7 freedoms is in the table."""
     pytest.importorskip("example_robot_data")
@@ -277,6 +278,7 @@ def states(robot: Robot, number: int, seed: int) -> list[tuple[Array, Array]]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY)
 def test_value_gradient_and_rate_at_random_states(
     name: str, load: Callable[[str], Robot]
@@ -539,6 +541,7 @@ def singular_members(robot: Robot, frame: str, axes: str) -> dict[str, JacobianC
     return members
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["planar3r", "panda", "iiwa14", "ur5", "kinova"])
 def test_finite_at_every_singularity(name: str, load: Callable[[str], Robot]) -> None:
     """Joints at multiples of 45°: stretched, folded, wrist aligned, all at once."""

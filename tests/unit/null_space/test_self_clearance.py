@@ -106,6 +106,7 @@ def test_pairs_that_overlap_at_home_are_left_out() -> None:
     assert field.minimum_distance(still(both)) > 0.0
 
 
+@pytest.mark.slow
 def test_each_robot_is_the_others_moving_obstacle() -> None:
     """Gradient and rate of the pairs between two arms that both move."""
     panda = load("panda")

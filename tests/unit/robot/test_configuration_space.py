@@ -125,6 +125,7 @@ def test_half_a_turn_is_pi_and_not_minus_pi() -> None:
     np.testing.assert_array_equal(robot.joint_positions(q), [np.pi, 0.0, np.pi / 2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ROBOTS)
 def test_position_limits(case: str) -> None:
     """The model's for joints with one number; none for continuous joints and roots."""
@@ -177,6 +178,7 @@ def test_home_is_the_sources_or_neutral_or_the_middle_of_the_range() -> None:
     np.testing.assert_allclose(load("solo12").home()[7:10], [0.1, 0.8, -1.6])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted({*BUNDLED, *example_robots()} - set(REFUSED)))
 def test_random_and_home_configurations_are_within_limits(name: str) -> None:
     """For every robot that there is, with a floating root and without."""

@@ -87,6 +87,7 @@ def test_example_robot(name: str, root: str, nq: int, nv: int) -> None:
     assert (robot.source.package_dirs[0] / "example-robot-data").is_dir()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(example_robots()))
 @pytest.mark.parametrize("mimic", [True, False])
 def test_every_example_robot_loads_or_says_why_not(name: str, mimic: bool) -> None:

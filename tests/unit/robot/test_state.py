@@ -41,6 +41,7 @@ def test_update_moves_everything(case: str) -> None:
         assert_equal_terms(everything(used, frame), everything(fresh, frame))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["panda", "panda_fingers", "solo12"])
 def test_order_of_questions_does_not_matter(case: str) -> None:
     """Pinocchio's algorithms share one memory: none may spoil what another wrote."""

@@ -570,6 +570,7 @@ ALL: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_every_imperfection_is_felt_and_repeats_itself(name: str) -> None:
     """Another motion than the ideal loop's; the same settings give the same again."""

@@ -139,6 +139,7 @@ for k in range(1000):
 """
 
 
+@pytest.mark.process
 def test_a_killed_writer_loses_nothing_that_it_wrote(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
     done = subprocess.run(
@@ -200,6 +201,7 @@ def test_a_full_disk_is_an_error_with_the_file_s_name() -> None:
         JournalWriter(full)
 
 
+@pytest.mark.slow
 def test_the_commands_take_it(
     rollout: Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -260,6 +260,7 @@ def dampers(robot: Robot, springs: Array) -> JointFriction:
     return JointFriction.of(robot, viscous=0.03 * springs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["talos", "g1", "solo12", "go2"])
 def test_a_legged_robot_stands_on_its_own_feet(name: str) -> None:
     """On the collision geometry of its feet: less than 2 cm and 2°, and it rests.
@@ -285,6 +286,7 @@ def test_a_legged_robot_stands_on_its_own_feet(name: str) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "contacts"),
     [
@@ -422,6 +424,7 @@ def test_a_push_gives_its_impulse() -> None:
     assert v[5] == pytest.approx(turned, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_reading_contacts_changes_nothing() -> None:
     robot, q, feet, springs = standing("go2")
     ends = []

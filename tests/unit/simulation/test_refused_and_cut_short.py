@@ -226,6 +226,7 @@ def test_divergence_keeps_the_rollout(
     np.testing.assert_array_equal(loaded.v, run.v)
 
 
+@pytest.mark.slow
 def test_a_runaway_is_told_with_its_speed() -> None:
     message = (
         r"^the simulation stopped: the motion diverged before t = 0.0\d+ s: a joint "

@@ -37,6 +37,7 @@ Array = NDArray[np.float64]
 # --- the members ---------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @every_task
 def test_the_rows_move_as_the_robot_does(case: Case) -> None:
     """J v and J' are the rates of the rows' coordinates and of J itself.
@@ -132,6 +133,7 @@ def test_the_law_of_the_error(case: Case, part: float, gains: str) -> None:
     np.testing.assert_allclose(e_ddot, -Kv @ e_dot - Kp @ e, rtol=0, atol=5e-9 * size)
 
 
+@pytest.mark.slow
 @every_task
 def test_reference_rate_is_the_motion_of_who_stays_on_the_reference(case: Case) -> None:
     """At e = 0, a robot with J v = reference_rate has e' = 0."""
@@ -158,6 +160,7 @@ def test_reference_rate_is_the_motion_of_who_stays_on_the_reference(case: Case) 
     assert (np.linalg.norm(rate) > 0.01) == moving
 
 
+@pytest.mark.slow
 @every_task
 def test_measure(case: Case) -> None:
     """Reference and actual, as a person would plot them; beyond half a turn too."""
@@ -171,6 +174,7 @@ def test_measure(case: Case) -> None:
         case.family.check_measure(task, motion, reference, actual, e)
 
 
+@pytest.mark.slow
 @every_task
 def test_evaluate_writes_where_it_is_told_and_has_no_memory(case: Case) -> None:
     """The same state gives the same bits, whatever was evaluated between."""

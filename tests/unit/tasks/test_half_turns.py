@@ -58,6 +58,7 @@ def panda_state() -> Any:
     return motion.robot.state(TIME, motion.q, motion.v)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(near_pi, directions)
 @example(np.pi, np.array([1.0, 0.0, 0.0]))
@@ -83,6 +84,7 @@ def test_orientation_through_half_a_turn(angle: float, axis: Array) -> None:
     assert np.abs(sample.acceleration).max() < 500.0
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(near_pi, st.floats(-np.pi, np.pi), st.sampled_from(["still", "tumbling"]))
 @example(np.pi, 0.0, "still")

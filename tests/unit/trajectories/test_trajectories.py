@@ -194,6 +194,7 @@ def test_rates_are_those_of_the_motion(name: str) -> None:
             np.testing.assert_allclose(acceleration, sped, rtol=1e-7, atol=2e-7)
 
 
+@pytest.mark.slow
 @every_member
 def test_motion_never_jumps(name: str) -> None:
     """Each small step is the integral of the rate over it; each change of rate too."""

@@ -58,7 +58,7 @@ from hsp_control.visualization.plots import (
     views,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
+pytestmark = [pytest.mark.filterwarnings("error"), pytest.mark.slow]
 A = np.tril(np.ones((3, 3)))
 SHADOW = mpl.colors.to_rgba(palette.SHADOW)
 NAMES = ("uncontrolled", "rest", "obstacle", "space", "pose", "several", "posture")

@@ -255,6 +255,7 @@ def mesh_of(robot: Robot, recorder_path: Path, **about: Any) -> dict[str, Any]:
     return {"type": kind, "format": suffix, "data": text, **about}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "talos", "kinova", "ur5"])
 def test_meshes_are_read_as_pinocchio_reads_them(name: str) -> None:
     robot = Robot.load(name)
@@ -403,6 +404,7 @@ def tracks_of(content: dict[str, Any]) -> dict[tuple[str, str], tuple[Any, Any]]
     }
 
 
+@pytest.mark.slow
 def test_every_joint_is_where_the_log_has_it(panda: Rollout, tmp_path: Path) -> None:
     page = export_html(panda, tmp_path / "panda.html")
     assert page.stat().st_size < 2.0 * MEGABYTE
@@ -442,6 +444,7 @@ def sampled(times: np.ndarray, values: np.ndarray, t: np.ndarray, how: Any) -> A
     return how(values[left], values[right], fraction[:, None])
 
 
+@pytest.mark.slow
 def test_talos_fits_and_its_mirrored_side_is_mirrored(tmp_path: Path) -> None:
     experiment = load_experiment(TALOS)
     rollout = experiment.run()
@@ -486,6 +489,7 @@ def world_vertices(thing: dict[str, Any], node: dict[str, Any]) -> np.ndarray:
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
+@pytest.mark.slow
 def test_the_page_needs_nothing_from_anywhere(planar: Rollout, tmp_path: Path) -> None:
     page = export_html(planar, tmp_path / "new" / "page.html")
     text = page.read_text(encoding="utf-8")
@@ -621,6 +625,7 @@ def test_a_film_that_cannot_be_is_refused(
         export_film(planar, tmp_path / name, style=style)
 
 
+@pytest.mark.slow
 def test_what_is_missing_for_a_film_is_said_and_the_rest_goes_on(
     planar: Rollout,
     tmp_path: Path,

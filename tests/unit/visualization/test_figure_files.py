@@ -22,7 +22,7 @@ from hsp_control.visualization.plots import (
     views,
 )
 
-pytestmark = pytest.mark.filterwarnings("error")
+pytestmark = [pytest.mark.filterwarnings("error"), pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
@@ -128,6 +128,7 @@ def test_a_figure_keeps_its_style_wherever_it_is_saved(tmp_path: Path) -> None:
     assert label.get_color() == palette.INK
 
 
+@pytest.mark.process
 def test_matplotlib_comes_late_and_no_display_is_needed(tmp_path: Path) -> None:
     program = """
 import sys

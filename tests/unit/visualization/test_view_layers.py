@@ -471,6 +471,7 @@ class Watched(Recorder):
         self.sent += [unpack(command.packed) for command in commands]
 
 
+@pytest.mark.slow
 def test_a_run_is_shown_while_it_is_computed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
