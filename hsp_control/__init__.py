@@ -127,154 +127,50 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .trajectories import UniformLine as UniformLine
 
 _ROOMS = {
-    "robot": (
-        "Dop853",
-        "JointFriction",
-        "Rk4",
-        "Robot",
-        "RobotState",
-        "SemiImplicitEuler",
-    ),
-    "robot.description.loading": ("ToolFrame",),
+    "robot": "Dop853 JointFriction Rk4 Robot RobotState SemiImplicitEuler",
+    "robot.description.loading": "ToolFrame",
     "geometry": (
-        "Box",
-        "Capsule",
-        "Cylinder",
-        "HalfSpace",
-        "HeightField",
-        "Mesh",
-        "Obstacle",
-        "PointCloud",
-        "Scene",
-        "Shape",
-        "Sphere",
+        "Box Capsule Cylinder HalfSpace HeightField Mesh Obstacle PointCloud Scene "
+        "Shape Sphere"
     ),
     "trajectories": (
-        "Blend",
-        "BlendOrientation",
-        "CallableOrientation",
-        "CallableTrajectory",
-        "Circle",
-        "ComposedPose",
-        "Hold",
-        "HoldOrientation",
-        "HoldPose",
-        "Line",
-        "Lissajous",
-        "MinimumJerk",
-        "OrientationPath",
-        "OrientationTrajectory",
-        "PoseTrajectory",
-        "Schedule",
-        "ScrewInterpolation",
-        "Spin",
-        "Spline",
-        "Stops",
-        "Trajectory",
-        "UniformLine",
+        "Blend BlendOrientation CallableOrientation CallableTrajectory Circle "
+        "ComposedPose Hold HoldOrientation HoldPose Line Lissajous MinimumJerk "
+        "OrientationPath OrientationTrajectory PoseTrajectory Schedule "
+        "ScrewInterpolation Spin Spline Stops Trajectory UniformLine"
     ),
     "tasks": (
-        "AngularMomentum",
-        "CenterOfMass",
-        "FrameOrientation",
-        "FramePose",
-        "FramePosition",
-        "Gains",
-        "JointPosture",
-        "Pointing",
-        "RelativePose",
-        "Task",
+        "AngularMomentum CenterOfMass FrameOrientation FramePose FramePosition Gains "
+        "JointPosture Pointing RelativePose Task"
     ),
     "null_space.fields": (
-        "Cost",
-        "EqualJointAngles",
-        "FunctionCost",
-        "FunctionField",
-        "InverseCondition",
-        "JointCentering",
-        "LimitBarrier",
-        "Manipulability",
-        "NullSpaceField",
-        "ObstacleClearance",
-        "PointDistance",
-        "Ramp",
-        "Rest",
-        "SelfClearance",
-        "StateWeight",
-        "TargetPosture",
-        "Transmission",
-        "Uncontrolled",
-        "VectorField",
-        "WeightedSum",
+        "Cost EqualJointAngles FunctionCost FunctionField InverseCondition "
+        "JointCentering LimitBarrier Manipulability NullSpaceField ObstacleClearance "
+        "PointDistance Ramp Rest SelfClearance StateWeight TargetPosture Transmission "
+        "Uncontrolled VectorField WeightedSum"
     ),
-    "null_space.metrics": (
-        "ConstantMetric",
-        "IdentityMetric",
-        "MassMatrixMetric",
-        "Metric",
-    ),
-    "constraints.contacts": (
-        "BallContact",
-        "Contact",
-        "PointContact",
-        "SurfaceContact",
-    ),
-    "constraints.limits": (
-        "Limits",
-        "MinimumDistance",
-    ),
-    "control": (
-        "ControlOutput",
-        "Controller",
-        "Diagnostics",
-    ),
-    "control.log_channel": ("LogChannel",),
+    "null_space.metrics": "ConstantMetric IdentityMetric MassMatrixMetric Metric",
+    "constraints.contacts": "BallContact Contact PointContact SurfaceContact",
+    "constraints.limits": "Limits MinimumDistance",
+    "control": "ControlOutput Controller Diagnostics",
+    "control.log_channel": "LogChannel",
     "control.compensation": (
-        "Command",
-        "EffortRateClip",
-        "FrictionFeedForward",
-        "IntegralAction",
-        "MomentumObserver",
-        "Predictor",
-        "Compensation",
-        "StartUpRamp",
-        "VelocityFilter",
-        "check_rate",
+        "Command EffortRateClip FrictionFeedForward IntegralAction MomentumObserver "
+        "Predictor Compensation StartUpRamp VelocityFilter check_rate"
     ),
-    "simulation": (
-        "Rollout",
-        "simulate",
-    ),
+    "simulation": "Rollout simulate",
     "simulation.plants": (
-        "ContactPlant",
-        "ContinuousPlant",
-        "ImperfectPlant",
-        "IntegratedPlant",
-        "Plant",
-        "Push",
-        "RigidBodyPlant",
-        "RigidContact",
-        "SampledPlant",
-        "StickingPlant",
+        "ContactPlant ContinuousPlant ImperfectPlant IntegratedPlant Plant Push "
+        "RigidBodyPlant RigidContact SampledPlant StickingPlant"
     ),
-    "simulation.plants.mujoco": (
-        "ContactShape",
-        "Ground",
-        "MujocoPlant",
-    ),
-    "config": (
-        "Experiment",
-        "load_experiment",
-    ),
-    "sweeps": (
-        "Sweep",
-        "sweep",
-    ),
-    "common.exceptions": ("HspControlError",),
+    "simulation.plants.mujoco": "ContactShape Ground MujocoPlant",
+    "config": "Experiment load_experiment",
+    "sweeps": "Sweep sweep",
+    "common.exceptions": "HspControlError",
 }
-"""The public names, by the room that each is imported from when it is asked for."""
+"""The public names, by the room from which each is imported at its first use."""
 
-_HOMES = {name: room for room, names in _ROOMS.items() for name in names}
+_HOMES = {name: room for room, names in _ROOMS.items() for name in names.split()}
 
 __all__ = ["__version__", *_HOMES]
 

@@ -13,9 +13,9 @@ from hsp_control.common.resources import bundled_configs, bundled_robots
 from hsp_control.common.version import __version__
 
 _OWN_INTERRUPTS = {"bench", "export", "sweep", "view"}
-"""Commands that have processes, pages or rows to look after when Ctrl-C comes."""
+"""Commands that must close processes and pages, or save rows, at Ctrl-C."""
 FAILURE = 2
-"""Exit status of anything that did not go as asked."""
+"""Exit status after any error."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -29,12 +29,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command is None:
         parser.print_help()
         return 0
-    # Commands are imported when they are asked for: `hsp --help` answers at once.
+    # Commands are imported only when needed, so that `hsp --help` answers at once.
     from hsp_control.cli import commands, consoles
 
     try:
-        # Elsewhere Ctrl-C ends the process at once, as while it was starting: there is
-        # nothing to save, and an exception may get lost in other people's callbacks.
+        # With other commands Ctrl-C ends the process at once, as during start-up: there
+        # is nothing to save, and an exception may get lost in callbacks of libraries.
         if (
             options.command in _OWN_INTERRUPTS or getattr(options, "view", False)
         ) and signal.getsignal(signal.SIGINT) is end_quietly:
@@ -101,13 +101,13 @@ def _parser() -> argparse.ArgumentParser:
         "--speed",
         type=float,
         metavar="X",
-        help="seconds of motion in one second; default: as the log says",
+        help="playback speed, 1 is real time; default: as the log says",
     )
     view.add_argument(
         "--loop",
         action=argparse.BooleanOptionalAction,
         default=None,
-        help="play again and again; default: as the log says",
+        help="repeat the run; default: as the log says",
     )
     _add_page(view)
     _add_strict(view)
@@ -131,8 +131,10 @@ def _parser() -> argparse.ArgumentParser:
         help="draw joint angles, not absolute ones, where the robot has both",
     )
 
-    salvage = _command(commands, "salvage", "read what is whole of a log that was cut")
-    salvage.add_argument("log", type=Path, metavar="LOG", help="a log that is cut")
+    salvage = _command(
+        commands, "salvage", "recover the complete rows of a truncated log"
+    )
+    salvage.add_argument("log", type=Path, metavar="LOG", help="a truncated log")
     salvage.add_argument(
         "--out", type=Path, metavar="FILE", help="default: LOG's name, -salvaged.npz"
     )
@@ -144,7 +146,9 @@ def _parser() -> argparse.ArgumentParser:
         _command(commands, "live", "control a simulated robot in another process")
     )
 
-    robots = _command(commands, "robots", "list what can be loaded, or describe one")
+    robots = _command(
+        commands, "robots", "list the robots that can be loaded, or describe one"
+    )
     which = robots.add_mutually_exclusive_group()
     name = which.add_argument(
         "name", nargs="?", metavar="ROBOT", help="a name or a URDF"
@@ -185,14 +189,14 @@ def _add_export(export: argparse.ArgumentParser) -> None:
         "--fps",
         type=float,
         metavar="N",
-        help="pictures in a second of films; default: 30, of GIF and WebP 20",
+        help="frames per second of films; default: 30, of GIF and WebP 20",
     )
     export.add_argument(
         "--speed",
         type=float,
         default=1.0,
         metavar="X",
-        help="seconds of the run in a second of films; default: 1",
+        help="playback speed of films, 1 is real time; default: 1",
     )
     for name, which in (("from", "first"), ("to", "last")):
         export.add_argument(
@@ -240,7 +244,7 @@ def _add_sweep(sweep: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUES",
-        help="what varies: a,b,c or LOW:HIGH:COUNT or log:LOW:HIGH:COUNT, or (with "
+        help="what is varied: a,b,c or LOW:HIGH:COUNT or log:LOW:HIGH:COUNT, or (with "
         "--samples) uniform:LOW:HIGH, loguniform:LOW:HIGH, normal:MEAN:DEVIATION, "
         "integers:LOW:HIGH; may be repeated",
     )
@@ -262,10 +266,10 @@ def _add_sweep(sweep: argparse.ArgumentParser) -> None:
         "out/NAME-sweep.parquet",
     )
     sweep.add_argument(
-        "--fresh", action="store_true", help="begin anew, whatever the file holds"
+        "--fresh", action="store_true", help="ignore what the file holds already"
     )
     sweep.add_argument(
-        "--workers", type=int, metavar="N", help="processes; default: one a core"
+        "--workers", type=int, metavar="N", help="processes; default: one per core"
     )
     sweep.add_argument(
         "--scheduler",
@@ -282,7 +286,7 @@ def _add_bench(bench: argparse.ArgumentParser) -> None:
         "--latency",
         action="store_true",
         required=True,
-        help="a loop against the clock, beside an empty one",
+        help="a real-time loop, and an empty one to compare with",
     )
     bench.add_argument(
         "config",
@@ -368,7 +372,7 @@ def _add_strict(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strict",
         action="store_true",
-        help="for files of strangers: read only what lies beside them or is bundled",
+        help="for untrusted files: read only files beside them and bundled ones",
     )
     parser.add_argument(
         "--allow",

@@ -52,8 +52,8 @@ def kept(function: Callable[..., Any]) -> Any:
 class Stamp:
     """What the machine code of a function depends on.
 
-    It is computed at its first comparison, not before: a kernel may call one that is
-    defined further down in its file.
+    It is computed at the first comparison: a kernel may call one that is defined
+    further down in its file.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -106,7 +106,10 @@ def _code(code: CodeType, docstring: str | None, names: set[str]) -> Iterator[by
 
 
 def _value(value: Any, seen: set[int]) -> Iterator[bytes]:
-    """Yield what compiled code takes a value for; never twice the same if unknown."""
+    """Yield the contents of a value that a kernel reads.
+
+    For values of unknown kinds never the same twice: their code is compiled anew.
+    """
     function = getattr(value, "py_func", getattr(value, "_defn", value))
     if isinstance(function, FunctionType):
         yield from _function(function, seen)
@@ -133,9 +136,9 @@ def _value(value: Any, seen: set[int]) -> Iterator[bytes]:
 
 
 class _ByContent:
-    """A locator of Numba's, with a stamp that tells more and less than a file's text.
+    """Makes one of Numba's locators use a `Stamp` in place of a digest of the file.
 
-    Nor does the name of the file on disk hold the line at which the function stands.
+    The name of the file on disk does not contain the function's line number either.
     """
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:

@@ -1,4 +1,4 @@
-"""The active stack: the contacts that bear and the tasks that count at one time."""
+"""The active stack: the law for the contacts and tasks active at one time."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -23,17 +23,18 @@ from hsp_control.tasks import Task, TaskSample
 class ActiveStack:
     """The law for one set of contacts and tasks, with rows in order of priority.
 
-    The first level, where there is a floating base, holds the contacts still and asks
-    for no effort where nothing can give one; those of the tasks follow, and the field.
+    With a floating base the first level keeps the contacts at rest, and requires zero
+    effort along base motions that neither motors nor contacts can drive. The levels of
+    the tasks follow, then the field.
 
     Attributes:
-        contacts: The contacts that bear.
+        contacts: The active contacts.
         levels: The tasks of each level.
-        support: What the contacts can push.
+        support: The contacts' forces and their bounds.
         resolution: The law.
-        task_rows: Where each task's rows stand in the stack, by name.
-        contact_rows: Where each contact's rows stand, by name.
-        first_task_row: Where the rows of contacts end and those of tasks begin.
+        task_rows: The rows of each task in the stack, by name.
+        contact_rows: The rows of each contact, by name.
+        first_task_row: Index of the first row that belongs to a task.
         rows: All rows stacked: J, J', e, e', a_x.
     """
 
@@ -48,7 +49,7 @@ class ActiveStack:
         gain: Array,
         threshold: float,
     ) -> None:
-        """Stack the rows; the state tells which base motions the contacts permit."""
+        """Stack the rows; the state decides which base motions the contacts permit."""
         robot: Robot = state.robot
         self.contacts = tuple(contacts)
         self.levels = tuple(tuple(level) for level in levels if level)
@@ -90,7 +91,7 @@ class ActiveStack:
     def _compile(
         self, state: RobotState, metric: Metric, field: NullSpaceField
     ) -> list[Callable[[float], Any]]:
-        """Return what a step calls with the time, in order."""
+        """Return the calls of a step, each of the time, in order."""
         problem = self.resolution.problem
         plans = [part.compile(state, sample) for part, sample in self._parts]
         if self._rest is not None:
@@ -102,7 +103,7 @@ class ActiveStack:
         return steps(plans, law)
 
     def not_finite(self) -> str | None:
-        """Return which task's or contact's numbers are not finite, if any are."""
+        """Return the first task or contact whose sample contains NaN or inf, if any."""
         for part, sample in self._parts:
             if not all(np.isfinite(array).all() for array in sample):
                 kind = "task" if isinstance(part, Task) else "contact"

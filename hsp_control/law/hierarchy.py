@@ -1,12 +1,12 @@
-"""Strict priorities: the law for levels of tasks that may be in conflict.
+"""Strict priorities: the law for levels of tasks that may conflict.
 
     Q_0 = W⁻¹,   G_k = J_k Q_{k-1} J_kᵀ
     a ← a + Q_{k-1} J_kᵀ q(G_k) (a_k - J_k'v - J_k a)
     Q_k = Q_{k-1} - Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1}
 
-Each level moves in the null space of those above, which stay exact whatever it asks
-for, and the field is the last level: with P = Q_K W, J_a the stack of all levels and w
-any solution of J_aᵀ w = W(I - P)x, which going back through the levels finds,
+Each level acts in the null space of those above, which stay exact whatever it demands.
+The field is the last level: with P = Q_K W, J_a the stack of all levels, and w any
+solution of J_aᵀ w = W(I - P)x, found by going back through the levels,
 
     φ_N = Q_K [ W(g' + K_N e_N) - J_a'ᵀ w + W'(x - e_N/2) ],   e_N = P x,  x = g - v
 
@@ -175,7 +175,7 @@ def _open_level(
     square: Array,
     threshold: float,
 ) -> bool:
-    """Write Q Jᵀ and q(J Q Jᵀ), with q as in `pseudo_inverse.py`; any damped?"""
+    """Write Q Jᵀ and q(J Q Jᵀ), see `pseudo_inverse.py`; return whether it damped."""
     m, n = J.shape
     for k in range(m):
         multiply(Q, J[k], QJ[:, k])

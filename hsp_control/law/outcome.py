@@ -1,4 +1,4 @@
-"""What became of the law at one state."""
+"""Whether the law is exact at one state."""
 
 from enum import IntEnum
 

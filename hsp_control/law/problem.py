@@ -1,4 +1,4 @@
-"""The numbers of one step, which tasks, field and metric write and the law reads."""
+"""The input of the law: tasks, field and metric write it, the law reads it."""
 
 from hsp_control.common.arrays import Array
 from hsp_control.null_space.fields import FieldSample

@@ -30,7 +30,7 @@ def weighted_pseudo_inverse(
     Q: Array,
     X: Array,
 ) -> bool:
-    """Write the factors of J# = W⁻¹Jᵀ q(JW⁻¹Jᵀ); return whether it was damped.
+    """Write the factors of J# = W⁻¹Jᵀ q(JW⁻¹Jᵀ), and return whether it was damped.
 
     q(x) = 1/x for x ≥ threshold² and (2 - x/threshold²)/threshold² below it
     (docs/law.md, Near singularities): continuously differentiable, exactly the inverse
@@ -47,7 +47,7 @@ def weighted_pseudo_inverse(
         X: Shape (m, m).
     """
     whiten(J, L, form, B)
-    # The spectrum is asked for only where cheaper bounds leave open whether it is met.
+    # The spectrum is computed only where cheaper bounds cannot decide.
     bound = orthonormalise_rows(B, Q, X)
     if 0.0 < bound < threshold:
         bound = smallest_singular_value_bound(X)
@@ -68,7 +68,7 @@ def whiten(J: Array, L: Array, form: int, B: Array) -> None:
 
 @kernel
 def _bounded_factors(B: Array, threshold: float, Q: Array, X: Array) -> bool:
-    """Write Q = U B, with rows of norms s, and X = q(s²) U; any s damped?"""
+    """Write Q = U B with rows of norms s, and X = q(s²) U; return whether it damped."""
     m, n = B.shape
     for k in range(m):
         for i in range(n):
@@ -91,7 +91,7 @@ def _bounded_factors(B: Array, threshold: float, Q: Array, X: Array) -> bool:
 def apply_pseudo_inverse(
     Q: Array, X: Array, L: Array, form: int, x: Array, part: Array, out: Array
 ) -> None:
-    """Write J# x = L⁻ᵀ Qᵀ X x, the least motion that x asks for; part is scratch."""
+    """Write J# x = L⁻ᵀ Qᵀ X x, the smallest motion that gives x; part is scratch."""
     multiply(X, x, part)
     multiply_transposed(Q, part, out)
     if form != IDENTITY:

@@ -1,4 +1,4 @@
-"""From tasks and a field to one acceleration: the law with its memory."""
+"""The law with its memory: from tasks and a field to one acceleration."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -28,7 +28,7 @@ _EXACT, _DAMPED, _NOT_FINITE = map(int, OUTCOMES)
 
 
 class Resolved(NamedTuple):
-    """What the law decided at one state.
+    """The law's result at one state.
 
     Attributes:
         acceleration: a, shape (nv,).
@@ -60,13 +60,13 @@ class Scratch(NamedTuple):
 
 
 class Resolution:
-    """The law for levels of tasks: the kernels with their buffers.
+    """The law for levels of tasks: its kernels and their buffers.
 
-    It has scratch but nothing that it remembers: the same input gives the same output.
+    It has scratch memory but no state: the same input gives the same output.
 
     Attributes:
-        problem: What is to be resolved, to be filled in before `resolve`.
-        ends: Where each level's rows end in the stack.
+        problem: The input, to be written before `resolve`.
+        ends: End of each level's rows in the stack.
         form: The metric's form.
         threshold: Singular value below which the inverse is bounded.
         acceleration: a of the last `resolve`, shape (nv,).
@@ -80,7 +80,7 @@ class Resolution:
 
         Args:
             levels: Rows of each level, the highest priority first.
-            nv: Freedoms.
+            nv: Number of degrees of freedom.
             form: The metric's form.
             gain: Null-space gain K_N, shape (nv, nv) [1/s].
             threshold: Singular value of the whitened Jacobian below which it is damped.
@@ -114,9 +114,11 @@ class Resolution:
         )
 
     def compile(self, v: Array, *, controls: bool) -> Callable[[], float]:
-        """Return what `resolve` calls for a velocity, an array that is followed.
+        """Return the call that `resolve` makes; it returns the number of an `Outcome`.
 
-        It returns the number of an `Outcome`.
+        Args:
+            v: The velocity, shape (nv,); the call reads this array each time.
+            controls: False for φ_N = 0.
         """
         problem = self.problem
         return bind(
@@ -136,9 +138,10 @@ class Resolution:
         )
 
     def spectrum(self, first: int = 0) -> tuple[Array, float]:
-        """Return the singular values of J L⁻ᵀ from a row on, largest first.
+        """Return singular values and their squared product, the paper's manipulability.
 
-        And their product squared: det(J W⁻¹ Jᵀ), the manipulability of the paper.
+        Of J L⁻ᵀ without its rows before ``first``; the largest value comes first. The
+        squared product is det(J W⁻¹ Jᵀ).
         """
         values = self._spectra.get(first)
         if values is None:
