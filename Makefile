@@ -34,6 +34,9 @@ quick: $(STAMP) ## what to run after every edit: a minute of CPU
 test: $(STAMP) ## run the tests
 	@$(BIN)/python -m pytest -n $(WORKERS) $(ARGS)
 
+thorough: $(STAMP) ## run the tests with more seeds, and every configuration's page
+	@HSP_THOROUGH=1 $(BIN)/python -m pytest -n $(WORKERS) $(ARGS)
+
 lint: $(STAMP) ## ruff, mypy --strict and the layers of the architecture
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
@@ -77,7 +80,7 @@ figures: $(STAMP) ## draw the documents' figures anew, into docs/figures
 	@$(BIN)/python docs/make_figures.py
 
 screenshots: $(STAMP) ## photograph the page of every configuration, into out/screenshots
-	@HSP_PICTURES=all $(BIN)/python -m pytest tests/system/test_browser.py -k picture
+	@HSP_THOROUGH=1 $(BIN)/python -m pytest tests/system/test_browser.py -k picture
 
 animations: $(STAMP) ## film the README's animations anew, into docs/figures (needs Chromium)
 	@$(BIN)/python docs/make_animations.py
@@ -102,7 +105,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help figures screenshots animations demo quick test lint coverage fuzz mutants wheel-test format constraints clean
+.PHONY: help figures screenshots animations demo quick test thorough lint coverage fuzz mutants wheel-test format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from hsp_control.cli.startup import end_quietly
+from hsp_control.cli.startup import end_quietly, is_command
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.common.resources import bundled_configs, bundled_robots
 from hsp_control.common.version import __version__
@@ -29,6 +29,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command is None:
         parser.print_help()
         return 0
+    # For one state it is faster to run kernels as Python than to load machine code.
+    plain = (
+        options.command == "check"
+        and is_command()
+        and "NUMBA_DISABLE_JIT" not in os.environ
+    )
+    if plain:
+        os.environ["NUMBA_DISABLE_JIT"] = "1"
     # Commands are imported only when needed, so that `hsp --help` answers at once.
     from hsp_control.cli import commands, consoles
 
@@ -42,6 +50,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(getattr(commands, options.command)(options))
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
+    except ArithmeticError:
+        if not plain:
+            raise
+        # Python divides by zero where compiled kernels go on with inf: once more, so.
+        command = [sys.executable, *sys.orig_argv[1:]]
+        os.execve(command[0], command, {**os.environ, "NUMBA_DISABLE_JIT": "0"})
     except BrokenPipeError:  # `hsp schema | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:

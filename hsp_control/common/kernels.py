@@ -3,18 +3,17 @@
 A *kernel* writes its results into arrays that the caller owns, allocates nothing, and
 calls only other kernels. There is one implementation of each: with
 ``NUMBA_DISABLE_JIT=1`` the very same function runs as plain Python, for reading,
-debugging and coverage.
+debugging and coverage, and Numba is not even imported.
 """
 
+import os
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-import numba
-from numba.core.ccallback import CFunc
-
-from hsp_control.common.kernel_cache import kept
-
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+"""Whether kernels run as plain Python."""
 
 _OPTIONS: dict[str, Any] = {
     "nopython": True,
@@ -36,9 +35,14 @@ def kernel(function: Function) -> Function:
     See `kernel_cache` for where it is kept, and for how long. A kernel may return
     arrays to other kernels alone, not to Python.
     """
+    if PLAIN:
+        return function
+    import numba
+
+    from hsp_control.common.kernel_cache import kept
+
     compiled = cast("Any", numba.jit(**_OPTIONS)(function))
-    if is_compiled(compiled):
-        compiled._cache = kept(function)
+    compiled._cache = kept(function)
     return cast("Function", compiled)
 
 
@@ -54,6 +58,10 @@ def callback(signature: Any, function: Callable[..., Any]) -> Any:
         signature: Its types, as ``types.float64(types.int64)``.
         function: The function.
     """
+    from numba.core.ccallback import CFunc
+
+    from hsp_control.common.kernel_cache import kept
+
     arguments = signature.args, signature.return_type
     compiled = cast("Any", CFunc)(function, arguments, locals={}, options=_OPTIONS)
     compiled._cache = kept(function)

@@ -17,7 +17,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from PIL import Image, ImageSequence
-from places import ROOT
+from places import ROOT, THOROUGH
 
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
@@ -404,16 +404,14 @@ QUICK = (*COARSE, "simulation.duration=4")
 SHOWN = {"paper": (), "whole_body": ("simulation.duration=0.6",)}
 
 
-ALL_PICTURES = os.environ.get("HSP_PICTURES") == "all"  # `make screenshots`
 EACH_KIND = (
     "paper/4_moving_obstacle",
     "panda_obstacle",
-    "tiago_reach",
     "whole_body/talos_circle",
 )
 
 
-@pytest.mark.parametrize("name", bundled_configs() if ALL_PICTURES else EACH_KIND)
+@pytest.mark.parametrize("name", bundled_configs() if THOROUGH else EACH_KIND)
 def test_a_configuration_has_its_picture(
     name: str, browser: Any, tmp_path: Path
 ) -> None:

@@ -105,3 +105,38 @@ def test_a_shell_completes_without_the_engine(
     )
     assert answer.read_text().strip("\013") == offered
     assert not found & HEAVY
+
+
+@pytest.mark.process
+def test_check_needs_no_compiler() -> None:
+    code = (
+        "import sys; sys.argv[0] = 'hsp'\n"
+        "from hsp_control.cli import main\n"
+        "assert main(['check', 'paper/2_rest']) == 0"
+    )
+    assert "numba" not in imported(code)
+
+
+@pytest.mark.process
+def test_what_python_cannot_divide_is_checked_compiled() -> None:
+    """Python raises where a compiled kernel goes on with inf: then `hsp` tries again."""
+    code = """
+import sys, types
+sys.argv[0] = "hsp"
+import hsp_control.cli
+
+def check(options):
+    from hsp_control.common import kernels
+    if kernels.PLAIN:
+        raise ZeroDivisionError
+    print("compiled")
+    return 0
+
+hsp_control.cli.commands = types.SimpleNamespace(check=check)
+sys.exit(hsp_control.cli.main(["check", "anything"]))
+"""
+    kept = {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"}
+    ran = subprocess.run(
+        [sys.executable, "-c", code], env=kept, capture_output=True, text=True
+    )
+    assert (ran.returncode, ran.stdout) == (0, "compiled\n"), ran.stderr

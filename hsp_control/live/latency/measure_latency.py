@@ -5,7 +5,6 @@ from contextlib import AbstractContextManager, nullcontext
 from time import perf_counter_ns
 
 import numpy as np
-from numba.core import event
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
@@ -54,6 +53,8 @@ def measure(
         pass  # raise at once if it cannot be set
     turn = max(1, round(TURN / loop.period))
     period = round(loop.period * 1e9)
+    from numba.core import event
+
     control, empty = StepTimes(period, count), StepTimes(period, count)
     # With ordinary priority: Linux throttles real-time processes that never sleep.
     back_to_back = dry_run(loop, seconds)

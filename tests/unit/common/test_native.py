@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hsp_control as hsp
-from hsp_control.common import native
+from hsp_control.common import adapters
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import NativeCall, Timed, bind, sequence
@@ -219,14 +219,14 @@ def test_records_are_arguments() -> None:
 
 @compiled
 def test_numba_s_layout_is_known() -> None:
-    assert native.unknown_layout() == ""
-    assert native.AVAILABLE
+    assert adapters.unknown_layout() == ""
+    assert adapters.AVAILABLE
 
 
 def test_another_layout_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(native, "_ARRAY", ("data", "shape"))
+    monkeypatch.setattr(adapters, "_ARRAY", ("data", "shape"))
     with pytest.warns(RuntimeWarning, match="an array is meminfo, .*; known is data, "):
-        assert not native._available()
+        assert not adapters._available()
 
 
 def test_ordinary_calls_give_the_same_efforts(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -242,7 +242,7 @@ def test_ordinary_calls_give_the_same_efforts(monkeypatch: pytest.MonkeyPatch) -
         return np.array(controller.compute(state).tau)
 
     packed = effort()
-    monkeypatch.setattr(native, "AVAILABLE", False)
+    monkeypatch.setattr(adapters, "AVAILABLE", False)
     assert not isinstance(bind(_note, np.zeros(2), 1.0), NativeCall)
     # Kernels that are not compiled into one another add their sums in another order.
     np.testing.assert_allclose(effort(), packed, rtol=1e-12, atol=1e-11)

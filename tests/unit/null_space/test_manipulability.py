@@ -19,6 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import slope
+from places import THOROUGH
 
 from hsp_control import Robot, ToolFrame
 from hsp_control.common.exceptions import (
@@ -293,7 +294,7 @@ def test_value_gradient_and_rate_at_random_states(
     for which, member in MEMBERS.items():
         field = member.build(robot, frame)
         turned = 0.0
-        for q, v in states(robot, 4, seed=1):
+        for q, v in states(robot, 8 if THOROUGH else 2, seed=1):
             state = robot.state(0.0, q, v)
             kappa = member.spectrum(robot, q, frame).sharpness
             f = member.value(robot, q, frame)

@@ -1,0 +1,164 @@
+"""The compiled side of native calls: adapters that read packed arguments and call.
+
+An adapter is f(address of the words, time), whatever the kernel's own arguments are.
+"""
+
+import hashlib
+import warnings
+from collections.abc import Callable
+from functools import cache
+from types import FunctionType
+from typing import Any, cast
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.datamodel.registry import default_manager
+from numba.extending import intrinsic
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.kernels import callback, kernel
+
+_ARRAY = ("meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides")
+"""The words of an array in Numba's compiled code, in order."""
+
+
+def unknown_layout() -> str:
+    """Return what of Numba's memory layout is not as `packed` has it, or nothing."""
+    lookup: Callable[[Any], Any] = default_manager.lookup
+    array = lookup(types.float64[:, ::1])
+    pair = lookup(cast("Any", types).Tuple((types.int64,) * 2))
+    found = getattr(array, "_fields", ())
+    if found != _ARRAY:
+        return f"an array is {', '.join(found)}; known is {', '.join(_ARRAY)}"
+    if not isinstance(pair.get_value_type(), ir.ArrayType):
+        return f"a tuple of two integers is {pair.get_value_type()}; known is [2 x i64]"
+    return ""
+
+
+def packed(argument: Any) -> tuple[types.Type, Array]:
+    """Return an argument's type, and what stands for it in memory."""
+    if isinstance(argument, np.ndarray):
+        kind = cast("Callable[[Any], types.Type]", numba.typeof)(argument)
+        size, item, at = argument.size, argument.itemsize, argument.ctypes.data
+        shape = *argument.shape, *argument.strides
+        # Two owners come first in Numba's arrays, of which kernels know nothing.
+        return kind, np.array([0, 0, size, item, at, *shape], dtype=np.int64)
+    if isinstance(argument, tuple):  # a record: its values, one after the other
+        kind = cast("Callable[[Any], types.Type]", numba.typeof)(argument)
+        return kind, np.concatenate([packed(value)[1] for value in argument])
+    if isinstance(argument, bool | int | np.integer | np.bool_):
+        return types.int64, np.array([argument], dtype=np.int64)
+    return types.float64, np.array([argument], dtype=float).view(np.int64)
+
+
+@cache
+def adapter(
+    function: Callable[..., Any], kinds: tuple[types.Type, ...], timed: bool
+) -> int:
+    """Return the address of what calls a kernel: f(where its arguments are, time)."""
+    template = _call_at_a_time if timed else _call
+    place = {
+        "__name__": __name__,
+        "kernel": function,
+        "arguments": cast("Any", types).Tuple(kinds),
+        "_unpacked": _unpacked,
+        "_number": _number,
+    }
+    call = FunctionType(cast("FunctionType", template).__code__, place)
+    digest = hashlib.sha256(f"{kinds} {timed}".encode()).hexdigest()[:12]
+    name = f"{function.__module__}_{function.__name__}_{digest}".replace(".", "_")
+    call.__qualname__ = name
+    signature = types.float64(types.int64, types.float64)
+    code = callback(signature, call)
+    _codes.append(code)
+    return int(code.address)
+
+
+_codes: list[Any] = []
+"""What has been compiled: its addresses are used for as long as the process lives."""
+
+
+def _call(words: int, t: float) -> float:
+    return _number(kernel(*_unpacked(words, arguments)))  # type: ignore # noqa
+
+
+def _call_at_a_time(words: int, t: float) -> float:
+    return _number(kernel(*_unpacked(words, arguments), t))  # type: ignore # noqa
+
+
+@intrinsic
+def _number(typing: Any, value: Any) -> Any:
+    """Return what a kernel returned as a number, 0 for nothing."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        if isinstance(value, types.NoneType):
+            return context.get_constant(types.float64, 0.0)
+        return context.cast(builder, arguments[0], value, types.float64)
+
+    return types.float64(value), code
+
+
+@intrinsic
+def _unpacked(typing: Any, words: Any, kind: Any) -> Any:
+    """Return the values of the types of a tuple that lie at an address."""
+    values = kind.instance_type
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        pointer = context.get_value_type(values).as_pointer()
+        return builder.load(builder.inttoptr(arguments[0], pointer))
+
+    return values(types.int64, kind), code
+
+
+@intrinsic
+def _invoke(typing: Any, address: Any, words: Any, t: Any) -> Any:
+    """Call what `adapter` made."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = ir.FunctionType(ir.DoubleType(), [ir.IntType(64), ir.DoubleType()])
+        function = builder.inttoptr(arguments[0], kind.as_pointer())
+        return builder.call(function, arguments[1:])
+
+    return types.float64(types.int64, types.int64, types.float64), code
+
+
+@kernel
+def run(calls: Indices, when: Array, t: float) -> float:
+    """Make calls, each a row (code, arguments), those at whose time it is.
+
+    Returns:
+        What the last one returned.
+    """
+    value = 0.0
+    for k in range(calls.shape[0]):
+        if when[k, 0] <= t < when[k, 1]:
+            value = _invoke(calls[k, 0], calls[k, 1], t)  # type: ignore[call-arg]
+    return value
+
+
+@cache
+def entry() -> Callable[..., float]:
+    """Return `run` as Python calls it without asking for types."""
+    kinds = types.int64[:, ::1], types.float64[:, ::1], types.float64
+    compiled_run = cast("Any", run)
+    compiled_run.compile(kinds)
+    return cast("Callable[..., float]", compiled_run.overloads[kinds].entry_point)
+
+
+def _available() -> bool:
+    if complaint := unknown_layout():
+        warnings.warn(
+            f"kernels are called one by one from Python, which doubles the time of a "
+            f"step: in Numba {numba.__version__} {complaint}. Install a version that "
+            "hsp_control declares",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return False
+    return True
+
+
+AVAILABLE = _available()
+"""Whether calls are packed; otherwise they are ordinary ones, with the same results."""
