@@ -91,7 +91,7 @@ class Watched:
         if message.type in {"error", "warning"} and HARMLESS not in message.text:
             self.wrong.append(message.text)
 
-    def until(self, expression: str, timeout: float = 20.0) -> None:
+    def until(self, expression: str, timeout: float = 200.0) -> None:
         """Wait until an expression is true; playwright's own way needs eval."""
         deadline = time.monotonic() + timeout
         while not self.page.evaluate(expression):
@@ -305,7 +305,7 @@ def test_the_live_view_draws_and_plays(
     with Viewer(Robot.load("planar3r")) as viewer:
         viewer.draw_scene(planar)
         watched = watch(viewer.url)
-        assert viewer.wait_for_browser(20.0)
+        assert viewer.wait_for_browser(200.0)
         first = watched.picture()
         assert (first.sum(axis=2) < 200).sum() > 500
         viewer.play(planar, speed=2.0)

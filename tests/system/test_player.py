@@ -82,7 +82,7 @@ def opened(chromium: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
         ),
     )
     page.goto(viewer.url)
-    assert viewer.wait_for_browser(60.0)
+    assert viewer.wait_for_browser(200.0)
     yield page, wrong
     page.close()
 
@@ -122,14 +122,15 @@ def trail() -> list[Any]:
 
 def tell(viewer: Viewer, commands: list[Any]) -> None:
     viewer.transport.send(commands)
-    assert viewer.wait_for_browser(20.0)
+    assert viewer.wait_for_browser(200.0)
 
 
 def player(page: Any, name: str) -> Any:
     return page.evaluate(f"player.{name}")
 
 
-def until(page: Any, expression: str, timeout: float = 20.0) -> None:
+def until(page: Any, expression: str, timeout: float = 200.0) -> None:
+    """Wait for an event; the time only ends a test that hangs."""
     deadline = time.monotonic() + timeout
     while not page.evaluate(expression):
         assert time.monotonic() < deadline, f"never: {expression}"
@@ -206,6 +207,15 @@ def test_it_is_steered_from_the_keyboard(page: Any) -> None:
     assert player(page, "playing") is False
 
 
+# Told by the player's own events: a slow machine may draw no picture of any one moment.
+COUNT_ROUNDS = """window.rounds = 0;
+let last = player.time;
+player.addEventListener("time", ({detail}) => {
+  if (detail.time < last) rounds += 1;
+  last = detail.time;
+})"""
+
+
 def test_it_is_steered_from_the_page(page: Any) -> None:
     bar = page.locator(".player")
     assert bar.is_visible()
@@ -220,10 +230,9 @@ def test_it_is_steered_from_the_page(page: Any) -> None:
     page.locator(".toggle").click()
     until(page, "!player.playing && player.time === player.end")  # once, to its end
     page.locator(".loop").click()
-    page.locator(".toggle").click()  # from the start again
-    until(page, "player.playing && player.time < 2")
-    until(page, "player.time > 2")
-    until(page, "player.time < 2")  # round it goes
+    page.evaluate(COUNT_ROUNDS)
+    page.locator(".toggle").click()  # from the start again, and again
+    until(page, "rounds >= 2")
     page.locator(".toggle").click()
     # The bar's keys are still the page's, wherever the focus is.
     page.locator(".timeline").focus()
@@ -318,7 +327,7 @@ def test_a_page_opened_again_shows_the_same(
 ) -> None:
     again = chromium.new_page()
     again.goto(viewer.url)
-    assert viewer.wait_for_browser(60.0)
+    assert viewer.wait_for_browser(200.0)
     until(again, "player.loaded && player.end === 3")
     page.evaluate("player.seek(2)")
     again.evaluate("player.seek(2)")

@@ -119,7 +119,7 @@ def test_check_needs_no_compiler() -> None:
 
 @pytest.mark.process
 def test_what_python_cannot_divide_is_checked_compiled() -> None:
-    """Python raises where a compiled kernel goes on with inf: then `hsp` tries again."""
+    """Python raises where a compiled kernel returns inf: then `hsp` tries again."""
     code = """
 import sys, types
 sys.argv[0] = "hsp"
