@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.control.controller import Controller
 from hsp_control.robot import RobotState
 from hsp_control.visualization.viewer.appearance import (
@@ -52,8 +53,8 @@ class SelfMotion:
         self._controller = controller
         self._radius = ARROW_RADIUS * motion.size
         self._longest = _MAX_LENGTH * motion.size
-        positions, velocities, fields = self._velocities(motion)
-        self._last = motion, (positions, velocities, fields)
+        self._speeds = IdentityCache(self._velocities)
+        positions, velocities, fields = self._speeds.get(motion)
         size = motion.size
         speeds = np.maximum(
             *(np.linalg.norm(each, axis=2) for each in (velocities, fields))
@@ -78,9 +79,7 @@ class SelfMotion:
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
         """Yield its tracks along the run."""
-        if self._last[0] is not motion:
-            self._last = motion, self._velocities(motion)
-        positions, velocities, fields = self._last[1]
+        positions, velocities, fields = self._speeds.get(motion)
         arrows = [("velocity", velocities, self._radius)]
         if self._controller.field.controls:
             arrows.append(("field", fields, _WIDENING * self._radius))

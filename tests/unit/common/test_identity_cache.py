@@ -1,0 +1,46 @@
+"""A cache by identity: equal is not enough, and a copy begins anew."""
+
+import copy
+import pickle
+from typing import Any
+
+import numpy as np
+
+from hsp_control.common.identity_cache import IdentityCache
+
+
+class Maker:
+    """Counts what it makes."""
+
+    def __init__(self) -> None:
+        self.made: list[tuple[Any, ...]] = []
+        self.cache = IdentityCache(self.make)
+
+    def make(self, *keys: Any) -> int:
+        self.made.append(keys)
+        return len(self.made)
+
+
+def test_it_is_made_anew_for_another_object_of_any_place() -> None:
+    maker, keys = Maker(), [np.zeros(1) for _ in range(5)]
+    assert maker.cache.get(*keys) == 1
+    assert maker.cache.get(*keys) == 1
+    for place in range(5):
+        others = list(keys)
+        others[place] = np.zeros(1)  # equal, and another
+        count = len(maker.made)
+        assert maker.cache.get(*others) == count + 1
+        assert all(a is b for a, b in zip(maker.made[-1], others, strict=True))
+        maker.cache.get(*keys)
+    assert maker.cache.get(keys[0]) == len(maker.made)  # fewer keys are other keys
+    assert maker.made[-1] == (keys[0],)
+
+
+def test_a_copy_makes_its_own() -> None:
+    maker, key = Maker(), object()
+    maker.cache.get(key)
+    for other in (copy.deepcopy(maker), pickle.loads(pickle.dumps(Maker()))):
+        count = len(other.made)
+        other.cache.get(key)
+        assert len(other.made) == count + 1
+    assert len(maker.made) == 1
