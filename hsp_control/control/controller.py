@@ -41,7 +41,8 @@ class ControlOutput:
     what must outlive it.
 
     Attributes:
-        tau: Effort M a + N minus the contact forces' share, shape (nv,) [N·m or N].
+        tau: Effort M a + N minus what the contact forces supply, shape (nv,)
+            [N·m or N].
         acceleration: a, shape (nv,).
         task: All tasks stacked: J, J', e, e', a_x.
         field: g and g', shape (nv,) each.
@@ -87,9 +88,9 @@ class Diagnostics(NamedTuple):
 AccelerationModifier = Callable[
     [RobotState, ActiveStack, Array], tuple[Array, Array | None]
 ]
-"""(state, active stack, a) ↦ the acceleration to deliver, shape (nv,), and the effort
-that this takes besides M a + N, shape (nv,) or None: how compensators act between the
-law and the limits."""
+"""How compensators act between the law and the limits: a function of (state, active
+stack, a). It returns the acceleration to deliver, shape (nv,), and an additional effort
+besides M a + N, shape (nv,), or None."""
 
 
 class Controller:
@@ -137,13 +138,12 @@ class Controller:
             metric: Joint-space metric; None: identity.
             singularity_threshold: Singular value of the stacked Jacobian (in the
                 metric) below which its inverse is bounded instead of exact. For
-                positions about 3 % of the arm's reach [m]; efforts on the way into a
-                singularity grow with its inverse cube.
+                position tasks choose about 3 % of the arm's reach [m]. Near a
+                singularity the efforts grow with the inverse cube of this value.
             limits: Limits on efforts and motion; None: no limits.
             contacts: The contacts that may support a robot with a free-flyer root.
-            base: What else moves such a root: ``flying``, nothing while no contact is
-                active; ``driven``, something else delivers the root's effort, for
-                example a simulator.
+            base: What moves the free-flyer root besides contacts. ``flying``: nothing;
+                ``driven``: something outside, for example a simulator.
             schedules: When tasks are active, by name; all others always are.
 
         Raises:
@@ -371,8 +371,8 @@ class Controller:
         """Return v = J# x_d' + P g, shape (nv,): the robot once both errors have died.
 
         The law makes the robot this first-order flow (docs/law.md, Equations (7) and
-        (13) over a metric; Liégeois 1977), so it previews a field, and a start with
-        this velocity has no transient.
+        (13) over a metric; Liégeois 1977). So it shows what a field will do, and a
+        start with this velocity has no transient.
         """
         state = self.robot.state(t, q, np.zeros(self.robot.nv))
         self.compute(state)
@@ -477,7 +477,7 @@ class Controller:
         Raises:
             ControllerError: If the field belongs to another robot.
             FieldError: If the ramp is not positive, or one of the two fields leaves the
-                null space uncontrolled: nothing lies between a field and none.
+                null space uncontrolled: there is no blend between the two.
         """
         check_parts(self.robot, self.levels, field)
         self.field = crossfade(self.field, field, start=start, duration=ramp)

@@ -4,17 +4,17 @@
     a ← a + Q_{k-1} J_kᵀ q(G_k) (a_k - J_k'v - J_k a)
     Q_k = Q_{k-1} - Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1}
 
-Each level acts in the null space of those above, which stay exact whatever it demands.
-The field is the last level: with P = Q_K W, J_a the stack of all levels, and w any
-solution of J_aᵀ w = W(I - P)x, found by going back through the levels,
+Each level acts in the null space of the levels above. Those stay exact, whatever the
+lower level requires. The field is the last level: with P = Q_K W, J_a the stack of all
+levels, and w any solution of J_aᵀ w = W(I - P)x, found by going back through them,
 
     φ_N = Q_K [ W(g' + K_N e_N) - J_a'ᵀ w + W'(x - e_N/2) ],   e_N = P x,  x = g - v
 
 so that V' = -e_NᵀW K_N e_N as long as the stack keeps its rank, conflicts included.
-Where the stack has full rank this *is* the law of `law.py`, to rounding, which then
-serves: it costs a tenth. (Its least singular value bounds those of all levels from
-below, by the interlacing of Schur complements, so that the two meet where they change
-over.) ``docs/law.md``, Priorities.
+If the stack has full rank, this equals the law of `law.py` up to rounding. That law is
+then used, because it takes a tenth of the time. The smallest singular value of the
+stack is a lower bound for those of all levels (Schur complements interlace), so both
+give the same result where one replaces the other. ``docs/law.md``, Priorities.
 """
 
 from typing import NamedTuple

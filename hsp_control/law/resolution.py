@@ -1,4 +1,4 @@
-"""The law with its memory: from tasks and a field to one acceleration."""
+"""The law with its buffers: from tasks and a field to one acceleration."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -83,7 +83,8 @@ class Resolution:
             nv: Number of degrees of freedom.
             form: The metric's form.
             gain: Null-space gain K_N, shape (nv, nv) [1/s].
-            threshold: Singular value of the whitened Jacobian below which it is damped.
+            threshold: Singular value of the whitened Jacobian below which its inverse
+                is bounded.
         """
         m = sum(levels)
         self.problem = Problem(m, nv, gain)
@@ -140,8 +141,8 @@ class Resolution:
     def spectrum(self, first: int = 0) -> tuple[Array, float]:
         """Return singular values and their squared product, the paper's manipulability.
 
-        Of J L⁻ᵀ without its rows before ``first``; the largest value comes first. The
-        squared product is det(J W⁻¹ Jᵀ).
+        The values are those of J L⁻ᵀ without the rows before ``first``, the largest
+        first. Their squared product is det(J W⁻¹ Jᵀ).
         """
         values = self._spectra.get(first)
         if values is None:

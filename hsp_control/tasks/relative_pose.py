@@ -25,7 +25,7 @@ class RelativePose(CompiledTask):
 
     Attributes:
         frame: Name of the frame that is controlled.
-        reference: Name of the frame that it is measured in.
+        reference: Name of the frame in which the pose is measured.
         trajectory: The desired relative pose.
     """
 

@@ -46,7 +46,8 @@ class NullSpaceModel(Model):
     """The control of self-motion."""
 
     gain: Gain = 10.0
-    """Null-space gain K_N [1/s]: a number, nv numbers, or a matrix."""
+    """Null-space gain K_N [1/s], the rate at which the null-space error decays: a
+    number, nv numbers, or a matrix."""
     metric: AnyMetric = IdentityModel(type="identity")
     """The joint-space metric W."""
     fields: list[AnyField] = []

@@ -49,6 +49,7 @@ class SimulationModel(Model):
     """Time for which an effort is held [s]; without it, the law is evaluated in every
     stage of the integrator."""
     check_rate: bool = True
-    """Whether a loop that is unstable at its control period is an error."""
+    """Whether the loop is checked for stability at its control period: an unstable loop
+    is an error, a doubtful one a warning. Without a control period nothing is done."""
     integrator: AnyIntegrator = Dop853Model(type="dop853")
     """The integrator of the robot's motion."""

@@ -16,9 +16,9 @@ from hsp_control.tasks import TaskSample
 class BallContact(Contact):
     """A spherical foot that rolls on the plane, like the feet of quadrupeds.
 
-    The material point in contact, at -r n from the centre, does not slip; it is another
-    point at the next moment. Holding the centre still instead adds a null-space error
-    of 0.2 rad/s on Solo.
+    The material point in contact, at -r n from the centre, does not slip. A moment
+    later another point is in contact. Holding the centre still instead adds a
+    null-space error of 0.2 rad/s on Solo.
 
     Attributes:
         radius: r [m].

@@ -16,9 +16,9 @@ class UnactuatedRows:
     mass, which makes them comparable with those of tasks.
 
     Attributes:
-        name: Its name in messages.
+        name: Name of these rows in messages.
         robot: The robot.
-        rows: The number of such motions.
+        rows: The number of free base motions.
     """
 
     def __init__(self, robot: Robot, base: Indices, count: int) -> None:

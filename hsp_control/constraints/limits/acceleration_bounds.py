@@ -8,9 +8,9 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 
 _STEEPER = 4.0
-"""How much steeper the velocity barrier is beyond the guarded speed. With efforts held
-for 1 ms that change at 1000 N·m/s the acceleration has an error of M⁻¹·0.5 N·m, half a
-rad/s² on a Panda, for as long as they change: the margin must be enough for it."""
+"""How much steeper the velocity barrier is beyond the guarded speed. While efforts that
+are held for 1 ms change at 1000 N·m/s, the acceleration has an error of M⁻¹·0.5 N·m,
+half a rad/s² on a Panda. The margin must cover this error."""
 
 
 MOTION, EFFORT = 1, 2

@@ -29,8 +29,8 @@ class Limits:
         acceleration    a ≤ a_max
 
     and likewise from below; the velocity barrier is four times as steep within its
-    margin. Distances have their own barriers, see `MinimumDistance`, and so has the
-    effort against gravity, see `StaticEffort`. Where limits contradict each other they
+    margin. Distances have their own barriers, see `MinimumDistance`; the effort against
+    gravity has its own too, see `StaticEffort`. Where limits contradict each other they
     are relaxed in this order: static effort, acceleration, velocity, position,
     distance. Effort limits are never relaxed.
 
@@ -38,7 +38,8 @@ class Limits:
     If `null_space_speed` is given, the deviation of the null space is bounded: with δ
     the deviation from the law's acceleration, s this speed and λ the decay rate of K_N,
     |(P δ)_j| ≤ λ s_j. Then e_N' = -K_N e_N - P δ is a stable system with a bounded
-    input, and ‖e_N‖_W ≤ ‖s‖_|W| at all times (docs/limits.md). This bound is the first
+    input, and ‖e_N‖_W ≤ ‖s‖_|W| at all times, |W| the absolute values of W
+    (docs/limits.md). This bound is the first
     of all to be relaxed.
 
     Attributes:
@@ -97,13 +98,14 @@ class Limits:
             distances: The minimum distances.
             bandwidth: α [1/s]. Motors can follow 5 to 20: faster barriers act so late
                 that they need more than the effort rate permits.
-            static_effort: The part of an effort that gravity may take, in (0, 1], for
-                motors that carry no contact. None: any.
+            static_effort: The part of an effort that gravity may take, in (0, 1]. It
+                holds for motors that are not between the root and a contact. None: no
+                limit.
             null_space_speed: s [rad/s or m/s]: how fast the null space may leave the
                 field, before tasks deviate. None: no bound.
             null_space_weight: Cost of null-space deviation relative to the first task,
-                between 0 and 1. None: 1e-6, and 1e-8 where tasks have priorities. 1e-3
-                brings a robot to rest that cannot reach its target; 1e-3 of the
+                between 0 and 1. None: 1e-6, and 1e-8 where tasks have priorities. With
+                1e-3, a robot that cannot reach its target comes to rest; 1e-3 of the
                 null-space deviation then appears in the task.
 
         Raises:

@@ -5,8 +5,9 @@ Minimise ½ δᵀH δ over a = a* + δ, with a* the law's acceleration and
     H = Σ ρ_k N_k N_kᵀ,      ρ_1 = 1 > ρ_2 > ... > ρ_N
 
 in whitened coordinates, N_k the directions of the tasks of level k in the null space of
-those above, and ρ_N the cost of the rest. So the null space deviates first, then the
-tasks, the lowest priority first. The constraints are affine in (δ, f):
+those above, and ρ_N the cost of motion in the null space of all tasks. So the null
+space deviates first, then the tasks, the lowest priority first. The constraints are
+affine in (δ, f):
 
     effort      |M a + N - F f| ≤ limits, and within the rate limit of the last effort
     base        (M a + N - F f)_base = 0                          no motor acts there
@@ -383,7 +384,7 @@ def _nearest(H: Array, f: Array, kept: Rows, bound: Rows | None) -> Array | None
 def _relax(hard: Rows, soft: Mapping[str, Rows]) -> tuple[Rows, Array | None, float]:
     """Relax the soft rows as little as the hard rows permit.
 
-    Cheap kinds are relaxed first: joint motion before distances before contacts, see
+    Contacts are kept longest, then distances, then joint motion, see
     `_RELAXATION_COST`.
 
     Returns:

@@ -18,9 +18,9 @@ from hsp_control.law.pseudo_inverse import whiten
 from hsp_control.null_space.metrics.metric import IDENTITY
 
 _ONE_LEVEL, _SEVERAL_LEVELS = 1e-6, 1e-8
-"""Cost of null-space deviation relative to the first level, with one level and with
-several. The smaller it is, the stricter the priorities; at 1e-6 an error of 1e-3 m/s²
-remains in the task (docs/limits.md)."""
+"""Cost of null-space deviation relative to the first level: two values, for one level
+and for several. The smaller it is, the stricter the priorities; at 1e-6 an error of
+1e-3 m/s² remains in the task (docs/limits.md)."""
 
 
 class DeviationCost(NamedTuple):

@@ -5,8 +5,8 @@
 
 The friction feed-forward and the observer's estimate r are an offset of the effort of
 the model, M a + N + friction - r; the controller's limits hold for the sum. The two do
-not cancel each other: the observer gets the effort sent *less* the feed-forward, which
-friction takes.
+not cancel each other: the observer gets the effort sent minus the feed-forward, because
+friction consumes that part.
 """
 
 from collections import deque

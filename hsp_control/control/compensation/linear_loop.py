@@ -14,7 +14,7 @@ class LinearLoop:
 
     x is the error of a task, or that of the null space, with Kp = K_N A, Kv = K_N + A
     for a field g of slope -A. The loop includes delays and compensators, in the order
-    of `Command`. The robot is as its model, or performs a part of each acceleration.
+    of `Command`. The robot equals its model, or performs a part of each acceleration.
 
     Attributes:
         kp: Kp, shape (m, m) [1/s²].

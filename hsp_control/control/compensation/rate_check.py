@@ -1,8 +1,8 @@
 """Checks before a run whether the control loop is stable at its rate.
 
 The law makes each task's error, and the null space, a linear system. Sampled, delayed
-and filtered, this system has a spectral radius. It is exact for an exact model, and the
-nonlinear robot agrees closely with it (``docs/robustness.md``).
+and filtered, this system has a spectral radius. The radius is exact for an exact model,
+and the nonlinear robot agrees closely with it (``docs/robustness.md``).
 """
 
 from collections.abc import Callable
@@ -29,8 +29,8 @@ to the law."""
 RULE_DELAYED = 0.1
 """Recommended maximum of ω0 h with a delay and no predictor."""
 RULE_HEAVY = 5.0
-"""How many times heavier at a task than its model a robot shall be able to be before
-integral action makes the error grow. Without other compensators: a rate of Kv/5."""
+"""Integral action must stay stable for a robot up to this many times as heavy, at a
+task, as its model. Without other compensators this is a rate of Kv/5."""
 _ROUNDING = 1e-7
 """Tolerance of the radius: self-motion without a field has eigenvalues of 1."""
 _STEP = 1e-5

@@ -12,7 +12,7 @@ from hsp_control.robot import Robot
 
 
 class InverseCondition(CompiledJacobianCost):
-    """f = -k²/(tr G · tr G⁻¹), G = J Jᵀ of k rows: minus the inverse condition number.
+    """f = -k²/(tr G · tr G⁻¹), G = J Jᵀ of k rows.
 
     -f is the square of the inverse condition number in the Frobenius norm: 1 where all
     singular values are equal, 0 at a singularity. It is smooth everywhere, whereas
