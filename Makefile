@@ -31,11 +31,12 @@ quick: $(STAMP) ## what to run after every edit: a minute of CPU
 	@$(BIN)/python -m pytest tests/unit -m "not slow and not process and not browser" \
 	  $(ARGS)
 
+# A file's tests stay in one process, which makes what they share once.
 test: $(STAMP) ## run the tests
-	@$(BIN)/python -m pytest -n $(WORKERS) $(ARGS)
+	@$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(ARGS)
 
 thorough: $(STAMP) ## run the tests with more seeds, and every configuration's page
-	@HSP_THOROUGH=1 $(BIN)/python -m pytest -n $(WORKERS) $(ARGS)
+	@HSP_THOROUGH=1 $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(ARGS)
 
 lint: $(STAMP) ## ruff, mypy --strict and the layers of the architecture
 	@$(BIN)/ruff check

@@ -405,7 +405,6 @@ SHOWN = {"paper": (), "whole_body": ("simulation.duration=0.6",)}
 
 
 EACH_KIND = (
-    "paper/4_moving_obstacle",
     "panda_obstacle",
     "whole_body/talos_circle",
 )

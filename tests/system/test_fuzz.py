@@ -11,6 +11,7 @@ from campaigns.cases import KINDS, count_cases
 from campaigns.results import keep, kept
 from campaigns.soak import PROCESS_GROWTH, PYTHON_GROWTH, soak
 from campaigns.worker import Worker
+from places import THOROUGH
 
 from hsp_control.common.exceptions import LogError
 from hsp_control.common.resources import bundled_robots
@@ -32,7 +33,9 @@ def test_random_states(robot: str) -> None:
     assert tally.status[2] > 0  # limits were met
 
 
-@pytest.mark.parametrize(("kind", "cases"), [("yaml", 30), ("urdf", 5), ("logs", 5)])
+@pytest.mark.parametrize(
+    ("kind", "cases"), [("yaml", 30 if THOROUGH else 12), ("urdf", 5), ("logs", 5)]
+)
 def test_mutated_files(kind: str, cases: int) -> None:
     count = count_cases(KINDS[kind], SEED, cases)
     assert count.good, "\n".join(count.examples)

@@ -142,7 +142,7 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "hsp_control", "run", MOVING, "--out"]
     long = ["--set", "simulation.duration=10000", "--set", "simulation.log_period=0.1"]
     log = tmp_path / "4_moving_obstacle.npz"
-    for patience in (8.0, 20.0, 60.0):  # a loaded machine takes its time to start
+    for patience in (3.0, 8.0, 20.0, 60.0):  # a loaded machine takes its time to start
         process = subprocess.Popen(
             [*command, str(tmp_path), *long],
             stdout=subprocess.PIPE,
