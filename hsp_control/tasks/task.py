@@ -2,14 +2,14 @@
 
 import re
 from abc import ABC, abstractmethod
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
-from hsp_control.common.identity_cache import IdentityCache
+from hsp_control.common.identity_cache import IdentityCache, without_caches
 from hsp_control.common.kernels import kernel
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.robot import Robot, RobotState
@@ -197,7 +197,6 @@ class CompiledTask(Task):
     def __init__(self, robot: Robot, rows: int, gains: Gains, name: str) -> None:
         """Check the arguments and store them; see `Task`."""
         super().__init__(robot, rows, gains, name)
-        self._compiled = IdentityCache(self._step_plan)
 
     @abstractmethod
     def _step_plan(self, state: RobotState, out: TaskSample) -> StepPlan:
@@ -220,6 +219,13 @@ class CompiledTask(Task):
         for write in plan.write:
             write()
         return out
+
+    @cached_property
+    def _compiled(self) -> IdentityCache[StepPlan]:
+        return IdentityCache(self._step_plan)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return without_caches(self)
 
 
 def default_name(frame: str) -> str:

@@ -2,11 +2,13 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.identity_cache import IdentityCache
+from hsp_control.common.identity_cache import IdentityCache, without_caches
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.null_space.fields.cost import Cost, descend
@@ -28,8 +30,6 @@ class CompiledCost(Cost):
         """Set the robot, and the name of the field in the log."""
         super().__init__(robot, name)
         self._own = np.zeros(robot.nv), np.zeros(robot.nv)
-        self._own_derivatives = IdentityCache(self._compile_own)
-        self._derivatives = IdentityCache(self._compile)
 
     @abstractmethod
     def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
@@ -66,6 +66,17 @@ class CompiledCost(Cost):
     def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
         """Write ∇f and (∇f)'; see `Cost.differentiate`."""
         self._derivatives.get(state, gradient, rate)()
+
+    @cached_property
+    def _own_derivatives(self) -> IdentityCache[Derivatives]:
+        return IdentityCache(self._compile_own)
+
+    @cached_property
+    def _derivatives(self) -> IdentityCache[Derivatives]:
+        return IdentityCache(self._compile)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return without_caches(self)
 
     def _compile_own(self, state: RobotState) -> Derivatives:
         """Return the call that writes into the cost's own arrays."""

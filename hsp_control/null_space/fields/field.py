@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cached_property, partial
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.identity_cache import IdentityCache
+from hsp_control.common.identity_cache import IdentityCache, without_caches
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
@@ -154,7 +154,6 @@ class WeightedSum(NullSpaceField):
         super().__init__(robot, " + ".join(field.name for _, field in flat))
         self.terms: tuple[tuple[Weight, NullSpaceField], ...] = tuple(flat)
         self.samples = tuple(FieldSample.allocate(robot.nv) for _ in flat)
-        self._compiled = IdentityCache(self._compile)
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -192,6 +191,13 @@ class WeightedSum(NullSpaceField):
             add = bind(_add, k == 0, weights, *sample, *out)
             terms.append((weight, field, sample, weights, add))
         return terms
+
+    @cached_property
+    def _compiled(self) -> "IdentityCache[list[_Term]]":
+        return IdentityCache(self._compile)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return without_caches(self)
 
     def value(self, state: RobotState) -> float:
         """Return Σ w_k value_k."""
