@@ -59,18 +59,18 @@ class Case:
         self.q0 = robot.home()
         start = robot.state(0.0, self.q0, np.zeros(robot.nv)).frame(FRAME)
         circle = hsp.Circle(
-            start.position + CENTER, 0.1, 2.0, np.pi, normal=[0.0, 0.0, 1.0]
+            0.1, 2.0, start.position + CENTER, phase=np.pi, normal=[0.0, 0.0, 1.0]
         )
         self.trajectory = ComposedPose(
-            Blend(start.position, circle, 1.0), HoldOrientation(start.rotation)
+            Blend(circle, 1.0, start=start.position), HoldOrientation(start.rotation)
         )
         ball = hsp.Circle(
-            [-0.1, 0.51, 0.61], 0.3, 1.1, np.pi / 2, normal=[0.0, 0.0, 1.0]
+            0.3, 1.1, [-0.1, 0.51, 0.61], phase=np.pi / 2, normal=[0.0, 0.0, 1.0]
         )
         self.ball = hsp.Obstacle("ball", Sphere(0.1), ball)
-        self.gains = hsp.Gains.from_frequency(self.natural_frequency)
-        posture = hsp.TargetPosture(robot, self.q0, weights=self.posture_rate)
-        self.clearance = ObstacleClearance(robot, [self.ball], influence=0.25)
+        self.gains = hsp.Gains(natural_frequency=self.natural_frequency)
+        posture = hsp.TargetPosture(self.q0, weights=self.posture_rate)
+        self.clearance = ObstacleClearance([self.ball], influence=0.25)
         self.field: hsp.NullSpaceField = posture
         if self.obstacle:
             self.field = posture + self.clearance_weight * self.clearance

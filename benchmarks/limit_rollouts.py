@@ -75,22 +75,15 @@ def draw(seed: int) -> tuple[hsp.Controller, hsp.Limits, Array]:
     robot, rng = panda(), np.random.default_rng(seed)
     lower, upper = robot.position_limits()
     q0 = 0.5 * (lower + upper) + 0.35 * (upper - lower) * rng.uniform(-1.0, 1.0, 7)
-    own = hsp.Limits(robot)
-    limits = hsp.Limits(
-        robot,
-        effort=own.effort * rng.uniform(0.7, 1.0),
-        effort_rate=1000.0,
-        velocity=own.velocity * rng.uniform(0.2, 0.5),
-        null_space_speed=2.0 if seed % 2 else None,
-        static_effort=1.0 if seed % 2 else None,
-    )
+    own = hsp.Limits()
+    limits = hsp.Limits(effort=own.effort * rng.uniform(0.7, 1.0), effort_rate=1000.0, velocity=own.velocity * rng.uniform(0.2, 0.5), null_space_speed=2.0 if seed % 2 else None, static_effort=1.0 if seed % 2 else None)
     start = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp")
     away = rng.uniform(0.0, 0.5) * rng.normal(size=3)
     center, rate = start + away, rng.uniform(1.0, 6.0)
-    path = hsp.Circle(center, 0.2, rate, normal=rng.normal(size=3))
-    gains = hsp.Gains.from_frequency(rng.uniform(5.0, 12.0))
-    task = hsp.FramePosition(robot, "panda_tcp", path, gains)
-    field = hsp.JointCentering(robot)
+    path = hsp.Circle(0.2, rate, center, normal=rng.normal(size=3))
+    gains = hsp.Gains(natural_frequency=rng.uniform(5.0, 12.0))
+    task = hsp.FramePosition("panda_tcp", path, gains=gains)
+    field = hsp.JointCentering()
     return hsp.Controller(robot, [task], field, limits=limits), limits, q0
 
 

@@ -39,23 +39,23 @@ class Poses:
         for frame in self.frames:
             start = state.frame(frame)
             circle = hsp.Circle(
-                start.position + ASIDE, 0.05, 2.0, np.pi, normal=[0.0, 0.0, 1.0]
+                0.05, 2.0, start.position + ASIDE, phase=np.pi, normal=[0.0, 0.0, 1.0]
             )
             self.trajectories.append(
                 ComposedPose(
-                    hsp.Blend(start.position, circle, 1.0),
+                    hsp.Blend(circle, 1.0, start=start.position),
                     HoldOrientation(start.rotation),
                 )
             )
 
     def law(self) -> Callable[[float, Array, Array], Array]:
         """Return this law as a function (t, q, v) ↦ tau."""
-        gains = hsp.Gains.from_frequency(FREQUENCY)
+        gains = hsp.Gains(natural_frequency=FREQUENCY)
         tasks = [
-            hsp.FramePose(self.robot, frame, trajectory, gains)
+            hsp.FramePose(frame, trajectory, gains=gains)
             for frame, trajectory in zip(self.frames, self.trajectories, strict=True)
         ]
-        posture = hsp.TargetPosture(self.robot, self.q0, weights=POSTURE_RATE)
+        posture = hsp.TargetPosture(self.q0, weights=POSTURE_RATE)
         controller = hsp.Controller(
             self.robot, tasks, posture, null_space_gain=NULL_SPACE_GAIN
         )

@@ -37,7 +37,7 @@ from hsp_control.visualization.plots import new_figure, styled
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENT, FIGURE = ROOT / "docs" / "speed.md", ROOT / "docs" / "figures" / "scaling.png"
-GAINS = hsp.Gains.from_frequency(10.0)
+GAINS = hsp.Gains(natural_frequency=10.0)
 HAND = "panda_tcp"
 
 Point = tuple[int, hsp.Robot, dict[str, Compute]]
@@ -79,15 +79,15 @@ def fields() -> Iterator[Point]:
     """A Panda's pose with 0 to 6 fields."""
     robot = hsp.Robot.load("panda")
     available: list[hsp.NullSpaceField] = [
-        JointCentering(robot),
-        LimitBarrier(robot),
-        TargetPosture(robot, robot.home()),
-        Manipulability(robot, HAND),
-        InverseCondition(robot, HAND),
-        Transmission(robot, HAND, [0.0, 0.0, 1.0]),
+        JointCentering(),
+        LimitBarrier(),
+        TargetPosture(robot.home()),
+        Manipulability(HAND),
+        InverseCondition(HAND),
+        Transmission(HAND, [0.0, 0.0, 1.0]),
     ]
     for n in range(len(available) + 1):
-        field: hsp.NullSpaceField = Rest(robot)
+        field: hsp.NullSpaceField = Rest()
         if n:
             field = sum(available[1:n], start=1.0 * available[0])
         yield n, robot, {"this law": Law(panda_pose(robot, field))}
@@ -101,13 +101,13 @@ def obstacles() -> Iterator[Point]:
         angle = rng.uniform(0.0, 2.0 * np.pi)
         away = 0.55 if k % 5 == 0 else 1.2
         center = [away * np.cos(angle), away * np.sin(angle), rng.uniform(0.2, 0.9)]
-        path = hsp.Circle(center, 0.05, 1.0, normal=[0.0, 0.0, 1.0])
+        path = hsp.Circle(0.05, 1.0, center, normal=[0.0, 0.0, 1.0])
         balls.append(hsp.Obstacle(f"ball{k}", Sphere(0.1), path))
-    posture = TargetPosture(robot, robot.home())
+    posture = TargetPosture(robot.home())
     for n in (0, 1, 2, 5, 10, 20, 35, 50):
         field: hsp.NullSpaceField = posture
         if n:
-            field = posture + 0.05 * ObstacleClearance(robot, balls[:n])
+            field = posture + 0.05 * ObstacleClearance(balls[:n])
         yield n, robot, {"this law": Law(panda_pose(robot, field))}
 
 
@@ -121,12 +121,12 @@ def levels() -> Iterator[Point]:
     frames = [f"link{40 - 6 * k}" for k in range(5)]
     paths = circles(robot, frames)
     positions = [
-        hsp.FramePosition(robot, frame, path, GAINS)
+        hsp.FramePosition(frame, path, gains=GAINS)
         for frame, path in zip(frames, paths, strict=True)
     ]
-    away = hsp.Hold(paths[0].center + 0.3)
-    conflicting = hsp.FramePosition(robot, frames[0], away, GAINS, name="conflicting")
-    posture = TargetPosture(robot, bent(robot))
+    away = hsp.Hold(np.asarray(paths[0].center) + 0.3)
+    conflicting = hsp.FramePosition(frames[0], away, gains=GAINS, name="conflicting")
+    posture = TargetPosture(bent(robot))
 
     def law(stack: list[list[hsp.Task]]) -> Law:
         return Law(hsp.Controller(robot, stack, posture, singularity_threshold=1e-3))
@@ -178,7 +178,7 @@ def circles(robot: hsp.Robot, frames: list[str]) -> list[hsp.Circle]:
     """Return a small circle through the position of each frame."""
     state = robot.state(0.0, bent(robot), np.zeros(robot.nv))
     return [
-        hsp.Circle(state.position(frame), 0.05, 2.0, normal=[0.0, 0.0, 1.0])
+        hsp.Circle(0.05, 2.0, state.position(frame), normal=[0.0, 0.0, 1.0])
         for frame in frames
     ]
 
@@ -187,10 +187,10 @@ def beside_tsid(robot: hsp.Robot, frames: list[str]) -> dict[str, Compute]:
     """Return this law and, if it is installed, TSID with positions of frames."""
     paths = circles(robot, frames)
     positions = [
-        hsp.FramePosition(robot, frame, path, GAINS)
+        hsp.FramePosition(frame, path, gains=GAINS)
         for frame, path in zip(frames, paths, strict=True)
     ]
-    posture = TargetPosture(robot, bent(robot))
+    posture = TargetPosture(bent(robot))
     controller = hsp.Controller(
         robot,
         positions,
@@ -266,10 +266,10 @@ def panda_pose(robot: hsp.Robot, field: hsp.NullSpaceField) -> hsp.Controller:
     """Return this law for a pose of the hand and a field."""
     frame = robot.state(0.0, robot.home(), np.zeros(robot.nv)).frame(HAND)
     pose = hsp.ComposedPose(
-        hsp.Circle(frame.position, 0.05, 2.0, normal=[0.0, 0.0, 1.0]),
+        hsp.Circle(0.05, 2.0, frame.position, normal=[0.0, 0.0, 1.0]),
         hsp.HoldOrientation(frame.rotation),
     )
-    task = hsp.FramePose(robot, HAND, pose, GAINS)
+    task = hsp.FramePose(HAND, pose, gains=GAINS)
     return hsp.Controller(robot, [task], field, null_space_gain=10.0)
 
 

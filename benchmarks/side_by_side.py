@@ -86,9 +86,9 @@ def _this_law(
 ) -> Compute:
     robot = case.robot
     fields: dict[str, hsp.NullSpaceField] = {
-        "centering": hsp.JointCentering(robot, weights=2.0),
-        "manipulability": Manipulability(robot, FRAME),
-        "obstacle": hsp.TargetPosture(robot, case.q0) + 0.3 * case.clearance,
+        "centering": hsp.JointCentering(weights=2.0),
+        "manipulability": Manipulability(FRAME),
+        "obstacle": hsp.TargetPosture(case.q0) + 0.3 * case.clearance,
     }
     return this_law.make(case, fields[name], diagnoses=diagnoses)
 

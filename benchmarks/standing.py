@@ -113,13 +113,13 @@ class Standing:
         self.soles_at = [state.position(name).copy() for name in body.soles]
         up, ahead = [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]
         start = state.centroidal.position.copy()
-        circle = hsp.Circle(start, 0.03, 2.5, normal=up)
-        self.com = Blend(start, circle, 1.5)
+        circle = hsp.Circle(0.03, 2.5, start, normal=up)
+        self.com = Blend(circle, 1.5, start=start)
         start = state.position(body.hand).copy()
-        circle = hsp.Circle(start + np.array([0.05, 0.0, 0.1]), 0.08, 3.8, normal=ahead)
-        self.hand = Blend(start, circle, 1.5)
+        circle = hsp.Circle(0.08, 3.8, start + np.array([0.05, 0.0, 0.1]), normal=ahead)
+        self.hand = Blend(circle, 1.5, start=start)
         self.upright = state.frame(body.trunk).rotation.copy()
-        self.gains = hsp.Gains.from_frequency(FREQUENCY)
+        self.gains = hsp.Gains(natural_frequency=FREQUENCY)
         self._reference = self.controller(limited=False, threshold=1e-6)  # an exact P
         self._state = hsp.RobotState(robot)
         self._edges = _cone_edges(self.corners)
@@ -139,33 +139,21 @@ class Standing:
         weights = np.full(robot.nv, POSTURE_RATE)
         weights[list(robot.unactuated)] = 0.0
         tasks = [
-            hsp.CenterOfMass(robot, self.com, self.gains, name=COM),
-            hsp.FramePosition(robot, body.hand, self.hand, self.gains, name=HAND),
-            hsp.FrameOrientation(
-                robot,
-                body.trunk,
-                hsp.HoldOrientation(self.upright),
-                self.gains,
-                name=TRUNK,
-            ),
+            hsp.CenterOfMass(self.com, gains=self.gains, name=COM),
+            hsp.FramePosition(body.hand, self.hand, gains=self.gains, name=HAND),
+            hsp.FrameOrientation(body.trunk, hsp.HoldOrientation(self.upright), gains=self.gains, name=TRUNK),
         ]
         return hsp.Controller(
             robot,
             tasks,
-            hsp.TargetPosture(robot, self.q0, weights=weights),
+            hsp.TargetPosture(self.q0, weights=weights),
             null_space_gain=GAIN,
             singularity_threshold=threshold,
             contacts=[
-                hsp.SurfaceContact(
-                    robot,
-                    name,
-                    corners=self.corners,
-                    friction=FRICTION,
-                    damping=CONTACT_DAMPING,
-                )
+                hsp.SurfaceContact(name, corners=self.corners, friction=FRICTION, damping=CONTACT_DAMPING)
                 for name in body.soles
             ],
-            limits=hsp.Limits(robot, velocity=None, position=None) if limited else None,
+            limits=hsp.Limits(velocity=None, position=None) if limited else None,
         )
 
     # -- plants -----------------------------------------------------------------------

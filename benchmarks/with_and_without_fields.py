@@ -151,9 +151,9 @@ def limit_ratio(values: Array, limits: Array) -> float:
 def clearance_of(experiment: Experiment) -> Clearance | None:
     """Return a field that measures the run's distances, for any field of the run."""
     if experiment.scene:
-        return ObstacleClearance(experiment.robot, list(experiment.scene.values()))
+        return ObstacleClearance(list(experiment.scene.values()))
     if len(experiment.robot.parts) > 1:
-        return SelfClearance(experiment.robot)
+        return SelfClearance()
     return None
 
 

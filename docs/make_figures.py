@@ -153,12 +153,9 @@ def moving_iiwa(robot: hsp.Robot, metric: hsp.Metric) -> hsp.Rollout:
         hand.position - [0.05, 0.0, 0.0], 0.1, 2.0, normal=[0.0, 0.0, 1.0]
     )
     pose = hsp.ComposedPose(circle, hsp.HoldOrientation(hand.rotation))
-    gains = hsp.Gains.from_frequency(FREQUENCY)
-    task = hsp.FramePose(robot, "iiwa_link_ee", pose, gains, name="hand")
-    swing = hsp.FunctionField(
-        robot,
-        lambda s: 0.8 * np.sin(1.5 * s.t + np.arange(7)) - robot.joint_positions(s.q),
-    )
+    gains = hsp.Gains(natural_frequency=FREQUENCY)
+    task = hsp.FramePose("iiwa_link_ee", pose, gains=gains, name="hand")
+    swing = hsp.FunctionField(lambda s: 0.8 * np.sin(1.5 * s.t + np.arange(7)) - robot.joint_positions(s.q))
     controller = hsp.Controller(
         robot, [task], swing, null_space_gain=GAIN, metric=metric
     )

@@ -22,16 +22,16 @@ def make(
     robot = case.robot
     task: hsp.Task
     if case.rows == 6:
-        task = hsp.FramePose(robot, FRAME, case.trajectory, case.gains)
+        task = hsp.FramePose(FRAME, case.trajectory, gains=case.gains)
     else:
-        task = hsp.FramePosition(robot, FRAME, case.trajectory.position, case.gains)
+        task = hsp.FramePosition(FRAME, case.trajectory.position, gains=case.gains)
     controller = hsp.Controller(
         robot,
         [task],
         field or case.field,
         null_space_gain=case.null_space_gain,
         metric=metric,
-        limits=hsp.Limits(robot),
+        limits=hsp.Limits(),
     )
     state = hsp.RobotState(robot)
 
@@ -40,7 +40,7 @@ def make(
 
     def compute_and_diagnose(t: float, q: Array, v: Array) -> Array:
         tau = controller.compute(state.update(t, q, v)).tau
-        controller.diagnose(state)
+        controller.diagnose()
         return tau
 
     return compute_and_diagnose if diagnoses else compute

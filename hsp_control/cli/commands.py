@@ -147,9 +147,8 @@ def check(options: argparse.Namespace) -> int:
     with np.errstate(all="ignore"):  # as compiled kernels do; `hsp check` runs plain
         experiment = load(options)
         robot, controller = experiment.robot, experiment.controller
-        state = robot.state(0.0, experiment.q0, experiment.v0)
-        output = controller.compute(state)
-        diagnostics = controller.diagnose(state)
+        output = controller.compute(0.0, experiment.q0, experiment.v0)
+        diagnostics = controller.diagnose()
     table = Table(show_header=False, box=None, pad_edge=False)
     rows = sum(task.rows for task in controller.tasks)
     table.add_row("robot", f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}")

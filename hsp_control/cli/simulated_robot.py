@@ -21,7 +21,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.build_live import simulated_robot
-from hsp_control.control.controller import ControlOutput
+from hsp_control.control.output import ControlOutput
 from hsp_control.live.faults import Faults
 from hsp_control.live.link import Link
 from hsp_control.live.live_log import LiveLog, Row, live_channels
@@ -144,9 +144,7 @@ class _RobotLog:
 
 def _warm_up(robot: SimulatedRobot, experiment: Experiment) -> None:
     """Execute each real-time operation once, so that none is compiled later."""
-    experiment.controller.compute(
-        experiment.robot.state(0.0, experiment.q0, experiment.v0)
-    )
+    experiment.controller.compute(0.0, experiment.q0, experiment.v0)
     trial = SimulatedRobot(
         robot.plant, robot.q, robot.v, robot.period, watchdog=1, stop=StopSettings()
     )

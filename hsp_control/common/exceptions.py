@@ -12,9 +12,20 @@ class HspControlError(Exception):
     Attributes:
         location: File and line of the configuration that caused the error
             (``panda.yaml:12``), or None. If it is set, the message begins with it.
+        path: The key path of the wrong value, such as ("tasks", "hand", "frame"), if it
+            is known. The message then contains it.
     """
 
     location: str | None = None
+    path: tuple[str | int, ...] = ()
+    _bare: str | None = None
+
+    @property
+    def bare_message(self) -> str:
+        """The message without location and path."""
+        if self._bare is None:
+            self._bare = str(self)
+        return self._bare
 
 
 class ShapeError(HspControlError, ValueError):
@@ -23,6 +34,10 @@ class ShapeError(HspControlError, ValueError):
 
 class NonFiniteError(HspControlError, ValueError):
     """An argument contains NaN or inf where finite numbers are needed."""
+
+
+class ImmutableError(HspControlError, AttributeError):
+    """A value cannot be assigned; the message says what changes it instead."""
 
 
 class GainError(HspControlError, ValueError):

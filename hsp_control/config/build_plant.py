@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 
 from hsp_control.config.build_robot import load_robot, located_model
-from hsp_control.config.build_scene import build_shape
 from hsp_control.config.document import Document
 from hsp_control.config.models import plant as s
 from hsp_control.config.models.robot import LoadModel
@@ -201,9 +200,9 @@ def _mujoco(
     for frame, contact in model.contacts.items():
         with document.at("plant", "contacts", frame):
             robot.frame_id(frame)
-            own = contact.shape
-            shape = None if own is None else build_shape(own, Path())
-            contacts.append(ContactShape(frame, shape, contact.position, contact.rpy))
+            contacts.append(
+                ContactShape(frame, contact.shape, contact.position, contact.rpy)
+            )
     return MujocoPlant(
         robot,
         timestep=model.timestep,

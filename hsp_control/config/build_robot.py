@@ -8,10 +8,10 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigurationError
 from hsp_control.config.document import Document
-from hsp_control.config.keys import KeyPath
 from hsp_control.config.models import robot as s
 from hsp_control.config.scenario import Scenario
-from hsp_control.robot import Robot, RobotState
+from hsp_control.declaration.keys import KeyPath
+from hsp_control.robot import Robot
 from hsp_control.robot.description.combining import placement
 from hsp_control.robot.description.loading import ToolFrame
 
@@ -151,23 +151,3 @@ def _moved_joints(document: Document, robot: Robot, joints: dict[str, float]) ->
                 )
         positions[where] = value
     return robot.integrate(robot.neutral(), positions)
-
-
-def end_effector(
-    document: Document, at: KeyPath, frame: str | None, robot: Robot
-) -> str:
-    """Return the named frame, checked to exist, or the robot's end effector."""
-    if frame is None:
-        return robot.end_effector
-    with document.at(*at, "frame"):
-        robot.frame_id(frame)
-    return frame
-
-
-def posture(value: Any, start: RobotState) -> Array:
-    """Return the configuration of ``start``, ``home`` or given joint positions."""
-    if value == "start":
-        return start.q
-    if value == "home":
-        return start.robot.home()
-    return joint_configuration(start.robot, value, "posture")

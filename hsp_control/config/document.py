@@ -9,13 +9,13 @@ from typing import Any
 
 from hsp_control.common.exceptions import ConfigError, HspControlError
 from hsp_control.common.suggestions import nearest
-from hsp_control.config.keys import KeyPath, split_assignment
-from hsp_control.config.located import locate, located
 from hsp_control.config.overrides import assign
-from hsp_control.config.plain import shortened, shown
 from hsp_control.config.renamed import current_keys, rename_keys
 from hsp_control.config.syntax import YamlError
 from hsp_control.config.yaml_reader import MAX_SIZE, Mark, read_yaml
+from hsp_control.declaration.keys import KeyPath, split_assignment
+from hsp_control.declaration.located import locate, located
+from hsp_control.declaration.plain import shortened, shown
 from hsp_control.robot.description.access import ANYWHERE
 
 _TOO_LARGE = f"larger than {MAX_SIZE // 1_000_000} MB, the limit for a configuration"
@@ -179,9 +179,10 @@ class Document:
         """Add the location of a key path to errors that are raised inside the block.
 
         An error keeps its class. An error that has a location already keeps it, so of
-        nested blocks the innermost one counts::
+        nested blocks the innermost one counts. A key path that the error has itself
+        (see `hsp_control.declaration.located.within`) continues the given one::
 
-            with document.at("tasks", 0, "frame"):
+            with document.at("tasks", "hand"), within("frame"):
                 robot.frame_id("panda_hnad")  # FrameNotFoundError: panda.yaml:7: ...
 
         Raises:
@@ -190,7 +191,8 @@ class Document:
         try:
             yield
         except HspControlError as error:
-            locate(error, self.location(path), path)
+            whole = (*path, *error.path)
+            locate(error, self.location(whole), whole)
             raise
 
     def _origin(self, path: KeyPath) -> Mark | str:

@@ -13,27 +13,20 @@ from hsp_control.common.exceptions import ConfigError, SimulationError
 from hsp_control.common.resources import bundled_configs
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.config.build_compensation import build_compensation, check_rates
-from hsp_control.config.build_null_space import build_fields, build_metric
 from hsp_control.config.build_plant import build_plant
 from hsp_control.config.build_robot import build_robot, build_start
-from hsp_control.config.build_scene import build_scene, located_scene
-from hsp_control.config.build_support import (
-    build_contacts,
-    build_limits,
-    build_schedules,
-    by_priority,
-    put_on_ground,
-)
-from hsp_control.config.build_tasks import build_task
 from hsp_control.config.document import Document
+from hsp_control.config.ground import put_on_ground
+from hsp_control.config.located_scene import located_scene
 from hsp_control.config.models.plant import MujocoPlantModel
 from hsp_control.config.models.simulation import Dop853Model, Rk4Model
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
 from hsp_control.control.compensation import Compensation, RateFinding
-from hsp_control.control.composition import check_support
 from hsp_control.control.controller import Controller
+from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Scene
+from hsp_control.null_space.fields import FieldSum
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import only_within
 from hsp_control.robot.description.sources import packaged_folders
@@ -97,7 +90,7 @@ class Experiment:
             meta={
                 "name": self.name,
                 "title": self.scenario.title,
-                "config": self.scenario.model_dump(mode="json"),
+                "config": plain_data(self.scenario, defaults=True),
             },
         )
 
@@ -190,45 +183,38 @@ def build(document: Document) -> Experiment:
     folder = Path(document.name).resolve().parent
     robot, scenario = build_robot(document, scenario, folder)
     q0 = build_start(document, scenario.start, robot)
-    contacts = build_contacts(document, scenario.contacts, robot)
     if scenario.start.ground is not None:
-        q0 = put_on_ground(document, scenario.start.ground, contacts, robot, q0)
-    start = robot.state(0.0, q0, np.zeros(robot.nv))
-
-    scene = build_scene(document, scenario.scene, folder)
-    located = located_scene(scenario.scene, folder)
-    scenario = scenario.model_copy(update={"scene": located})
-    tasks = [
-        build_task(document, name, task, start) for name, task in scenario.tasks.items()
-    ]
-    metric = build_metric(document, scenario.null_space.metric, robot)
-    field = build_fields(document, scenario.null_space.fields, start, scene)
-    with document.at("contacts" if contacts and scenario.base is None else "base"):
-        check_support(robot, contacts, scenario.base)
-    limits = build_limits(document, scenario.limits, robot, scene)
-    schedules = build_schedules(document, scenario.tasks)
-    with document.at("null_space"):
+        with document.at("start", "ground"):
+            contacts = scenario.contacts.values()
+            q0 = put_on_ground(scenario.start.ground, contacts, robot, q0)
+    with document.at():
+        scene = located_scene(scenario.scene, folder, document.access)
+        scenario = scenario.model_copy(update={"scene": scene})
+        fields, null_space = scenario.null_space.fields, scenario.null_space
         controller = Controller(
             robot,
-            by_priority(tasks, scenario.tasks),
-            field,
-            null_space_gain=scenario.null_space.gain,
-            metric=metric,
-            singularity_threshold=scenario.null_space.singularity_threshold,
-            limits=limits,
-            contacts=contacts,
+            tuple(scenario.tasks.values()),
+            fields[0] if len(fields) == 1 else FieldSum(fields) if fields else None,
+            null_space_gain=null_space.gain,
+            metric=null_space.metric,
+            singularity_threshold=null_space.singularity_threshold,
+            limits=scenario.limits,
+            contacts=tuple(scenario.contacts.values()),
             base=scenario.base,
-            schedules=schedules,
+            scene=scene,
+            start=q0,
+            changes=scenario.changes,
         )
+    start = robot.state(0.0, q0, np.zeros(robot.nv))
     velocity = scenario.start.velocity
     with document.at("start", "velocity"):
         if velocity == "flow":
             v0 = controller.flow(0.0, q0)
         else:
             v0 = robot.check_tangent(start.v if velocity == "rest" else velocity, "v0")
-    if limits is not None:
+    if controller.limits is not None:
         with document.at("start"):
-            limits.check_start(q0, v0)
+            controller.limits.check_start(q0, v0)
     integrator = _integrator(document, scenario)
     plant, scenario = build_plant(document, scenario, folder, robot, integrator)
     compensation = build_compensation(document, scenario, controller)

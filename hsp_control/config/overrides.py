@@ -3,9 +3,9 @@
 import re
 from typing import Any
 
-from hsp_control.config.keys import KeyPath, written
-from hsp_control.config.plain import shown
 from hsp_control.config.yaml_reader import MAX_DEPTH
+from hsp_control.declaration.keys import KeyPath, written
+from hsp_control.declaration.plain import shown
 
 
 def assign(data: dict[str, Any], keys: list[str], value: Any) -> KeyPath:

@@ -2,20 +2,44 @@
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
-from hsp_control.config.keys import KeyPath, written
-from hsp_control.config.located import located
+from hsp_control.declaration.keys import KeyPath, written
+from hsp_control.declaration.located import located
 
-RENAMED: dict[KeyPath, KeyPath] = {
-    ("remedies",): ("compensation",),
-}
-"""Old key path to new key path.
 
-A ``*`` in the old path matches any one key or list entry. The new path has as many
-``*``; they take, in order, what those of the old path matched.
-"""
+class Renamed(NamedTuple):
+    """A key that has a new name.
 
+    A ``*`` in the old path matches any one key or list entry. The new path has as many
+    ``*``; they take, in order, what those of the old path matched.
+
+    Attributes:
+        old: The old key path.
+        new: The new key path.
+        type: Only where the mapping that holds the key has this ``type``; None: in all.
+    """
+
+    old: KeyPath
+    new: KeyPath
+    type: str | None = None
+
+
+_ORIENTATIONS: tuple[KeyPath, ...] = (
+    ("tasks", "*", "trajectory"),
+    ("tasks", "*", "trajectory", "orientation"),
+    ("scene", "obstacles", "*", "orientation"),
+)
+
+RENAMED = (
+    Renamed(("remedies",), ("compensation",)),
+    Renamed(
+        ("limits", "distances", "*", "least"), ("limits", "distances", "*", "minimum")
+    ),
+    *(Renamed((*at, "rpy"), (*at, "rotations"), "path") for at in _ORIENTATIONS),
+    *(Renamed((*at, "rpy"), (*at, "rotation")) for at in _ORIENTATIONS),
+)
+"""All keys that have a new name; of two that fit, the first counts."""
 
 _NESTED = dict, list
 
@@ -40,8 +64,10 @@ def rename_keys(
     Raises:
         ConfigError: If the old and the new key are both given.
     """
-    for old_pattern, new_pattern in RENAMED.items():
+    for old_pattern, new_pattern, kind in RENAMED:
         for old in list(_matches(data, old_pattern)):
+            if kind is not None and _get(data, old[:-1]).get("type") != kind:
+                continue
             new = _new_path(old_pattern, new_pattern, old)
             holders = [_get(data, new[:k]) for k in range(len(new))]
             if isinstance(holders[-1], dict) and new[-1] in holders[-1]:
@@ -67,7 +93,9 @@ def current_keys(keys: Sequence[str], where: str) -> list[str]:
         where: The file and line, or the option, for the warning.
     """
     current: KeyPath = tuple(keys)
-    for old_pattern, new_pattern in RENAMED.items():
+    for old_pattern, new_pattern, kind in RENAMED:
+        if kind is not None:
+            continue  # the type is not known here
         old = current[: len(old_pattern)]
         if _fits(old, old_pattern):
             new = _new_path(old_pattern, new_pattern, old)

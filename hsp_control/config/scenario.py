@@ -4,22 +4,26 @@ Each ``type:`` selects one class of a union; the builders map it to the object o
 same name. Units are SI: metres, radians, seconds.
 """
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
-from hsp_control.config.models.base import Model, Name
+from hsp_control.config.models.base import Model
 from hsp_control.config.models.compensation import CompensationModel
-from hsp_control.config.models.contacts import AnyContact
-from hsp_control.config.models.limits import LimitsModel
 from hsp_control.config.models.live import LiveModel
 from hsp_control.config.models.null_space import NullSpaceModel
 from hsp_control.config.models.plant import AnyPlant
 from hsp_control.config.models.robot import RobotModel, StartModel
-from hsp_control.config.models.scene import SceneModel
 from hsp_control.config.models.simulation import SimulationModel
-from hsp_control.config.models.tasks import AnyTask
 from hsp_control.config.models.view import ViewModel
+from hsp_control.constraints.contacts import Contact
+from hsp_control.constraints.limits import Limits
+from hsp_control.control.changes import Change
+from hsp_control.declaration.named import BY_NAME
+from hsp_control.declaration.quantities import Name
+from hsp_control.geometry.scene import Scene
+from hsp_control.tasks import Task
 
 
 class Scenario(Model):
@@ -33,21 +37,23 @@ class Scenario(Model):
     """The robot that is controlled."""
     start: StartModel = StartModel()
     """Configuration and velocity at t = 0."""
-    scene: SceneModel = SceneModel()
+    scene: Scene = Scene()
     """The obstacles."""
-    tasks: Annotated[dict[Name, AnyTask], Field(min_length=1, max_length=100)]
+    tasks: Annotated[dict[Name, Task], Field(min_length=1, max_length=100), BY_NAME]
     """The tasks, by name; tasks of the same priority form one level."""
-    contacts: Annotated[dict[Name, AnyContact], Field(max_length=100)] = Field(
+    contacts: Annotated[dict[Name, Contact], Field(max_length=100), BY_NAME] = Field(
         default_factory=dict
     )
     """The contacts that support a robot with a free-flyer root, by name."""
     base: Literal["flying", "driven"] | None = None
     """For a free-flyer root without contacts: ``flying`` if nothing holds it,
     ``driven`` if something outside the controller moves it."""
-    limits: LimitsModel | None = None
+    limits: Limits | None = None
     """Limits on efforts and motion that the controller keeps; no limits by default."""
     null_space: NullSpaceModel = NullSpaceModel()
     """The control of self-motion: fields, metric and gain."""
+    changes: Annotated[Sequence[Change], AfterValidator(tuple)] = ()
+    """Changes of tasks, gains, fields and contacts while the controller runs."""
     plant: AnyPlant = "rigid_body"
     """The simulated system that the efforts act on, and its differences from the
     controller's model."""
@@ -66,7 +72,7 @@ def json_schema() -> dict[str, Any]:
     schema = Scenario.model_json_schema()
     for model in schema["$defs"].values():
         if "const" in (kind := model.get("properties", {}).get("type", {})):
-            kind["description"] = f"{kind['const']}: {model['description']}"
+            kind.setdefault("description", f"{kind['const']}: {model['description']}")
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "hsp_control configuration"
     return schema

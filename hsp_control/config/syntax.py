@@ -2,7 +2,7 @@
 
 import yaml
 
-from hsp_control.config.keys import KeyPath
+from hsp_control.declaration.keys import KeyPath
 
 _HINTS = {
     r"'\t'": "a tab in the indentation; use spaces",

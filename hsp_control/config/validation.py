@@ -4,11 +4,13 @@ from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.exceptions import HspControlError
 from hsp_control.config.document import Document
-from hsp_control.config.findings import Finding, Pending, findings
-from hsp_control.config.schema import shape
-from hsp_control.config.wording import explained
+from hsp_control.declaration.findings import Finding, Pending, findings
+from hsp_control.declaration.located import locate
+from hsp_control.declaration.mistakes import domain_error
+from hsp_control.declaration.schema import shape
+from hsp_control.declaration.wording import explained
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -21,7 +23,7 @@ def validate(document: Document, model: type[Model]) -> Model:
     """Return the document as an instance of the pydantic model.
 
     Raises:
-        ConfigError: If it does not follow the model. The message describes the
+        HspControlError: If it does not follow the model. The message describes the
             first mistake in the order of the file, then up to five others, a line each.
     """
     try:
@@ -52,8 +54,19 @@ def _order(document: Document, finding: Finding) -> tuple[bool, tuple[int, ...]]
     return mark is None, tuple(mark or ())
 
 
-def _summary(document: Document, found: list[Finding]) -> ConfigError:
-    errors = [document.error(finding.path, explained(finding)) for finding in found]
+def _error(document: Document, finding: Finding) -> HspControlError:
+    """Return the error of a finding; one that a part raised keeps its class."""
+    own = domain_error(finding.error)
+    if own is None:
+        return document.error(finding.path, explained(finding))
+    path = (*finding.path, *own.path)
+    error = type(own)(own.bare_message)
+    locate(error, document.location(path), path)
+    return error
+
+
+def _summary(document: Document, found: list[Finding]) -> HspControlError:
+    errors = [_error(document, finding) for finding in found]
     messages = list(dict.fromkeys(str(error) for error in errors))
     first, others = errors[0], messages[1:]
     if others:

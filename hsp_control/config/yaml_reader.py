@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from hsp_control.config.keys import KeyPath
-from hsp_control.config.plain import shown
 from hsp_control.config.scalars import SCALARS, TAG
 from hsp_control.config.syntax import YamlError, character_error, syntax_error
+from hsp_control.declaration.keys import KeyPath
+from hsp_control.declaration.plain import shown
 
 MAX_SIZE = 1_000_000
 """Most characters in a text; parsing that many takes seconds."""

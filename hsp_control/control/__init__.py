@@ -1,5 +1,5 @@
 """From tasks, a field and constraints to an effort."""
 
 from .controller import Controller as Controller
-from .controller import ControlOutput as ControlOutput
-from .controller import Diagnostics as Diagnostics
+from .output import ControlOutput as ControlOutput
+from .output import Diagnostics as Diagnostics

@@ -1,23 +1,24 @@
 """The active stack: the law for the contacts and tasks active at one time."""
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.step_plan import StepPlan, steps
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.unactuated import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
+from hsp_control.control.setup import PlannedTask
 from hsp_control.law import Outcome, Resolution
 from hsp_control.law.outcome import OUTCOMES
-from hsp_control.null_space.fields import NullSpaceField
+from hsp_control.null_space.fields import FieldSample, FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
+from hsp_control.tasks.task import Feedback
 
 
 class ActiveStack:
@@ -36,69 +37,118 @@ class ActiveStack:
         contact_rows: The rows of each contact, by name.
         first_task_row: Index of the first row that belongs to a task.
         rows: All rows stacked: J, J', e, e', a_x.
+        row_count: Number of rows.
+        memory: The rows, the field and the law's results, in one block: see `Record`.
+        acceleration: The law's acceleration, shape (nv,).
+        term_samples: The weighted sample of each term of the field.
     """
 
     def __init__(
         self,
         state: RobotState,
-        contacts: Sequence[Contact],
-        levels: Sequence[Sequence[Task]],
-        base: Indices,
         support: Support,
+        levels: Sequence[Sequence[PlannedTask]],
+        feedback: Mapping[int, Feedback],
+        base: Indices,
         metric: Metric,
+        field: NullSpaceField,
         gain: Array,
         threshold: float,
     ) -> None:
-        """Stack the rows; the state decides which base motions the contacts permit."""
+        """Stack the rows; the state decides which base motions the contacts permit.
+
+        Args:
+            state: The state that every step reads.
+            support: The active contacts, with their forces.
+            levels: The tasks of each level, the highest priority first.
+            feedback: The feedback of each task, by key; every step reads these arrays.
+            base: Indices of the degrees of freedom without a motor.
+            metric: The metric.
+            field: The field.
+            gain: K_N; every step reads this array.
+            threshold: Singular value below which the inverse is bounded.
+        """
         robot: Robot = state.robot
-        self.contacts = tuple(contacts)
-        self.levels = tuple(tuple(level) for level in levels if level)
         self.support = support
-        held = sum(contact.rows for contact in contacts)
-        free = unactuated_count(_jacobian(contacts, state), base) if base.size else 0
+        self.contacts = support.contacts
+        planned = [level for level in levels if level]
+        self.levels = tuple(tuple(each.task for each in level) for level in planned)
+        held = sum(contact.rows for contact in self.contacts)
+        free = (
+            unactuated_count(_jacobian(self.contacts, state), base) if base.size else 0
+        )
         first = [held + free] if held + free else []
         sizes = [sum(task.rows for task in level) for level in self.levels]
         self.resolution = Resolution(
             first + sizes, robot.nv, metric.form, gain, threshold
         )
-        problem = self.resolution.problem
-        self.rows = problem.task
-        self._held, self._rest = self.rows.rows(0, held), None
+        self.rows = self.resolution.problem.task
+        self.row_count = len(self.rows.error)
+        self.memory = self.resolution.problem.record.memory
+        self.acceleration = self.resolution.acceleration
+        self.contact_rows = _places(self.contacts, 0)
+        self.first_task_row = held + free
+        tasks = [each for level in planned for each in level]
+        self.task_rows = _places([each.task for each in tasks], self.first_task_row)
+        self._parts: list[tuple[Task | Contact, TaskSample]] = []
+        plans: list[Callable[[], StepPlan]] = []
+        row = 0
+        for contact in self.contacts:
+            sample = self.rows.rows(row, row + contact.rows)
+            self._parts.append((contact, sample))
+            plans.append(partial(contact.compile, state, sample))
+            row += contact.rows
+        row = self.first_task_row
+        for each in tasks:
+            sample = self.rows.rows(row, row + each.task.rows)
+            self._parts.append((each.task, sample))
+            plans.append(partial(each.task.compile, state, feedback[each.key], sample))
+            row += each.task.rows
+        self._plans = plans
+        self._rest = None
         if free:
             self._rest = UnactuatedRows(robot, base, free)
-            self._free = self.rows.rows(held, held + free)
-        self._steps = IdentityCache(self._compile)
-        self.contact_rows = _places(self.contacts, 0)
-        tasks = [task for level in self.levels for task in level]
-        self.first_task_row = held + free
-        self.task_rows = _places(tasks, self.first_task_row)
-        parts: list[Task | Contact] = [*self.contacts, *tasks]
-        places = [*self.contact_rows.values(), *self.task_rows.values()]
-        self._parts = tuple(
-            (part, self.rows.rows(where.start, where.stop))
-            for part, where in zip(parts, places, strict=True)
-        )
+        self._held = held
+        self._state, self._metric, self._field = state, metric, field
+        self.term_samples: tuple[FieldSample, ...] = ()
 
-    def resolve(
-        self, state: RobotState, metric: Metric, field: NullSpaceField
-    ) -> Outcome:
-        """Resolve contacts, tasks and field; `resolution` holds the results."""
-        t, outcome = state.t, 0.0
-        for step in self._steps.get(state, metric, field):
+    def resolve(self, t: float) -> Outcome:
+        """Resolve contacts, tasks and field at the state; `resolution` has the results.
+
+        Args:
+            t: The time of the state [s].
+        """
+        outcome = 0.0
+        for step in self._steps:
             outcome = step(t)
         return OUTCOMES[int(outcome)]
 
-    def _compile(
-        self, state: RobotState, metric: Metric, field: NullSpaceField
-    ) -> list[Callable[[float], Any]]:
-        """Return the calls of a step, each of the time, in order."""
+    def prepare(self) -> None:
+        """Compile what `resolve` calls, now instead of at its first call."""
+        self._steps  # noqa: B018 (compiled, and kept)
+
+    @cached_property
+    def _steps(self) -> list[Callable[[float], Any]]:
+        """The calls of a step, each of the time, in order."""
+        state, metric, field = self._state, self._metric, self._field
         problem = self.resolution.problem
-        plans = [part.compile(state, sample) for part, sample in self._parts]
+        plans = [plan() for plan in self._plans]
         if self._rest is not None:
-            rest = partial(self._rest.evaluate, state, self._held, self._free)
+            held = self.rows.rows(0, self._held)
+            free = self.rows.rows(self._held, self.first_task_row)
+            rest = partial(self._rest.evaluate, state, held, free)
             plans.append(StepPlan(write=(rest,)))
         plans.append(metric.compile(state, problem.metric))
-        plans.append(field.compile(state, problem.metric, metric.form, problem.field))
+        sample, form = problem.field, metric.form
+        if isinstance(field, FieldSum):
+            self.term_samples = field.allocate_terms(state.robot.nv)
+            plan = field.compile_terms(
+                state, problem.metric, form, sample, self.term_samples
+            )
+        else:
+            self.term_samples = (sample,)
+            plan = field.compile(state, problem.metric, form, sample)
+        plans.append(plan)
         law = self.resolution.compile(state.v, controls=field.controls)
         return steps(plans, law)
 

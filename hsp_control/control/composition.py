@@ -1,15 +1,14 @@
 """Checks that the parts of a controller fit together."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError, ControllerError, GainError
-from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
-from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.metrics import Metric, MetricSample
 from hsp_control.null_space.metrics.metric import VARYING
 from hsp_control.robot import Robot
@@ -20,59 +19,47 @@ Base = Literal["flying", "driven"]
 """What else than contacts acts on a free-flyer root: nothing, or an outside device."""
 
 
-def levels_of(tasks: Sequence[Task | Sequence[Task]]) -> tuple[tuple[Task, ...], ...]:
-    """Return the tasks of each level; a plain list of tasks is one level.
+def check_tasks(tasks: Sequence[Task], robot: Robot) -> None:
+    """Check that there are tasks, that their names differ, and that no level is large.
 
     Raises:
-        ControllerError: If tasks and lists of tasks are mixed.
+        ControllerError: Names the task or the level.
     """
-    single = [entry for entry in tasks if isinstance(entry, Task)]
-    nested = [tuple(entry) for entry in tasks if not isinstance(entry, Task)]
-    if single and nested:
-        raise ControllerError(
-            "tasks mixes tasks and lists of tasks; needs a list of tasks (one level) "
-            "or a list of lists (one per level)"
-        )
-    return tuple(nested) if nested else (tuple(single),)
-
-
-def check_parts(
-    robot: Robot, levels: Sequence[Sequence[Task]], field: NullSpaceField
-) -> None:
-    """Check that tasks and field belong to the robot, and that no level is too large.
-
-    Raises:
-        ControllerError: Names the task, the field or the level.
-    """
-    tasks = [task for level in levels for task in level]
-    if not tasks or not all(levels):
-        raise ControllerError("a controller needs at least one task, at every level")
+    if not tasks:
+        raise ControllerError("a controller needs at least one task")
+    for each in tasks:
+        if not isinstance(each, Task):
+            raise ControllerError(f"tasks contains {each!r}, which is not a task")
     names = [task.name for task in tasks]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise ControllerError(
             f"two tasks are called {twice[0]!r}; give them distinct names"
         )
-    parts: list[Task | NullSpaceField] = [*tasks, field]
-    for part in parts:
-        if part.robot is not robot:
-            kind = "task" if isinstance(part, Task) else "field"
-            raise ControllerError(
-                f"{kind} {part.name!r} was built for another robot object "
-                f"({part.robot.name}); build it with the controller's"
-            )
-    for number, level in enumerate(levels, start=1):
+    for priority in sorted({priority_of(task, robot) for task in tasks}):
+        level = [task for task in tasks if priority_of(task, robot) == priority]
         rows = sum(task.rows for task in level)
         if rows > robot.nv:
-            each = ", ".join(f"{task.name}: {task.rows}" for task in level)
-            where = f" of level {number}" if len(levels) > 1 else ""
+            each_of = ", ".join(f"{task.name}: {task.rows}" for task in level)
+            where = "" if len(level) == len(tasks) else f" of priority {priority}"
             raise ControllerError(
-                f"the tasks{where} have {rows} rows ({each}); "
+                f"the tasks{where} have {rows} rows ({each_of}); "
                 f"{robot.name} has only {robot.nv} degrees of freedom"
             )
 
 
-def checked_gain(gain: Any, robot: Robot, metric: Metric) -> Array:
+def priority_of(task: Task, robot: Robot) -> int:
+    """Return the priority of a placed task, 1 the highest.
+
+    Without one of its own it is 1; on a floating base 1 for what keeps the balance, and
+    2 for all else, so that no hand that reaches too far makes the robot fall.
+    """
+    if task.priority is not None:
+        return task.priority
+    return 2 if robot.unactuated and not task.keeps_balance(robot) else 1
+
+
+def checked_gain(gain: ArrayLike, robot: Robot, metric: Metric) -> Array:
     """Return K_N as a matrix, checked for V' = -e_NᵀW K_N e_N < 0.
 
     If W is the mass matrix it changes with q: then K_N alone must be positive definite,
@@ -131,23 +118,3 @@ def check_support(robot: Robot, contacts: Sequence[Contact], base: Base | None) 
         raise ContactError(
             f"two contacts are called {twice[0]!r}; give them distinct names"
         )
-    for contact in contacts:
-        if contact.robot is not robot:
-            raise ContactError(
-                f"contact {contact.name!r} was built for another robot object "
-                f"({contact.robot.name}); build it with the controller's"
-            )
-
-
-def check_schedules(schedules: Mapping[str, Any], tasks: Sequence[str]) -> None:
-    """Check that every schedule belongs to an existing task.
-
-    Raises:
-        ControllerError: Names the unknown task, and the most similar one.
-    """
-    for name in schedules:
-        if name not in tasks:
-            raise ControllerError(
-                f"there is no task {name!r} to schedule"
-                f"{did_you_mean(name, tasks)} (there are {listing(tasks)})"
-            )

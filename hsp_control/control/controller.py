@@ -1,89 +1,50 @@
 """The controller: from tasks, a null-space field and a metric to one effort."""
 
-from collections.abc import Callable, Mapping, Sequence, Set
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from dataclasses import replace
 from itertools import pairwise
-from typing import Any, NamedTuple
+from threading import Lock
+from typing import Any, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, NonFiniteError
 from hsp_control.constraints.contacts import Contact
-from hsp_control.constraints.limits import Limits
+from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.actuation import Actuation, Status
+from hsp_control.control.actuation import Actuation
+from hsp_control.control.changes import Change, Changes
 from hsp_control.control.composition import (
     Base,
-    check_parts,
-    check_schedules,
     check_support,
+    check_tasks,
     checked_gain,
-    levels_of,
+    priority_of,
 )
+from hsp_control.control.evolution import PRESENT, Evolution
+from hsp_control.control.output import ControlOutput, Diagnostics
+from hsp_control.control.planned_contact import PlannedContact
+from hsp_control.control.read_only import read_only
+from hsp_control.control.setup import (
+    PlannedTerm,
+    Setup,
+    levels_of,
+    planned_task,
+)
+from hsp_control.declaration import within
+from hsp_control.geometry.scene import Obstacle, Scene
+from hsp_control.geometry.start import Start
 from hsp_control.law import Outcome, Resolution
 from hsp_control.law.outcome import DAMPED, EXACT, NOT_FINITE
-from hsp_control.null_space.fields import FieldSample, NullSpaceField, Rest
-from hsp_control.null_space.fields.crossfade import crossfade
+from hsp_control.null_space.fields import NullSpaceField, Rest
+from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import IdentityMetric, Metric
 from hsp_control.null_space.metrics.metric import CONSTANT
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks import Gains, Task, TaskSample
-from hsp_control.tasks.gain_ramp import GainRamp
-from hsp_control.trajectories.schedule import Schedule
-
-
-@dataclass(slots=True)
-class ControlOutput:
-    """The effort at one state, and everything that explains it.
-
-    The arrays are the controller's own and are overwritten by its next `compute`: copy
-    what must outlive it.
-
-    Attributes:
-        tau: Effort M a + N minus what the contact forces supply, shape (nv,)
-            [N·m or N].
-        acceleration: a, shape (nv,).
-        task: All tasks stacked: J, J', e, e', a_x.
-        field: g and g', shape (nv,) each.
-        null_space_error: e_N = (I - J#J)(g - v), shape (nv,).
-        damped: Whether a task is so near a singularity that its inverse is bounded,
-            and the law not exact.
-        forces: Forces at the points of the active contacts, in the axes of each
-            contact (two tangents, normal), shape (3 points,) [N]; see
-            `ActiveStack.support`.
-        status: What the limits left of the law's acceleration.
-        relaxation: The largest violation of a limit, where limits contradict each
-            other [rad/s² or m/s²].
-    """
-
-    tau: Array
-    acceleration: Array
-    task: TaskSample
-    field: FieldSample
-    null_space_error: Array
-    damped: bool
-    forces: Array
-    status: Status
-    relaxation: float
-
-
-class Diagnostics(NamedTuple):
-    """Quantities to plot beside the effort.
-
-    Attributes:
-        field_value: The field's cost f, or its norm.
-        null_space_norm: ‖e_N‖_W, which decays like exp(-K_N t) for a scalar gain.
-        singular_values: Of the tasks' stacked Jacobian in the metric, J L⁻ᵀ, largest
-            first.
-        manipulability: det(J W⁻¹ Jᵀ), the product of their squares.
-    """
-
-    field_value: float
-    null_space_norm: float
-    singular_values: Array
-    manipulability: float
-
+from hsp_control.tasks import Task, TaskSample
+from hsp_control.tasks.task import Feedback
 
 AccelerationModifier = Callable[
     [RobotState, ActiveStack, Array], tuple[Array, Array | None]
@@ -91,6 +52,10 @@ AccelerationModifier = Callable[
 """How compensators act between the law and the limits: a function of (state, active
 stack, a). It returns the acceleration to deliver, shape (nv,), and an additional effort
 besides M a + N, shape (nv,), or None."""
+
+_MEMORY = 1.0
+"""Changes that were complete this long ago are forgotten [s]; an integrator may ask for
+earlier times than the last one."""
 
 
 class Controller:
@@ -101,38 +66,34 @@ class Controller:
     same state gives the same effort: its only memory is the last effort, used where
     the effort rate is limited (see `applied`).
 
-    Attributes:
-        robot: The robot.
-        levels: The tasks of each level, the highest priority first.
-        tasks: All tasks, in the same order.
-        field: The null-space field.
-        metric: The joint-space metric.
-        null_space_gain: K_N, shape (nv, nv) [1/s].
-        contacts: The contacts that may support a floating base.
-        limits: The limits on efforts and motion, if any.
-        schedules: When each task is active, by name; tasks without one always are.
+    The parts are values and do not change; `at` makes changes while the controller
+    runs. What they leave relative (trajectories without a centre, ``target="start"``) refers
+    to ``start``, or else to the first state for which an effort is computed. A
+    controller can be copied and pickled at any time; several threads may share it.
     """
 
     def __init__(
         self,
         robot: Robot,
-        tasks: Sequence[Task | Sequence[Task]],
+        tasks: Sequence[Task],
         field: NullSpaceField | None = None,
         *,
-        null_space_gain: Any = 10.0,
+        null_space_gain: ArrayLike = 10.0,
         metric: Metric | None = None,
         singularity_threshold: float = 0.03,
         limits: Limits | None = None,
         contacts: Sequence[Contact] = (),
         base: Base | None = None,
-        schedules: Mapping[str, Schedule] | None = None,
+        scene: Scene | Iterable[Obstacle] = (),
+        start: ArrayLike | None = None,
+        changes: Sequence[Change] = (),
     ) -> None:
         """Compose a controller.
 
         Args:
             robot: The robot.
-            tasks: One task or more, with distinct names, stacked at one level; or a
-                list of such lists, the highest priority first.
+            tasks: One task or more, with distinct names. Tasks of the same priority
+                form one level; see `Task.priority`.
             field: The field g that the self-motion follows; None: `Rest`, g = 0.
             null_space_gain: K_N > 0 [1/s]: scalar, shape (nv,) or (nv, nv).
             metric: Joint-space metric; None: identity.
@@ -144,7 +105,10 @@ class Controller:
             contacts: The contacts that may support a robot with a free-flyer root.
             base: What moves the free-flyer root besides contacts. ``flying``: nothing;
                 ``driven``: something outside, for example a simulator.
-            schedules: When tasks are active, by name; all others always are.
+            scene: The obstacles that fields and limits name.
+            start: The configuration that relative parts refer to, shape (nq,); None:
+                that of the first `compute`.
+            changes: Changes while running; see `at`.
 
         Raises:
             ControllerError: If tasks, field and robot do not belong together, or the
@@ -152,98 +116,217 @@ class Controller:
             ContactError: If a floating base has neither contacts nor ``base``, or a
                 fixed base has either.
             GainError: If K_N does not make the null-space error decay.
-            MetricError: If the metric does not fit the robot.
+            HspControlError: If a part does not fit the robot; the message contains its
+                key path.
         """
-        field = Rest(robot) if field is None else field
-        metric = IdentityMetric() if metric is None else metric
-        levels = levels_of(tasks)
-        check_parts(robot, levels, field)
-        check_support(robot, contacts, base)
-        metric.check(robot.nv)
         if not 0.0 < singularity_threshold < np.inf:
             raise ControllerError(
                 f"singularity_threshold is {singularity_threshold}; must be positive"
             )
-        if limits is not None and limits.robot is not robot:
-            raise ControllerError("the limits were built for another robot object")
-        self.robot = robot
-        self.levels = levels
-        self.tasks = tuple(task for level in levels for task in level)
-        self.field = field
-        self.metric = metric
-        self.null_space_gain = checked_gain(null_space_gain, robot, metric)
-        self.contacts = tuple(contacts)
-        self.limits = limits
-        self.schedules = dict(schedules or {})
-        check_schedules(self.schedules, [task.name for task in self.tasks])
-        self._threshold = singularity_threshold
+        self._robot = robot
+        self._declared_tasks = tuple(tasks)
+        self._declared_field = Rest() if field is None else field
+        self._declared_limits = limits
+        self._declared_contacts = tuple(contacts)
+        self._declared_metric = IdentityMetric() if metric is None else metric
+        self._base = base
+        self._scene = scene if isinstance(scene, Scene) else Scene(scene)
+        self._threshold = float(singularity_threshold)
+        self._changes: tuple[Change, ...] = ()
+        self._given_start = None
+        if start is not None:
+            self._given_start = robot.check_configuration(start).copy()
+        check_support(robot, self._declared_contacts, base)
+        self._declared_gain = np.array(null_space_gain, dtype=float)
+        self._allocate()
+        for change in changes:
+            self.change(change)
+
+    def _allocate(self) -> None:
+        """Set up what a copy has of its own, and compose the parts."""
+        robot = self._robot
+        self._lock = Lock()
+        self._state = RobotState(robot)
+        self._modified, self._mixed = np.zeros((2, robot.nv))
+        self._gain = np.zeros((robot.nv, robot.nv))
+        self._feedback: dict[int, Feedback] = {}
+        self._stacks: dict[tuple[int, ...], ActiveStack] = {}
+        self._field: NullSpaceField = Rest()
+        self._now, self._begun = -np.inf, False
+        q = robot.home() if self._given_start is None else self._given_start
+        state = robot.state(0.0, q, np.zeros(robot.nv))
+        self._compose(Start(state, self._scene, known=self._given_start is not None))
+
+    # -- composition ------------------------------------------------------------------
+
+    def _compose(self, start: Start) -> None:
+        """Place all parts, and apply the changes."""
+        robot = self._robot
+        tasks = []
+        for task in self._declared_tasks:
+            with within("tasks", getattr(task, "name", repr(task))):
+                tasks.append(task.placed(start))
+        check_tasks(tasks, robot)
+        with within("null_space", "metric"):
+            metric = self._declared_metric.placed(start)
+        with within("null_space", "gain"):
+            gain = checked_gain(self._declared_gain, robot, metric)
+        fields = []
+        for k, term in enumerate(terms_of(self._declared_field)):
+            with within("null_space", "fields", k):
+                fields.append(PlannedTerm(term.placed(start), PRESENT))
+        contacts = []
+        for contact in self._declared_contacts:
+            with within("contacts", contact.name):
+                contacts.append(PlannedContact(contact.placed(start), PRESENT))
+        limits: RobotLimits | None = None
+        if self._declared_limits is not None:
+            with within("limits"):
+                limits = self._declared_limits.placed(start)
         self._actuation = Actuation(
-            robot, limits, () if base == "driven" else robot.unactuated
+            robot, limits, () if self._base == "driven" else robot.unactuated
         )
-        self._stacks: dict[tuple[Any, ...], ActiveStack] = {}
+        self._start = start
+        self._settled = Setup(
+            start,
+            metric,
+            tuple(planned_task(k, task, PRESENT) for k, task in enumerate(tasks)),
+            tuple(fields),
+            Evolution(gain),
+            tuple(contacts),
+        )
+        self._open = [_placed(change, start) for change in self._changes]
+        self._stacks.clear()
+        self._install(_applied(self._open, self._settled))
+
+    def _install(self, setup: Setup) -> None:
+        """Let the steps follow a setup; what stays the same is not compiled again."""
+        self._setup = setup
+        field = setup.field
+        if field != self._field:
+            self._field = field
+        self._feedback = {
+            each.key: self._feedback.get(each.key) or each.task.feedback()
+            for each in setup.tasks
+        }
+        self._levels = levels_of(setup.tasks, self._robot)
+        self._steady = setup.steady and setup.end == -np.inf
         self._active: ActiveStack | None = None
-        self._mixed, self._modified = np.zeros(robot.nv), np.zeros(robot.nv)
-        self._ramps: list[GainRamp] = []
-        self._next_field: tuple[float, NullSpaceField] | None = None
-        self._timeless = not self.schedules and all(
-            contact.schedule.constant for contact in self.contacts
-        )
+        self._write_gains(self._now)
+
+    def _write_gains(self, t: float) -> None:
+        """Write the gains of a time; every step reads these arrays."""
+        for each in self._setup.tasks:
+            feedback = self._feedback[each.key]
+            feedback.Kp[:], feedback.Kv[:] = each.gains.at(t)
+        self._gain[:] = self._setup.gain.at(t)
+
+    def _begin(self, state: RobotState) -> None:
+        """Place what is relative at the first state, unless a start was given."""
+        if self._given_start is None:
+            here = self._robot.state(state.t, state.q, state.v)
+            self._compose(Start(here, self._scene))
+        self._begun = True
 
     # -- the step ---------------------------------------------------------------------
 
+    @overload
     def compute(
-        self, state: RobotState, modifier: AccelerationModifier | None = None
+        self,
+        t: float,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        modifier: AccelerationModifier | None = None,
+        out: ControlOutput | None = None,
+    ) -> ControlOutput: ...
+
+    @overload
+    def compute(
+        self,
+        t: RobotState,
+        *,
+        modifier: AccelerationModifier | None = None,
+        out: ControlOutput | None = None,
+    ) -> ControlOutput: ...
+
+    def compute(
+        self,
+        t: float | RobotState,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+        *,
+        modifier: AccelerationModifier | None = None,
+        out: ControlOutput | None = None,
     ) -> ControlOutput:
-        """Return the effort at a state.
+        """Return the effort at a time, configuration and velocity.
 
         Args:
-            state: The robot's state.
+            t: Time [s]; or a `RobotState` instead of all three; its values are copied.
+            q: Configuration, shape (nq,).
+            v: Velocity, shape (nv,) [rad/s or m/s].
             modifier: Changes the law's acceleration before the limits are applied;
                 None: nothing does.
+            out: An output of an earlier step, to be overwritten; None: a new one.
 
         Raises:
-            NonFiniteError: If a task or the field contains NaN or inf; a non-finite
-                effort is never returned.
+            ShapeError: If q or v has the wrong shape.
+            NonFiniteError: If t, q or v contains NaN or inf, or a task or the field
+                does; a non-finite effort is never returned.
+            ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
             ControllerError: If the state belongs to another robot.
         """
-        if state.robot is not self.robot:
+        with self._lock:
+            state = self._state
+            if q is not None and v is not None:
+                state.update(t, q, v)  # type: ignore[arg-type]
+            elif t is not state:
+                self._adopt(t)
+            active = self._active
+            if active is None or not self._steady:
+                a, outcome = self._mix()
+                active = self.active_stack
+            else:
+                outcome = active.resolve(state.t)
+                a = active.acceleration
+            if outcome is NOT_FINITE:
+                self._explain_non_finite()
+            offset = None
+            if modifier is not None:
+                self._modified[:], offset = modifier(state, active, a)
+                a = self._modified
+            tau, a, forces, status, relaxation = self._actuation.deliver(
+                state, a, active.resolution, active.support, offset
+            )
+            # By name, and without a call of nine arguments, which costs 1 µs.
+            if out is None:
+                out = ControlOutput()
+                out.tau, out._memory = tau.copy(), active.memory.copy()
+            else:
+                out.tau[:] = tau
+                out._keep(active.memory)
+            out._rows = active.row_count
+            out._acceleration = None if a is active.acceleration else a.copy()
+            out.forces = forces.copy() if active.support.size else forces
+            out.damped = outcome is DAMPED
+            out.status, out.relaxation = status, relaxation
+            return out
+
+    def _adopt(self, state: object) -> None:
+        """Copy the values of a state."""
+        if not isinstance(state, RobotState):
+            raise ControllerError(
+                "compute needs t, q and v, or a RobotState; got "
+                f"{type(state).__name__} alone"
+            )
+        if state.robot is not self._robot:
             raise ControllerError(
                 f"the state is of another robot object ({state.robot.name}); "
-                f"this controller is for {self.robot.name}"
+                f"this controller is for {self._robot.name}"
             )
-        if self._ramps:
-            self._ramps = [ramp for ramp in self._ramps if not ramp.apply(state.t)]
-        if self._next_field is not None and state.t >= self._next_field[0]:
-            self.field, self._next_field = self._next_field[1], None
-        active = self._active
-        if active is None or not self._timeless:
-            a, outcome = self._scheduled(state)
-            active = self.active_stack
-        else:
-            outcome = active.resolve(state, self.metric, self.field)
-            a = active.resolution.acceleration
-        if outcome is NOT_FINITE:
-            self._explain_non_finite(state)
-        offset = None
-        if modifier is not None:
-            self._modified[:], offset = modifier(state, active, a)
-            a = self._modified
-        resolution = active.resolution
-        tau, a, forces, status, relaxation = self._actuation.deliver(
-            state, a, resolution, active.support, offset
-        )
-        # By name, and without a call of nine arguments, which costs 1 µs.
-        output = object.__new__(ControlOutput)
-        output.tau, output.acceleration = tau, a
-        output.task = active.rows
-        output.field = resolution.problem.field
-        output.null_space_error = resolution.null_space_error
-        output.damped = outcome is DAMPED
-        output.forces = forces
-        output.status, output.relaxation = status, relaxation
-        return output
+        self._state.update(state.t, state.q, state.v)
 
-    def applied(self, tau: Array, period: float) -> None:
+    def applied(self, tau: ArrayLike, period: float) -> None:
         """Store the effort that was sent to the robot, for the limit on its rate.
 
         Without such a limit it has no effect.
@@ -251,16 +334,33 @@ class Controller:
         Args:
             tau: Effort, shape (nv,) [N·m or N].
             period: Time until the next effort [s].
+
+        Raises:
+            ShapeError: If the effort has another shape.
+            NonFiniteError: If the effort or the period contains NaN or inf.
+            ControllerError: If the period is not positive.
         """
-        self._actuation.applied(tau, period)
+        effort = self._robot.check_tangent(tau, "effort tau")
+        if not np.isfinite(period):
+            raise NonFiniteError(f"period is {period}; needs a finite number")
+        if not period > 0.0:
+            raise ControllerError(f"period is {period} s; must be positive")
+        self._actuation.applied(effort, period)
 
     def restart(self) -> None:
-        """Forget the last effort and all task offsets, before another run."""
-        self._actuation.forget()
-        for task in self.tasks:
-            task.offset[:] = 0.0
+        """Begin anew: forget the last effort, the offsets of tasks, and where it began.
 
-    def _scheduled(self, state: RobotState) -> tuple[Array, Outcome]:
+        Changes that were made stay on the time line.
+        """
+        with self._lock:
+            self._actuation.forget()
+            self._now, self._begun = -np.inf, False
+            for feedback in self._feedback.values():
+                feedback.offset[:] = 0.0
+            if self._changes:
+                self._compose(self._start)
+
+    def _mix(self) -> tuple[Array, Outcome]:
         """Return the law's acceleration for the tasks that are active, and its outcome.
 
         A task that fades in or out has a weight between 0 and 1. With w1 ≥ w2 ≥ ... the
@@ -272,23 +372,28 @@ class Controller:
         continuous in the weights. The rows of the tasks in all sets are linear in a, so
         that these tasks keep their exact error equation throughout.
         """
-        t = state.t
-        weights = {
-            name: schedule.weight(t) for name, schedule in self.schedules.items()
-        }
+        t = self._state.t
+        if not self._begun:
+            self._begin(self._state)
+        self._now = max(self._now, t)
+        if self._setup.end > -np.inf:
+            if self._now > self._setup.end + _MEMORY:
+                self._settle()
+            self._write_gains(t)
+        weights = {each.key: each.weight(t) for each in self._setup.tasks}
         coming = sorted(
-            (name for name, w in weights.items() if 0.0 < w < 1.0),
-            key=lambda name: -weights[name],
+            (key for key, w in weights.items() if 0.0 < w < 1.0),
+            key=lambda key: -weights[key],
         )
-        off = {name for name, w in weights.items() if w < 1.0}
-        shares = [1.0, *(weights[name] for name in coming), 0.0]
+        off = {key for key, w in weights.items() if w < 1.0}
+        shares = [1.0, *(weights[key] for key in coming), 0.0]
         mixed = self._mixed
         mixed[:] = 0.0
         outcome = EXACT
         for k, (share, following) in enumerate(pairwise(shares)):
-            active = self._stack_without(state, off - set(coming[:k]))
+            active = self._stack_without(t, off - set(coming[:k]))
             self._active = active
-            outcome = max(outcome, active.resolve(state, self.metric, self.field))
+            outcome = max(outcome, active.resolve(t))
             a = active.resolution.acceleration
             if not coming:
                 break
@@ -296,23 +401,160 @@ class Controller:
             a = mixed
         return a, outcome
 
-    def _stack_without(self, state: RobotState, off: Set[str]) -> ActiveStack:
+    def _settle(self) -> None:
+        """Forget the changes that are complete."""
+        self._settled = self._setup.settled(self._setup.end)
+        self._open = []
+        self._install(self._settled)
+
+    def _stack_without(self, t: float, off: Set[int]) -> ActiveStack:
         """Return the stack of the contacts that are active now, without some tasks."""
-        bearing = tuple(c for c in self.contacts if c.schedule.active(state.t))
-        key = (tuple(c.name for c in bearing), frozenset(off))
+        bearing = [each for each in self._setup.contacts if each.active(t)]
+        on = [each.key for each in self._setup.tasks if each.key not in off]
+        # By identity: to compare values would cost more than the step.
+        key = (*map(id, bearing), -1, *on, id(self._field))
         if key not in self._stacks:
-            levels = [[t for t in level if t.name not in off] for level in self.levels]
             self._stacks[key] = ActiveStack(
-                state,
-                bearing,
-                levels,
-                self._actuation.base,
+                self._state,
                 self._actuation.support(bearing),
-                self.metric,
-                self.null_space_gain,
+                [[each for each in level if each.key in on] for level in self._levels],
+                self._feedback,
+                self._actuation.base,
+                self._setup.metric,
+                self._field,
+                self._gain,
                 self._threshold,
             )
         return self._stacks[key]
+
+    # -- changes while running --------------------------------------------------------
+
+    def at(self, t: float) -> Changes:
+        """Return what makes changes that begin at a time [s].
+
+        ``controller.at(2.0).ramp(0.5).gains("hand", hsp.Gains(natural_frequency=20))``.
+        Changes count in the order of their times, whatever the order of the calls; each
+        continues from what is then in force, so that several may overlap, and efforts
+        stay continuous. A time that has passed means now, with the whole ramp.
+        """
+        return Changes(self.change, t)
+
+    def change(self, change: Change) -> None:
+        """Make a change; `at` is the shorter way.
+
+        Raises:
+            ControllerError: If it names something that does not exist at its time.
+            HspControlError: If its parts do not fit the robot.
+        """
+        with self._lock:
+            start = self._start
+            if self._begun:
+                change = replace(change, at=max(change.at, self._now))
+                state = self._state
+                here = self._robot.state(state.t, state.q, state.v)
+                start = Start(here, self._scene)
+            placed = _placed(change, start)
+            self._install(_applied([*self._open, placed], self._settled))
+            self._open.append(placed)
+            made = (*self._changes, placed if self._begun else change)
+            self._changes = tuple(sorted(made, key=lambda each: each.at))
+            if self._begun:  # compile now, not in a step
+                self._stack_without(self._now, set()).prepare()
+
+    # -- what it is made of -----------------------------------------------------------
+
+    @read_only()
+    def robot(self) -> Robot:
+        """The robot."""
+        return self._robot
+
+    @read_only("use at(t).add(task) and at(t).remove(name)")
+    def tasks(self) -> tuple[Task, ...]:
+        """The tasks that count now or fade, placed, the highest priority first."""
+        return tuple(task for level in self.levels for task in level)
+
+    @read_only("use at(t).add(task) and at(t).remove(name)")
+    def levels(self) -> tuple[tuple[Task, ...], ...]:
+        """The tasks that count now or fade, by level, the highest priority first."""
+        now = self._now
+        levels = [
+            tuple(each.task for each in level if each.presence.at(now) > 0.0)
+            for level in self._levels
+        ]
+        return tuple(level for level in levels if level)
+
+    @read_only("use at(t).field(...)")
+    def field(self) -> NullSpaceField:
+        """The null-space field, placed; while it changes, all terms of old and new."""
+        return self._field
+
+    @read_only("use at(t).null_space_gain(...)")
+    def null_space_gain(self) -> Array:
+        """K_N in force, shape (nv, nv) [1/s]."""
+        return self._gain.copy()
+
+    @read_only()
+    def metric(self) -> Metric:
+        """The joint-space metric."""
+        return self._setup.metric
+
+    @read_only("use at(t).limits(...)")
+    def limits(self) -> RobotLimits | None:
+        """The limits, as numbers of this robot."""
+        return self._actuation.limits
+
+    @read_only("use at(t).contact(name, bears=...)")
+    def contacts(self) -> tuple[Contact, ...]:
+        """The contacts."""
+        return tuple(each.contact for each in self._setup.contacts)
+
+    @read_only()
+    def base(self) -> Base | None:
+        """What else than contacts acts on a floating base."""
+        return self._base
+
+    @read_only()
+    def scene(self) -> Scene:
+        """The obstacles that fields and limits name."""
+        return self._scene
+
+    @read_only("use at(t)")
+    def changes(self) -> tuple[Change, ...]:
+        """All changes that were made, in order of their times."""
+        return self._changes
+
+    @read_only("call compute")
+    def state(self) -> RobotState:
+        """The state that the last effort was computed for; the next one overwrites it.
+
+        It may be updated and given to `compute`, which then copies nothing.
+        """
+        return self._state
+
+    def feedback(self, task: str) -> Feedback:
+        """Return a task's gains and offset in force; compensators write the offset.
+
+        Raises:
+            ControllerError: If there is no such task.
+        """
+        return self._feedback[self._setup.tasks[self._setup.find_task(task)].key]
+
+    def weight_of(self, task: str, t: float) -> float:
+        """Return how much a task counts at time t [s], in [0, 1].
+
+        Raises:
+            ControllerError: If there is no such task.
+        """
+        return self._setup.tasks[self._setup.find_task(task)].weight(t)
+
+    def priority_of(self, task: str) -> int:
+        """Return the priority of a task, 1 the highest.
+
+        Raises:
+            ControllerError: If there is no such task.
+        """
+        planned = self._setup.tasks[self._setup.find_task(task)]
+        return priority_of(planned.task, self._robot)
 
     # -- what explains it -------------------------------------------------------------
 
@@ -329,61 +571,46 @@ class Controller:
 
     def stack(self, state: RobotState) -> TaskSample:
         """Return the rows of all active contacts and tasks at a state."""
-        self._scheduled(state)
-        return self.active_stack.rows
-
-    def level_of(self, task: str) -> int:
-        """Return the level that a task is at, 0 the highest.
-
-        Raises:
-            ControllerError: If there is no such task.
-        """
-        check_schedules({task: None}, [each.name for each in self.tasks])
-        return next(
-            k
-            for k, level in enumerate(self.levels)
-            if any(each.name == task for each in level)
-        )
+        with self._lock:
+            if state is not self._state:
+                self._adopt(state)
+            self._mix()
+            return self.active_stack.rows
 
     @property
-    def task_rows(self) -> dict[str, slice]:
+    def task_rows(self) -> Mapping[str, slice]:
         """The rows of each task in the last output's stack, by name."""
         return self.active_stack.task_rows
 
-    @property
-    def field_sample(self) -> FieldSample:
-        """The field, g and g', at the last `compute`."""
-        return self.active_stack.resolution.problem.field
-
-    def diagnose(self, state: RobotState) -> Diagnostics:
-        """Return quantities to plot, after `compute` at the same state."""
+    def diagnose(self) -> Diagnostics:
+        """Return quantities to plot, after `compute`, at the same state."""
         active = self.active_stack
         resolution = active.resolution
         singular_values, manipulability = resolution.spectrum(active.first_task_row)
         return Diagnostics(
-            self.field.value(state),
+            self._field.value(self._state),
             resolution.null_space_norm(),
             singular_values,
             manipulability,
         )
 
-    def flow(self, t: float, q: Array) -> Array:
+    def flow(self, t: float, q: ArrayLike) -> Array:
         """Return v = J# x_d' + P g, shape (nv,): the robot once both errors have died.
 
         The law makes the robot this first-order flow (docs/law.md, Equations (7) and
         (13) over a metric; Liégeois 1977). So it shows what a field will do, and a
         start with this velocity has no transient.
         """
-        state = self.robot.state(t, q, np.zeros(self.robot.nv))
-        self.compute(state)
+        nv, state = self._robot.nv, self._state
+        self.compute(t, q, np.zeros(nv))
         active = self.active_stack
         problem = active.resolution.problem
         # At rest, without drift and with unit gain the law's acceleration is the flow.
         flow = Resolution(
             np.diff(active.resolution.ends, prepend=0).tolist(),
-            self.robot.nv,
+            nv,
             min(self.metric.form, CONSTANT),
-            np.eye(self.robot.nv),
+            np.eye(nv),
             self._threshold,
         )
         flow.problem.task.jacobian[:] = active.rows.jacobian
@@ -395,108 +622,78 @@ class Controller:
         flow.problem.metric.W[:], flow.problem.metric.L[:] = problem.metric[:2]
         return flow.resolve(state.v).acceleration
 
-    # -- changes while it runs --------------------------------------------------------
-
-    def add_task(
-        self, task: Task, *, start: float, ramp: float, level: int | None = None
-    ) -> None:
-        """Add a task that fades in without a jump in effort.
-
-        Args:
-            task: The task, with a name of its own.
-            start: When it begins to fade in [s].
-            ramp: How long it fades in [s].
-            level: Its level, 0 the highest; None: the lowest existing one.
-
-        Raises:
-            ControllerError: If it belongs to another robot, its name is used already,
-                or there is no such level.
-        """
-        levels = [list(each) for each in self.levels]
-        if level is not None and not 0 <= level <= len(levels):
-            raise ControllerError(
-                f"there is no level {level}; levels are 0 to {len(levels) - 1}, and "
-                f"{len(levels)} opens a new one"
-            )
-        if level == len(levels):
-            levels.append([])
-        levels[-1 if level is None else level].append(task)
-        check_parts(self.robot, levels, self.field)
-        self.levels = tuple(tuple(each) for each in levels)
-        self.tasks = tuple(each for row in self.levels for each in row)
-        self.schedules[task.name] = Schedule([(start, np.inf)], ramp=ramp)
-        self._stacks.clear()
-        self._timeless = False
-
-    def remove_task(self, name: str, *, start: float, ramp: float) -> None:
-        """Remove a task, which fades out without a jump in effort.
-
-        Args:
-            name: The task.
-            start: When it begins to fade out [s].
-            ramp: How long it fades out [s].
-
-        Raises:
-            ControllerError: If there is no such task.
-        """
-        check_schedules({name: None}, [task.name for task in self.tasks])
-        self.schedules[name] = Schedule([(-np.inf, start + ramp)], ramp=ramp)
-        self._timeless = False
-
-    def change_gains(
-        self, name: str, gains: Gains, *, start: float, ramp: float
-    ) -> None:
-        """Change a task's gains smoothly; its error equation holds throughout.
-
-        Args:
-            name: The task.
-            gains: The new gains.
-            start: When they begin to change [s].
-            ramp: How long they change [s].
-
-        Raises:
-            ControllerError: If there is no such task.
-            GainError: If the gains do not fit it.
-        """
-        check_schedules({name: None}, [task.name for task in self.tasks])
-        task = next(task for task in self.tasks if task.name == name)
-        self._ramps.append(GainRamp(task, gains, start, ramp))
-
-    def change_field(self, field: NullSpaceField, *, start: float, ramp: float) -> None:
-        """Change to another field smoothly; Proposition 2 holds throughout.
-
-        In between the field is a `crossfade` with its exact rate, so that the
-        null-space error decays as if nothing had happened. A change that begins before
-        the last one has ended starts from the field at that time.
-
-        Args:
-            field: The new field.
-            start: When the change begins, now or later [s].
-            ramp: How long it takes [s].
-
-        Raises:
-            ControllerError: If the field belongs to another robot.
-            FieldError: If the ramp is not positive, or one of the two fields leaves the
-                null space uncontrolled: there is no blend between the two.
-        """
-        check_parts(self.robot, self.levels, field)
-        self.field = crossfade(self.field, field, start=start, duration=ramp)
-        self._next_field = start + ramp, field
-
-    def _explain_non_finite(self, state: RobotState) -> None:
+    def _explain_non_finite(self) -> None:
+        state = self._state
         part = self.active_stack.not_finite()
         if part is not None:
             raise NonFiniteError(
                 f"{part} is not finite at t = {state.t:.6g} s; "
                 "does its trajectory return NaN or infinity there?"
             )
-        if not all(np.isfinite(array).all() for array in self.field_sample):
-            raise NonFiniteError(
-                f"field {self.field.name!r} is not finite at t = {state.t:.6g} s"
-            )
         problem = self.active_stack.resolution.problem
-        self.metric.evaluate(state, problem.metric)  # may say what is wrong with it
+        if not all(np.isfinite(array).all() for array in problem.field):
+            raise NonFiniteError(
+                f"field {self._field.name!r} is not finite at t = {state.t:.6g} s"
+            )
+        self._setup.metric.evaluate(state, problem.metric)  # may say what is wrong
         raise NonFiniteError(
             f"the effort is not finite at t = {state.t:.6g} s, "
             f"q = {state.q.tolist()}, v = {state.v.tolist()}"
         )
+
+    # -- copies -----------------------------------------------------------------------
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = self._state
+        return {
+            "declared": {name: getattr(self, name) for name in _DECLARED},
+            "begun": self._begun,
+            "start": self._start,
+            "settled": self._settled,
+            "open": list(self._open),
+            "now": self._now,
+            "at": (state.t, state.q.copy(), state.v.copy()),
+            "offsets": {k: each.offset.copy() for k, each in self._feedback.items()},
+            "last_effort": self._actuation.memory(),
+        }
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        vars(self).update(saved["declared"])
+        self._allocate()
+        self._start, self._settled = saved["start"], saved["settled"]
+        self._open, self._begun, self._now = saved["open"], saved["begun"], saved["now"]
+        self._install(_applied(self._open, self._settled))
+        for key, offset in saved["offsets"].items():
+            self._feedback[key].offset[:] = offset
+        self._state.update(*saved["at"])
+        self._actuation.remember(saved["last_effort"])
+
+
+_DECLARED = (
+    "_base",
+    "_changes",
+    "_declared_contacts",
+    "_declared_field",
+    "_declared_gain",
+    "_declared_limits",
+    "_declared_metric",
+    "_declared_tasks",
+    "_given_start",
+    "_robot",
+    "_scene",
+    "_threshold",
+)
+"""The attributes from which all others are made."""
+
+
+def _placed(change: Change, start: Start) -> Change:
+    with within("changes", type(change).yaml_type or type(change).__name__):
+        return change.placed(start)
+
+
+def _applied(changes: Sequence[Change], setup: Setup) -> Setup:
+    """Return the setup with changes, in order of time."""
+    for change in sorted(changes, key=lambda each: each.at):
+        with within("changes", type(change).yaml_type or type(change).__name__):
+            setup = change.apply(setup)
+    return setup

@@ -218,7 +218,7 @@ def _obstacle(shape: Shape) -> tuple[int, list[float]]:
         half = 0.5 * shape.length
         return SEGMENT, [0.0, 0.0, -half, 0.0, 0.0, shape.length, shape.radius]
     if isinstance(shape, Box):
-        return BOX, [*(0.5 * edge for edge in shape.size), 0.0, 0.0, 0.0, 0.0]
+        return BOX, [*(0.5 * np.asarray(shape.size)), 0.0, 0.0, 0.0, 0.0]
     if isinstance(shape, Cylinder):
         size = [shape.radius, shape.radius, 0.5 * shape.length]
         return CYLINDER, [*size, 0.0, 0.0, 0.0, 0.0]

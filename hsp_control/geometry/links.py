@@ -3,7 +3,7 @@
 import logging
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
-from weakref import WeakSet
+from weakref import WeakKeyDictionary, WeakSet
 
 import coal
 import numpy as np
@@ -29,6 +29,9 @@ _MAX_SPHERES = 100
 
 _log = logging.getLogger(__name__)
 _warned: "WeakSet[Robot]" = WeakSet()
+_found: "WeakKeyDictionary[Robot, dict[Proxy, tuple[LinkShape, ...]]]" = (
+    WeakKeyDictionary()
+)
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class LinkShape:
 
 
 def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
-    """Return the shapes of the robot's links.
+    """Return the shapes of the robot's links; they are found once for each robot.
 
     A robot without collision geometry gets capsules between its joints, and a warning.
 
@@ -66,6 +69,13 @@ def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
     """
     if proxy not in get_args(Proxy):
         raise ModelError(f"proxy {proxy!r} is not one of {', '.join(get_args(Proxy))}")
+    known = _found.setdefault(robot, {})
+    if proxy not in known:
+        known[proxy] = tuple(_shapes_of(robot, proxy))
+    return list(known[proxy])
+
+
+def _shapes_of(robot: Robot, proxy: Proxy) -> list[LinkShape]:
     own = {part.prefix: _collision_shapes(robot, part) for part in robot.parts}
     without = [part for part in robot.parts if not own[part.prefix]]
     if without and robot not in _warned:

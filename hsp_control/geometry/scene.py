@@ -1,13 +1,18 @@
 """Obstacles in the robot's world, fixed or moving."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SceneError
+from hsp_control.common.exceptions import SceneError, TrajectoryError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import ArrayField, Name
 from hsp_control.geometry.shapes import Shape
 from hsp_control.trajectories import (
     HoldOrientation,
@@ -19,37 +24,41 @@ from hsp_control.trajectories import (
 from hsp_control.trajectories.following import Follower, follow_all
 
 
-class Obstacle:
-    """A shape that is fixed, or moves along trajectories.
+def _in_space(center: Trajectory) -> Trajectory:
+    """Return the trajectory of a point in the world.
 
-    Attributes:
-        name: Its name in fields and in the log.
-        shape: Its shape, centred on its own frame.
-        center: Trajectory of its frame's origin in the world [m], of dimension 3.
-        orientation: Trajectory of its frame's orientation in the world.
+    Raises:
+        SceneError: If it is relative to a start, or its dimension is not 3.
     """
+    try:
+        center = center.anchored(None)
+    except TrajectoryError as error:
+        raise SceneError(str(error)) from None
+    if center.dimension != 3:
+        raise SceneError(f"its dimension is {center.dimension}; needs 3 (x, y, z)")
+    return center
 
-    def __init__(
-        self,
-        name: str,
-        shape: Shape,
-        center: Trajectory,
-        orientation: OrientationTrajectory | None = None,
-    ) -> None:
-        """Set the obstacle; the default orientation is that of the world's axes.
 
-        Raises:
-            SceneError: If the dimension of the centre is not 3.
-        """
-        if center.dimension != 3:
-            raise SceneError(
-                f"obstacle {name!r}: its centre has dimension {center.dimension}; "
-                "needs 3 (x, y, z)"
-            )
-        self.name = name
-        self.shape = shape
-        self.center = center
-        self.orientation = orientation or HoldOrientation(np.eye(3))
+def _from_world_axes(orientation: OrientationTrajectory) -> OrientationTrajectory:
+    return orientation.anchored(np.eye(3))
+
+
+class Obstacle(Part, error=SceneError):
+    """A shape that is fixed, or moves along trajectories; a value."""
+
+    yaml_key: ClassVar[str | None] = "name"
+
+    name: Name
+    """Its name in fields and in the log [-]; in YAML, its key in the scene."""
+    shape: Shape
+    """Its shape, centred on its own frame [-]."""
+    center: Annotated[Trajectory, AfterValidator(_in_space)]
+    """Trajectory of its frame's origin in the world, of dimension 3 [m]."""
+    orientation: Annotated[OrientationTrajectory, AfterValidator(_from_world_axes)] = (
+        HoldOrientation((0.0, 0.0, 0.0))
+    )
+    """Trajectory of its frame's orientation, body to world [-]; along the world's axes
+    by default. One without a rotation begins along them."""
 
     def placement(self, t: float) -> pin.SE3:
         """Return its placement in the world at time t [s]."""
@@ -70,36 +79,73 @@ class Obstacle:
         return follow_all(self.center.follow(center), self.orientation.follow(turn))
 
 
-class Scene(Mapping[str, Obstacle]):
-    """The obstacles of a world, by name."""
+def _keyed(obstacles: Any) -> Any:
+    """Return obstacles as a mapping by name; data of YAML with their keys as names.
 
-    def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
-        """Collect obstacles.
+    Raises:
+        SceneError: If two have the same name.
+    """
+    if isinstance(obstacles, Mapping):
+        return {
+            key: {"name": key, **each} if isinstance(each, dict) else each
+            for key, each in obstacles.items()
+        }
+    if isinstance(obstacles, str) or not isinstance(obstacles, Iterable):
+        return obstacles
+    keyed: dict[Any, Any] = {}
+    for each in obstacles:
+        if not isinstance(each, Obstacle):
+            raise SceneError(f"{each!r:.60} is not an obstacle")
+        if each.name in keyed:
+            raise SceneError(f"two obstacles have the name {each.name!r}")
+        keyed[each.name] = each
+    return keyed
 
-        Raises:
-            SceneError: If two have the same name.
-        """
-        self._obstacles: dict[str, Obstacle] = {}
-        for obstacle in obstacles:
-            if obstacle.name in self._obstacles:
-                raise SceneError(f"two obstacles have the name {obstacle.name!r}")
-            self._obstacles[obstacle.name] = obstacle
+
+def _stored(obstacles: Mapping[str, Obstacle]) -> tuple[Obstacle, ...]:
+    """Return the obstacles of a mapping.
+
+    Raises:
+        SceneError: If an obstacle's name is not its key.
+    """
+    for key, each in obstacles.items():
+        if each.name != key:
+            raise SceneError(f"obstacle {key!r} has another name, {each.name!r}")
+    return tuple(obstacles.values())
+
+
+class Scene(Part, Mapping[str, Obstacle], error=SceneError):
+    """The obstacles of a world, a mapping by name; a value.
+
+    In YAML, ``obstacles`` is a mapping too, and its keys are their names.
+    """
+
+    obstacles: Annotated[
+        Iterable[Obstacle],
+        ArrayField(Annotated[dict[Name, Obstacle], Field(max_length=1000)], _stored),
+        BeforeValidator(_keyed),
+    ] = ()
+    """The obstacles, in the order of the log [-]; no two have the same name."""
+
+    @cached_property
+    def _by_name(self) -> dict[str, Obstacle]:
+        return {obstacle.name: obstacle for obstacle in self.obstacles}
 
     def __getitem__(self, name: str) -> Obstacle:
         try:
-            return self._obstacles[name]
+            return self._by_name[name]
         except KeyError:
-            known = listing(self._obstacles) or "none"
+            known = listing(self) or "none"
             raise SceneError(
-                f"no obstacle {name!r}{did_you_mean(name, self._obstacles)} "
+                f"no obstacle {name!r}{did_you_mean(name, self)} "
                 f"(the scene has {known})"
             ) from None
 
     def __contains__(self, name: object) -> bool:
-        return name in self._obstacles
+        return name in self._by_name
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._obstacles)
+        return iter(self._by_name)
 
     def __len__(self) -> int:
-        return len(self._obstacles)
+        return len(self._by_name)

@@ -1,15 +1,65 @@
 """The input of the law: tasks, field and metric write it, the law reads it."""
 
+from typing import NamedTuple
+
+import numpy as np
+
 from hsp_control.common.arrays import Array
 from hsp_control.null_space.fields import FieldSample
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.tasks import TaskSample
 
 
+class Record(NamedTuple):
+    """What explains a step, in one block of memory, so that one copy keeps it all.
+
+    Attributes:
+        task: All tasks, level after level: J, J', e, e', a_x.
+        field: g and g'.
+        null_space_error: e_N, shape (nv,).
+        acceleration: a, shape (nv,).
+        memory: The block, of which all of these are views.
+    """
+
+    task: TaskSample
+    field: FieldSample
+    null_space_error: Array
+    acceleration: Array
+    memory: Array
+
+    @classmethod
+    def allocate(cls, rows: int, nv: int) -> "Record":
+        """Return a record of zeros."""
+        return cls.over(np.zeros(2 * rows * nv + 3 * rows + 4 * nv), rows, nv)
+
+    @classmethod
+    def over(cls, memory: Array, rows: int, nv: int) -> "Record":
+        """Return the record of m = ``rows`` rows whose arrays are views of ``memory``.
+
+        Args:
+            memory: J, J', e, e', a_x, g, g', e_N and a one after another, shape
+                (2 m nv + 3 m + 4 nv,).
+            rows: m.
+            nv: Degrees of freedom.
+        """
+        square, ends = rows * nv, 2 * rows * nv + 3 * rows
+        vectors = memory[2 * square : ends].reshape(3, rows)
+        joints = memory[ends:].reshape(4, nv)
+        task = TaskSample(
+            memory[:square].reshape(rows, nv),
+            memory[square : 2 * square].reshape(rows, nv),
+            *vectors,
+        )
+        return cls(
+            task, FieldSample(joints[0], joints[1]), joints[2], joints[3], memory
+        )
+
+
 class Problem:
     """The input of the law at one state.
 
     Attributes:
+        record: The memory of tasks, field and null-space error.
         task: All tasks, level after level: J, J', e, e', a_x.
         field: g and g'.
         metric: W, its Cholesky factor and W'; the identity until it is written.
@@ -17,8 +67,15 @@ class Problem:
     """
 
     def __init__(self, rows: int, nv: int, gain: Array) -> None:
-        """Allocate for a number of rows and of degrees of freedom."""
-        self.task = TaskSample.allocate(rows, nv)
-        self.field = FieldSample.allocate(nv)
+        """Allocate for a number of rows and of degrees of freedom.
+
+        Args:
+            rows: Number of rows.
+            nv: Degrees of freedom.
+            gain: K_N; the law reads this very array.
+        """
+        self.record = Record.allocate(rows, nv)
+        self.task = self.record.task
+        self.field = self.record.field
         self.metric = MetricSample.allocate(nv)
-        self.gain = gain.copy()
+        self.gain = gain

@@ -98,7 +98,8 @@ class Resolution:
             np.zeros((nv, m)),
             np.zeros((nv, nv)),
         )
-        self.acceleration, self.null_space_error = np.zeros(nv), np.zeros(nv)
+        self.acceleration = self.problem.record.acceleration
+        self.null_space_error = self.problem.record.null_space_error
         self._norm = bind(norm, self.problem.metric.W, self.null_space_error)
         self._spectra: dict[int, tuple[Callable[[], float], Array]] = {}
 

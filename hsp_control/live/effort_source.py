@@ -4,7 +4,8 @@ from typing import Protocol
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation import Command
-from hsp_control.control.controller import Controller, ControlOutput
+from hsp_control.control.controller import Controller
+from hsp_control.control.output import ControlOutput
 from hsp_control.robot import RobotState
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.controller import Controller, ControlOutput
+from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.output import ControlOutput
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.effort_source import EffortSource

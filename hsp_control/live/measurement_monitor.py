@@ -3,7 +3,7 @@
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.constraints.limits import Limits
+from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.live.hardware import Measurement
 from hsp_control.live.settings import Tolerance
 from hsp_control.robot import Robot
@@ -16,7 +16,7 @@ class MeasurementMonitor:
         last: The last valid measurement.
     """
 
-    def __init__(self, robot: Robot, limits: Limits | None, tolerance: Tolerance):
+    def __init__(self, robot: Robot, limits: RobotLimits | None, tolerance: Tolerance):
         """Read the limits.
 
         Args:
@@ -26,7 +26,7 @@ class MeasurementMonitor:
                 states.
         """
         self._robot, self._tolerance = robot, tolerance
-        limits = Limits(robot) if limits is None else limits
+        limits = own_limits(robot) if limits is None else limits
         self._lower = limits.lower - tolerance.position_margin
         self._upper = limits.upper + tolerance.position_margin
         self._speed = limits.velocity * (1.0 + tolerance.velocity_margin)

@@ -24,7 +24,7 @@ class OperatorRequests:
     def call(self, change: Callable[[], object]) -> None:
         """Request that a change is made between two periods, for example a new task.
 
-        ``requests.call(lambda: controller.change_gains(...))``. If it raises, the
+        ``requests.call(lambda: controller.at(t).gains(...))``. If it raises, the
         robot is stopped. The loop waits until it returns: build what it needs, and
         compute once with it, before the call.
         """

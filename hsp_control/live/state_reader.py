@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
-from hsp_control.constraints.limits import Limits
+from hsp_control.constraints.limits import RobotLimits
 from hsp_control.live.dead_reckoning import DeadReckoning
 from hsp_control.live.deadlines import Deadlines
 from hsp_control.live.hardware import Hardware, Measurement
@@ -31,7 +31,7 @@ class StateReader:
     def __init__(
         self,
         robot: Robot,
-        limits: Limits | None,
+        limits: RobotLimits | None,
         hardware: Hardware,
         tolerance: Tolerance,
         clock: Callable[[], float],

@@ -6,10 +6,10 @@ for what a state does not offer: loading and checks of models, integration, coll
 geometry, derivatives of gravity, plants with models of their own, and the viewer.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -40,6 +40,11 @@ from hsp_control.robot.kinematics import (
     mass_matrix_difference,
 )
 from hsp_control.robot.matrix_view import matrix_view
+
+Made = TypeVar("Made")
+
+_MADE_LIMIT = 1000
+"""Number of parts whose memory a state keeps; then it starts anew."""
 
 
 class Robot(ConfigurationSpace):
@@ -215,6 +220,15 @@ class Robot(ConfigurationSpace):
         model = self.joints[joint]
         return slice(model.idx_v, model.idx_v + model.nv)
 
+    def is_on_root(self, frame: str) -> bool:
+        """Return whether a frame is fixed to a floating base.
+
+        Raises:
+            FrameNotFoundError: If there is no such frame.
+        """
+        joint = self.model.frames[self.frame_id(frame)].parentJoint
+        return bool(self.unactuated) and joint == 1
+
     # -- dynamics ---------------------------------------------------------------------
 
     def state(self, t: float, q: Any, v: Any) -> "RobotState":
@@ -296,6 +310,7 @@ class RobotState:
         self._centroidal: CentroidalMotion | None = None
         self._mass_matrix_rate: Array = np.zeros((robot.nv, robot.nv))
         self._displaced: RobotState | None = None
+        self._made: dict[int, tuple[object, Any]] = {}
 
     def update(self, t: float, q: Array, v: Array) -> Self:
         """Move to time t [s], configuration q (nq,) and velocity v (nv,), in place.
@@ -416,6 +431,28 @@ class RobotState:
                 self.v,
             )
         return self._world
+
+    def made(self, part: object, make: Callable[[], Made]) -> Made:
+        """Return what ``make`` returned for a part and this state; it is called once.
+
+        Parts are values and have no memory. What they compute with at a state, such as
+        buffers and compiled calls, is kept here, so that one part may serve many
+        states, in many threads.
+        """
+        found = self._made.get(id(part))
+        if found is None:
+            if len(self._made) >= _MADE_LIMIT:
+                self._made.clear()
+            self._made[id(part)] = found = part, make()  # keeps the part, and its id
+        made: Made = found[1]
+        return made
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"robot": self.robot, "t": self.t, "q": self.q, "v": self.v}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["robot"])  # type: ignore[misc]
+        self.update(state["t"], state["q"], state["v"])
 
     def displaced(self, dt: float, displacement: Array) -> "RobotState":
         """Return the state at (t + dt, q ⊕ displacement) with the same velocity.

@@ -9,8 +9,9 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.common.kernels import kernel
 from hsp_control.control.compensation import Command
-from hsp_control.control.controller import Controller, ControlOutput
+from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.output import ControlOutput
 from hsp_control.robot import RobotState
 from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation.plants import ContinuousPlant, SampledPlant
@@ -56,18 +57,18 @@ def continuous_loop(
     Raises:
         SimulationError: If the motion diverges.
     """
-    state = RobotState(controller.robot)
+    state = controller.state
     controller.restart()
 
     def feedback(t: float, q: Array, v: Array) -> Array:
-        tau = controller.compute(state.update(t, q, v)).tau
+        tau = controller.compute(t, q, v).tau
         return plant.acceleration(t, q, v, tau)
 
     for k, t in enumerate(times):
         if k > 0:
             q, v = integrator.advance(plant.robot, feedback, times[k - 1], t, q, v)
             _check_divergence(t, q, v)
-        output = controller.compute(state.update(t, q, v))
+        output = controller.compute(t, q, v)
         yield Instant(state, output, output.tau, {})
 
 

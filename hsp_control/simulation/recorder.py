@@ -4,7 +4,6 @@ import math
 import platform
 from collections.abc import Mapping
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,13 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.common.version import __version__
-from hsp_control.control.controller import Controller, ControlOutput
+from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.output import ControlOutput
 from hsp_control.geometry.scene import Obstacle, Scene
-from hsp_control.null_space.fields import FieldSample, NullSpaceField, WeightedSum
+from hsp_control.geometry.shapes import shape_to_log
+from hsp_control.null_space.fields import NullSpaceField
+from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import ConstantMetric, Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.log_file import MAX_SIZE
@@ -96,12 +98,16 @@ class Recorder:
     def _add_task_columns(self) -> None:
         """Add the columns of all tasks; tasks may be added during the run."""
         self._tasks, column = self._controller.tasks, self._add_column
-        probe, unit = _probe(self._controller.robot), "m or rad"
+        probe = _probe(self._controller.robot)
         for task in self._tasks:
             m, prefix = task.rows, f"task.{task.name}"
             width = len(task.measure(probe)[0])
-            column(f"{prefix}.error", (m,), unit, "error e in the task's coordinates")
-            column(f"{prefix}.error_rate", (m,), f"{unit}/s", "error rate e'")
+            parts = task.error_parts
+            unit = " and ".join(dict.fromkeys(part.unit for part in parts))
+            rate_unit = " and ".join(dict.fromkeys(part.rate_unit for part in parts))
+            what = " and ".join(part.name for part in parts)
+            column(f"{prefix}.error", (m,), unit, f"error e: {what}")
+            column(f"{prefix}.error_rate", (m,), rate_unit, "error rate e'")
             column(f"{prefix}.reference", (width,), unit, "desired value")
             column(f"{prefix}.actual", (width,), unit, "actual value")
 
@@ -110,7 +116,7 @@ class Recorder:
         controller, probe = self._controller, _probe(self._controller.robot)
         self._field, self._terms = controller.field, _terms(controller)
         shape, unit = (controller.robot.nv,), f"{self._joint_unit}/s"
-        for name, (_, field) in self._terms.items():
+        for name, field in self._terms.items():
             self._add_column(f"field.{name}.g", shape, unit, "weighted share of g")
             self._add_column(f"field.{name}.value", (), "-", "unweighted cost or norm")
             if field.minimum_distance(probe) is not None:
@@ -143,7 +149,7 @@ class Recorder:
         """
         i, columns = self._rows, self._columns
         robot = self._controller.robot
-        if self._controller.tasks is not self._tasks:
+        if self._controller.tasks != self._tasks:
             self._add_task_columns()
         if self._controller.field is not self._field:
             self._add_term_columns()
@@ -179,7 +185,7 @@ class Recorder:
         for name, rows in controller.task_rows.items():  # of the active tasks
             columns[f"task.{name}.error"][i] = output.task.error[rows]
             columns[f"task.{name}.error_rate"][i] = output.task.error_rate[rows]
-        diagnostics = controller.diagnose(state)
+        diagnostics = controller.diagnose()
         columns["field.g"][i] = output.field.g
         columns["field.value"][i] = diagnostics.field_value
         columns["null_space_error"][i] = output.null_space_error
@@ -196,8 +202,9 @@ class Recorder:
         columns["status"][i] = output.status
         columns["relaxation"][i] = output.relaxation
         self._record_contacts(output)
-        for name, (sample, field) in self._terms.items():
-            columns[f"field.{name}.g"][i] = (sample or output.field).g
+        samples = controller.active_stack.term_samples
+        for (name, field), sample in zip(self._terms.items(), samples, strict=True):
+            columns[f"field.{name}.g"][i] = sample.g
             columns[f"field.{name}.value"][i] = field.value(state)
             if f"distance.{name}" in columns:
                 columns[f"distance.{name}"][i] = field.minimum_distance(state)
@@ -267,11 +274,13 @@ class Recorder:
                 task.name: {
                     "type": type(task).__name__,
                     "rows": task.rows,
-                    "level": controller.level_of(task.name),
+                    "level": level,
+                    "error": [list(part) for part in task.error_parts],
                     "axes": getattr(task, "axes", None),
                     "frame": getattr(task, "frame", None),
                 }
-                for task in controller.tasks
+                for level, tasks in enumerate(controller.levels)
+                for task in tasks
             },
             "field": controller.field.name,
             "controls_null_space": controller.field.controls,
@@ -300,21 +309,13 @@ def versions() -> dict[str, str]:
     }
 
 
-def _terms(
-    controller: Controller,
-) -> dict[str, tuple[FieldSample | None, NullSpaceField]]:
-    """Return the controller's field by terms, each with the sample of its share of g.
-
-    The sample is None if there is only one term: its share is the whole g.
-    """
-    field = controller.field
-    if not isinstance(field, WeightedSum):
-        return {field.name: (None, field)}
-    terms = zip(field.samples, (term for _, term in field.terms), strict=True)
-    names = [term.name for _, term in field.terms]
+def _terms(controller: Controller) -> dict[str, NullSpaceField]:
+    """Return the terms of the controller's field, by names that differ."""
+    terms = terms_of(controller.field)
+    names = [term.name for term in terms]
     return {
-        name if names.count(name) == 1 else f"{name}_{k}": pair
-        for k, (name, pair) in enumerate(zip(names, terms, strict=True))
+        name if names.count(name) == 1 else f"{name}_{k}": term
+        for k, (name, term) in enumerate(zip(names, terms, strict=True))
     }
 
 
@@ -322,10 +323,9 @@ def _obstacle_meta(obstacle: Obstacle) -> dict[str, Any]:
     radius = obstacle.shape.bounding_radius
     return {
         "shape": type(obstacle.shape).__name__,
-        "parameters": {k: str(v) if isinstance(v, Path) else v
-                       for k, v in vars(obstacle.shape).items()},
+        "parameters": shape_to_log(obstacle.shape),
         "radius": radius if np.isfinite(radius) else None,
-    }  # fmt: skip
+    }
 
 
 def _constant_matrix(metric: Metric) -> list[list[float]] | None:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.exceptions import SweepError
-from hsp_control.config.keys import split_assignment, written
 from hsp_control.config.renamed import current_keys
+from hsp_control.declaration.keys import split_assignment, written
 from hsp_control.sweeps.distributions import Choices, Distribution
 from hsp_control.sweeps.spelling import values
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from hsp_control.common.exceptions import SweepError
-from hsp_control.config.plain import shown
+from hsp_control.declaration.plain import shown
 from hsp_control.sweeps.journal import Journal, journal_of
 from hsp_control.sweeps.metrics import Measure
 from hsp_control.sweeps.parquet import require_parquet

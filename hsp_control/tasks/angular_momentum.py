@@ -1,72 +1,69 @@
 """The task of the angular momentum about the centre of mass."""
 
+from dataclasses import replace
+from typing import ClassVar, Literal, Self
+
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TaskError
+from hsp_control.declaration.quantities import Positive
+from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Task, TaskSample
-from hsp_control.trajectories import Trajectory, TrajectorySample
+from hsp_control.tasks.placing import place_point
+from hsp_control.tasks.task import ErrorPart, Feedback, Task, TaskSample
+from hsp_control.trajectories import Hold, Trajectory
 
 
-class AngularMomentum(Task):
+class AngularMomentum(Task, type="angular_momentum"):
     """e' + K e = 0 with e = ℓ_d - ℓ, ℓ = A v / m the angular momentum per mass [m²/s].
 
     In world axes, about the centre of mass; J = A / m, a_x = ℓ_d' + K e. The error
     equation is exact and of first order, because angular momentum is not the rate of
     any function of the configuration. Divided by the mass, the rows of J have the same
     size as those of a position, with which the singularity threshold compares them.
-
-    Attributes:
-        rate: K [1/s].
-        trajectory: ℓ_d(t).
     """
 
-    def __init__(
+    order: ClassVar[Literal[1, 2]] = 1
+
+    trajectory: Trajectory = Hold((0.0, 0.0, 0.0))
+    """ℓ_d(t) in world axes [m²/s], of dimension 3; its velocity is ℓ_d'. Zero by
+    default."""
+    rate: Positive = 10.0
+    """K, the rate at which the error decays [1/s]."""
+
+    @property
+    def error_parts(self) -> tuple[ErrorPart, ...]:
+        """The angular momentum per mass."""
+        return (ErrorPart("angular momentum", "m²/s", "m²/s²", 3),)
+
+    def keeps_balance(self, robot: Robot) -> bool:
+        """Return True: see `Task.keeps_balance`."""
+        return True
+
+    def feedback(self) -> Feedback:
+        """Return new arrays of feedback: Kp = K and Kv = 1, for e' + K e = 0."""
+        return Feedback(self.rate * np.eye(3), np.eye(3), np.zeros(3))
+
+    def placed(self, start: Start) -> Self:
+        """Return the task with its trajectory about zero; see `Task.placed`."""
+        trajectory = place_point(self.trajectory, np.zeros(3), None)
+        return replace(self, trajectory=trajectory).checked(start.state.robot)
+
+    def evaluate(
         self,
-        robot: Robot,
-        trajectory: Trajectory,
-        rate: float,
-        *,
-        name: str = "angular_momentum",
-    ) -> None:
-        """Set the task.
-
-        Args:
-            robot: The robot.
-            trajectory: ℓ_d(t) in world axes [m²/s], of dimension 3; its velocity is
-                ℓ_d'.
-            rate: K > 0 [1/s].
-            name: Name of the task in the log.
-
-        Raises:
-            TaskError: If the trajectory has another dimension, or the robot has fewer
-                than three degrees of freedom.
-            GainError: If the rate is not positive.
-        """
-        # `Gains` needs Kp and Kv, which `evaluate` does not use. Those of (s + K)² have
-        # the same decay, and `Gains` checks K.
-        super().__init__(robot, 3, Gains.from_frequency(rate), name)
-        if trajectory.dimension != 3:
-            raise TaskError(
-                f"task {name!r}: its trajectory has dimension {trajectory.dimension}, "
-                "needs 3"
-            )
-        self.rate = float(rate)
-        self.trajectory = trajectory
-        self._desired = TrajectorySample.allocate(3)
-
-    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
+        state: RobotState,
+        out: TaskSample | None = None,
+        feedback: Feedback | None = None,
+    ) -> TaskSample:
         """Return the three rows, with e' = -K e; see `Task.evaluate`."""
-        out = self._out(out)
+        out, feedback = self.given(state, out, feedback)
         mass = state.centroidal
-        desired = self.trajectory.sample(state.t, self._desired)
+        desired = self.trajectory.sample(state.t)
         np.divide(mass.momentum_matrix, mass.mass, out=out.jacobian)
         np.divide(mass.momentum_matrix_dot, mass.mass, out=out.jacobian_dot)
         out.error[:] = desired.position - out.jacobian @ state.v
-        out.error_rate[:] = -self.rate * out.error
-        out.acceleration[:] = desired.velocity - out.error_rate + self.offset
+        out.error_rate[:] = -(feedback.Kp @ out.error)
+        out.acceleration[:] = desired.velocity - out.error_rate + feedback.offset
         return out
 
     def reference_rate(self, state: RobotState) -> Array:

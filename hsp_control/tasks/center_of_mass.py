@@ -1,73 +1,67 @@
 """The task of the centre of mass."""
 
-from collections.abc import Sequence
+from dataclasses import KW_ONLY, replace
 from functools import partial
+from typing import Self
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TaskError
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
+from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.axes import axis_indices, track_axes
-from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import CompiledTask, TaskSample
-from hsp_control.trajectories import Trajectory, TrajectorySample
+from hsp_control.tasks.frame_task import TrackingTask
+from hsp_control.tasks.placing import place_point
+from hsp_control.tasks.task import ErrorPart, Feedback, TaskSample
+from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
 
 
-class CenterOfMass(CompiledTask):
+class CenterOfMass(TrackingTask, type="center_of_mass"):
     """e = c_d - c, the centre of mass in world axes [m].
 
     a_x = c_d'' + Kv e' + Kp e + offset; J is the Jacobian of the centre of mass.
-
-    Attributes:
-        axes: World axes that are tracked, such as ``"xyz"`` or ``"xy"``.
-        trajectory: c_d(t).
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        trajectory: Trajectory,
-        gains: Gains,
-        *,
-        axes: str | Sequence[str] = "xyz",
-        name: str = "center_of_mass",
-    ) -> None:
-        """Set the task.
+    trajectory: Trajectory = Hold()
+    """c_d(t), the trajectory of the centre of mass [m]; held by default."""
+    _: KW_ONLY
+    axes: str = "xyz"
+    """World axes that are tracked, in the order of the trajectory, such as ``xy``."""
 
-        Args:
-            robot: The robot.
-            trajectory: c_d(t) along the tracked axes [m], of dimension ``len(axes)``.
-            gains: Feedback gains of the rows.
-            axes: World axes that are tracked, in the trajectory's order.
-            name: Name of the task in the log.
+    def __post_init__(self) -> None:
+        """Check the axes."""
+        axis_indices(self.axes)
 
-        Raises:
-            TaskError: If the axes are not distinct letters of "xyz", or the trajectory
-                has another dimension.
-            GainError: If the gains do not fit the rows.
-        """
-        self._axes = axis_indices(axes)
-        super().__init__(robot, len(self._axes), gains, name)
-        self.axes = "".join(axes)
-        if trajectory.dimension != self.rows:
-            raise TaskError(
-                f"task {name!r} tracks the axes {self.axes!r}; its trajectory has "
-                f"dimension {trajectory.dimension}, needs {self.rows}"
-            )
-        self.trajectory = trajectory
+    @property
+    def error_parts(self) -> tuple[ErrorPart, ...]:
+        """The position along the tracked axes."""
+        return (ErrorPart("position", "m", "m/s", len(self.axes)),)
 
-    def _step_plan(self, state: RobotState, out: TaskSample) -> StepPlan:
+    def keeps_balance(self, robot: Robot) -> bool:
+        """Return True: see `Task.keeps_balance`."""
+        return True
+
+    def placed(self, start: Start) -> Self:
+        """Return the task with its trajectory in the world; see `Task.placed`."""
+        here = start.state.centroidal.position[axis_indices(self.axes)]
+        trajectory = place_point(self.trajectory, here, self.blend)
+        placed = replace(self, trajectory=trajectory, blend=None)
+        return placed.checked(start.state.robot)
+
+    def compile(
+        self, state: RobotState, feedback: Feedback, out: TaskSample
+    ) -> StepPlan:
+        """Return the step plan; see `Task.compile`."""
         mass, desired = state.centroidal, TrajectorySample.allocate(self.rows)
         write = bind(
             track_axes,
-            self._axes,
+            axis_indices(self.axes),
             mass.jacobian,
             mass.jacobian_dot,
             mass.position,
             mass.velocity,
             desired,
-            self.feedback,
+            feedback,
             out,
         )
         centroidal = partial(getattr, state, "centroidal")
@@ -80,4 +74,4 @@ class CenterOfMass(CompiledTask):
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return c_d and c along the tracked axes, shape (m,) each [m]."""
         desired = self.trajectory.sample(state.t)
-        return desired.position, state.centroidal.position[self._axes]
+        return desired.position, state.centroidal.position[axis_indices(self.axes)]

@@ -1,7 +1,8 @@
 """The task of a frame's orientation on SO(3), with an exactly linear error."""
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
+from typing import Any, Self
 
 import numpy as np
 
@@ -20,73 +21,67 @@ from hsp_control.common.rotations import (
     rotate,
     rotate_back,
 )
-from hsp_control.robot import Robot, RobotState
+from hsp_control.geometry.start import Start
+from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
-from hsp_control.tasks.frame_task import FrameTask
-from hsp_control.tasks.gains import Gains
+from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
+from hsp_control.tasks.placing import place_orientation
 from hsp_control.tasks.task import (
+    ErrorPart,
     Feedback,
     TaskSample,
     add_feedback,
     copy_rows,
-    default_name,
 )
-from hsp_control.trajectories import OrientationSample, OrientationTrajectory
+from hsp_control.trajectories import (
+    HoldOrientation,
+    OrientationSample,
+    OrientationTrajectory,
+)
 from hsp_control.trajectories.following import Follower
 
 ORIENTATION_SCRATCH = 12
 """Rows of the scratch array of `orientation_error` and `orientation_acceleration`."""
 
 
-class FrameOrientation(FrameTask):
+class FrameOrientation(FrameTask, TrackingTask, type="frame_orientation"):
     """e = -log(R_dᵀ R), the orientation of a frame in the world [rad].
 
     e is a rotation vector in the axes of the desired frame. The error equation is
     exact up to an angle of pi (docs/law.md). At pi the shortest rotation back changes
     its side: e jumps to -e, and all values stay finite. J are the angular rows of the
     frame's Jacobian in world axes.
-
-    Attributes:
-        frame: Name of the frame.
-        trajectory: R_d(t).
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        frame: str,
-        trajectory: OrientationTrajectory,
-        gains: Gains,
-        *,
-        name: str | None = None,
-    ) -> None:
-        """Set the task.
+    trajectory: OrientationTrajectory = HoldOrientation()
+    """R_d(t), world ← frame [rad]; held as at the start by default."""
 
-        Args:
-            robot: The robot.
-            frame: Name of the frame.
-            trajectory: R_d(t), world ← frame.
-            gains: Feedback gains of the three rows, in the axes of the desired frame.
-            name: Name of the task in the log; ``<frame>_orientation`` by default.
+    @property
+    def error_parts(self) -> tuple[ErrorPart, ...]:
+        """The rotation vector."""
+        return (ErrorPart("orientation", "rad", "rad/s", 3),)
 
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-            TaskError: If the robot has fewer than three degrees of freedom.
-            GainError: If the gains do not fit the rows.
-        """
-        name = name or f"{default_name(frame)}_orientation"
-        super().__init__(robot, frame, 3, gains, name)
-        self.trajectory = trajectory
+    def _default_name(self) -> str:
+        return f"{super()._default_name()}_orientation"
+
+    def placed(self, start: Start) -> Self:
+        """Return the task with its trajectory in the world; see `Task.placed`."""
+        robot = start.state.robot
+        frame = frame_of(self.frame, robot)
+        here = start.state.frame(frame).rotation
+        trajectory = place_orientation(self.trajectory, here, self.blend)
+        placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
+        return placed.checked(robot)
 
     def _compile(
-        self, frame: FrameKinematics, out: TaskSample
+        self, frame: FrameKinematics, feedback: Feedback, out: TaskSample
     ) -> tuple[Follower, Callable[[], Any]]:
         desired = OrientationSample.allocate()
         write = bind(
             _frame_orientation,
             frame.motion,
             desired,
-            self.feedback,
+            feedback,
             np.zeros((ORIENTATION_SCRATCH, 3)),
             out,
         )
@@ -100,7 +95,7 @@ class FrameOrientation(FrameTask):
         """Return desired and actual orientation, quaternions (x, y, z, w)."""
         desired, actual = np.zeros(4), np.zeros(4)
         quaternion_from_rotation(self.trajectory.sample(state.t).rotation, desired)
-        quaternion_from_rotation(state.frame(self.frame).rotation, actual)
+        quaternion_from_rotation(state.frame(self.frame_name).rotation, actual)
         # q and -q are one rotation: choose the sign that is closer to the desired one.
         return desired, actual if desired @ actual >= 0.0 else -actual
 

@@ -1,90 +1,102 @@
 """The task of a frame's pose: its origin and its orientation together."""
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
+from typing import Annotated, Any, Self
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.rotations import quaternion_from_rotation
-from hsp_control.robot import Robot, RobotState
+from hsp_control.declaration import AnyOf
+from hsp_control.geometry.start import Start
+from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.frame_orientation import (
     ORIENTATION_SCRATCH,
     orientation_acceleration,
     orientation_error,
 )
-from hsp_control.tasks.frame_task import FrameTask
-from hsp_control.tasks.gains import Gains
+from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
+from hsp_control.tasks.placing import place_pose
 from hsp_control.tasks.task import (
+    ErrorPart,
     Feedback,
     TaskSample,
     add_feedback,
     copy_rows,
-    default_name,
 )
-from hsp_control.trajectories import PoseSample, PoseTrajectory
+from hsp_control.trajectories import (
+    ComposedPose,
+    PoseSample,
+    PoseTrajectory,
+    Trajectory,
+)
 from hsp_control.trajectories.following import Follower
 
+PoseOrPoint = Annotated[PoseTrajectory | Trajectory, AnyOf(PoseTrajectory, Trajectory)]
+"""The trajectory of a pose, or of its origin: then the orientation is held."""
 
-class FramePose(FrameTask):
+POSE_ERROR = (
+    ErrorPart("position", "m", "m/s", 3),
+    ErrorPart("orientation", "rad", "rad/s", 3),
+)
+
+
+class FramePose(FrameTask, TrackingTask, type="frame_pose"):
     """e = (x_d - x, -log(R_dᵀ R)), the pose of a frame in the world [m, rad].
 
     Position rows are in world axes; orientation rows are those of `FrameOrientation`.
     The two errors are decoupled and exactly linear, and the origin returns on a
     straight line. With the logarithm on SE(3) it would return on a screw
     (docs/law.md).
-
-    Attributes:
-        frame: Name of the frame.
-        trajectory: The desired pose.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        frame: str,
-        trajectory: PoseTrajectory,
-        gains: Gains,
-        *,
-        name: str | None = None,
-    ) -> None:
-        """Set the task.
+    trajectory: PoseOrPoint = ComposedPose()
+    """The desired pose, world ← frame, or the trajectory of its origin, with the
+    orientation of the start [m, rad]; held at the start by default."""
 
-        Args:
-            robot: The robot.
-            frame: Name of the frame.
-            trajectory: The desired pose, world ← frame.
-            gains: Feedback gains of the six rows, position before orientation.
-            name: Name of the task in the log; the frame's name by default.
+    @property
+    def error_parts(self) -> tuple[ErrorPart, ...]:
+        """Position and rotation vector."""
+        return POSE_ERROR
 
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-            TaskError: If the robot has fewer than six degrees of freedom.
-            GainError: If the gains do not fit the rows.
-        """
-        super().__init__(robot, frame, 6, gains, name or default_name(frame))
-        self.trajectory = trajectory
+    @property
+    def pose(self) -> PoseTrajectory:
+        """The trajectory of a placed task."""
+        assert isinstance(self.trajectory, PoseTrajectory), "the task is not placed"
+        return self.trajectory
+
+    def placed(self, start: Start) -> Self:
+        """Return the task with its trajectory in the world; see `Task.placed`."""
+        robot = start.state.robot
+        frame = frame_of(self.frame, robot)
+        motion = start.state.frame(frame)
+        here = pin.SE3(motion.rotation, motion.position)
+        trajectory = place_pose(self.trajectory, here, self.blend)
+        placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
+        return placed.checked(robot)
 
     def _compile(
-        self, frame: FrameKinematics, out: TaskSample
+        self, frame: FrameKinematics, feedback: Feedback, out: TaskSample
     ) -> tuple[Follower, Callable[[], Any]]:
         desired = np.zeros((8, 3))
         write = bind(
             pose_error_equation,
             frame.motion,
             desired,
-            self.feedback,
+            feedback,
             np.zeros((ORIENTATION_SCRATCH, 3)),
             out,
         )
-        return self.trajectory.follow(PoseSample.over(desired)), write
+        return self.pose.follow(PoseSample.over(desired)), write
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' and w_d in world axes, shape (6,) [m/s, rad/s]."""
-        sample = self.trajectory.sample(state.t)
+        sample = self.pose.sample(state.t)
         velocity, turning = (
             sample.position.velocity,
             sample.orientation.angular_velocity,
@@ -93,8 +105,8 @@ class FramePose(FrameTask):
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return desired and actual pose: x, y, z [m], quaternion (x, y, z, w)."""
-        frame = state.frame(self.frame)
-        sample = self.trajectory.sample(state.t)
+        frame = state.frame(self.frame_name)
+        sample = self.pose.sample(state.t)
         desired, actual = np.zeros(7), np.zeros(7)
         desired[:3], actual[:3] = sample.position.position, frame.position
         quaternion_from_rotation(sample.orientation.rotation, desired[3:])

@@ -1,57 +1,62 @@
-"""The base class of tasks that track one frame."""
+"""The base classes of tasks that follow a trajectory, or that track a frame."""
 
 from abc import abstractmethod
 from collections.abc import Callable
+from dataclasses import KW_ONLY
 from typing import Any
 
 from hsp_control.common.step_plan import StepPlan
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Positive
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameKinematics
-from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import CompiledTask, TaskSample
+from hsp_control.tasks.task import (
+    Feedback,
+    SecondOrderTask,
+    TaskSample,
+    default_name,
+)
 from hsp_control.trajectories.following import Follower
 
 
-class FrameTask(CompiledTask):
+class TrackingTask(SecondOrderTask):
+    """A task that follows a trajectory, into which it may be blended at the start."""
+
+    _: KW_ONLY
+    blend: Positive | None = None
+    """Duration of the transition from where the robot starts to the trajectory [s];
+    none by default."""
+
+
+class FrameTask(SecondOrderTask):
     """J a + J'v = a_x for one frame, with a reference that a trajectory gives.
 
     A subclass implements `_compile`, `reference_rate` and `measure`. The frame's
     kinematics are in world axes at its origin, linear rows before angular rows
     (Pinocchio's LOCAL_WORLD_ALIGNED).
-
-    Attributes:
-        frame: Name of the frame.
     """
 
-    def __init__(
-        self, robot: Robot, frame: str, rows: int, gains: Gains, name: str
-    ) -> None:
-        """Check the arguments and store them.
+    frame: str | None = None
+    """Name of the frame; the robot's end effector by default."""
 
-        Args:
-            robot: The robot.
-            frame: Name of the frame.
-            rows: Number of rows m.
-            gains: Feedback gains of the m rows.
-            name: Name of the task in the log.
+    @property
+    def frame_name(self) -> str:
+        """Name of the frame of a placed task."""
+        assert self.frame is not None, f"task {self.name!r} is not placed"
+        return self.frame
 
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-            TaskError: If the task has more rows than the robot has degrees of freedom.
-            GainError: If the gains do not fit the rows.
-        """
-        robot.frame_id(frame)
-        super().__init__(robot, rows, gains, name)
-        self.frame = frame
+    def _default_name(self) -> str:
+        return default_name(self.frame or "end_effector")
 
     @abstractmethod
     def _compile(
-        self, frame: FrameKinematics, out: TaskSample
+        self, frame: FrameKinematics, feedback: Feedback, out: TaskSample
     ) -> tuple[Follower, Callable[[], Any]]:
         """Return two calls: one updates the reference, the other writes ``out``.
 
         Args:
             frame: The kinematics of the frame, computed before the second call.
+            feedback: The gains and the offset that the second call reads.
             out: The sample that the second call writes.
 
         Returns:
@@ -59,7 +64,27 @@ class FrameTask(CompiledTask):
             arguments that reads reference and frame and writes ``out``.
         """
 
-    def _step_plan(self, state: RobotState, out: TaskSample) -> StepPlan:
-        frame = state.frame(self.frame)
-        follow, write = self._compile(frame, out)
+    def compile(
+        self, state: RobotState, feedback: Feedback, out: TaskSample
+    ) -> StepPlan:
+        """Return the step plan; see `Task.compile`."""
+        frame = state.frame(self.frame_name)
+        follow, write = self._compile(frame, feedback, out)
         return StepPlan((follow,), (frame.compute, write))
+
+    def keeps_balance(self, robot: Robot) -> bool:
+        """Whether the frame is fixed to the floating base."""
+        return robot.is_on_root(self.frame_name)
+
+
+def frame_of(frame: str | None, robot: Robot) -> str:
+    """Return the frame, checked to exist, or the robot's end effector.
+
+    Raises:
+        FrameNotFoundError: If the robot has no such frame.
+    """
+    if frame is None:
+        return robot.end_effector
+    with within("frame"):
+        robot.frame_id(frame)
+    return frame

@@ -1,61 +1,66 @@
 """Feedback gains of a task: e'' + Kv e' + Kp e = 0."""
 
-from typing import Any, Self
+from dataclasses import KW_ONLY
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
+from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import Gain
 
 
-class Gains:
-    """e'' + Kv e' + Kp e = 0: stiffness Kp [1/s²] and damping Kv [1/s] of a task.
+class Gains(Part, error=GainError):
+    """e'' + Kv e' + Kp e = 0: stiffness and damping, or frequency and damping ratio.
 
-    Each is a number, one number per row of the task, or a full matrix.
-
-    Attributes:
-        kp: Stiffness as given, shape (), (m,) or (m, m) [1/s²].
-        kv: Damping as given, shape (), (m,) or (m, m) [1/s].
+    Each gain is a number, one number for each row of the task, or (not ω0 and ζ) a full
+    matrix.
     """
 
-    def __init__(self, kp: Any, kv: Any) -> None:
-        """Set the gains.
+    kp: Gain | None = None
+    """Stiffness Kp [1/s²], together with `kv`."""
+    kv: Gain | None = None
+    """Damping Kv [1/s], together with `kp`."""
+    _: KW_ONLY
+    natural_frequency: Gain | None = None
+    """ω0 [rad/s], instead of kp and kv: Kp = ω0², Kv = 2 ζ ω0."""
+    damping_ratio: Gain | None = None
+    """ζ [-]; 1, critical damping, by default."""
 
-        Args:
-            kp: Stiffness Kp > 0 [1/s²]: scalar, shape (m,) or (m, m).
-            kv: Damping Kv > 0 [1/s]: scalar, shape (m,) or (m, m).
+    def __post_init__(self) -> None:
+        """Check that the gains are given one way, and positive."""
+        stiff = self.kp is not None or self.kv is not None
+        if stiff and not (
+            self.natural_frequency is None and self.damping_ratio is None
+        ):
+            raise GainError(
+                "give either kp and kv, or natural_frequency and damping_ratio"
+            )
+        if stiff and (self.kp is None or self.kv is None):
+            raise GainError("give both kp and kv; one of them is missing")
+        if not stiff and self.natural_frequency is None:
+            raise GainError("give either kp and kv, or natural_frequency")
+        self._pair()
 
-        Raises:
-            GainError: If a gain is not positive (a matrix: on its diagonal), not
-                finite, or has another shape.
-        """
-        self.kp = as_gain(kp, "kp")
-        self.kv = as_gain(kv, "kv")
-
-    @classmethod
-    def from_frequency(cls, natural_frequency: Any, damping_ratio: Any = 1.0) -> Self:
-        """Return the gains Kp = ω0², Kv = 2 ζ ω0.
-
-        Args:
-            natural_frequency: ω0 > 0 [rad/s]: scalar or shape (m,).
-            damping_ratio: ζ > 0 [-]: scalar or shape (m,); 1 is critically damped.
-
-        Raises:
-            GainError: If either is not positive, or is a matrix.
-        """
-        frequency = as_gain(natural_frequency, "natural_frequency")
-        ratio = as_gain(damping_ratio, "damping_ratio")
-        if frequency.ndim > 1 or ratio.ndim > 1:
+    def _pair(self) -> tuple[Array, Array]:
+        """Return Kp and Kv, each of shape (), (m,) or (m, m)."""
+        if self.kp is not None and self.kv is not None:
+            return as_gain(self.kp, "kp"), as_gain(self.kv, "kv")
+        assert self.natural_frequency is not None
+        frequency = as_gain(self.natural_frequency, "natural_frequency")
+        ratio = 1.0 if self.damping_ratio is None else self.damping_ratio
+        damping = as_gain(ratio, "damping_ratio")
+        if frequency.ndim > 1 or damping.ndim > 1:
             raise GainError(
                 "natural_frequency and damping_ratio must be numbers or lists"
             )
-        try:
-            return cls(frequency**2, 2.0 * ratio * frequency)
-        except ValueError as error:
-            raise GainError(f"natural_frequency and damping_ratio: {error}") from error
-
-    def __repr__(self) -> str:
-        return f"Gains(kp={self.kp.tolist()}, kv={self.kv.tolist()})"
+        if frequency.ndim and damping.ndim and len(frequency) != len(damping):
+            raise GainError(
+                f"natural_frequency has {len(frequency)} entries, damping_ratio "
+                f"{len(damping)}"
+            )
+        return frequency**2, 2.0 * damping * frequency
 
     def matrices(self, rows: int) -> tuple[Array, Array]:
         """Return Kp and Kv as matrices of shape (rows, rows).
@@ -64,8 +69,9 @@ class Gains:
             GainError: If a gain has another size, or the solution of
                 e'' + Kv e' + Kp e = 0 does not decay.
         """
-        Kp = as_matrix(self.kp, rows, "kp")
-        Kv = as_matrix(self.kv, rows, "kv")
+        kp, kv = self._pair()
+        Kp = as_matrix(kp, rows, "kp")
+        Kv = as_matrix(kv, rows, "kv")
         companion = np.block([[np.zeros((rows, rows)), np.eye(rows)], [-Kp, -Kv]])
         slowest = float(np.linalg.eigvals(companion).real.max())
         if slowest >= 0.0:
@@ -92,7 +98,7 @@ def as_matrix(gain: Array, size: int, name: str) -> Array:
     return np.diag(gain) if gain.ndim == 1 else gain.copy()
 
 
-def as_gain(value: Any, name: str) -> Array:
+def as_gain(value: ArrayLike, name: str) -> Array:
     """Return a gain as an array of 0, 1 or 2 dimensions.
 
     Raises:

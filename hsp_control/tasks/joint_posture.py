@@ -1,8 +1,8 @@
 """The task of joint positions, which track a posture that may move."""
 
-from collections.abc import Sequence
+from dataclasses import KW_ONLY, replace
 from math import atan2, cos, sin
-from typing import Any
+from typing import Self
 
 import numpy as np
 
@@ -11,96 +11,96 @@ from hsp_control.common.exceptions import TaskError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Names
+from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.configuration_space import joint_displacements
-from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import CompiledTask, Feedback, TaskSample, add_feedback
+from hsp_control.robot.postures import Posture, configuration
+from hsp_control.tasks.task import (
+    ErrorPart,
+    Feedback,
+    SecondOrderTask,
+    TaskSample,
+    add_feedback,
+)
 from hsp_control.trajectories import Trajectory, TrajectorySample
 from hsp_control.trajectories.following import stay
 
 
-class JointPosture(CompiledTask):
+class JointPosture(SecondOrderTask, type="joint_posture"):
     """e = q_d ⊖ q of some joints, with q_d(t) = reference ⊕ displacement(t).
 
     Each joint has one degree of freedom, in rad or m. The error is exactly linear, and
     J are rows of the identity.
-
-    Attributes:
-        joints: Names of the joints, in the order of the rows.
-        displacement: Motion of the joints about the reference, or None.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        reference: Any,
-        gains: Gains,
-        *,
-        displacement: Trajectory | None = None,
-        joints: Sequence[str] | None = None,
-        name: str = "posture",
-    ) -> None:
-        """Set the task.
+    reference: Posture = "start"
+    """The posture: ``start``, ``home``, nv joint positions or a configuration of nq
+    numbers [rad or m]."""
+    _: KW_ONLY
+    joints: Names | None = None
+    """Names of the joints, in the order of the rows; all with one degree of freedom by
+    default."""
+    displacement: Trajectory | None = None
+    """Motion of the joints about the reference, one number for each of the joints [rad
+    or m]; none by default."""
 
-        Args:
-            robot: The robot.
-            reference: Configuration of the whole robot, shape (nq,).
-            gains: Feedback gains of the rows, one row per joint.
-            displacement: Motion of the joints about the reference [rad or m], of
-                dimension ``len(joints)``; None: the posture is constant.
-            joints: Names of the joints; None: all with one degree of freedom.
-            name: Name of the task in the log.
+    @property
+    def error_parts(self) -> tuple[ErrorPart, ...]:
+        """The joints."""
+        return (ErrorPart("joints", "rad or m", "rad/s or m/s", len(self._joints)),)
+
+    def _default_name(self) -> str:
+        return "posture"
+
+    def placed(self, start: Start) -> Self:
+        """Return the task with its configuration and its joints; see `Task.placed`.
 
         Raises:
             JointNotFoundError: If a joint does not exist.
-            TaskError: If there is no joint, a joint is named twice, a joint has several
-                degrees of freedom (a floating root: use a pose task), or the
-                displacement has another dimension.
-            ShapeError: If the reference has the wrong shape.
-            GainError: If the gains do not fit the rows.
+            TaskError: If there is no joint, a joint is named twice or has several
+                degrees of freedom, or the displacement has another dimension.
         """
-        self._reference = robot.check_configuration(reference).copy()
-        indices = []
+        robot: Robot = start.state.robot
+        with within("reference"):
+            reference = configuration(self.reference, start.state)
+        joints, displacement = self.joints, self.displacement
         if joints is None:
             joints = [name for name, joint in robot.joints.items() if joint.nv == 1]
-        if not joints:
-            raise TaskError(f"task {name!r} names no joint")
-        for k, joint in enumerate(joints):
-            if joint in joints[:k]:
-                raise TaskError(f"task {name!r} names joint {joint!r} twice")
-            where = robot.velocity_index(joint)
-            if where.stop - where.start != 1:
-                raise TaskError(
-                    f"joint {joint!r} has {where.stop - where.start} degrees of "
-                    "freedom; a posture task needs joints with one (use a pose task "
-                    "for a root)"
-                )
-            indices.append(where.start)
-        super().__init__(robot, len(indices), gains, name)
-        if displacement is not None and displacement.dimension != self.rows:
-            raise TaskError(
-                f"task {name!r} has {self.rows} joints; its displacement has "
-                f"dimension {displacement.dimension}"
-            )
-        self.joints = tuple(joints)
-        self.displacement = displacement
-        self._indices = np.array(indices, dtype=np.int64)
-        self._moved = np.zeros(robot.nv)
+        placed = replace(self, reference=reference, joints=joints)
+        with within("joints"):
+            if not joints:
+                raise TaskError("there is no joint")
+            placed._indices(robot)  # checks them
+        if displacement is not None:
+            with within("displacement"):
+                displacement = displacement.anchored(np.zeros(len(joints)))
+                if displacement.dimension != len(joints):
+                    raise TaskError(
+                        f"the task has {len(joints)} joints; its displacement has "
+                        f"dimension {displacement.dimension}"
+                    )
+        return replace(placed, displacement=displacement).checked(robot)
+
+    def compile(
+        self, state: RobotState, feedback: Feedback, out: TaskSample
+    ) -> StepPlan:
+        """Return the step plan; see `Task.compile`."""
+        robot, displacement = state.robot, self.displacement
+        sample = TrajectorySample.allocate(self.rows)
         # The rows of `single_dof_joints`, in the order of the joints of the task.
         place = {int(row[0]): row for row in robot.single_dof_joints}
-        self._rows: Indices = np.array([place[i] for i in indices], dtype=np.int64)
-
-    def _step_plan(self, state: RobotState, out: TaskSample) -> StepPlan:
-        sample, displacement = TrajectorySample.allocate(self.rows), self.displacement
+        joints = np.array([place[i] for i in self._indices(robot)], dtype=np.int64)
         write = bind(
             _joint_posture,
             state.q,
             state.v,
-            self._reference,
-            self._rows,
+            np.asarray(self.reference),
+            joints,
             sample,
-            self.feedback,
-            np.zeros(self.robot.nv),
+            feedback,
+            np.zeros(robot.nv),
             out,
         )
         follow = stay if displacement is None else displacement.follow(sample)
@@ -118,15 +118,42 @@ class JointPosture(CompiledTask):
         The desired position of a continuous joint is the one nearest to the actual
         position.
         """
-        actual = self.robot.joint_positions(state.q)[self._indices]
-        error = self.robot.difference(state.q, self._desired(state.t))[self._indices]
-        return actual + error, actual
+        robot = state.robot
+        indices = self._indices(robot)
+        desired = np.asarray(self.reference)
+        if self.displacement is not None:
+            moved = np.zeros(robot.nv)
+            moved[indices] = self.displacement.sample(state.t).position
+            desired = robot.integrate(desired, moved)
+        actual = robot.joint_positions(state.q)[indices]
+        return actual + robot.difference(state.q, desired)[indices], actual
 
-    def _desired(self, t: float) -> Array:
-        if self.displacement is None:
-            return self._reference
-        self._moved[self._indices] = self.displacement.sample(t).position
-        return self.robot.integrate(self._reference, self._moved)
+    def _indices(self, robot: Robot) -> list[int]:
+        """Return the index of each joint in v.
+
+        Raises:
+            JointNotFoundError: If a joint does not exist.
+            TaskError: If there is no joint, a joint is named twice, or a joint has
+                several degrees of freedom.
+        """
+        indices = []
+        for k, joint in enumerate(self._joints):
+            if joint in self._joints[:k]:
+                raise TaskError(f"joint {joint!r} is named twice")
+            where = robot.velocity_index(joint)
+            if where.stop - where.start != 1:
+                raise TaskError(
+                    f"joint {joint!r} has {where.stop - where.start} degrees of "
+                    "freedom; a posture task needs joints with one (use a pose task "
+                    "for a root)"
+                )
+            indices.append(where.start)
+        return indices
+
+    @property
+    def _joints(self) -> tuple[str, ...]:
+        assert self.joints is not None, f"task {self.name!r} is not placed"
+        return tuple(self.joints)
 
 
 @kernel

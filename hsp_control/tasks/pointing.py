@@ -1,8 +1,10 @@
 """The task of an axis of a frame that points along a direction, which may move."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import KW_ONLY, replace
+from functools import cached_property
 from math import sqrt
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -11,19 +13,25 @@ from hsp_control.common.exceptions import TaskError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.rotations import cross, rotate, rotate_back
-from hsp_control.robot import Robot, RobotState
+from hsp_control.declaration.quantities import Vector3
+from hsp_control.geometry.start import Start
+from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
-from hsp_control.tasks.frame_task import FrameTask
-from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import Feedback, TaskSample, add_feedback, default_name
-from hsp_control.trajectories import OrientationSample, OrientationTrajectory
+from hsp_control.tasks.frame_task import FrameTask, frame_of
+from hsp_control.tasks.placing import place_orientation
+from hsp_control.tasks.task import ErrorPart, Feedback, TaskSample, add_feedback
+from hsp_control.trajectories import (
+    HoldOrientation,
+    OrientationSample,
+    OrientationTrajectory,
+)
 from hsp_control.trajectories.following import Follower
 
 ANTIPODE_MARGIN = 0.02
 """Smallest 1 + cos(angle) of the coordinates; below it (angle > 168°) they are held."""
 
 
-class Pointing(FrameTask):
+class Pointing(FrameTask, type="pointing"):
     """e = -(n_x, n_y)/(1 + n_z), the direction n of an axis in the desired frame [-].
 
     Two rows; the rotation about the axis itself is free. e are stereographic
@@ -35,79 +43,98 @@ class Pointing(FrameTask):
 
     J are the angular rows of the frame's Jacobian along two directions perpendicular
     to the axis.
-
-    Attributes:
-        frame: Name of the frame.
-        axis: The pointing axis in the frame, a unit vector, shape (3,).
-        trajectory: The desired orientation; its third axis is the desired direction.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        frame: str,
-        axis: Sequence[float],
-        trajectory: OrientationTrajectory,
-        gains: Gains,
-        *,
-        name: str | None = None,
-    ) -> None:
-        """Set the task.
+    direction: Vector3 | None = None
+    """The desired direction in the world, of any length but zero [-]."""
+    _: KW_ONLY
+    axis: Vector3 = (0.0, 0.0, 1.0)
+    """The pointing axis in the frame, of any length but zero [-]."""
+    trajectory: OrientationTrajectory | None = None
+    """Instead of `direction`, one that moves: an orientation, world ← desired frame,
+    whose third axis is the desired direction [rad]."""
 
-        Args:
-            robot: The robot.
-            frame: Name of the frame.
-            axis: Pointing axis in the frame, of any length but zero, shape (3,).
-            trajectory: An orientation, world ← desired frame, whose third axis is the
-                desired direction.
-            gains: Feedback gains of the two rows.
-            name: Name of the task in the log; ``<frame>_pointing`` by default.
+    def __post_init__(self) -> None:
+        """Check axis and direction."""
+        if (self.direction is None) == (self.trajectory is None):
+            raise TaskError("give one of direction and trajectory")
+        for name in ("axis", "direction"):
+            value = getattr(self, name)
+            if value is not None and not np.linalg.norm(value) > 0.0:
+                raise TaskError(f"{name} must be non-zero, got [0, 0, 0]")
 
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-            TaskError: If the axis is not a non-zero vector of three finite numbers, or
-                the robot has fewer than two degrees of freedom.
-            GainError: If the gains do not fit the rows.
-        """
-        name = name or f"{default_name(frame)}_pointing"
-        super().__init__(robot, frame, 2, gains, name)
-        vector = np.asarray(axis, dtype=float)
-        if vector.shape != (3,) or not 0.0 < np.linalg.norm(vector) < np.inf:
-            raise TaskError(
-                f"axis must be 3 finite numbers, not all zero; got {list(axis)}"
-            )
-        self.axis: Array = vector / np.linalg.norm(vector)
-        self.trajectory = trajectory
-        # Two unit vectors perpendicular to the axis, right-handed with it: the rows.
-        normals = np.linalg.svd(self.axis[None, :])[2][1:]
-        normals[1] *= np.sign(np.linalg.det(np.vstack([normals, self.axis])))
-        self._normals = normals.copy()
+    @property
+    def error_parts(self) -> tuple[ErrorPart, ...]:
+        """The stereographic coordinates."""
+        return (ErrorPart("direction", "-", "1/s", 2),)
+
+    def _default_name(self) -> str:
+        return f"{super()._default_name()}_pointing"
+
+    def placed(self, start: Start) -> Self:
+        """Return the task for the robot; see `Task.placed`."""
+        robot = start.state.robot
+        frame = frame_of(self.frame, robot)
+        trajectory = self.trajectory
+        if trajectory is not None:
+            here = start.state.frame(frame).rotation
+            trajectory = place_orientation(trajectory, here, None)
+        return replace(self, frame=frame, trajectory=trajectory).checked(robot)
+
+    @cached_property
+    def _desired(self) -> OrientationTrajectory:
+        if self.direction is None:
+            assert self.trajectory is not None
+            return self.trajectory
+        return HoldOrientation(_facing(np.asarray(self.direction)))
+
+    @cached_property
+    def _axis(self) -> Array:
+        """The axis, of length 1."""
+        axis = np.asarray(self.axis, dtype=float)
+        return np.asarray(axis / np.linalg.norm(axis))
+
+    @cached_property
+    def _normals(self) -> Array:
+        """Two unit vectors across the axis, right-handed with it: the rows."""
+        normals = np.linalg.svd(self._axis[None, :])[2][1:]
+        normals[1] *= np.sign(np.linalg.det(np.vstack([normals, self._axis])))
+        return normals.copy()
 
     def _compile(
-        self, frame: FrameKinematics, out: TaskSample
+        self, frame: FrameKinematics, feedback: Feedback, out: TaskSample
     ) -> tuple[Follower, Callable[[], Any]]:
         desired = OrientationSample.allocate()
         write = bind(
             _pointing,
-            self.axis,
+            self._axis,
             self._normals,
             frame.motion,
             desired,
-            self.feedback,
+            feedback,
             np.zeros((14, 3)),
             out,
         )
-        return self.trajectory.follow(desired), write
+        return self._desired.follow(desired), write
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return the part of w_d perpendicular to the axis, shape (2,) [rad/s]."""
-        w_d = self.trajectory.sample(state.t).angular_velocity
-        return self._normals @ state.frame(self.frame).rotation.T @ w_d
+        w_d = self._desired.sample(state.t).angular_velocity
+        return self._normals @ state.frame(self.frame_name).rotation.T @ w_d
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return desired and actual direction, unit vectors in the world, (3,) each."""
-        desired = self.trajectory.sample(state.t).rotation[:, 2].copy()
-        return desired, state.frame(self.frame).rotation @ self.axis
+        desired = self._desired.sample(state.t).rotation[:, 2].copy()
+        return desired, state.frame(self.frame_name).rotation @ self._axis
+
+
+def _facing(direction: Array) -> Array:
+    """Return a rotation whose third axis is a direction."""
+    length = float(np.linalg.norm(direction))
+    x, y = np.linalg.svd(direction[None, :] / length)[2][1:]
+    rotation = np.column_stack([x, y, direction / length])
+    rotation[:, 0] *= np.sign(np.linalg.det(rotation))
+    return rotation
 
 
 @kernel

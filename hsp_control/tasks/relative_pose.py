@@ -1,6 +1,10 @@
 """The task of a frame's pose relative to another frame, as for two hands on a part."""
 
+from dataclasses import KW_ONLY, replace
+from typing import Self
+
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
@@ -8,68 +12,82 @@ from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.rotations import quaternion_from_rotation
 from hsp_control.common.step_plan import StepPlan
+from hsp_control.declaration import within
+from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameMotion
 from hsp_control.tasks.frame_orientation import ORIENTATION_SCRATCH
-from hsp_control.tasks.frame_pose import pose_error_equation
-from hsp_control.tasks.gains import Gains
-from hsp_control.tasks.task import CompiledTask, TaskSample, default_name
-from hsp_control.trajectories import PoseSample, PoseTrajectory
+from hsp_control.tasks.frame_pose import POSE_ERROR, PoseOrPoint, pose_error_equation
+from hsp_control.tasks.frame_task import TrackingTask, frame_of
+from hsp_control.tasks.placing import place_pose
+from hsp_control.tasks.task import ErrorPart, Feedback, TaskSample, default_name
+from hsp_control.trajectories import ComposedPose, PoseSample, PoseTrajectory
 
 
-class RelativePose(CompiledTask):
+class RelativePose(TrackingTask, type="relative_pose"):
     """e = (x_d - x, -log(R_dᵀ Q)), x = R_rᵀ(p - p_r), Q = R_rᵀ R [m, rad].
 
     The pose of a frame relative to a reference frame r, in the axes of r. Both errors
     are exactly linear; all else is as in `FramePose`.
-
-    Attributes:
-        frame: Name of the frame that is controlled.
-        reference: Name of the frame in which the pose is measured.
-        trajectory: The desired relative pose.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        frame: str,
-        reference: str,
-        trajectory: PoseTrajectory,
-        gains: Gains,
-        *,
-        name: str | None = None,
-    ) -> None:
-        """Set the task.
+    frame: str | None = None
+    """Name of the frame that is controlled; the robot's end effector by default."""
+    trajectory: PoseOrPoint = ComposedPose()
+    """The desired pose, reference ← frame, or the trajectory of its origin, with the
+    relative orientation of the start [m, rad]; held at the start by default."""
+    _: KW_ONLY
+    reference: str
+    """Name of the frame that the pose is relative to."""
 
-        Args:
-            robot: The robot.
-            frame: Name of the frame.
-            reference: Name of the frame that the pose is measured in.
-            trajectory: The desired pose, reference ← frame.
-            gains: Feedback gains of the six rows, position before orientation.
-            name: Name of the task in the log; ``<frame>_from_<reference>`` by default.
+    @property
+    def error_parts(self) -> tuple[ErrorPart, ...]:
+        """Position and rotation vector, in the axes of the reference."""
+        return POSE_ERROR
+
+    def _default_name(self) -> str:
+        return default_name(f"{self.frame or 'end_effector'}_from_{self.reference}")
+
+    @property
+    def frame_name(self) -> str:
+        """Name of the frame of a placed task."""
+        assert self.frame is not None, f"task {self.name!r} is not placed"
+        return self.frame
+
+    @property
+    def pose(self) -> PoseTrajectory:
+        """The trajectory of a placed task."""
+        assert isinstance(self.trajectory, PoseTrajectory), "the task is not placed"
+        return self.trajectory
+
+    def placed(self, start: Start) -> Self:
+        """Return the task with its trajectory in the reference; see `Task.placed`.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            TaskError: If the two frames are the same, or the robot has fewer than six
-                degrees of freedom.
-            GainError: If the gains do not fit the rows.
+            TaskError: If frame and reference are the same.
         """
-        robot.frame_id(frame)
-        robot.frame_id(reference)
-        if frame == reference:
-            raise TaskError(
-                f"frame and reference are both {frame!r}; they must be different frames"
-            )
-        default = default_name(f"{frame}_from_{reference}")
-        super().__init__(robot, 6, gains, name or default)
-        self.frame = frame
-        self.reference = reference
-        self.trajectory = trajectory
+        robot: Robot = start.state.robot
+        frame = frame_of(self.frame, robot)
+        with within("reference"):
+            robot.frame_id(self.reference)
+            if frame == self.reference:
+                raise TaskError(
+                    f"frame and reference are both {frame!r}; they must be different "
+                    "frames"
+                )
+        poses = [start.state.frame(name) for name in (self.reference, frame)]
+        there, here = (pin.SE3(pose.rotation, pose.position) for pose in poses)
+        trajectory = place_pose(self.trajectory, there.actInv(here), self.blend)
+        placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
+        return placed.checked(robot)
 
-    def _step_plan(self, state: RobotState, out: TaskSample) -> StepPlan:
-        frame, reference = state.frame(self.frame), state.frame(self.reference)
-        desired, relative = np.zeros((8, 3)), FrameMotion.allocate(self.robot.nv)
+    def compile(
+        self, state: RobotState, feedback: Feedback, out: TaskSample
+    ) -> StepPlan:
+        """Return the step plan; see `Task.compile`."""
+        frame, reference = state.frame(self.frame_name), state.frame(self.reference)
+        desired, relative = np.zeros((8, 3)), FrameMotion.allocate(state.robot.nv)
         relate = bind(
             _relative_kinematics, frame.motion, reference.motion, state.v, relative
         )
@@ -77,23 +95,23 @@ class RelativePose(CompiledTask):
             pose_error_equation,
             relative,
             desired,
-            self.feedback,
+            feedback,
             np.zeros((ORIENTATION_SCRATCH, 3)),
             out,
         )
-        follow = self.trajectory.follow(PoseSample.over(desired))
+        follow = self.pose.follow(PoseSample.over(desired))
         return StepPlan((follow,), (frame.compute, reference.compute, relate, write))
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' and w_d in the reference's axes, shape (6,) [m/s, rad/s]."""
-        sample = self.trajectory.sample(state.t)
+        sample = self.pose.sample(state.t)
         return np.concatenate(
             [sample.position.velocity, sample.orientation.angular_velocity]
         )
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return desired and actual pose: x, y, z [m], quaternion (x, y, z, w)."""
-        sample, relative = self.trajectory.sample(state.t), self._relative(state)
+        sample, relative = self.pose.sample(state.t), self._relative(state)
         desired, actual = np.zeros(7), np.zeros(7)
         desired[:3], actual[:3] = sample.position.position, relative.position
         quaternion_from_rotation(sample.orientation.rotation, desired[3:])
@@ -103,8 +121,8 @@ class RelativePose(CompiledTask):
         return desired, actual
 
     def _relative(self, state: RobotState) -> FrameMotion:
-        frame, reference = state.frame(self.frame), state.frame(self.reference)
-        relative = FrameMotion.allocate(self.robot.nv)
+        frame, reference = state.frame(self.frame_name), state.frame(self.reference)
+        relative = FrameMotion.allocate(state.robot.nv)
         _relative_kinematics(frame.motion, reference.motion, state.v, relative)
         return relative
 

@@ -2,18 +2,22 @@
 
 import re
 from abc import ABC, abstractmethod
-from functools import cached_property, partial
-from typing import Any, NamedTuple
+from dataclasses import KW_ONLY
+from functools import partial
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
+from pydantic import Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
-from hsp_control.common.identity_cache import IdentityCache, without_caches
 from hsp_control.common.kernels import kernel
 from hsp_control.common.step_plan import StepPlan
+from hsp_control.declaration import Part, within
+from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
+from hsp_control.trajectories import Schedule
 
 
 class TaskSample(NamedTuple):
@@ -57,10 +61,14 @@ class TaskSample(NamedTuple):
 class Feedback(NamedTuple):
     """Kv e' + Kp e + offset: a task's feedback, as one argument of a kernel.
 
+    The controller owns these arrays and changes them in place: gains by events, the
+    offset by compensators such as integral action.
+
     Attributes:
         Kp: Position gain, shape (m, m) [1/s²].
         Kv: Velocity gain, shape (m, m) [1/s].
-        offset: Added acceleration, shape (m,), see `Task`.
+        offset: Additional term of the error equation, shape (m,) [m/s² or rad/s²];
+            zero unless a compensator writes it.
     """
 
     Kp: Array
@@ -68,65 +76,130 @@ class Feedback(NamedTuple):
     offset: Array
 
 
-class Task(ABC):
+class ErrorPart(NamedTuple):
+    """Some consecutive components of a task's error that share a unit.
+
+    Attributes:
+        name: What they are, such as ``position``.
+        unit: Their unit, such as ``m``.
+        rate_unit: The unit of their rates, such as ``m/s``.
+        size: How many they are.
+    """
+
+    name: str
+    unit: str
+    rate_unit: str
+    size: int
+
+
+class Task(Part, ABC, family="tasks", error=TaskError):
     """e'' + Kv e' + Kp e + offset = 0: a task with an exactly linear error equation.
 
-    A subclass calls ``super().__init__`` and implements three methods:
+    A subclass declares its parameters as fields (see `Part`) and implements:
 
+    * `error_parts` names the components of e, and so says how many rows there are.
     * `evaluate` writes J, J', e, e' and a_x. The error equation must follow *exactly*
       from J a + J'v = a_x, in the coordinates of e.
     * `reference_rate` returns J v on the reference.
     * `measure` returns the reference and the actual value, for logs and plots.
+    * `placed`, if it refers to the start or to frames.
 
     The task chooses the frame and units of its m rows; J, J' and a_x use the same.
     J acts on the tangent space: v and a have shape (nv,), as in Pinocchio. The
     coordinates of e, e' and offset may be others, in which the error equation is linear
     (a rotation vector, for example).
 
-    A subclass may override `compile` to make a step faster. The default calls
-    `evaluate` at every step. `CompiledTask` is the base class for tasks that compile.
+    `compile` may be implemented instead of `evaluate`, to make a step faster. A task
+    has no memory: the controller owns the feedback, and the state keeps what a
+    computation needs (see `RobotState.made`).
+
+    Most tasks derive from `SecondOrderTask`, which has gains.
 
     Attributes:
-        robot: The robot.
-        name: Name of the task in the log.
-        rows: Number of rows m.
-        Kp: Stiffness, shape (m, m) [1/s²]. Compiled steps read this array: change it
-            in place.
-        Kv: Damping, shape (m, m) [1/s]. Change it in place.
-        offset: Additional term of the error equation, shape (m,) [m/s² or rad/s²].
-            Zero, unless a compensator such as integral action writes it. Change it in
-            place.
+        order: Order of the error equation.
     """
 
-    def __init__(self, robot: Robot, rows: int, gains: Gains, name: str) -> None:
-        """Check the arguments and store them.
+    order: ClassVar[Literal[1, 2]] = 2
+    yaml_key: ClassVar[str | None] = "name"
 
-        Args:
-            robot: The robot.
-            rows: Number of rows m, at most nv.
-            gains: Feedback gains of the m rows.
-            name: Name of the task in the log: letters, digits, ``_`` and ``-``.
+    _: KW_ONLY
+    priority: Annotated[int, Field(ge=1)] | None = None
+    """Priority [-]; 1 is the highest, and tasks of the same priority form one level. By
+    default 1; on a floating base 1 for what keeps the balance (centre of mass, angular
+    momentum, the trunk) and 2 for all else."""
+    schedule: Schedule | None = None
+    """When the task is active; always by default."""
+    name: str = ""
+    """The task's name in the log; by default that of its frame, or its type."""
+
+    def _complete(self) -> None:
+        if not self.name:
+            self._set_default("name", self._default_name())
+        if not self.name.replace("_", "").replace("-", "").isalnum():
+            raise TaskError(
+                f"task name {self.name!r}: use letters, digits, '_' and '-' (the "
+                "columns of the log contain it)"
+            )
+
+    def _default_name(self) -> str:
+        return self.yaml_type or default_name(type(self).__name__)
+
+    def changed_fields(self) -> dict[str, Any]:
+        """Return the fields that are not their defaults, by name."""
+        changed = super().changed_fields()
+        if self.name == self._default_name():
+            changed.pop("name", None)
+        return changed
+
+    @property
+    @abstractmethod
+    def error_parts(self) -> tuple[ErrorPart, ...]:
+        """The components of e, in the order of the rows."""
+
+    @property
+    def rows(self) -> int:
+        """Number of rows m."""
+        return sum(part.size for part in self.error_parts)
+
+    @abstractmethod
+    def feedback(self) -> Feedback:
+        """Return new arrays of feedback with the task's own gains, and no offset.
 
         Raises:
             GainError: If the gains do not fit the rows, or the error would not decay.
-            TaskError: If the task has more rows than the robot has degrees of freedom,
-                or the name has other characters.
         """
-        if rows > robot.nv:
+
+    def placed(self, start: Start) -> Self:
+        """Return the task for a robot and a start, checked.
+
+        What is relative to the start, and what is omitted because the robot knows it,
+        is replaced by numbers and names. A subclass ends with ``return
+        replaced.checked(start.state.robot)``.
+
+        Raises:
+            HspControlError: If the task does not fit the robot; the message contains
+                the field.
+        """
+        return self.checked(start.state.robot)
+
+    def checked(self, robot: Robot) -> Self:
+        """Return the task itself, whose rows and gains fit each other and the robot.
+
+        Raises:
+            TaskError: If the task has more rows than the robot has degrees of freedom.
+            GainError: If the gains do not fit the rows, or the error would not decay.
+        """
+        if self.rows > robot.nv:
             raise TaskError(
-                f"task {name!r} has {rows} rows; {robot.name} has {robot.nv} degrees "
+                f"the task has {self.rows} rows; {robot.name} has {robot.nv} degrees "
                 "of freedom"
             )
-        if not name or not name.replace("_", "").replace("-", "").isalnum():
-            raise TaskError(
-                f"task name {name!r}: use letters, digits, '_' and '-' (the columns of "
-                "the log contain it)"
-            )
-        self.robot = robot
-        self.name = name
-        self.rows = rows
-        self.Kp, self.Kv = gains.matrices(rows)
-        self.offset: Array = np.zeros(rows)
+        self.feedback()
+        return self
+
+    def keeps_balance(self, robot: Robot) -> bool:
+        """Whether a floating base needs the task to stand; see `priority`."""
+        return False
 
     def __init_subclass__(cls, **arguments: Any) -> None:
         """Reset `compile` if a subclass overrides `evaluate` only.
@@ -138,29 +211,67 @@ class Task(ABC):
         if "evaluate" in vars(cls) and "compile" not in vars(cls):
             cls.compile = Task.compile  # type: ignore[method-assign]
 
-    def compile(self, state: RobotState, out: TaskSample) -> StepPlan:
+    def compile(
+        self, state: RobotState, feedback: Feedback, out: TaskSample
+    ) -> StepPlan:
         """Return the step plan that does what `evaluate` does; may be overridden.
 
         Args:
             state: The state that every step reads. Its values change between steps.
+            feedback: The gains and the offset that every step reads.
             out: The sample that every step writes.
         """
-        return StepPlan(write=(partial(self.evaluate, state, out),))
+        return StepPlan(write=(partial(self.evaluate, state, out, feedback),))
 
-    @abstractmethod
-    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
+    def evaluate(
+        self,
+        state: RobotState,
+        out: TaskSample | None = None,
+        feedback: Feedback | None = None,
+    ) -> TaskSample:
         """Return J, J', e, e' and a_x at a state.
 
-        Start an implementation with ``out = self._out(out)``, write every entry of the
-        five arrays, and return ``out``.
+        Start an implementation with ``out, feedback = self.given(state, out,
+        feedback)``, write every entry of the five arrays, and return ``out``.
 
         Args:
             state: The robot's state: t, q, v and the kinematics.
             out: The sample to write into; None: a new one.
+            feedback: The gains and the offset; None: the task's own gains.
 
         Returns:
             ``out``, or the new sample.
         """
+        if type(self).compile is Task.compile:
+            raise TypeError(f"{type(self).__name__} implements no evaluate")
+        out, feedback = self.given(state, out, feedback)
+
+        def make() -> tuple[Feedback, TaskSample, StepPlan]:
+            own, sample = (
+                self.feedback(),
+                TaskSample.allocate(self.rows, state.robot.nv),
+            )
+            return own, sample, self.compile(state, own, sample)
+
+        own, sample, plan = state.made(self, make)
+        for array, value in zip(own, feedback, strict=True):
+            array[:] = value
+        for follow in plan.follow:
+            follow(state.t)
+        for write in plan.write:
+            write()
+        for array, value in zip(out, sample, strict=True):
+            array[:] = value
+        return out
+
+    def given(
+        self, state: RobotState, out: TaskSample | None, feedback: Feedback | None
+    ) -> tuple[TaskSample, Feedback]:
+        """Return both, or new ones where they are None."""
+        return (
+            TaskSample.allocate(self.rows, state.robot.nv) if out is None else out,
+            self.feedback() if feedback is None else feedback,
+        )
 
     @abstractmethod
     def reference_rate(self, state: RobotState) -> Array:
@@ -177,55 +288,19 @@ class Task(ABC):
         be m.
         """
 
-    @property
+
+class SecondOrderTask(Task):
+    """A task with gains: e'' + Kv e' + Kp e + offset = 0."""
+
+    _: KW_ONLY
+    gains: Gains = Gains(natural_frequency=10.0)
+    """Feedback gains of the rows; critically damped at 10 rad/s by default."""
+
     def feedback(self) -> Feedback:
-        """The gains and the offset, for kernels."""
-        return Feedback(self.Kp, self.Kv, self.offset)
-
-    def _out(self, out: TaskSample | None) -> TaskSample:
-        """Return ``out``, or a new sample if it is None."""
-        return TaskSample.allocate(self.rows, self.robot.nv) if out is None else out
-
-
-class CompiledTask(Task):
-    """A task that compiles its step plan once and runs it at every step.
-
-    A subclass implements `_step_plan` instead of `evaluate`; `reference_rate` and
-    `measure` as for `Task`.
-    """
-
-    def __init__(self, robot: Robot, rows: int, gains: Gains, name: str) -> None:
-        """Check the arguments and store them; see `Task`."""
-        super().__init__(robot, rows, gains, name)
-
-    @abstractmethod
-    def _step_plan(self, state: RobotState, out: TaskSample) -> StepPlan:
-        """Return the calls that write ``out``.
-
-        The calls read the state each time that they run; see `Task.compile`.
-        """
-
-    def compile(self, state: RobotState, out: TaskSample) -> StepPlan:
-        """Return the step plan that does what `evaluate` does; see `Task.compile`."""
-        return self._step_plan(state, out)
-
-    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
-        """Return J, J', e, e' and a_x at a state; see `Task.evaluate`."""
-        if out is None:
-            out = TaskSample.allocate(self.rows, self.robot.nv)
-        plan = self._compiled.get(state, out)
-        for follow in plan.follow:
-            follow(state.t)
-        for write in plan.write:
-            write()
-        return out
-
-    @cached_property
-    def _compiled(self) -> IdentityCache[StepPlan]:
-        return IdentityCache(self._step_plan)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return without_caches(self)
+        """Return new arrays of feedback; see `Task.feedback`."""
+        with within("gains"):
+            Kp, Kv = self.gains.matrices(self.rows)
+        return Feedback(Kp, Kv, np.zeros(self.rows))
 
 
 def default_name(frame: str) -> str:

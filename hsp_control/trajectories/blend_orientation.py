@@ -1,5 +1,9 @@
 """A smooth transition from a given orientation into a moving orientation trajectory."""
 
+from dataclasses import KW_ONLY, replace
+from functools import cached_property
+from typing import Self
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -16,16 +20,17 @@ from hsp_control.common.rotations import (
     rotate,
     turn,
 )
-from hsp_control.trajectories import checks
+from hsp_control.declaration.quantities import Number, Positive, Vector3
 from hsp_control.trajectories.following import Follower, follow_blended
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
 )
 from hsp_control.trajectories.polynomial import QUINTIC, horner
+from hsp_control.trajectories.rotation import Rotation, matrix_of
 
 
-class BlendOrientation(OrientationTrajectory):
+class BlendOrientation(OrientationTrajectory, type="blend"):
     """R(t) = R_d(t) exp(y(t)), y a quintic with y = y' = y'' = 0 at t0 + T.
 
     y, y' and y'' at t0 are such that the body starts at R0 with angular velocity ω0 and
@@ -33,57 +38,42 @@ class BlendOrientation(OrientationTrajectory):
     and rests at R0 before t0. It needs the logarithm at t0 only. It is therefore smooth
     for any R_d, whereas exp(s log(R0ᵀ R_d)) jumps where R_d passes an angle of π from
     R0.
-
-    Attributes:
-        start: R0, body to world, shape (3, 3).
-        trajectory: R_d.
-        duration: T [s].
-        start_angular_velocity: ω0 in the world frame, shape (3,) [rad/s].
-        start_time: t0 [s].
     """
 
-    __slots__ = (
-        "_coefficients",
-        "duration",
-        "start",
-        "start_angular_velocity",
-        "start_time",
-        "trajectory",
-    )
+    trajectory: OrientationTrajectory
+    """R_d."""
+    duration: Positive
+    """T [s]."""
+    _: KW_ONLY
+    rotation: Rotation | None = None
+    """R0, body to world: roll, pitch and yaw [rad], a quaternion or a matrix [-]; the
+    orientation in which the robot starts by default."""
+    start_angular_velocity: Vector3 = (0.0, 0.0, 0.0)
+    """ω0 in the world frame, shape (3,) [rad/s]."""
+    start_time: Number = 0.0
+    """t0 [s]."""
 
-    def __init__(
-        self,
-        start: ArrayLike,
-        trajectory: OrientationTrajectory,
-        duration: float,
-        start_angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
-        start_time: float = 0.0,
-    ) -> None:
-        """Set the transition from ``start`` into ``trajectory``.
+    @property
+    def relative(self) -> bool:
+        """Whether it, or the trajectory, depends on how the robot starts."""
+        return self.rotation is None or self.trajectory.relative
 
-        Args:
-            start: R0, body to world, shape (3, 3).
-            trajectory: R_d.
-            duration: T > 0 [s].
-            start_angular_velocity: ω0 in the world frame, shape (3,) [rad/s].
-            start_time: t0 [s].
+    def anchored(self, start: ArrayLike) -> Self:
+        """Return both with the start orientation; see `OrientationTrajectory`."""
+        rotation = start if self.rotation is None else self.rotation
+        inner = self.trajectory.anchored(start)
+        return replace(self, trajectory=inner, rotation=rotation)
 
-        Raises:
-            TrajectoryError: If R0 is not a rotation matrix, ω0 has another shape, a
-                value is not finite, or the duration is not positive.
-        """
-        self.start = checks.rotation(start, "start")
-        self.trajectory = trajectory
-        self.duration = T = checks.positive(duration, "duration")
-        self.start_angular_velocity = checks.array(
-            start_angular_velocity, "start_angular_velocity", (3,)
-        )
-        self.start_time = checks.number(start_time, "start_time")
+    @cached_property
+    def _start(self) -> Array:
+        assert self.rotation is not None
+        return matrix_of(self.rotation)
+
+    @cached_property
+    def _coefficients(self) -> Array:
+        T, rest = self.duration, np.zeros(3)
         y, y_dot, y_ddot = self._start_offset()
-        rest = np.zeros(3)
-        self._coefficients = QUINTIC @ np.stack(
-            [y, T * y_dot, T * T * y_ddot, rest, rest, rest]
-        )
+        return QUINTIC @ np.stack([y, T * y_dot, T * T * y_ddot, rest, rest, rest])
 
     def _start_offset(self) -> tuple[Array, Array, Array]:
         """Return y, y' and y'' at t0, with which ω = ω_d + R w = ω0 and ω' = 0.
@@ -91,7 +81,7 @@ class BlendOrientation(OrientationTrajectory):
         w = Jexp(y) y' is the angular velocity relative to R_d, in the body frame.
         """
         R_d, omega_d, omega_d_dot = self.trajectory.sample(self.start_time)
-        R, omega = self.start, self.start_angular_velocity
+        R, omega = self._start, np.asarray(self.start_angular_velocity)
         E, y = np.empty((3, 3)), np.empty(3)
         compose_back(R_d, R, E)
         log3(E, y)
@@ -107,8 +97,7 @@ class BlendOrientation(OrientationTrajectory):
         self, t: float, out: OrientationSample | None = None
     ) -> OrientationSample:
         """Return the orientation at time t; see `OrientationTrajectory.sample`."""
-        if out is None:
-            out = OrientationSample.allocate()
+        out = self._output(out)
         if t >= self.start_time:
             self.trajectory.sample(t, out)
         if t < self.start_time + self.duration:
@@ -117,13 +106,14 @@ class BlendOrientation(OrientationTrajectory):
 
     def follow(self, out: OrientationSample) -> Follower:
         """Return the follower; see `Trajectory.follow`."""
+        out = self._output(out)
         blend = bind(_blend, *self._parameters(), *out, timed=True)
         end = self.start_time + self.duration
         return follow_blended(self.trajectory, out, blend, self.start_time, end)
 
     def _parameters(self) -> tuple[float, float, Array, Array, Array]:
         work = np.empty((11, 3))
-        return self.start_time, self.duration, self.start, self._coefficients, work
+        return self.start_time, self.duration, self._start, self._coefficients, work
 
 
 @kernel

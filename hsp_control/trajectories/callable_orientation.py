@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.rotations import compose_back, log3
+from hsp_control.declaration.quantities import Positive
 from hsp_control.trajectories import checks, time_derivatives
 from hsp_control.trajectories.orientation import (
     OrientationSample,
@@ -22,30 +23,12 @@ class CallableOrientation(OrientationTrajectory):
     seven points (`time_derivatives`), with an error of about 1e-10 for rotations of a
     few rad/s. The function must be smooth, and defined three steps before and after
     every sampled time. For pickling it must be defined at the top level of a module.
-
-    Attributes:
-        function: f, time [s] to a rotation matrix of shape (3, 3), body to world.
-        step: Time between the seven points [s].
     """
 
-    __slots__ = ("function", "step")
-
-    def __init__(
-        self,
-        function: Callable[[float], ArrayLike],
-        step: float = time_derivatives.STEP,
-    ) -> None:
-        """Set the function.
-
-        Args:
-            function: f, time [s] to a rotation matrix of shape (3, 3), body to world.
-            step: Time between the points of the differences [s].
-
-        Raises:
-            TrajectoryError: If the step is not positive.
-        """
-        self.function = function
-        self.step = checks.positive(step, "step")
+    function: Callable[[float], ArrayLike]
+    """f, time [s] to a rotation matrix of shape (3, 3), body to world."""
+    step: Positive = time_derivatives.STEP
+    """Time between the seven points of the differences [s]."""
 
     def sample(
         self, t: float, out: OrientationSample | None = None
@@ -55,8 +38,7 @@ class CallableOrientation(OrientationTrajectory):
         Raises:
             TrajectoryError: If the function does not return a rotation matrix.
         """
-        if out is None:
-            out = OrientationSample.allocate()
+        out = self._output(out)
         R = self._call(t)
 
         def relative_rotation(time: float) -> Array:

@@ -1,11 +1,13 @@
 """Any Python function of time as a trajectory."""
 
 from collections.abc import Callable
+from typing import Annotated
 
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.declaration.quantities import Count, Positive
 from hsp_control.trajectories import checks, time_derivatives
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
@@ -19,51 +21,18 @@ class CallableTrajectory(Trajectory):
     with an error of about 1e-10 for motions of a few rad/s. The function must be
     smooth, and defined three steps before and after every sampled time. For pickling it
     must be defined at the top level of a module.
-
-    Attributes:
-        function: f, time [s] to a point of shape (n,).
-        velocity: f', or None.
-        acceleration: f'', or None.
-        step: Time between the seven points [s].
     """
 
-    __slots__ = ("_dimension", "acceleration", "function", "step", "velocity")
-
-    def __init__(
-        self,
-        function: PointFunction,
-        dimension: int,
-        velocity: PointFunction | None = None,
-        acceleration: PointFunction | None = None,
-        step: float = time_derivatives.STEP,
-    ) -> None:
-        """Set the function and the derivatives that are known.
-
-        Args:
-            function: f, time [s] to a point of shape (n,).
-            dimension: n.
-            velocity: f', time [s] to shape (n,), if known.
-            acceleration: f'', time [s] to shape (n,), if known.
-            step: Time between the points of the differences [s].
-
-        Raises:
-            TrajectoryError: If the dimension is not a positive integer, or the step is
-                not positive.
-        """
-        if dimension < 1 or dimension != int(dimension):
-            raise TrajectoryError(
-                f"dimension must be a positive integer; dimension = {dimension}"
-            )
-        self._dimension = int(dimension)
-        self.function = function
-        self.velocity = velocity
-        self.acceleration = acceleration
-        self.step = checks.positive(step, "step")
-
-    @property
-    def dimension(self) -> int:
-        """The number n of coordinates."""
-        return self._dimension
+    function: PointFunction
+    """f, time [s] to a point of shape (n,)."""
+    dimension: Annotated[Count, Field(gt=0)]
+    """The number n of coordinates [-]."""
+    velocity: PointFunction | None = None
+    """f', time [s] to shape (n,), if known."""
+    acceleration: PointFunction | None = None
+    """f'', time [s] to shape (n,), if known."""
+    step: Positive = time_derivatives.STEP
+    """Time between the seven points of the differences [s]."""
 
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
         """Return x(t), x'(t) and x''(t); see `Trajectory.sample`.
@@ -93,4 +62,4 @@ class CallableTrajectory(Trajectory):
         return self._call(v, "velocity", t), self._call(a, "acceleration", t)
 
     def _call(self, function: PointFunction, name: str, t: float) -> Array:
-        return checks.array(function(t), f"{name}({t:g})", (self._dimension,))
+        return checks.array(function(t), f"{name}({t:g})", (self.dimension,))

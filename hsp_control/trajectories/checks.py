@@ -33,27 +33,6 @@ def array(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Array:
     return result
 
 
-def number(value: float, name: str) -> float:
-    """Return ``value`` as a finite number.
-
-    Raises:
-        TrajectoryError: If it is not one finite number.
-    """
-    return float(array(value, name, ()))
-
-
-def positive(value: float, name: str) -> float:
-    """Return ``value`` as a finite, positive number.
-
-    Raises:
-        TrajectoryError: If it is not one finite, positive number.
-    """
-    result = number(value, name)
-    if result <= 0.0:
-        raise TrajectoryError(f"{name} must be positive; {name} = {result}")
-    return result
-
-
 def waypoint_times(value: ArrayLike, count: int) -> Array:
     """Return the times of ``count`` waypoints, shape (count,) [s].
 
@@ -84,6 +63,19 @@ def direction(value: ArrayLike, name: str) -> Array:
     if not length > 0.0:
         raise TrajectoryError(f"{name} must be non-zero; {name} = [0, 0, 0]")
     return vector / length
+
+
+def unit(value: ArrayLike, name: str) -> Array:
+    """Return ``value``, shape (4,), if its norm is 1.
+
+    Raises:
+        TrajectoryError: If it has another norm.
+    """
+    vector = array(value, name, (4,))
+    norm = float(np.linalg.norm(vector))
+    if abs(norm - 1.0) > _ORTHONORMAL:
+        raise TrajectoryError(f"{name} must have norm 1; it has {norm:.9g}")
+    return vector
 
 
 def orthonormal(value: ArrayLike, name: str, shape: tuple[int, int]) -> Array:

@@ -1,6 +1,9 @@
 """A circle at constant speed, in any Rⁿ with n ≥ 2."""
 
+from dataclasses import KW_ONLY
+from functools import cached_property
 from math import cos, sin
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,112 +11,95 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.common.kernels import kernel
+from hsp_control.declaration.quantities import Matrix, Number, Positive, Vector, Vector3
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.trajectory import Trajectory
 
 
-class Circle(Compiled, Trajectory):
+class Circle(Compiled, Trajectory, type="circle"):
     """x(t) = c + r (cos θ u1 + sin θ u2), θ = ω t + θ0, for all t.
 
-    The paper's (1 + cos 3t, 1 + sin 3t) is ``Circle([1, 1], 1, 3)``.
-
-    Attributes:
-        center: c, shape (n,).
-        radius: r > 0.
-        angular_rate: ω [rad/s].
-        phase: θ0 [rad].
-        axes: u1 and u2, orthonormal, shape (2, n).
+    The paper's (1 + cos 3t, 1 + sin 3t) is ``Circle(1, 3, center=[1, 1])``. In the
+    plane u1 and u2 are the x and y axes; in space the circle is level, unless
+    ``normal`` or ``axes`` say otherwise.
     """
 
-    __slots__ = ("_radii", "angular_rate", "axes", "center", "phase", "radius")
+    points: ClassVar[tuple[str, ...]] = ("center",)
 
-    def __init__(
-        self,
-        center: ArrayLike,
-        radius: float,
-        angular_rate: float,
-        phase: float = 0.0,
-        *,
-        axes: ArrayLike | None = None,
-        normal: ArrayLike | None = None,
-        start: ArrayLike | None = None,
-    ) -> None:
-        """Set the circle; its plane is given by ``axes`` or by ``normal``.
+    radius: Positive
+    """r [m, or the task's unit]."""
+    angular_rate: Number
+    """ω [rad/s]."""
+    center: Vector | None = None
+    """c, shape (n,) [m, or the task's unit]; where the robot starts by default."""
+    _: KW_ONLY
+    phase: Number = 0.0
+    """θ0, the angle at t = 0 [rad]."""
+    normal: Vector3 | None = None
+    """In space: normal of the circle's plane, of any length but zero [-]; for ω > 0 the
+    motion is right-handed about it."""
+    toward: Vector3 | None = None
+    """With a normal: a direction whose projection onto the plane is u1 [-]; by default
+    the coordinate axis that is most nearly perpendicular to the normal."""
+    axes: Matrix | None = None
+    """Instead of a normal: u1 and u2, orthonormal, shape (2, n) [-]."""
 
-        Args:
-            center: c, shape (n,).
-            radius: r > 0, in the units of the center.
-            angular_rate: ω [rad/s].
-            phase: θ0 [rad].
-            axes: u1 and u2, orthonormal, shape (2, n); the x and y axes by default if
-                n = 2.
-            normal: For n = 3, instead of ``axes``: normal of the plane, of any length
-                but zero, shape (3,). For ω > 0 the rotation about it is right-handed.
-            start: With ``normal``: a vector whose projection onto the plane gives u1,
-                shape (3,); by default the coordinate axis that is most nearly
-                perpendicular to the normal.
-
-        Raises:
-            TrajectoryError: If the plane is missing or given twice, a shape does not
-                fit, a value is not finite, the radius is not positive, the axes are not
-                orthonormal, or ``start`` is parallel to ``normal``.
-        """
-        self.center = checks.array(center, "center", (None,))
-        self.radius = checks.positive(radius, "radius")
-        self.angular_rate = checks.number(angular_rate, "angular_rate")
-        self.phase = checks.number(phase, "phase")
-        self.axes = _plane(self.dimension, axes, normal, start)
-        self._radii = self.radius * self.axes
+    def __post_init__(self) -> None:
+        """Check the plane."""
+        if self.normal is not None and self.axes is not None:
+            raise TrajectoryError("give axes or a normal, not both")
+        if self.toward is not None and self.normal is None:
+            raise TrajectoryError("toward needs a normal; axes define it already")
+        given = (self.center, self.normal, self.axes)
+        if any(each is not None for each in given):  # otherwise n is not yet known
+            self._plane  # noqa: B018 (computed, checked and kept)
 
     @property
     def dimension(self) -> int:
         """The number n of coordinates."""
-        return len(self.center)
+        if self.center is not None:
+            return np.size(self.center)
+        return 3 if self.axes is None else np.shape(self.axes)[-1]
+
+    @cached_property
+    def _plane(self) -> Array:
+        """u1 and u2, shape (2, n).
+
+        Raises:
+            TrajectoryError: If they are not orthonormal or do not fit the dimension.
+        """
+        n = self.dimension
+        if self.axes is not None:
+            return checks.orthonormal(self.axes, "axes", (2, n))
+        if self.normal is None and n == 2:
+            return np.eye(2)
+        if n != 3:
+            needs = "axes" if self.normal is None else "dimension 3 for its normal"
+            raise TrajectoryError(f"a circle in dimension {n} needs {needs}")
+        normal = [0.0, 0.0, 1.0] if self.normal is None else self.normal
+        return _axes_from_normal(checks.direction(normal, "normal"), self.toward)
 
     def _kernel(self) -> Kernel:
-        return _circle, (self.angular_rate, self.phase, self.center, self._radii)
+        radii = self.radius * self._plane
+        return _circle, (self.angular_rate, self.phase, np.asarray(self.center), radii)
 
 
-def _plane(
-    n: int, axes: ArrayLike | None, normal: ArrayLike | None, start: ArrayLike | None
-) -> Array:
-    """Return u1 and u2, shape (2, n), from ``axes``, or from ``normal`` and ``start``.
-
-    Raises:
-        TrajectoryError: If the plane is missing, or given twice.
-    """
-    if normal is None:
-        if start is not None:
-            raise TrajectoryError("start needs a normal; axes define the start already")
-        if axes is not None:
-            return checks.orthonormal(axes, "axes", (2, n))
-        if n == 2:
-            return np.eye(2)
-        choice = "axes or a normal" if n == 3 else "axes"
-        raise TrajectoryError(f"a circle in dimension {n} needs {choice}")
-    if axes is not None:
-        raise TrajectoryError("give axes or a normal, not both")
-    if n != 3:
-        raise TrajectoryError(f"a normal needs dimension 3; center has dimension {n}")
-    return _axes_from_normal(checks.direction(normal, "normal"), start)
-
-
-def _axes_from_normal(normal: Array, start: ArrayLike | None) -> Array:
+def _axes_from_normal(normal: Array, toward: ArrayLike | None) -> Array:
     """Return u1 and u2 = normal × u1, shape (2, 3); ``normal`` has length 1.
 
     Raises:
-        TrajectoryError: If ``start`` is parallel to ``normal``.
+        TrajectoryError: If ``toward`` is parallel to ``normal``.
     """
-    if start is None:
+    if toward is None:
         first = np.eye(3)[np.argmin(np.abs(normal))]
     else:
-        first = checks.direction(start, "start")
+        first = checks.direction(toward, "toward")
     first = first - (first @ normal) * normal
     length = float(np.linalg.norm(first))
     if length < 1e-6:
         raise TrajectoryError(
-            "start must not be parallel to normal; both have the direction "
+            "toward must not be parallel to normal; both have the direction "
             f"{normal.tolist()}"
         )
     first /= length

@@ -82,7 +82,7 @@ class Compiled(ABC):
 
     __slots__ = ()
 
-    _output: Callable[[Any], Any]  # the abstract class's: ``out``, or a new sample
+    _output: Callable[[Any], Any]  # the abstract class's: ``out``, checked, or a new
 
     @abstractmethod
     def _kernel(self) -> Kernel:
@@ -101,5 +101,6 @@ class Compiled(ABC):
 
     def follow(self, out: Any) -> Follower:
         """Return the follower; see `Trajectory.follow`."""
+        out = self._output(out)
         function, parameters = self._kernel()
         return bind(function, *parameters, *out, timed=True)

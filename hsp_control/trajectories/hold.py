@@ -1,38 +1,31 @@
 """A constant point."""
 
-from numpy.typing import ArrayLike
+from typing import ClassVar
 
-from hsp_control.trajectories import checks
+import numpy as np
+
+from hsp_control.declaration.quantities import Vector
 from hsp_control.trajectories.following import Follower, stay
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
-class Hold(Trajectory):
-    """x(t) = x0, a constant point.
+class Hold(Trajectory, type="hold"):
+    """x(t) = x0, a constant point."""
 
-    Attributes:
-        point: x0, shape (n,).
-    """
+    points: ClassVar[tuple[str, ...]] = ("point",)
 
-    __slots__ = ("point",)
-
-    def __init__(self, point: ArrayLike) -> None:
-        """Set the point x0, shape (n,).
-
-        Raises:
-            TrajectoryError: If it is not an array of finite numbers, shape (n,).
-        """
-        self.point = checks.array(point, "point", (None,))
+    point: Vector | None = None
+    """x0, shape (n,) [m, or the task's unit]; where the robot starts by default."""
 
     @property
     def dimension(self) -> int:
         """The number n of coordinates."""
-        return len(self.point)
+        return np.size(self.point) if self.point is not None else 0
 
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
         """Return x0 and zero rates; see `Trajectory.sample`."""
         out = self._output(out)
-        out.position[:] = self.point
+        out.position[:] = np.asarray(self.point)
         out.velocity.fill(0.0)
         out.acceleration.fill(0.0)
         return out

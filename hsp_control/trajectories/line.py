@@ -1,45 +1,48 @@
 """A straight line from rest to rest."""
 
-import numpy as np
-from numpy.typing import ArrayLike
+from dataclasses import KW_ONLY
+from typing import ClassVar
 
+import numpy as np
+
+from hsp_control.declaration.quantities import Number, Positive, Vector
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.piecewise_polynomial import PiecewisePolynomial
+from hsp_control.trajectories.piecewise_polynomial import (
+    Pieces,
+    PolynomialTrajectory,
+    join,
+)
 from hsp_control.trajectories.polynomial import QUINTIC
 
 
-class Line(PiecewisePolynomial):
+class Line(PolynomialTrajectory, type="line"):
     """x(t) = x0 + s (x1 - x0), with s the `smooth_step` from rest to rest.
 
     C². It rests at x0 before and at x1 after; the peak speed is 1.875 |x1 - x0| / T.
     For a line of constant speed use `UniformLine`.
     """
 
-    __slots__ = ()
+    points: ClassVar[tuple[str, ...]] = ("start", "end")
 
-    def __init__(
-        self,
-        start: ArrayLike,
-        end: ArrayLike,
-        duration: float,
-        start_time: float = 0.0,
-    ) -> None:
-        """Set the line.
+    end: Vector
+    """x1, shape (n,) [m, or the task's unit]."""
+    duration: Positive
+    """T [s]."""
+    _: KW_ONLY
+    start: Vector | None = None
+    """x0, shape (n,) [m, or the task's unit]; where the robot starts by default."""
+    start_time: Number = 0.0
+    """Time at which the motion begins [s]."""
 
-        Args:
-            start: x0, shape (n,).
-            end: x1, shape (n,).
-            duration: T > 0 [s].
-            start_time: Start of the motion [s].
+    @property
+    def dimension(self) -> int:
+        """The number n of coordinates."""
+        return np.size(self.end)
 
-        Raises:
-            TrajectoryError: If a shape does not fit, a value is not finite, or the
-                duration is not positive.
-        """
-        x0 = checks.array(start, "start", (None,))
-        x1 = checks.array(end, "end", x0.shape)
-        t0 = checks.number(start_time, "start_time")
-        t1 = t0 + checks.positive(duration, "duration")
+    def _pieces(self) -> Pieces:
+        x0 = checks.array(np.asarray(self.start), "start", (None,))
+        x1 = checks.array(self.end, "end", x0.shape)
         rest = np.zeros_like(x0)
         coefficients = QUINTIC @ np.stack([x0, rest, rest, x1, rest, rest])
-        super().__init__([t0, t1], coefficients[np.newaxis], x1)
+        times = [self.start_time, self.start_time + self.duration]
+        return join(times, coefficients[np.newaxis], x1)

@@ -1,65 +1,50 @@
 """A Lissajous curve: a sine in each coordinate."""
 
 from math import cos, sin
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
+from hsp_control.declaration.quantities import Vector
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.trajectory import Trajectory
 
 
-class Lissajous(Compiled, Trajectory):
-    """x_i(t) = c_i + a_i sin(ω_i t + φ_i), for all t.
+class Lissajous(Compiled, Trajectory, type="lissajous"):
+    """x_i(t) = c_i + a_i sin(ω_i t + φ_i), for all t."""
 
-    Attributes:
-        center: c, shape (n,).
-        amplitudes: a, shape (n,).
-        rates: ω, shape (n,) [rad/s].
-        phases: φ, shape (n,) [rad].
-    """
+    points: ClassVar[tuple[str, ...]] = ("center",)
 
-    __slots__ = ("_parameters", "amplitudes", "center", "phases", "rates")
+    amplitudes: Vector
+    """a, shape (n,) [m, or the task's unit]."""
+    rates: Vector
+    """ω, shape (n,) [rad/s]."""
+    phases: Vector | None = None
+    """φ at t = 0, shape (n,) [rad]; zero by default."""
+    center: Vector | None = None
+    """c, shape (n,) [m, or the task's unit]; where the robot starts by default."""
 
-    def __init__(
-        self,
-        center: ArrayLike,
-        amplitudes: ArrayLike,
-        rates: ArrayLike,
-        phases: ArrayLike | None = None,
-    ) -> None:
-        """Set the sines.
-
-        Args:
-            center: c, shape (n,).
-            amplitudes: a, shape (n,).
-            rates: ω, shape (n,) [rad/s].
-            phases: φ, shape (n,) [rad]; 0 by default.
-
-        Raises:
-            TrajectoryError: If the shapes differ, or a value is not finite.
-        """
-        self.center = checks.array(center, "center", (None,))
-        shape = self.center.shape
-        self.amplitudes = checks.array(amplitudes, "amplitudes", shape)
-        self.rates = checks.array(rates, "rates", shape)
-        self.phases = checks.array(
-            np.zeros(shape) if phases is None else phases, "phases", shape
-        )
-        self._parameters = np.stack(
-            [self.center, self.amplitudes, self.rates, self.phases]
-        )
+    def __post_init__(self) -> None:
+        """Check that all have one shape."""
+        shape = np.shape(self.amplitudes)
+        checks.array(self.rates, "rates", shape)
+        for name in ("phases", "center"):
+            value = getattr(self, name)
+            if value is not None:
+                checks.array(value, name, shape)
 
     @property
     def dimension(self) -> int:
         """The number n of coordinates."""
-        return len(self.center)
+        return np.size(self.amplitudes)
 
     def _kernel(self) -> Kernel:
-        return _lissajous, (self._parameters,)
+        phases = np.zeros(self.dimension) if self.phases is None else self.phases
+        parameters = [self.center, self.amplitudes, self.rates, phases]
+        return _lissajous, (np.array(parameters, dtype=float),)
 
 
 @kernel

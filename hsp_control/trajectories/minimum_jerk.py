@@ -1,11 +1,17 @@
 """The minimum-jerk motion through waypoints."""
 
+from typing import ClassVar
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
+from hsp_control.declaration.quantities import Matrix, Vector
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.piecewise_polynomial import PiecewisePolynomial
+from hsp_control.trajectories.piecewise_polynomial import (
+    Pieces,
+    PolynomialTrajectory,
+    join,
+)
 from hsp_control.trajectories.polynomial import QUINTIC
 
 # Third and fourth derivative of Σ c_k u^k at u = 0 and u = 1, as functions of the end
@@ -19,42 +25,37 @@ _END = np.array(
 )
 
 
-class MinimumJerk(PiecewisePolynomial):
+class MinimumJerk(PolynomialTrajectory, type="minimum_jerk"):
     """min ∫ |x'''|² dt through waypoints, at rest at both ends.
 
     The motion is a quintic between waypoints, and C⁴ at the inner waypoints. Velocity
     and acceleration are zero at both ends, so that it is C² together with the rest
-    before and after. ``__init__`` solves one dense linear system: the unknowns are
-    velocity and acceleration at the inner waypoints, the equations continuity of jerk
-    and snap there.
+    before and after. One dense linear system is solved: the unknowns are velocity and
+    acceleration at the inner waypoints, the equations continuity of jerk and snap
+    there.
 
     References:
         T. Flash, N. Hogan, "The coordination of arm movements: an experimentally
         confirmed mathematical model", Journal of Neuroscience 5(7), 1985.
     """
 
-    __slots__ = ()
+    points: ClassVar[tuple[str, ...]] = ("waypoints",)
 
-    def __init__(self, waypoints: ArrayLike, times: ArrayLike) -> None:
-        """Set the waypoints.
+    waypoints: Matrix
+    """At least two points, shape (m, n) [m, or the task's unit]."""
+    times: Vector
+    """Times of the waypoints, increasing, shape (m,) [s]."""
 
-        Args:
-            waypoints: At least two points, shape (m, n).
-            times: Times of the waypoints, increasing, shape (m,) [s].
-
-        Raises:
-            TrajectoryError: If there are fewer than two waypoints, a shape does not
-                fit, a value is not finite, or the times do not increase.
-        """
-        x = checks.array(waypoints, "waypoints", (None, None))
-        t = checks.waypoint_times(times, len(x))
+    def _pieces(self) -> Pieces:
+        x = np.asarray(self.waypoints)
+        t = checks.waypoint_times(self.times, len(x))
         # states[i] = (x, x', x'') at waypoint i
         states = np.zeros((len(x), 3, x.shape[1]))
         states[:, 0] = x
         states[1:-1, 1:] = _inner_rates(x, np.diff(t))
         scales = np.diff(t)[:, np.newaxis] ** [0, 1, 2, 0, 1, 2]  # d/dt to d/du
         ends = np.concatenate([states[:-1], states[1:]], axis=1)
-        super().__init__(t, QUINTIC @ (scales[..., np.newaxis] * ends), x[-1])
+        return join(t, QUINTIC @ (scales[..., np.newaxis] * ends), x[-1])
 
 
 def _inner_rates(x: Array, widths: Array) -> Array:

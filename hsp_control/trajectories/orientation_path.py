@@ -1,62 +1,51 @@
-"""Shortest rotations between waypoints, with a stop at each of them."""
+"""Rotations from waypoint to waypoint, with a stop at each of them."""
 
-from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 from hsp_control.common.rotations import compose_back, log3, rotate, turn
+from hsp_control.declaration.quantities import Vector
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.orientation import OrientationTrajectory
+from hsp_control.trajectories.rotation import Rotations, matrix_of
 from hsp_control.trajectories.timing import smooth_step
 
 
-class OrientationPath(Compiled, OrientationTrajectory):
+class OrientationPath(Compiled, OrientationTrajectory, type="path"):
     """R(t) = exp(s a_i) R_i from t_i to t_{i+1}, s the `smooth_step`.
 
     a_i = R_i log(R_iᵀ R_{i+1}) is the shortest rotation to the next waypoint, in the
     world frame. For an angle of π its sense is not unique: add a waypoint in between.
     The body rests at each waypoint, before the first and after the last; the motion is
     C².
-
-    Attributes:
-        rotations: R_i, body to world, shape (m, 3, 3).
-        times: t_i, increasing, shape (m,) [s].
     """
 
-    __slots__ = ("_turns", "rotations", "times")
+    rotations: Rotations
+    """R_i, at least two, body to world: each as roll, pitch and yaw [rad], as a
+    quaternion or as a matrix [-]."""
+    times: Vector
+    """t_i, increasing, shape (m,) [s]."""
 
-    def __init__(
-        self, rotations: ArrayLike | Sequence[ArrayLike], times: ArrayLike
-    ) -> None:
-        """Set the waypoints.
+    def __post_init__(self) -> None:
+        """Check the waypoints and their times."""
+        checks.waypoint_times(self.times, len(self._matrices))
 
-        Args:
-            rotations: At least two rotation matrices R_i, body to world, shape
-                (m, 3, 3).
-            times: Times t_i of the waypoints, increasing, shape (m,) [s].
+    @cached_property
+    def _matrices(self) -> Array:
+        return np.array([matrix_of(each) for each in np.asarray(self.rotations)])
 
-        Raises:
-            TrajectoryError: If there are fewer than two waypoints, one is not a
-                rotation matrix, a shape does not fit, or the times do not increase.
-        """
-        R = checks.array(np.asarray(rotations), "rotations", (None, 3, 3))
-        for i, rotation in enumerate(R):
-            checks.rotation(rotation, f"rotations[{i}]")
-        self.rotations = R
-        self.times = checks.waypoint_times(times, len(R))
+    def _kernel(self) -> Kernel:
+        R = self._matrices
         turns, between = np.zeros((len(R) - 1, 3)), np.zeros((3, 3))
         for i, a in enumerate(turns):
             compose_back(R[i], R[i + 1], between)
             log3(between, a)
             rotate(R[i], a, a)
-        self._turns = turns
-
-    def _kernel(self) -> Kernel:
-        return _path, (self.times, self.rotations, self._turns)
+        return _path, (np.asarray(self.times), R, turns)
 
 
 @kernel

@@ -1,60 +1,100 @@
-"""Polynomials between knots, the base class of lines, splines and minimum jerk."""
+"""Polynomials that join at knots."""
+
+from abc import abstractmethod
+from dataclasses import KW_ONLY
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
+from hsp_control.declaration.quantities import Tensor, Vector
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.polynomial import horner
 from hsp_control.trajectories.trajectory import Trajectory
 
 
-class PiecewisePolynomial(Compiled, Trajectory):
+class Pieces(NamedTuple):
     """x(t) = Σ_k c_ik u^k with u = (t - t_i) / (t_{i+1} - t_i) between t_i and t_{i+1}.
-
-    The motion rests exactly at the first point before the first knot, and at the last
-    point after the last knot. The coefficients decide how smooth it is at the knots.
 
     Attributes:
         times: The m knots, increasing, shape (m,) [s].
         waypoints: The points at the knots, shape (m, n).
+        coefficients: c, shape (m - 1, degree + 1, n).
     """
 
-    __slots__ = ("_coefficients", "times", "waypoints")
+    times: Array
+    waypoints: Array
+    coefficients: Array
 
-    def __init__(
-        self,
-        times: ArrayLike,
-        coefficients: ArrayLike,
-        end: ArrayLike | None = None,
-    ) -> None:
-        """Join m - 1 polynomials at m knots.
 
-        Args:
-            times: The knots, increasing, shape (m,) [s].
-            coefficients: c, shape (m - 1, degree + 1, n).
-            end: The point after the last knot, shape (n,); None: the end of the last
-                polynomial, with its rounding error.
+def join(times: ArrayLike, coefficients: ArrayLike, end: ArrayLike | None) -> Pieces:
+    """Return polynomials joined at their knots, checked.
 
-        Raises:
-            TrajectoryError: If a shape does not fit, a value is not finite, or the
-                knots do not increase.
-        """
-        c = checks.array(coefficients, "coefficients", (None, None, None))
-        last = c[-1].sum(axis=0) if end is None else end
-        self.times = checks.waypoint_times(times, len(c) + 1)
-        self.waypoints = np.vstack([c[:, 0], checks.array(last, "end", c.shape[2:])])
-        self._coefficients = c
+    Args:
+        times: The knots, increasing, shape (m,) [s].
+        coefficients: c, shape (m - 1, degree + 1, n).
+        end: The point after the last knot, shape (n,); None: the end of the last
+            polynomial, with its rounding error.
+
+    Raises:
+        TrajectoryError: If a shape does not fit, a value is not finite, or the knots do
+            not increase.
+    """
+    c = checks.array(coefficients, "coefficients", (None, None, None))
+    knots = checks.waypoint_times(times, len(c) + 1)
+    last = c[-1].sum(axis=0) if end is None else end
+    last = checks.array(last, "end", c.shape[2:])
+    return Pieces(knots, np.vstack([c[:, 0], last]), c)
+
+
+class PolynomialTrajectory(Compiled, Trajectory):
+    """Polynomials that join at knots; a subclass says which, in `_pieces`.
+
+    The motion rests exactly at the first point before the first knot, and at the last
+    point after the last knot. The coefficients decide how smooth it is at the knots.
+    """
+
+    @abstractmethod
+    def _pieces(self) -> Pieces:
+        """Return the polynomials; called once, when no point is missing."""
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """The polynomials."""
+        return self._pieces()
+
+    def __post_init__(self) -> None:
+        """Compute the polynomials, which checks the arguments."""
+        if all(getattr(self, name) is not None for name in self.points):
+            self.pieces  # noqa: B018 (computed, and kept)
 
     @property
     def dimension(self) -> int:
         """The number n of coordinates."""
-        return len(self.waypoints[0])
+        return len(self.pieces.waypoints[0])
 
     def _kernel(self) -> Kernel:
-        return _evaluate, (self.times, self.waypoints, self._coefficients)
+        return _evaluate, tuple(self.pieces)
+
+
+class PiecewisePolynomial(PolynomialTrajectory):
+    """x(t) = Σ_k c_ik u^k, u = (t - t_i) / (t_{i+1} - t_i), from t_i to t_{i+1}."""
+
+    times: Vector
+    """The m knots, increasing, shape (m,) [s]."""
+    coefficients: Tensor
+    """c, shape (m - 1, degree + 1, n) [m, or the task's unit]."""
+    _: KW_ONLY
+    end: Vector | None = None
+    """The point after the last knot, shape (n,) [m, or the task's unit]; the end of the
+    last polynomial by default, with its rounding error."""
+
+    def _pieces(self) -> Pieces:
+        return join(self.times, self.coefficients, self.end)
 
 
 @kernel

@@ -4,11 +4,14 @@ from abc import ABC, abstractmethod
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.declaration import Part
 from hsp_control.trajectories.following import Follower, follow_all, follow_by
-from hsp_control.trajectories.immutable import Immutable
+from hsp_control.trajectories.hold import Hold
+from hsp_control.trajectories.hold_orientation import HoldOrientation
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
@@ -44,15 +47,23 @@ class PoseSample(NamedTuple):
         )
 
 
-class PoseTrajectory(Immutable, ABC):
-    """M(t) = (R(t), x(t)) in SE(3); immutable, stateless, defined at every t.
+class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
+    """M(t) = (R(t), x(t)) in SE(3); a value, defined at every t.
 
     Body to world; x is the body's origin [m], all rates are in world axes. A subclass
-    assigns its parameters in ``__init__``, lists them in ``__slots__`` and implements
-    `sample`; it may override `follow`, see `Trajectory.follow`.
+    declares its parameters as fields and implements `sample`; it may override `follow`,
+    see `Trajectory.follow`. If it can be relative to where the robot starts, it
+    overrides `relative` and `anchored`.
     """
 
-    __slots__ = ()
+    @property
+    def relative(self) -> bool:
+        """Whether it depends on where the robot starts."""
+        return False
+
+    def anchored(self, start: pin.SE3) -> "PoseTrajectory":
+        """Return this trajectory for a robot that starts in a pose, body to world."""
+        return self
 
     @abstractmethod
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
@@ -80,35 +91,33 @@ class PoseTrajectory(Immutable, ABC):
         return follow_by(sampler, (*out.position, *out.orientation))
 
 
-class ComposedPose(PoseTrajectory):
-    """M(t) = (R(t), x(t)), with x and R given by one trajectory each.
+class ComposedPose(PoseTrajectory, type="composed"):
+    """M(t) = (R(t), x(t)), with x and R given by one trajectory each."""
 
-    Attributes:
-        position: The origin's trajectory, of dimension 3 [m].
-        orientation: The orientation's trajectory.
-    """
+    position: Trajectory = Hold()
+    """x(t) [m]; held where the robot starts by default."""
+    orientation: OrientationTrajectory = HoldOrientation()
+    """R(t), body to world; held as the robot starts by default."""
 
-    __slots__ = ("orientation", "position")
-
-    def __init__(
-        self, position: Trajectory, orientation: OrientationTrajectory
-    ) -> None:
-        """Compose a pose of a position and an orientation.
-
-        Args:
-            position: x(t), of dimension 3 [m].
-            orientation: R(t), body to world.
-
-        Raises:
-            TrajectoryError: If ``position`` does not have dimension 3.
-        """
-        if position.dimension != 3:
+    def __post_init__(self) -> None:
+        """Check the dimension of the position."""
+        if not self.position.relative and self.position.dimension != 3:
             raise TrajectoryError(
-                f"position has dimension {position.dimension}; "
+                f"position has dimension {self.position.dimension}; "
                 "the origin of a pose needs dimension 3"
             )
-        self.position = position
-        self.orientation = orientation
+
+    @property
+    def relative(self) -> bool:
+        """Whether one of them depends on where the robot starts."""
+        return self.position.relative or self.orientation.relative
+
+    def anchored(self, start: pin.SE3) -> "ComposedPose":
+        """Return both for a robot that starts in a pose; see `PoseTrajectory`."""
+        return ComposedPose(
+            self.position.anchored(start.translation),
+            self.orientation.anchored(start.rotation),
+        )
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
         """Return the pose at time t; see `PoseTrajectory.sample`."""

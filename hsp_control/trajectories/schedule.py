@@ -1,44 +1,64 @@
 """Time intervals in which something is active, with smooth ramps at their ends."""
 
 from collections.abc import Sequence
+from functools import cached_property
+from typing import Annotated
 
 import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from hsp_control.common.exceptions import ScheduleError
+from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import NonNegative, Number, plain
 
 
-class Schedule:
+def _finite_or_none(value: object) -> object:
+    """Return plain lists, with None for a start at -inf and an end at inf."""
+    value = plain(value)
+    return [*map(_pair, value)] if isinstance(value, list | tuple) else value
+
+
+def _pair(value: object) -> object:
+    value = plain(value)
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        return value
+    start, end = map(plain, value)
+    return [None if start == -np.inf else start, None if end == np.inf else end]
+
+
+Intervals = Annotated[
+    Sequence[
+        Annotated[
+            Sequence[Number | None],
+            Field(min_length=2, max_length=2),
+            AfterValidator(tuple),
+        ]
+    ],
+    Field(min_length=1),
+    BeforeValidator(_finite_or_none),
+    AfterValidator(tuple),
+]
+"""Pairs (start, end) [s], stored as tuples; -inf and inf are stored as None."""
+
+
+class Schedule(Part, error=ScheduleError):
     """w(t) in [0, 1]: zero outside the intervals, one inside, with smooth ramps.
 
     The ramps lie inside the intervals: with a ramp the weight is 0 at the start and the
     end of an interval, so that a task with this weight is added and removed without a
     jump.
-
-    Attributes:
-        intervals: (start, end) of each interval [s].
-        ramp: Duration of each rise and each fall [s].
     """
 
-    def __init__(
-        self, intervals: Sequence[tuple[float, float]], *, ramp: float = 0.0
-    ) -> None:
-        """Set the intervals.
+    intervals: Intervals
+    """[start, end] of each interval, in order of time [s]; None for no start or no
+    end."""
+    ramp: NonNegative = 0.3
+    """Duration of each rise and each fall, inside the intervals [s]."""
 
-        Args:
-            intervals: (start, end) of each interval [s], in order of time. The first
-                may start at -inf, and the last may end at inf.
-            ramp: Duration of each rise and each fall ≥ 0 [s].
-
-        Raises:
-            ScheduleError: If an interval does not end after its start, two overlap, an
-                interval is shorter than its ramps, or the ramp is negative.
-        """
-        if not 0.0 <= ramp < np.inf:
-            raise ScheduleError(f"ramp is {ramp} s; must be at least 0")
-        self.intervals = tuple((float(start), float(end)) for start, end in intervals)
-        self.ramp = float(ramp)
+    def __post_init__(self) -> None:
+        """Check that intervals follow one another and have room for their ramps."""
         previous = -np.inf
-        for start, end in self.intervals:
+        for start, end in self.windows:
             if not start < end:
                 raise ScheduleError(
                     f"the interval from {start:g} to {end:g} s is empty"
@@ -56,26 +76,31 @@ class Schedule:
                 )
             previous = end
 
+    @cached_property
+    def windows(self) -> tuple[tuple[float, float], ...]:
+        """The intervals, with -inf and inf for no start and no end [s]."""
+        return tuple(
+            (-np.inf if a is None else a, np.inf if b is None else b)
+            for a, b in self.intervals
+        )
+
     @classmethod
     def always(cls) -> "Schedule":
         """Return the schedule that is always active."""
-        return cls([(-np.inf, np.inf)])
-
-    def __repr__(self) -> str:
-        return f"Schedule({list(self.intervals)}, ramp={self.ramp:g})"
+        return cls([(None, None)])
 
     @property
     def constant(self) -> bool:
         """Whether it is always active."""
-        return self.intervals == ((-np.inf, np.inf),)
+        return self.windows == ((-np.inf, np.inf),)
 
     def active(self, t: float) -> bool:
         """Return whether t [s] is in an interval: start ≤ t < end."""
-        return any(start <= t < end for start, end in self.intervals)
+        return any(start <= t < end for start, end in self.windows)
 
     def weight(self, t: float) -> float:
         """Return w(t), t in s; with a ramp it is C² in t."""
-        for start, end in self.intervals:
+        for start, end in self.windows:
             if start <= t < end:
                 if self.ramp == 0.0:
                     return 1.0

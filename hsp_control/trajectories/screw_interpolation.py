@@ -1,76 +1,93 @@
 """The screw motion from one pose to another."""
 
+from dataclasses import KW_ONLY, replace
+from functools import cached_property
+
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.rotations import compose_back, jlog3, log3, stumpff, turn
-from hsp_control.trajectories import checks
+from hsp_control.declaration.quantities import Number, Positive, Vector3
 from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
+from hsp_control.trajectories.rotation import Rotation, matrix_of
 from hsp_control.trajectories.timing import smooth_step
 
 
-class ScrewInterpolation(PoseTrajectory):
+class ScrewInterpolation(PoseTrajectory, type="screw"):
     """M(t) = M0 exp6(s log6(M0⁻¹ M1)), with s the `smooth_step` from rest to rest.
 
     The body rotates about one fixed axis and moves along it, so that its origin follows
     a helix. For a straight line of the origin use `ComposedPose` with a `Line` and an
     `OrientationPath`. C²; it rests at M0 before and at M1 after.
-
-    Attributes:
-        positions: The origin at start and end, shape (2, 3) [m].
-        rotations: The orientation at start and end, body to world, shape (2, 3, 3).
-        duration: T [s].
-        start_time: Start of the motion [s].
     """
 
-    __slots__ = ("_screw", "duration", "positions", "rotations", "start_time")
+    position: Vector3
+    """Final position of the origin in the world, shape (3,) [m]."""
+    rotation: Rotation
+    """Final orientation, body to world: roll, pitch and yaw [rad], a quaternion or a
+    matrix [-]."""
+    duration: Positive
+    """T [s]."""
+    _: KW_ONLY
+    start_time: Number = 0.0
+    """Time at which the motion begins [s]."""
+    start_position: Vector3 | None = None
+    """Position at the start, shape (3,) [m]; where the robot starts by default."""
+    start_rotation: Rotation | None = None
+    """Orientation at the start, as `rotation` [rad or -]; that in which the robot
+    starts by default."""
 
-    def __init__(
-        self,
-        start: pin.SE3,
-        end: pin.SE3,
-        duration: float,
-        start_time: float = 0.0,
-    ) -> None:
-        """Set the motion.
+    @property
+    def relative(self) -> bool:
+        """Whether it depends on where the robot starts."""
+        return self.start_position is None or self.start_rotation is None
 
-        Args:
-            start: M0, body to world.
-            end: M1, body to world.
-            duration: T > 0 [s].
-            start_time: Start of the motion [s].
+    def anchored(self, start: pin.SE3) -> "ScrewInterpolation":
+        """Return the motion from the given start; see `PoseTrajectory.anchored`."""
+        position, rotation = self.start_position, self.start_rotation
+        return replace(
+            self,
+            start_position=start.translation if position is None else position,
+            start_rotation=start.rotation if rotation is None else rotation,
+        )
+
+    @cached_property
+    def _ends(self) -> tuple[Array, Array]:
+        """Positions and rotations at both ends, shapes (2, 3) and (2, 3, 3).
 
         Raises:
-            TrajectoryError: If a rotation is not a rotation matrix, a value is not
-                finite, or the duration is not positive.
+            TrajectoryError: If the start is not known.
         """
-        self.positions = checks.array(
-            [start.translation, end.translation], "positions", (2, 3)
+        if self.start_position is None or self.start_rotation is None:
+            raise TrajectoryError(
+                "ScrewInterpolation begins where the robot starts, which only a "
+                "controller knows; give start_position and start_rotation"
+            )
+        positions = np.array([self.start_position, self.position], dtype=float)
+        return positions, np.stack(
+            [matrix_of(self.start_rotation), matrix_of(self.rotation)]
         )
-        self.rotations = np.stack(
-            [
-                checks.rotation(start.rotation, "start.rotation"),
-                checks.rotation(end.rotation, "end.rotation"),
-            ]
-        )
-        self.duration = checks.positive(duration, "duration")
-        self.start_time = checks.number(start_time, "start_time")
-        self._screw = _screw(self.positions, self.rotations)
+
+    @cached_property
+    def _screw(self) -> Array:
+        return _screw(*self._ends)
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
         """Return the pose at time t; see `PoseTrajectory.sample`."""
         if out is None:
             out = PoseSample.allocate()
+        positions, rotations = self._ends
         s, s_dot, s_ddot = smooth_step(float(t), self.start_time, self.duration)
         if 0.0 < s < 1.0:
-            p, R = self.positions[0], self.rotations[0]
+            p, R = positions[0], rotations[0]
             _advance(s, s_dot, s_ddot, p, R, self._screw, *out.position, *out[1])
         else:
             end = int(s)
-            out.position.position[:] = self.positions[end]
-            out.orientation.rotation[:] = self.rotations[end]
+            out.position.position[:] = positions[end]
+            out.orientation.rotation[:] = rotations[end]
             for rate in (*out.position[1:], *out.orientation[1:]):
                 rate.fill(0.0)
         return out

@@ -1,45 +1,39 @@
 """A rotation at constant angular velocity."""
 
-from numpy.typing import ArrayLike
+from dataclasses import KW_ONLY
+
+import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 from hsp_control.common.rotations import turn
+from hsp_control.declaration.quantities import Number, Vector3
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.orientation import OrientationTrajectory
+from hsp_control.trajectories.rotation import Rotation, matrix_of
 
 
-class Spin(Compiled, OrientationTrajectory):
-    """R(t) = exp(t ω) R0 with ω = rate · axis in the world frame, for all t.
+class Spin(Compiled, OrientationTrajectory, type="spin"):
+    """R(t) = exp(t ω) R0 with ω = rate · axis in the world frame, for all t."""
 
-    Attributes:
-        rotation: R0, the orientation at t = 0, body to world, shape (3, 3).
-        axis: Unit vector in the world frame, shape (3,).
-        rate: Angular rate about the axis [rad/s].
-    """
+    axis: Vector3
+    """Direction of the axis in the world, of any length but zero, shape (3,) [-]."""
+    rate: Number
+    """Angular rate about the axis [rad/s]."""
+    _: KW_ONLY
+    rotation: Rotation | None = None
+    """R0, the orientation at t = 0, body to world: roll, pitch and yaw [rad], a
+    quaternion or a matrix [-]; that in which the robot starts by default."""
 
-    __slots__ = ("_angular_velocity", "axis", "rate", "rotation")
-
-    def __init__(self, rotation: ArrayLike, axis: ArrayLike, rate: float) -> None:
-        """Set the rotation.
-
-        Args:
-            rotation: R0, the orientation at t = 0, body to world, shape (3, 3).
-            axis: Direction in the world frame, of any length but zero, shape (3,).
-            rate: Angular rate about the axis [rad/s].
-
-        Raises:
-            TrajectoryError: If R0 is not a rotation matrix, the axis is zero, or a
-                value is not finite.
-        """
-        self.rotation = checks.rotation(rotation, "rotation")
-        self.axis = checks.direction(axis, "axis")
-        self.rate = checks.number(rate, "rate")
-        self._angular_velocity = self.rate * self.axis
+    def __post_init__(self) -> None:
+        """Check that the axis is not zero."""
+        checks.direction(self.axis, "axis")
 
     def _kernel(self) -> Kernel:
-        return _spin, (self._angular_velocity, self.rotation)
+        assert self.rotation is not None
+        omega = self.rate * checks.direction(self.axis, "axis")
+        return _spin, (np.asarray(omega), matrix_of(self.rotation))
 
 
 @kernel

@@ -1,14 +1,16 @@
 """The abstract trajectory of a point in Rⁿ."""
 
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from dataclasses import KW_ONLY, replace
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ShapeError
+from hsp_control.common.exceptions import ShapeError, TrajectoryError
+from hsp_control.declaration import Part
 from hsp_control.trajectories.following import Follower, follow_by
-from hsp_control.trajectories.immutable import Immutable
 
 
 class TrajectorySample(NamedTuple):
@@ -27,20 +29,77 @@ class TrajectorySample(NamedTuple):
         return cls(np.zeros(dimension), np.zeros(dimension), np.zeros(dimension))
 
 
-class Trajectory(Immutable, ABC):
-    """x(t) in Rⁿ with x'(t) and x''(t); immutable, stateless, defined at every t.
+class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
+    """x(t) in Rⁿ with x'(t) and x''(t); a value, defined at every t.
 
-    A subclass assigns its parameters in ``__init__``, lists them in ``__slots__`` and
-    implements `dimension` and `sample`. The coordinates may have any unit; a task says
-    which frame and units it needs. A motion of finite duration rests at its first point
-    before the start and at its last point after the end.
+    A subclass declares its parameters as fields (see `Part`) and implements `dimension`
+    and `sample`. The coordinates may have any unit; a task says which frame and units
+    it needs. A motion of finite duration rests at its first point before the start and
+    at its last point after the end.
+
+    Points may be relative to where the robot starts: those that ``origin: start``
+    moves, and those that are omitted. Such a trajectory cannot be sampled; `anchored`
+    returns it with all points in the world. Name the fields that hold points in
+    `points`.
 
     A subclass may override `follow` to make repeated sampling faster. If one kernel
     computes the sample, derive from `Compiled` first, then from `Trajectory`, and
     implement `_kernel` instead of `sample`.
     """
 
-    __slots__ = ()
+    points: ClassVar[tuple[str, ...]] = ()
+
+    _: KW_ONLY
+    origin: Literal["world", "start"] = "world"
+    """What the points are counted from: the world's origin, or where the robot
+    starts."""
+
+    @property
+    def relative(self) -> bool:
+        """Whether it depends on where the robot starts."""
+        return self.origin == "start" or any(
+            getattr(self, name) is None for name in self.points
+        )
+
+    def anchored(self, start: ArrayLike | None) -> Self:
+        """Return this trajectory in the world, for a robot that starts at a point.
+
+        Args:
+            start: Where the robot starts, in the trajectory's coordinates, shape (n,);
+                None: nothing starts here, as in the case of an obstacle.
+
+        Raises:
+            TrajectoryError: If it has another dimension, or is relative to a start that
+                does not exist, or has no points that ``origin: start`` could move.
+        """
+        if self.origin == "start" and not self.points:
+            raise TrajectoryError(
+                f"origin: start cannot move a {type(self).__name__}; use origin: world"
+            )
+        if start is None:
+            if not self.relative:
+                return self
+            if self.origin == "start":
+                raise TrajectoryError(
+                    "origin: start is not available here; use origin: world"
+                )
+            missing = next(n for n in self.points if getattr(self, n) is None)
+            raise TrajectoryError(f"{missing} is missing: nothing starts here")
+        where = np.asarray(start, dtype=float)
+        origin = where if self.origin == "start" else np.zeros_like(where)
+        moved: dict[str, Any] = {}
+        for name in self.points:
+            value = getattr(self, name)
+            if value is None:
+                moved[name] = where
+                continue
+            if value.shape[-1] != len(where):
+                raise TrajectoryError(
+                    f"{name} has {value.shape[-1]} coordinates {value.tolist()}; needs "
+                    f"{len(where)}"
+                )
+            moved[name] = value + origin
+        return replace(self, origin="world", **moved) if self.relative else self
 
     @property
     @abstractmethod
@@ -80,7 +139,13 @@ class Trajectory(Immutable, ABC):
 
         Raises:
             ShapeError: If ``out`` has another dimension than the trajectory.
+            TrajectoryError: If the trajectory is relative to where the robot starts.
         """
+        if self.relative:
+            raise TrajectoryError(
+                f"{type(self).__name__} is relative to where the robot starts, which "
+                "only a controller knows; give points in the world, or `anchored`"
+            )
         n = self.dimension
         if out is None:
             return TrajectorySample.allocate(n)

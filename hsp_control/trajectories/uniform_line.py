@@ -1,44 +1,40 @@
 """An infinite straight line at constant speed."""
 
-from numpy.typing import ArrayLike
+from typing import ClassVar
+
+import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
+from hsp_control.declaration.quantities import Vector
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.trajectory import Trajectory
 
 
-class UniformLine(Compiled, Trajectory):
-    """x(t) = x0 + t v, for all t. For a line that starts and stops use `Line`.
+class UniformLine(Compiled, Trajectory, type="uniform_line"):
+    """x(t) = x0 + t v, for all t. For a line that starts and stops use `Line`."""
 
-    Attributes:
-        start: x0, the point at t = 0, shape (n,).
-        velocity: v, shape (n,) [1/s].
-    """
+    points: ClassVar[tuple[str, ...]] = ("start",)
 
-    __slots__ = ("start", "velocity")
+    velocity: Vector
+    """v, shape (n,) [m/s, or the task's unit per s]."""
+    start: Vector | None = None
+    """x0, the point at t = 0, shape (n,) [m, or the task's unit]; where the robot
+    starts by default."""
 
-    def __init__(self, start: ArrayLike, velocity: ArrayLike) -> None:
-        """Set the line.
-
-        Args:
-            start: x0, the point at t = 0, shape (n,).
-            velocity: v, shape (n,) [1/s].
-
-        Raises:
-            TrajectoryError: If the shapes differ, or a value is not finite.
-        """
-        self.start = checks.array(start, "start", (None,))
-        self.velocity = checks.array(velocity, "velocity", self.start.shape)
+    def __post_init__(self) -> None:
+        """Check that both have one shape."""
+        if self.start is not None:
+            checks.array(self.velocity, "velocity", np.shape(self.start))
 
     @property
     def dimension(self) -> int:
         """The number n of coordinates."""
-        return len(self.start)
+        return np.size(self.velocity)
 
     def _kernel(self) -> Kernel:
-        return _line, (self.start, self.velocity)
+        return _line, (np.asarray(self.start), np.asarray(self.velocity))
 
 
 @kernel

@@ -84,7 +84,7 @@ def configured(config: str, seed: int, steps: int) -> Iterator[Tally]:
     experiment = hsp.load_experiment(config)
     own = experiment.controller
     robot = own.robot
-    limits = own.limits or hsp.Limits(robot, position=None, velocity=None)
+    limits = own.limits or hsp.Limits(position=None, velocity=None)
     controller = hsp.Controller(
         robot,
         own.levels,
@@ -224,16 +224,17 @@ def drawn_controller(robot: hsp.Robot, rng: np.random.Generator) -> hsp.Controll
 def _trajectory(center: Array, rng: np.random.Generator) -> hsp.Lissajous:
     """Return a path about a point: near, far, or out of reach; slow or fast."""
     n, far = len(center), 10.0 ** rng.uniform(-3.0, 1.0)
+    middle = center + far * rng.uniform(-1.0, 1.0, n)
     return hsp.Lissajous(
-        center + far * rng.uniform(-1.0, 1.0, n),
         10.0 ** rng.uniform(-3.0, 0.5) * rng.uniform(-1.0, 1.0, n),
         10.0 ** rng.uniform(-1.0, 2.0) * rng.uniform(-1.0, 1.0, n),
         rng.uniform(-np.pi, np.pi, n),
+        middle,
     )
 
 
 def _gains(rng: np.random.Generator) -> hsp.Gains:
-    return hsp.Gains.from_frequency(10.0 ** rng.uniform(-0.5, 2.0))
+    return hsp.Gains(natural_frequency=10.0 ** rng.uniform(-0.5, 2.0))
 
 
 def _tasks(robot: hsp.Robot, rng: np.random.Generator) -> list[list[hsp.Task]]:
@@ -244,59 +245,56 @@ def _tasks(robot: hsp.Robot, rng: np.random.Generator) -> list[list[hsp.Task]]:
         axes = str(rng.choice(["xy", "x", "y"]))
         path = _trajectory(here[["xyz".index(axis) for axis in axes]], rng)
         levels: list[list[hsp.Task]] = [
-            [hsp.FramePosition(robot, frame, path, _gains(rng), axes=axes)]
+            [hsp.FramePosition(frame, path, gains=_gains(rng), axes=axes)]
         ]
         if rng.random() < 0.4:
             levels.append([_posture(robot, rng)])
         return levels
     path = _trajectory(here, rng)
     turning = hsp.Spin(
-        np.eye(3), rng.standard_normal(3), 10.0 ** rng.uniform(-1.0, 1.5)
+        rng.standard_normal(3), 10.0 ** rng.uniform(-1.0, 1.5), rotation=np.eye(3)
     )
-    position = hsp.FramePosition(robot, frame, path, _gains(rng))
+    position = hsp.FramePosition(frame, path, gains=_gains(rng))
     match rng.integers(5):
         case 0:
             return [[position]]
         case 1:
             pose = hsp.ComposedPose(path, turning)
-            return [[hsp.FramePose(robot, frame, pose, _gains(rng))]]
+            return [[hsp.FramePose(frame, pose, gains=_gains(rng))]]
         case 2:
-            orientation = hsp.FrameOrientation(robot, frame, turning, _gains(rng))
+            orientation = hsp.FrameOrientation(frame, turning, gains=_gains(rng))
             return [[position], [orientation]]
         case 3:
             return [[position], [_posture(robot, rng)]]
         case _:
             half = robot.model.njoints // 2
             other = next(f.name for f in robot.model.frames if f.parentJoint == half)
-            elbow = hsp.FramePosition(
-                robot, other, _trajectory(home.position(other), rng), _gains(rng),
-                name="elbow",
-            )  # fmt: skip
+            elbow = hsp.FramePosition(other, _trajectory(home.position(other), rng), gains=_gains(rng), name="elbow")  # fmt: skip
             return [[position], [elbow]]
 
 
 def _posture(robot: hsp.Robot, rng: np.random.Generator) -> hsp.Task:
-    return hsp.JointPosture(robot, drawn_configurations(robot, rng, 1)[0], _gains(rng))
+    return hsp.JointPosture(drawn_configurations(robot, rng, 1)[0], gains=_gains(rng))
 
 
 def _field(robot: hsp.Robot, rng: np.random.Generator) -> hsp.NullSpaceField | None:
     frame = robot.end_effector
     limited = np.isfinite(robot.position_limits()[0]).all()
     choices: list[Callable[[], hsp.NullSpaceField]] = [
-        lambda: hsp.TargetPosture(robot, drawn_configurations(robot, rng, 1)[0]),
-        lambda: hsp.PointDistance(robot, [frame], _ball(rng)),
+        lambda: hsp.TargetPosture(drawn_configurations(robot, rng, 1)[0]),
+        lambda: hsp.PointDistance([frame], _ball(rng)),
         lambda: _clearances(robot)[rng.integers(len(_clearances(robot)))],
     ]
     if limited:
         choices += [
-            lambda: hsp.JointCentering(robot),
-            lambda: hsp.LimitBarrier(robot),
-            lambda: hsp.Manipulability(robot, frame),
+            lambda: hsp.JointCentering(),
+            lambda: hsp.LimitBarrier(),
+            lambda: hsp.Manipulability(frame),
         ]
     else:
         choices += [
-            lambda: hsp.Manipulability(robot, frame, axes="xy"),
-            lambda: hsp.EqualJointAngles(robot, list(robot.joint_names)),
+            lambda: hsp.Manipulability(frame, axes="xy"),
+            lambda: hsp.EqualJointAngles(list(robot.joint_names)),
         ]
     count = int(rng.choice([0, 1, 1, 2]))
     total: hsp.NullSpaceField | None = None
@@ -312,8 +310,8 @@ def _clearances(robot: hsp.Robot) -> list[hsp.NullSpaceField]:
     """Return fields that read meshes: made once."""
     rng = np.random.default_rng(0)
     return [
-        hsp.SelfClearance(robot),
-        *(hsp.ObstacleClearance(robot, [_ball(rng)]) for _ in range(8)),
+        hsp.SelfClearance(),
+        *(hsp.ObstacleClearance([_ball(rng)]) for _ in range(8)),
     ]
 
 
@@ -324,14 +322,6 @@ def _ball(rng: np.random.Generator) -> hsp.Obstacle:
 
 def _limits(robot: hsp.Robot, rng: np.random.Generator) -> hsp.Limits:
     own = OWN_EFFORTS.get(robot.name)
-    effort = np.array(own) if own is not None else hsp.Limits(robot).effort
+    effort = np.array(own) if own is not None else hsp.Limits().effort
     bounded = bool(rng.random() < 0.3)  # a programme of many rows
-    return hsp.Limits(
-        robot,
-        effort=effort * 10.0 ** rng.uniform(-1.5, 0.0),
-        effort_rate=1000.0 if rng.random() < 0.4 else None,
-        velocity="robot" if bounded else None,
-        acceleration=20.0 if rng.random() < 0.2 else None,
-        position="robot" if bounded and own is None else None,
-        bandwidth=10.0 ** rng.uniform(0.0, 2.0),
-    )
+    return hsp.Limits(effort=effort * 10.0 ** rng.uniform(-1.5, 0.0), effort_rate=1000.0 if rng.random() < 0.4 else None, velocity="robot" if bounded else None, acceleration=20.0 if rng.random() < 0.2 else None, position="robot" if bounded and own is None else None, bandwidth=10.0 ** rng.uniform(0.0, 2.0))

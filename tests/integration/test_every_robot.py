@@ -159,19 +159,17 @@ def hold_and_centre(robot: Robot, kind: str) -> float:
         return size * reach * rng.uniform(-1.0, 1.0, robot.nv)
 
     goal = kinematics.placement(robot.integrate(q0, off(0.1)))  # so it can be reached
-    gains = Gains.from_frequency(FREQUENCY)
+    gains = Gains(natural_frequency=FREQUENCY)
     task: Task
     if kind == "position":
         letters = "".join("xyz"[i] for i in rows)
         target = Hold(goal.translation[rows])
-        task = FramePosition(
-            robot, robot.end_effector, target, gains, axes=letters, name="hand"
-        )
+        task = FramePosition(robot.end_effector, target, gains=gains, axes=letters, name="hand")
     else:
-        task = FramePose(robot, robot.end_effector, HoldPose(goal), gains, name="hand")
-    pull: NullSpaceField = TargetPosture(robot, robot.integrate(q0, off(0.5)))
+        task = FramePose(robot.end_effector, HoldPose(goal.translation, goal.rotation), gains=gains, name="hand")
+    pull: NullSpaceField = TargetPosture(robot.integrate(q0, off(0.5)))
     if np.isfinite(robot.position_limits()[0]).any() and (high - low < 6.28).any():
-        pull = pull + JointCentering(robot, weights=reach**2)
+        pull = pull + JointCentering(weights=reach**2)
     controller = Controller(robot, [task], pull, null_space_gain=FREQUENCY)
     rollout = simulate(
         controller, q0, off(0.3), duration=1.0, log_period=0.1, integrator=Rk4(STEP)

@@ -99,20 +99,16 @@ def test_a_matrix_of_one_column_is_a_view(robot: Robot) -> None:
 
 
 def gains() -> Gains:
-    return Gains.from_frequency(10.0)
+    return Gains(natural_frequency=10.0)
 
 
 def controlled(robot: Robot, task: str, metric: Any) -> Controller:
     tasks = {
-        "position": lambda: FramePosition(
-            robot, "tip", Hold([0.1]), gains(), axes="x", name="it"
-        ),
-        "center of mass": lambda: CenterOfMass(
-            robot, Hold([0.05]), gains(), axes="x", name="it"
-        ),
-        "posture": lambda: JointPosture(robot, [0.2], gains(), name="it"),
+        "position": lambda: FramePosition("tip", Hold([0.1]), gains=gains(), axes="x", name="it"),
+        "center of mass": lambda: CenterOfMass(Hold([0.05]), gains=gains(), axes="x", name="it"),
+        "posture": lambda: JointPosture([0.2], gains=gains(), name="it"),
     }
-    field = TargetPosture(robot, [0.0])
+    field = TargetPosture([0.0])
     return Controller(robot, [tasks[task]()], field, null_space_gain=5.0, metric=metric)
 
 
@@ -132,9 +128,9 @@ def test_the_error_equation_in_closed_loop(
 
 def test_within_limits_beside_a_ball_and_pushed(robot: Robot) -> None:
     ball = Obstacle("ball", Sphere(0.1), Hold([0.3, 0.0, 0.1]))
-    clearance = ObstacleClearance(robot, [ball])
-    limits = Limits(robot, distances=[MinimumDistance(clearance.proximity, 0.02)])
-    task = FramePosition(robot, "tip", Hold([0.39]), gains(), axes="x", name="it")
+    clearance = ObstacleClearance([ball])
+    limits = Limits(distances=[MinimumDistance(clearance.proximity, 0.02)])
+    task = FramePosition("tip", Hold([0.39]), gains=gains(), axes="x", name="it")
     controller = Controller(
         robot, [task], clearance, null_space_gain=5.0, limits=limits
     )

@@ -251,9 +251,9 @@ def test_the_metric_matters(runs: dict[int, Rollout]) -> None:
     """The paper's law is not W = I on relative angles: that is another acceleration."""
     run = runs[3]
     robot = Robot.load("planar3r", gravity=(0.0, 0.0, 0.0))
-    circle = Circle([1.0, 1.0], 1.0, 3.0)
-    task = FramePosition(robot, "tip", circle, Gains(100.0, 20.0), axes="xy")
-    field = EqualJointAngles(robot, ["joint2", "joint3"], weight=5.0)
+    circle = Circle(1.0, 3.0, [1.0, 1.0])
+    task = FramePosition("tip", circle, gains=Gains(100.0, 20.0), axes="xy")
+    field = EqualJointAngles(["joint2", "joint3"], weight=5.0)
     euclidean = Controller(robot, [task], field, metric=IdentityMetric())
     state = robot.state(run.t[100], run.q[100], run.v[100])
     a = euclidean.compute(state).acceleration

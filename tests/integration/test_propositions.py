@@ -162,7 +162,7 @@ class TaskCase:
 
 def circle_about(start: Array, off: Array) -> Lissajous:
     """Return a motion in space that starts ``off`` the given point, with a speed."""
-    return Lissajous(start + off, [0.05, 0.04, 0.03], [2.0, 3.0, 4.0])
+    return Lissajous([0.05, 0.04, 0.03], [2.0, 3.0, 4.0], center=start + off)
 
 
 def swing(start: Array, off: Array, t: float) -> Array:
@@ -181,7 +181,7 @@ def turned(start: pin.SE3, t: float) -> Array:
 
 
 def spin(start: pin.SE3) -> Spin:
-    return Spin(turned(start, 0.0), SPUN, float(np.linalg.norm(SPUN)))
+    return Spin(SPUN, float(np.linalg.norm(SPUN)), rotation=turned(start, 0.0))
 
 
 def log3_error(desired: Array, actual: Array) -> Array:
@@ -197,13 +197,7 @@ TASKS: dict[str, TaskCase] = {
     "planar position": TaskCase(
         "planar3r",
         lambda robot, start: [
-            FramePosition(
-                robot,
-                "tip",
-                Circle([1.0, 1.0], 0.9, 2.0, phase=0.4),
-                Gains.from_frequency(8.0),
-                axes="xy",
-            )
+            FramePosition("tip", Circle(0.9, 2.0, [1.0, 1.0], phase=0.4), gains=Gains(natural_frequency=8.0), axes="xy")
         ],
         lambda start: {
             "tip": lambda t, here: (
@@ -218,12 +212,7 @@ TASKS: dict[str, TaskCase] = {
     "iiwa14 position": TaskCase(
         "iiwa14",
         lambda robot, start: [
-            FramePosition(
-                robot,
-                "iiwa_link_ee",
-                circle_about(start.translation, OFF),
-                Gains.from_frequency(6.0),
-            )
+            FramePosition("iiwa_link_ee", circle_about(start.translation, OFF), gains=Gains(natural_frequency=6.0))
         ],
         lambda start: {
             "iiwa_link_ee": lambda t, here: (
@@ -236,12 +225,7 @@ TASKS: dict[str, TaskCase] = {
     "iiwa14 pose": TaskCase(
         "iiwa14",
         lambda robot, start: [
-            FramePose(
-                robot,
-                "iiwa_link_ee",
-                ComposedPose(circle_about(start.translation, OFF), spin(start)),
-                Gains.from_frequency(5.0),
-            )
+            FramePose("iiwa_link_ee", ComposedPose(circle_about(start.translation, OFF), spin(start)), gains=Gains(natural_frequency=5.0))
         ],
         lambda start: {
             "iiwa_link_ee": lambda t, here: np.concatenate(
@@ -256,19 +240,8 @@ TASKS: dict[str, TaskCase] = {
     "panda position and pointing": TaskCase(
         "panda",
         lambda robot, start: [
-            FramePosition(
-                robot,
-                "panda_tcp",
-                circle_about(start.translation, OFF),
-                Gains.from_frequency(5.0),
-            ),
-            Pointing(
-                robot,
-                "panda_tcp",
-                [0.0, 0.0, 1.0],
-                HoldOrientation(LEANT @ start.rotation),
-                Gains.from_frequency(5.0),
-            ),
+            FramePosition("panda_tcp", circle_about(start.translation, OFF), gains=Gains(natural_frequency=5.0)),
+            Pointing("panda_tcp", axis=[0.0, 0.0, 1.0], trajectory=HoldOrientation(LEANT @ start.rotation), gains=Gains(natural_frequency=5.0)),
         ],
         lambda start: {
             "panda_tcp": lambda t, here: (
@@ -293,7 +266,7 @@ def tracked(which: str) -> tuple[Controller, Rollout]:
     robot = load(case.robot)
     q0 = home(case.robot)
     start = plain(case.robot).placement(q0, FRAMES[case.robot])
-    field = TargetPosture(robot, robot.integrate(q0, np.full(robot.nv, 0.2)))
+    field = TargetPosture(robot.integrate(q0, np.full(robot.nv, 0.2)))
     metric = METRICS[case.metric][0](robot.nv)
     controller = Controller(robot, case.build(robot, start), field, metric=metric)
     v0 = 0.3 * np.sin(2.0 + np.arange(robot.nv))
@@ -384,17 +357,17 @@ def test_proposition_1_the_logged_acceleration(which: str) -> None:
 
 def moving(robot: Robot, name: str) -> NullSpaceField:
     """Return a field that moves in time: an obstacle, and a vector field with ∂g/∂t."""
-    lookout = Lissajous([0.7, 0.9, 1.1], [0.2, 0.3, 0.1], [3.0, 2.0, 4.0])
+    lookout = Lissajous([0.2, 0.3, 0.1], [3.0, 2.0, 4.0], center=[0.7, 0.9, 1.1])
     ball = Obstacle("ball", Sphere(0.1), lookout)
-    posture = TargetPosture(robot, home(name), weights=2.0)
+    posture = TargetPosture(home(name), weights=2.0)
     frame = FRAMES[name]
 
     def wave(state: RobotState) -> Array:
         i = np.arange(robot.nv)
         return 0.5 * np.sin(3.0 * state.t + i) * (1.0 + state.position(frame)[0])
 
-    avoid = PointDistance(robot, NEAR[name], ball, weight=0.05)
-    return posture + avoid + 0.8 * FunctionField(robot, wave)
+    avoid = PointDistance(NEAR[name], ball, weight=0.05)
+    return posture + avoid + 0.8 * FunctionField(wave)
 
 
 @dataclass(frozen=True)
@@ -432,16 +405,16 @@ def self_motion(run: Run) -> Rollout:
     """Return half a second of tracking off the path, with a field moving in time."""
     robot, frame, q0 = load(run.robot), FRAMES[run.robot], home(run.robot)
     start = plain(run.robot).placement(q0, frame)
-    gains = Gains.from_frequency(7.0)
+    gains = Gains(natural_frequency=7.0)
     if run.robot == "planar3r":
-        circle = Circle(start.translation[:2] - [0.5, 0.1], 0.5, 2.0)
-        task: Task = FramePosition(robot, frame, circle, gains, axes="xy")
+        circle = Circle(0.5, 2.0, start.translation[:2] - [0.5, 0.1])
+        task: Task = FramePosition(frame, circle, gains=gains, axes="xy")
     elif run.robot == "panda":
         path = circle_about(start.translation, OFF)
-        task = FramePosition(robot, frame, path, gains)
+        task = FramePosition(frame, path, gains=gains)
     else:
         pose = ComposedPose(circle_about(start.translation, OFF), spin(start))
-        task = FramePose(robot, frame, pose, gains)
+        task = FramePose(frame, pose, gains=gains)
     controller = Controller(
         robot,
         [task],
@@ -520,12 +493,7 @@ def test_the_law_integrates_in_fourth_order(metric: str) -> None:
     run = Run("panda", metric, "scalar")
     robot, q0 = load("panda"), home("panda")
     start = plain("panda").placement(q0, "panda_tcp")
-    task = FramePosition(
-        robot,
-        "panda_tcp",
-        circle_about(start.translation, OFF),
-        Gains.from_frequency(7),
-    )
+    task = FramePosition("panda_tcp", circle_about(start.translation, OFF), gains=Gains(natural_frequency=7))
     field = moving(robot, "panda")
     controller = Controller(
         robot, [task], field, null_space_gain=6.0, metric=METRICS[metric][0](7)
@@ -603,21 +571,10 @@ def centering_and_posture(angles: Array) -> float:
 HELD: dict[str, Held] = {
     "planar3r": Held(
         "planar3r",
-        lambda robot, start: FramePosition(
-            robot,
-            "tip",
-            Hold(start.translation[:2]),
-            Gains.from_frequency(10),
-            axes="xy",
-        ),
+        lambda robot, start: FramePosition("tip", Hold(start.translation[:2]), gains=Gains(natural_frequency=10), axes="xy"),
         lambda robot: (
-            EqualJointAngles(robot, ["joint2", "joint3"], weight=5.0)
-            + PointDistance(
-                robot,
-                ["link2", "link3"],
-                Obstacle("ball", Sphere(0.1), Hold([0.3, 1.3, 0.0])),
-                weight=0.5,
-            )
+            EqualJointAngles(["joint2", "joint3"], weight=5.0)
+            + PointDistance(["link2", "link3"], Obstacle("ball", Sphere(0.1), Hold([0.3, 1.3, 0.0])), weight=0.5)
         ),
         planar_cost,
         tip_by_hand,
@@ -626,11 +583,9 @@ HELD: dict[str, Held] = {
     ),
     "panda position": Held(
         "panda",
-        lambda robot, start: FramePosition(
-            robot, "panda_tcp", Hold(start.translation), Gains.from_frequency(10)
-        ),
+        lambda robot, start: FramePosition("panda_tcp", Hold(start.translation), gains=Gains(natural_frequency=10)),
         lambda robot: (
-            2.0 * JointCentering(robot) + 3.0 * TargetPosture(robot, posture())
+            2.0 * JointCentering() + 3.0 * TargetPosture(posture())
         ),
         centering_and_posture,
         lambda q: plain("panda").placement(q, "panda_tcp").translation,
@@ -639,11 +594,9 @@ HELD: dict[str, Held] = {
     ),
     "panda pose": Held(
         "panda",
-        lambda robot, start: FramePose(
-            robot, "panda_tcp", HoldPose(start), Gains.from_frequency(10)
-        ),
+        lambda robot, start: FramePose("panda_tcp", HoldPose(start.translation, start.rotation), gains=Gains(natural_frequency=10)),
         lambda robot: (
-            2.0 * JointCentering(robot) + 3.0 * TargetPosture(robot, posture())
+            2.0 * JointCentering() + 3.0 * TargetPosture(posture())
         ),
         centering_and_posture,
         lambda q: (

@@ -97,7 +97,7 @@ class Passage:
         return Controller(
             robot,
             [self.task],
-            TargetPosture(robot, self.start),
+            TargetPosture(self.start),
             null_space_gain=FREQUENCY,
             singularity_threshold=threshold,
         )
@@ -123,7 +123,7 @@ def stretched_planar_arm() -> Passage:
     here = robot.state(0.0, q0, np.zeros(3)).position("tip")[:2].copy()
     away = 3.4 * here / np.linalg.norm(here)
     path = MinimumJerk([here, away, away, here], [0.0, 1.5, 2.0, 3.5])
-    task = FramePosition(robot, "tip", path, Gains.from_frequency(FREQUENCY), axes="xy")
+    task = FramePosition("tip", path, gains=Gains(natural_frequency=FREQUENCY), axes="xy")
     return Passage(task, q0, 5.0, 0.1, effort=1.5e3)
 
 
@@ -135,7 +135,7 @@ def panda_out_of_reach(threshold: float) -> Passage:
     ray = (here - shoulder) * [1.0, 1.0, 0.0] + [0.0, 0.0, 0.1]
     away = shoulder + 1.05 * ray / np.linalg.norm(ray)
     path = MinimumJerk([here, away, away, here], [0.0, 1.5, 2.0, 3.5])
-    task = FramePosition(robot, "panda_tcp", path, Gains.from_frequency(FREQUENCY))
+    task = FramePosition("panda_tcp", path, gains=Gains(natural_frequency=FREQUENCY))
     effort = 2e3 if threshold < 0.1 else 2e2
     return Passage(task, q0, 5.0, threshold, effort)
 
@@ -160,7 +160,7 @@ def driven(
         CallableTrajectory(lambda t: hand(t).position.copy(), 3),
         CallableOrientation(lambda t: hand(t).rotation.copy()),
     )
-    task = FramePose(robot, frame, path, Gains.from_frequency(FREQUENCY))
+    task = FramePose(frame, path, gains=Gains(natural_frequency=FREQUENCY))
     return Passage(task, singular + span, 5.0, DEFAULT, effort=80.0, step=0.0025)
 
 
@@ -322,11 +322,11 @@ def test_a_target_out_of_reach_is_pointed_at(threshold: float) -> None:
     """
     robot = load("panda")
     goal = np.array([1.055, 0.0, 0.5])
-    task = FramePosition(robot, "panda_tcp", Hold(goal), Gains.from_frequency(3.0))
+    task = FramePosition("panda_tcp", Hold(goal), gains=Gains(natural_frequency=3.0))
     controller = Controller(
         robot,
         [task],
-        TargetPosture(robot, robot.home()),
+        TargetPosture(robot.home()),
         singularity_threshold=threshold,
     )
     rollout = simulate(
@@ -379,22 +379,21 @@ class Target:
     """A task whose target is set anew for every start."""
 
     def __init__(self, robot: Robot, kind: str) -> None:
-        frame, gains = robot.end_effector, Gains.from_frequency(FREQUENCY)
+        frame, gains = robot.end_effector, Gains(natural_frequency=FREQUENCY)
         self.robot, self.kind = robot, kind
         self.task: Task
         if kind == "pose":
-            self.task = FramePose(robot, frame, HoldPose(pin.SE3.Identity()), gains)
+            self.task = FramePose(frame, HoldPose(np.zeros(3), np.eye(3)), gains=gains)
         else:
-            self.task = FramePosition(
-                robot, frame, Hold(np.zeros(len(kind))), gains, axes=kind
-            )
+            self.task = FramePosition(frame, Hold(np.zeros(len(kind))), gains=gains, axes=kind)
 
     def move(self, state: RobotState, away: Array, turn: Array) -> None:
         """Put the target ``away`` [m] and turned by ``turn`` [rad] from the frame."""
         here = state.frame(self.task.frame)
         if self.kind == "pose":
-            goal = pin.SE3(here.rotation @ pin.exp3(turn), here.position + away)
-            self.task.trajectory = HoldPose(goal)
+            self.task.trajectory = HoldPose(
+                here.position + away, here.rotation @ pin.exp3(turn)
+            )
         else:
             axes = ["xyz".index(axis) for axis in self.kind]
             self.task.trajectory = Hold((here.position + away)[axes])
@@ -412,7 +411,7 @@ def test_random_starts(name: str) -> None:
     robot = loaded(name)
     rng = np.random.default_rng(sum(map(ord, name)))
     target = Target(robot, ROBOTS[name])
-    field = TargetPosture(robot, robot.random_configuration(rng))
+    field = TargetPosture(robot.random_configuration(rng))
     controller = Controller(robot, [target.task], field, null_space_gain=FREQUENCY)
     state = RobotState(robot)
     singular = 0
@@ -425,7 +424,7 @@ def test_random_starts(name: str) -> None:
         limit = bound(state, output, DEFAULT)
         assert np.isfinite(output.tau).all()
         assert np.linalg.norm(a) <= limit
-        values = controller.diagnose(state).singular_values
+        values = controller.diagnose().singular_values
         assert output.damped == (values[-1] < DEFAULT)
         singular += output.damped
         # ‖e_N‖ ≤ ‖g - v‖: a projection where exact, a contraction where damped.
@@ -447,7 +446,7 @@ def test_rollouts_from_singular_starts(name: str) -> None:
     robot = loaded(name)
     rng = np.random.default_rng(5)
     target = Target(robot, ROBOTS[name])
-    field = TargetPosture(robot, robot.home())
+    field = TargetPosture(robot.home())
     controller = Controller(robot, [target.task], field, null_space_gain=FREQUENCY)
     state, runs = RobotState(robot), 0
     while runs < 12:

@@ -72,7 +72,7 @@ def ends(shape: LinkShape) -> tuple[Array, Array, float]:
     return center - half, center + half, float(shape.geometry.radius)
 
 
-AIR = Lissajous([0.5, 0.3, 0.5], [0.1, 0.15, 0.05], [1.0, 2.0, 1.5])
+AIR = Lissajous([0.1, 0.15, 0.05], [1.0, 2.0, 1.5], center=[0.5, 0.3, 0.5])
 
 
 def flowing(field: Cost, state: Any, step: float) -> Array:

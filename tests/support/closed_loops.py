@@ -60,12 +60,12 @@ def order(steps: Array, errors: list[float]) -> float:
 @cache
 def planar_controller(gain: float = 10.0) -> Controller:
     robot = load("planar3r", gravity=False)
-    circle = Circle([1.0, 1.0], 0.9, 3.0)
-    task = FramePosition(robot, "tip", circle, Gains.from_frequency(10.0), axes="xy")
+    circle = Circle(0.9, 3.0, [1.0, 1.0])
+    task = FramePosition("tip", circle, gains=Gains(natural_frequency=10.0), axes="xy")
     ball = Obstacle(
-        "ball", Sphere(0.1), Lissajous([-1, 1.7, 0], [0, 0.7, 0], [1, 3, 1])
+        "ball", Sphere(0.1), Lissajous([0, 0.7, 0], [1, 3, 1], center=[-1, 1.7, 0])
     )
-    field = TargetPosture(robot, planar_start()) + PointDistance(robot, ["link3"], ball)
+    field = TargetPosture(planar_start()) + PointDistance(["link3"], ball)
     return Controller(robot, [task], field, null_space_gain=gain)
 
 
@@ -78,10 +78,5 @@ def planar_start() -> Array:
 def panda_controller() -> Controller:
     robot = load("panda")
     x = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
-    task = FramePosition(
-        robot,
-        "panda_tcp",
-        Lissajous(x, [0.1, 0.1, 0.05], [3.0, 4.0, 5.0]),
-        Gains.from_frequency(10.0),
-    )
-    return Controller(robot, [task], TargetPosture(robot, robot.home() + 0.2))
+    task = FramePosition("panda_tcp", Lissajous([0.1, 0.1, 0.05], [3.0, 4.0, 5.0], center=x), gains=Gains(natural_frequency=10.0))
+    return Controller(robot, [task], TargetPosture(robot.home() + 0.2))

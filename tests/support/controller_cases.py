@@ -25,7 +25,7 @@ from hsp_control.trajectories import (
 )
 
 Array = NDArray[np.float64]
-GAINS = Gains.from_frequency(20.0)
+GAINS = Gains(natural_frequency=20.0)
 TCP = "panda_tcp"
 CENTER = np.array([0.35, 0.1, 0.5])
 # Below every singular value of the random states: the law is exact there.
@@ -33,9 +33,7 @@ EXACT = 1e-4
 
 METRICS: dict[str, Callable[[int], Metric]] = {
     "identity": lambda nv: IdentityMetric(),
-    "coordinates": lambda nv: ConstantMetric.from_coordinates(
-        np.tril(np.ones((nv, nv)))
-    ),
+    "coordinates": lambda nv: CoordinatesMetric(np.tril(np.ones((nv, nv)))),
     "mass_matrix": lambda nv: MassMatrixMetric(),
 }
 metrics = pytest.mark.parametrize("kind", METRICS)
@@ -47,15 +45,15 @@ def panda() -> Robot:
 
 
 def circle() -> Circle:
-    return Circle(CENTER, 0.1, 2.0, normal=[0.0, 1.0, 1.0])
+    return Circle(0.1, 2.0, CENTER, normal=[0.0, 1.0, 1.0])
 
 
 def track(robot: Robot | None = None, **options: Any) -> FramePosition:
-    return FramePosition(robot or panda(), TCP, circle(), GAINS, **options)
+    return FramePosition(TCP, circle(), gains=GAINS, **options)
 
 
 def hold_orientation(robot: Robot | None = None) -> FrameOrientation:
-    return FrameOrientation(robot or panda(), TCP, HoldOrientation(np.eye(3)), GAINS)
+    return FrameOrientation(TCP, HoldOrientation(np.eye(3)), gains=GAINS)
 
 
 def states(count: int, seed: int = 0) -> list[tuple[float, Array, Array]]:

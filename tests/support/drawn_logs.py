@@ -70,10 +70,10 @@ class Arm:
         self.position, self.rotation = frame.position.copy(), frame.rotation.copy()
 
     def circle(self, normal: list[float]) -> Round:
-        return Round(self.position, 0.1, 2.0, normal=normal)
+        return Round(0.1, 2.0, self.position, normal=normal)
 
     def run(self, *tasks: Task, scene: Scene | None = None, **settings: Any) -> Rollout:
-        posture = TargetPosture(self.robot, self.q0 + 0.1)
+        posture = TargetPosture(self.q0 + 0.1)
         controller = Controller(self.robot, tasks, posture, **settings)
         return simulate(controller, self.q0, duration=0.5, scene=scene)
 
@@ -82,20 +82,16 @@ class Arm:
 def spatial() -> dict[str, Rollout]:
     arm = Arm()
     robot, tcp = arm.robot, arm.tcp
-    tilted = FramePosition(robot, tcp, arm.circle([1.0, 0.0, 1.0]), GAINS)
-    center = Lissajous([0.3, -0.3, 0.5], [0.0, 0.1, 0.1], [0, 2, 3], [0, 0, 0])
-    spin = Spin(arm.rotation, [0.0, 0.0, 1.0], 0.3)
-    pose = FramePose(robot, tcp, ComposedPose(arm.circle([1.0, 0.0, 0.0]), spin), GAINS)
-    aside = Spin(arm.rotation @ pin.utils.rotate("x", 0.4), [0, 0, 1], 1.0)
-    xz = FramePosition(
-        robot, tcp, Hold(arm.position[[0, 2]]), GAINS, axes="xz", name="xz"
-    )
-    pointing = Pointing(robot, tcp, [0, 0, 1], aside, GAINS)
+    tilted = FramePosition(tcp, arm.circle([1.0, 0.0, 1.0]), gains=GAINS)
+    center = Lissajous([0.0, 0.1, 0.1], [0, 2, 3], [0, 0, 0], [0.3, -0.3, 0.5])
+    spin = Spin([0.0, 0.0, 1.0], 0.3, rotation=arm.rotation)
+    pose = FramePose(tcp, ComposedPose(arm.circle([1.0, 0.0, 0.0]), spin), gains=GAINS)
+    aside = Spin([0, 0, 1], 1.0, rotation=arm.rotation @ pin.utils.rotate("x", 0.4))
+    xz = FramePosition(tcp, Hold(arm.position[[0, 2]]), gains=GAINS, axes="xz", name="xz")
+    pointing = Pointing(tcp, axis=[0, 0, 1], trajectory=aside, gains=GAINS)
     joints = ["panda_joint1", "panda_joint2"]
-    posture = JointPosture(robot, arm.q0 + 0.1, GAINS, joints=joints)
-    turned = FrameOrientation(
-        robot, "panda_link5", HoldOrientation(np.eye(3)), GAINS, name="turn"
-    )
+    posture = JointPosture(arm.q0 + 0.1, gains=GAINS, joints=joints)
+    turned = FrameOrientation("panda_link5", HoldOrientation(np.eye(3)), gains=GAINS, name="turn")
     return {
         "space": arm.run(
             tilted,

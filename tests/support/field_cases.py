@@ -1,8 +1,8 @@
 """Every null-space field on several robots, each beside its oracle."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
@@ -49,14 +49,18 @@ from hsp_control import (
     MassMatrixMetric,
     Metric,
     NullSpaceField,
+    Obstacle,
     Rest,
     Robot,
     RobotState,
+    Scene,
     TargetPosture,
     Uncontrolled,
 )
+from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import (
     FieldSample,
+    FieldSum,
     InverseCondition,
     LimitBarrier,
     Manipulability,
@@ -69,12 +73,20 @@ from hsp_control.null_space.metrics import MetricSample
 Array = NDArray[np.float64]
 
 
+Field = TypeVar("Field", bound=NullSpaceField)
+
+
+def placed(field: Field, state: RobotState, scene: Iterable[Obstacle] = ()) -> Field:
+    """Return a field, placed where the robot starts."""
+    return field.placed(Start(state, Scene(scene)))
+
+
 @dataclass(frozen=True)
 class Member:
     """A field, and the same once more with plain Pinocchio.
 
     Attributes:
-        build: The field on a robot.
+        make: The field for a robot, not yet placed.
         parts: (weight, oracle, whether a cost) of each term; a vector field's is g,
             and a weight may be a function of (t, q).
         rate_accuracy: Largest error of g', relative to its scale: rounding where it is
@@ -82,61 +94,72 @@ class Member:
             differenced gradient 1e-9, the promise of `Cost`.
     """
 
-    build: Callable[[str], NullSpaceField]
+    make: Callable[[str], NullSpaceField]
     parts: Callable[[str], list[tuple[Any, Any, bool]]]
     rate_accuracy: float = 5e-12
     robots: tuple[str, ...] = tuple(ROBOTS)
+
+    def build(self, name: str) -> NullSpaceField:
+        """Return the field, placed on a robot at rest at home."""
+        robot = load(name)
+        return placed(
+            self.make(name), robot.state(0.0, robot.home(), np.zeros(robot.nv))
+        )
+
+
+def posture(name: str, **options: Any) -> TargetPosture:
+    return TargetPosture(configuration=target(name), **options)
 
 
 def weighted(name: str) -> NullSpaceField:
     frame = frames_of(name)[2]
     of_state = StateWeight(lambda s: 1.5 + np.sin(s.t + s.position(frame)[0]))
-    return Ramp(0.5, 2.0, start=0.3, duration=1.0) * (
-        3.0 * TargetPosture(load(name), target(name)) + point_distance(name)
+    return Ramp(initial=0.5, final=2.0, start=0.3, duration=1.0) * (
+        3.0 * posture(name) + point_distance(name)
     ) + of_state * swirl_field(name, rate=True)
 
 
 LIMITED = ("panda", "kinova", "floating ur5", "rolling ur5")
 MEMBERS: dict[str, Member] = {
-    "rest": Member(lambda n: Rest(load(n)), lambda n: []),
-    "uncontrolled": Member(lambda n: Uncontrolled(load(n)), lambda n: []),
+    "rest": Member(lambda n: Rest(), lambda n: []),
+    "uncontrolled": Member(lambda n: Uncontrolled(), lambda n: []),
     "joint_centering": Member(
-        lambda n: JointCentering(load(n)),
+        lambda n: JointCentering(),
         lambda n: [(1.0, centering_oracle(n), True)],
         robots=LIMITED,
     ),
     "joint_centering, weights": Member(
-        lambda n: JointCentering(load(n), weights=spread(load(n).nv, 0.0, 3.0)),
+        lambda n: JointCentering(weights=spread(load(n).nv, 0.0, 3.0)),
         lambda n: [(1.0, centering_oracle(n, spread(load(n).nv, 0.0, 3.0)), True)],
         robots=LIMITED,
     ),
     "target_posture": Member(
-        lambda n: TargetPosture(load(n), target(n)),
+        lambda n: posture(n),
         lambda n: [(1.0, posture_oracle(n), True)],
     ),
     "target_posture, weights": Member(
-        lambda n: TargetPosture(load(n), target(n), weights=spread(load(n).nv, 0, 3)),
+        lambda n: posture(n, weights=spread(load(n).nv, 0, 3)),
         lambda n: [(1.0, posture_oracle(n, spread(load(n).nv, 0, 3)), True)],
     ),
     "equal_joint_angles": Member(
-        lambda n: EqualJointAngles(load(n), JOINTS[ROBOTS[n][0]], weight=5.0),
+        lambda n: FieldSum([EqualJointAngles(JOINTS[ROBOTS[n][0]], weight=5.0)]),
         lambda n: [(1.0, equal_oracle(n, 5.0), True)],
     ),
     "point_distance": Member(
-        point_distance, lambda n: [(1.0, distance_oracle(n, 0.4), True)]
+        lambda n: FieldSum([point_distance(n)]),
+        lambda n: [(1.0, distance_oracle(n, 0.4), True)],
     ),
     "limit_barrier": Member(
-        lambda n: LimitBarrier(load(n), zone=0.9),
+        lambda n: LimitBarrier(zone=0.9),
         lambda n: [(1.0, barrier_oracle(n, 0.9), True)],
         robots=LIMITED,
     ),
     "manipulability": Member(
-        lambda n: Manipulability(load(n), frames_of(n)[2], axes=position_axes(n)),
+        lambda n: Manipulability(frames_of(n)[2], axes=position_axes(n)),
         lambda n: [(1.0, spectrum_oracle(n, root_of_determinant), True)],
     ),
     "manipulability, determinant, metric": Member(
         lambda n: Manipulability(
-            load(n),
             frames_of(n)[2],
             axes=position_axes(n),
             form="determinant",
@@ -151,9 +174,7 @@ MEMBERS: dict[str, Member] = {
         ],
     ),
     "manipulability, log, pose": Member(
-        lambda n: Manipulability(
-            load(n), frames_of(n)[2], form="log", rows="pose", length=0.5
-        ),
+        lambda n: Manipulability(frames_of(n)[2], form="log", rows="pose", length=0.5),
         lambda n: [
             (
                 1.0,
@@ -166,12 +187,12 @@ MEMBERS: dict[str, Member] = {
         robots=LIMITED,
     ),
     "manipulability, orientation": Member(
-        lambda n: Manipulability(load(n), frames_of(n)[2], rows="orientation"),
+        lambda n: Manipulability(frames_of(n)[2], rows="orientation"),
         lambda n: [(1.0, spectrum_oracle(n, root_of_determinant, [3, 4, 5]), True)],
         robots=LIMITED,
     ),
     "inverse_condition": Member(
-        lambda n: InverseCondition(load(n), frames_of(n)[2], axes=position_axes(n)),
+        lambda n: InverseCondition(frames_of(n)[2], axes=position_axes(n)),
         lambda n: [
             (
                 1.0,
@@ -185,7 +206,7 @@ MEMBERS: dict[str, Member] = {
     ),
     "transmission, velocity": Member(
         lambda n: Transmission(
-            load(n), frames_of(n)[2], 3.0 * direction(n), axes=position_axes(n)
+            frames_of(n)[2], direction=3.0 * direction(n), axes=position_axes(n)
         ),
         lambda n: [
             (
@@ -202,7 +223,10 @@ MEMBERS: dict[str, Member] = {
     ),
     "transmission, force": Member(
         lambda n: Transmission(
-            load(n), frames_of(n)[2], direction(n), kind="force", axes=position_axes(n)
+            frames_of(n)[2],
+            direction=direction(n),
+            kind="force",
+            axes=position_axes(n),
         ),
         lambda n: [
             (
@@ -227,12 +251,12 @@ MEMBERS: dict[str, Member] = {
         lambda n: [(1.0, reach_oracle(n), True)],
     ),
     "own cost, value only": Member(
-        lambda n: ValueOnly(load(n), frames_of(n)[2]),
+        lambda n: ValueOnly(frames_of(n)[2]),
         lambda n: [(1.0, reach_oracle(n), True)],
         rate_accuracy=1e-9,
     ),
     "own cost, gradient": Member(
-        lambda n: WithGradient(load(n), frames_of(n)[2]),
+        lambda n: WithGradient(frames_of(n)[2]),
         lambda n: [(1.0, reach_oracle(n), True)],
         rate_accuracy=2e-11,
     ),
@@ -245,16 +269,16 @@ MEMBERS: dict[str, Member] = {
         lambda n: swirl_field(n, rate=True), lambda n: [(1.0, swirl_oracle(n), False)]
     ),
     "own vector field": Member(
-        lambda n: Swirl(load(n), frames_of(n)[2]),
+        lambda n: Swirl(frames_of(n)[2]),
         lambda n: [(1.0, swirl_oracle(n), False)],
         rate_accuracy=2e-11,
     ),
     "own vector field, rate": Member(
-        lambda n: SwirlWithRate(load(n), frames_of(n)[2]),
+        lambda n: SwirlWithRate(frames_of(n)[2]),
         lambda n: [(1.0, swirl_oracle(n), False)],
     ),
     "sum": Member(
-        lambda n: TargetPosture(load(n), target(n)) + point_distance(n),
+        lambda n: posture(n) + point_distance(n),
         lambda n: [
             (1.0, posture_oracle(n), True),
             (1.0, distance_oracle(n, 0.4), True),
@@ -262,9 +286,9 @@ MEMBERS: dict[str, Member] = {
     ),
     "sum of a sum and a vector field": Member(
         lambda n: (
-            0.5 * (3.0 * TargetPosture(load(n), target(n)) + 2 * point_distance(n))
+            0.5 * (3.0 * posture(n) + 2 * point_distance(n))
             + 0.7 * swirl_field(n, rate=False)
-            + Rest(load(n))
+            + Rest()
         ),
         lambda n: [
             (1.5, posture_oracle(n), True),

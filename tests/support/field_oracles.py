@@ -50,7 +50,9 @@ JOINTS = {
     "ur5": ("shoulder_pan_joint", "elbow_joint"),
 }
 OBSTACLE = Obstacle(
-    "ball", Sphere(0.1), Lissajous([1.4, 1.2, 0.9], [0.2, 0.3, 0.1], [1.3, 2.1, 0.7])
+    "ball",
+    Sphere(0.1),
+    Lissajous([0.2, 0.3, 0.1], [1.3, 2.1, 0.7], center=[1.4, 1.2, 0.9]),
 )
 
 
@@ -254,19 +256,16 @@ def reach_cost(
 ) -> FunctionCost:
     frame = frames_of(name)[2]
     return FunctionCost(
-        load(name),
         reach_value(frame),
-        gradient=reach_gradient(frame) if gradient else None,
-        gradient_rate=reach_rate(frame) if rate else None,
+        gradient_function=reach_gradient(frame) if gradient else None,
+        rate_function=reach_rate(frame) if rate else None,
     )
 
 
 class ValueOnly(Cost):
     """What a user writes first."""
 
-    def __init__(self, robot: Robot, frame: str) -> None:
-        super().__init__(robot, "value_only")
-        self.frame = frame
+    frame: str
 
     def value(self, state: RobotState) -> float:
         return reach(state.t, state.position(self.frame))
@@ -282,12 +281,10 @@ class WithGradient(ValueOnly):
 class Swirl(VectorField):
     """A user's own vector field, which is no gradient."""
 
-    def __init__(self, robot: Robot, frame: str) -> None:
-        super().__init__(robot, "swirl")
-        self.frame = frame
+    frame: str
 
     def vector(self, state: RobotState) -> Array:
-        return swirl(state.t, state.position(self.frame), self.robot.nv)
+        return swirl(state.t, state.position(self.frame), state.robot.nv)
 
 
 class SwirlWithRate(Swirl):
@@ -295,7 +292,7 @@ class SwirlWithRate(Swirl):
 
     def rate(self, state: RobotState) -> Array:
         at = state.frame(self.frame)
-        return swirl_rate(state.t, at.position, at.velocity[:3], self.robot.nv)
+        return swirl_rate(state.t, at.position, at.velocity[:3], state.robot.nv)
 
 
 def swirl(t: float, x: Array, nv: int) -> Array:
@@ -315,21 +312,20 @@ def swirl_oracle(name: str) -> VectorOracle:
 
 
 def swirl_field(name: str, *, rate: bool) -> FunctionField:
-    robot, frame = load(name), frames_of(name)[2]
+    frame, nv = frames_of(name)[2], load(name).nv
 
     def exact(state: RobotState) -> Array:
         at = state.frame(frame)
-        return swirl_rate(state.t, at.position, at.velocity[:3], robot.nv)
+        return swirl_rate(state.t, at.position, at.velocity[:3], nv)
 
     return FunctionField(
-        robot,
-        lambda state: swirl(state.t, state.position(frame), robot.nv),
-        rate=exact if rate else None,
+        lambda state: swirl(state.t, state.position(frame), nv),
+        rate_function=exact if rate else None,
     )
 
 
 def point_distance(name: str, weight: float = 0.4) -> PointDistance:
-    return PointDistance(load(name), frames_of(name)[:2], OBSTACLE, weight=weight)
+    return PointDistance(frames_of(name)[:2], OBSTACLE, weight=weight)
 
 
 def rows_of(name: str, q: Array, frame: str, rows: list[int]) -> Array:

@@ -42,13 +42,11 @@ def start() -> Array:
 def law(limits: Limits | None = None) -> Controller:
     """Return a controller that draws a circle and swings the elbow."""
     tip = panda().state(0.0, start(), np.zeros(7)).position("panda_tcp")
-    path = Circle(tip + np.array([0.0, 0.0, 0.1]), 0.1, 3.0, normal=[1.0, 0.0, 0.0])
-    task = FramePosition(
-        panda(), "panda_tcp", path, Gains.from_frequency(10.0), name="tip"
-    )
+    path = Circle(0.1, 3.0, tip + np.array([0.0, 0.0, 0.1]), normal=[1.0, 0.0, 0.0])
+    task = FramePosition("panda_tcp", path, gains=Gains(natural_frequency=10.0), name="tip")
     q = start()
     q[0] += 0.5
-    field = TargetPosture(panda(), q)
+    field = TargetPosture(q)
     return Controller(panda(), [task], field, null_space_gain=10.0, limits=limits)
 
 

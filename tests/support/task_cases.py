@@ -27,6 +27,7 @@ from hsp_control import (
     Robot,
     Task,
 )
+from hsp_control.declaration.quantities import Matrix
 from hsp_control.trajectories import (
     ComposedPose,
     HoldOrientation,
@@ -111,13 +112,11 @@ class Motion:
 class Tumble(OrientationTrajectory):
     """R(τ) = exp(f a) exp(g b) R0 with f, g parabolas: w and w' are not parallel."""
 
-    __slots__ = ("start", "time")
+    start: Matrix
+    time: float = TIME
+
     a = np.array([0.6, -0.3, 0.5])
     b = np.array([-0.2, 0.8, 0.4])
-
-    def __init__(self, start: Array, time: float = TIME) -> None:
-        self.start = np.array(start)
-        self.time = time
 
     def sample(
         self, t: float, out: OrientationSample | None = None
@@ -156,7 +155,7 @@ def wobble(position: Array) -> Lissajous:
     amplitudes, rates = 0.2 + 0.1 * np.arange(n), 1.3 + 0.4 * np.arange(n)
     phases = 0.3 * np.arange(n) + 0.2
     away = amplitudes * np.sin(rates * TIME + phases)
-    return Lissajous(position - away, amplitudes, rates, phases)
+    return Lissajous(amplitudes, rates, phases, position - away)
 
 
 # --- the members ---------------------------------------------------------------------
@@ -204,9 +203,7 @@ class Position(Family):
     ) -> Task:
         target = self.coordinates(None, motion)(0.0)
         target = target + error * unit(np.random.default_rng(seed), self.rows)
-        return FramePosition(
-            robot, self.frame, wobble(target), gains, axes=self.axes, name="here"
-        )
+        return FramePosition(self.frame, wobble(target), gains=gains, axes=self.axes, name="here")
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         indices = ["xyz".index(axis) for axis in self.axes]
@@ -238,7 +235,7 @@ class Orientation(Family):
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
         reference = self.reference(motion, error, np.random.default_rng(seed))
-        return FrameOrientation(robot, self.frame, reference, gains)
+        return FrameOrientation(self.frame, reference, gains=gains)
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         R = self.placement(motion, 0.0).rotation
@@ -262,7 +259,7 @@ class Pose(Orientation):
         x = self.placement(motion, 0.0).translation
         turned = self.reference(motion, error, rng)
         moved = wobble(x + error * unit(rng, 3))
-        return FramePose(robot, self.frame, ComposedPose(moved, turned), gains)
+        return FramePose(self.frame, ComposedPose(moved, turned), gains=gains)
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         turned = super().coordinates(task, motion)
@@ -298,9 +295,7 @@ class Seen(Pose):
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
         pose = super().build(robot, motion, error, gains, seed)
-        return RelativePose(
-            robot, self.frame, self.reference_frame, pose.trajectory, gains
-        )
+        return RelativePose(self.frame, pose.trajectory, reference=self.reference_frame, gains=gains)
 
 
 @dataclass(frozen=True)
@@ -318,7 +313,7 @@ class Mass(Family):
     ) -> Task:
         target = self.coordinates(None, motion)(0.0)
         target = target + error * unit(np.random.default_rng(seed), self.rows)
-        return CenterOfMass(robot, wobble(target), gains, axes=self.axes)
+        return CenterOfMass(wobble(target), gains=gains, axes=self.axes)
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         model, data = motion.robot.model, motion.robot.model.createData()
@@ -361,7 +356,7 @@ class Direction(Family):
             "tumbling": Tumble(R_d),
             "spinning": Spinning(R_d),
         }[self.motion_of_reference]
-        return Pointing(robot, self.frame, self.axis, reference, gains)
+        return Pointing(self.frame, axis=self.axis, trajectory=reference, gains=gains)
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         """Return the turn in the frame's own axes, along two fixed ones across."""
@@ -391,10 +386,7 @@ class Direction(Family):
 class Spinning(OrientationTrajectory):
     """Turns about its own third axis at 1.7 rad/s: the direction stands still."""
 
-    __slots__ = ("start",)
-
-    def __init__(self, start: Array) -> None:
-        self.start = np.array(start)
+    start: Matrix
 
     def sample(
         self, t: float, out: OrientationSample | None = None
@@ -426,9 +418,7 @@ class Posture(Family):
         if moved is not None:
             shift[indices] -= moved.sample(TIME).position
         reference = pin.integrate(robot.model, motion.q, shift)
-        return JointPosture(
-            robot, reference, gains, displacement=moved, joints=self.joints
-        )
+        return JointPosture(reference, gains=gains, displacement=moved, joints=self.joints)
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         model = motion.robot.model

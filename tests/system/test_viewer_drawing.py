@@ -248,7 +248,7 @@ def test_a_new_scene_replaces_the_old(
 ) -> None:
     viewer = Viewer(arm, transport=recorder)
     viewer.draw_scene(run)
-    ball = Obstacle("ball", Sphere(0.1), UniformLine([1, 0, 0], [0, 2, 0]))
+    ball = Obstacle("ball", Sphere(0.1), UniformLine([0, 2, 0], [1, 0, 0]))
     viewer.draw_scene(Scene([ball]))
     assert recorder.paths("/paths/") == recorder.paths("/targets/") == []
     assert recorder.paths("/obstacles/") == ["/obstacles/ball"]

@@ -1,4 +1,4 @@
-"""Types that all parts of a configuration use: checked numbers and a strict model."""
+"""The base class of the models of a configuration."""
 
 from typing import Annotated
 

@@ -2,8 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
+from hsp_control.common.exceptions import SceneError
 from hsp_control.config.models.base import (
     Model,
     NonNegative,
@@ -13,12 +14,7 @@ from hsp_control.config.models.base import (
     Weights,
 )
 from hsp_control.config.models.robot import LoadModel
-from hsp_control.config.models.scene import (
-    BoxModel,
-    CapsuleModel,
-    CylinderModel,
-    SphereModel,
-)
+from hsp_control.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
 Share = Annotated[float, Field(ge=0.0, lt=1.0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0)]
@@ -165,16 +161,24 @@ class ContactPlantModel(PlantModel):
     """Rate at which the velocity of a contact decays [1/s]."""
 
 
+def _supported(shape: Shape) -> Shape:
+    """Return a shape that MuJoCo has.
+
+    Raises:
+        SceneError: If it has none such.
+    """
+    if not isinstance(shape, Sphere | Capsule | Cylinder | Box):
+        raise SceneError(
+            f"{shape.yaml_type} is not possible here; needs a sphere, capsule, "
+            "cylinder or box"
+        )
+    return shape
+
+
 class ContactShapeModel(Model):
     """A shape at a frame that may touch the ground."""
 
-    shape: (
-        Annotated[
-            SphereModel | CapsuleModel | CylinderModel | BoxModel,
-            Field(discriminator="type"),
-        ]
-        | None
-    ) = None
+    shape: Annotated[Shape, AfterValidator(_supported)] | None = None
     """The shape; by default made from the link's collision geometry."""
     position: Vector3 = [0.0, 0.0, 0.0]
     """Position of the shape in the frame [m]."""

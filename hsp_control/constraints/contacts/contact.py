@@ -1,23 +1,41 @@
 """The base class of contacts: constraint rows, and points where forces may act."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from functools import partial
-from typing import Any
+from dataclasses import KW_ONLY
+from functools import cached_property, partial
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.step_plan import StepPlan
-from hsp_control.robot import Robot, RobotState
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.quantities import Positive, Vector3, read_only
+from hsp_control.geometry.start import Start
+from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks import TaskSample
 from hsp_control.trajectories.schedule import Schedule
 
 
-class Contact(ABC):
+def _direction(vector: Array) -> Array:
+    """Return a vector that has a direction.
+
+    Raises:
+        ContactError: If it is zero, or so long that its length overflows.
+    """
+    with np.errstate(over="ignore"):
+        length = float(np.linalg.norm(vector))
+    if not 0.0 < length < np.inf:
+        raise ContactError(f"{vector.tolist()} has no direction; must not be zero")
+    return vector
+
+
+class Contact(Part, ABC, family="contacts", error=ContactError):
     """A part of the robot that rests on a plane of the world.
 
     Its rows keep it still, J a + J'v = -Kd J v: damping without stiffness, since
@@ -25,62 +43,73 @@ class Contact(ABC):
     Each force lies within a friction pyramid inscribed in the Coulomb friction cone, so
     it pushes and never pulls.
 
-    To implement one: call ``super().__init__``, set `rows`, write `constrain` and
-    `arms`.
+    A subclass declares its parameters as fields (see `Part`), sets `rows`, and
+    implements `points`, `constrain` and `arms`.
 
     Attributes:
-        robot: The robot.
-        frame: Name of the frame that rests on the plane.
-        name: The contact's name in the log.
         rows: Number of constraint rows.
-        points: Where forces act, shape (k, 3), in the frame of the subclass [m].
-        axes: Two tangents and the normal of the plane as columns, world axes, shape
-            (3, 3).
-        friction: Friction coefficient μ.
-        damping: Kd [1/s].
-        schedule: When the contact is active.
     """
 
-    rows: int
+    rows: ClassVar[int]
+    yaml_key: ClassVar[str | None] = "name"
 
-    def __init__(
-        self,
-        robot: Robot,
-        frame: str,
-        points: Array,
-        *,
-        friction: float = 0.7,
-        normal: Sequence[float] = (0.0, 0.0, 1.0),
-        damping: float = 40.0,
-        schedule: Schedule | None = None,
-        name: str | None = None,
-    ) -> None:
-        """Check and store what all contacts have in common.
+    frame: str
+    """Name of the frame that rests on the plane [-]."""
+    _: KW_ONLY
+    friction: Positive = 0.7
+    """Coulomb friction coefficient μ [-]."""
+    normal: Annotated[Vector3, AfterValidator(_direction)] = (0.0, 0.0, 1.0)
+    """Normal of the plane in the world, of any length but zero, shape (3,) [-]."""
+    damping: Positive = 40.0
+    """Kd, the rate at which a remaining velocity of the contact decays [1/s]."""
+    schedule: Schedule | None = None
+    """When the contact is active [-]; always by default."""
+    name: str = ""
+    """Name of the contact in the log [-]; that of its frame by default."""
 
-        Args:
-            robot: The robot.
-            frame: Name of the frame that rests on the plane.
-            points: Where forces act, shape (k, 3) [m].
-            friction: Friction coefficient μ > 0.
-            normal: Normal of the plane, world axes, shape (3,), of any length > 0.
-            damping: Kd > 0 [1/s].
-            schedule: When the contact is active; None: always.
-            name: The contact's name; None: the frame's.
+    def _complete(self) -> None:
+        if not self.name:
+            self._set_default("name", self.frame)
+
+    def changed_fields(self) -> dict[str, Any]:
+        """Return the fields that are not their defaults, by name."""
+        changed = super().changed_fields()
+        if self.name == self.frame:
+            changed.pop("name", None)
+        return changed
+
+    def placed(self, start: Start) -> Self:
+        """Return the contact, checked.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            ContactError: If friction or damping is not positive, or the normal is not a
-                non-zero vector of three finite numbers.
         """
-        robot.frame_id(frame)
-        self.robot = robot
-        self.frame = frame
-        self.name = frame if name is None else name
-        self.points = points
-        self.axes = plane_axes(normal, self.name)
-        self.friction = _positive(friction, "friction", self.name)
-        self.damping = _positive(damping, "damping", self.name)
-        self.schedule = Schedule.always() if schedule is None else schedule
+        with within("frame"):
+            start.state.robot.frame_id(self.frame)
+        return self
+
+    @property
+    def always(self) -> bool:
+        """Whether the contact is active at all times."""
+        return self.schedule is None or self.schedule.constant
+
+    def active(self, t: float) -> bool:
+        """Return whether the contact is active at time t [s]."""
+        return self.schedule is None or self.schedule.active(t)
+
+    def weight(self, t: float) -> float:
+        """Return how much it bears at time t [s], in [0, 1]; see `Schedule`."""
+        return 1.0 if self.schedule is None else self.schedule.weight(t)
+
+    @cached_property
+    def axes(self) -> Array:
+        """Two tangents and the normal of the plane, as columns, shape (3, 3) [-]."""
+        return read_only(plane_axes(self.normal))
+
+    @property
+    @abstractmethod
+    def points(self) -> Array:
+        """Where forces act, in the frame, shape (k, 3) [m]."""
 
     def compile(self, state: RobotState, out: TaskSample) -> StepPlan:
         """Return the step plan that evaluates this state into this sample."""
@@ -114,28 +143,12 @@ def damp_velocity(J: Array, v: Array, damping: float, e_dot: Array, a: Array) ->
         a[k] = -damping * total
 
 
-def plane_axes(normal: Sequence[float], name: str) -> Array:
-    """Return two tangents and a unit normal as columns, shape (3, 3).
-
-    Raises:
-        ContactError: If the normal is not a non-zero vector of three finite numbers.
-    """
+def plane_axes(normal: ArrayLike) -> Array:
+    """Return two tangents and a unit normal as columns, shape (3, 3)."""
     n = np.array(normal, dtype=float)
-    length = float(np.linalg.norm(n)) if n.shape == (3,) else 0.0
-    if not 0.0 < length < np.inf:
-        raise ContactError(
-            f"contact {name!r}: normal must be a non-zero vector of three numbers, "
-            f"got {list(normal)}"
-        )
-    n /= length
+    n /= np.linalg.norm(n)
     # The tangent nearest to the world's x axis, or y if the normal is along x.
     along = np.eye(3)[0 if abs(n[0]) < 0.9 else 1]
     tangent = along - (along @ n) * n
     tangent /= np.linalg.norm(tangent)
     return np.column_stack([tangent, np.cross(n, tangent), n])
-
-
-def _positive(value: Any, what: str, name: str) -> float:
-    if not 0.0 < float(value) < np.inf:
-        raise ContactError(f"contact {name!r}: {what} is {value}; must be positive")
-    return float(value)

@@ -1,55 +1,32 @@
 """A point contact: three rows, and one force."""
 
-from collections.abc import Sequence
-from typing import Any
+from dataclasses import KW_ONLY
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ContactError
 from hsp_control.common.kernels import kernel
 from hsp_control.constraints.contacts.contact import Contact
-from hsp_control.robot import Robot
+from hsp_control.declaration.quantities import Vector3
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks import TaskSample
 
 
-class PointContact(Contact):
-    """A point of a link rests on the plane; the link may turn about it.
+class PointContact(Contact, type="point"):
+    """A point of a link rests on the plane: it does not move; the link may turn."""
 
-    Attributes:
-        points: The point in the frame, shape (1, 3) [m].
-    """
+    rows: ClassVar[int] = 3
 
-    rows = 3
+    _: KW_ONLY
+    point: Vector3 = (0.0, 0.0, 0.0)
+    """The point in the frame, shape (3,) [m]."""
 
-    def __init__(
-        self,
-        robot: Robot,
-        frame: str,
-        *,
-        point: Sequence[float] = (0.0, 0.0, 0.0),
-        **options: Any,
-    ) -> None:
-        """Create the contact.
-
-        Args:
-            robot: The robot.
-            frame: Name of the frame.
-            point: The point in the frame [m].
-            options: The arguments that all contacts have: see `Contact`.
-
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-            ContactError: If an argument is out of its range.
-        """
-        place = np.array(point, dtype=float)
-        if place.shape != (3,) or not np.isfinite(place).all():
-            raise ContactError(
-                f"contact at {frame!r}: point must be three finite numbers, got "
-                f"{point!r}"
-            )
-        super().__init__(robot, frame, place[None], **options)
+    @cached_property
+    def points(self) -> Array:
+        """The point in the frame, shape (1, 3) [m]."""
+        return np.asarray(self.point)[None]
 
     def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
         """Write the velocity rows of the point."""

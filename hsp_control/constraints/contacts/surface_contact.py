@@ -1,88 +1,81 @@
 """A flat sole: six rows, and a force at every corner."""
 
-from collections.abc import Sequence
-from typing import Any
+from dataclasses import KW_ONLY
+from functools import cached_property
+from typing import Annotated, ClassVar
 
 import numpy as np
+from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError
 from hsp_control.constraints.contacts.contact import Contact
-from hsp_control.robot import Robot
+from hsp_control.declaration.quantities import Points, Positive, Vector3, read_only
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks import TaskSample
 
 
-class SurfaceContact(Contact):
-    """A flat part of a link rests on the plane.
+def _surface(corners: Array) -> Array:
+    """Return corners that span a surface.
+
+    Raises:
+        ContactError: If they are fewer than three, or on one line.
+    """
+    spread = corners - corners.mean(axis=0)
+    if np.linalg.matrix_rank(spread, tol=1e-6) < 2:
+        raise ContactError(
+            f"{corners.tolist()} span no surface; needs three points or more, not on "
+            "one line"
+        )
+    return corners
+
+
+class SurfaceContact(Contact, type="surface"):
+    """A flat part of a link rests on the plane: it neither moves nor turns.
 
     Forces act at its corners, so that the centre of pressure stays within the sole and
     the yaw moment is limited by friction. Separate limits on the centre of pressure and
     on the yaw moment let feet slide by centimetres.
 
-    Attributes:
-        points: The corners in the frame, shape (k, 3) [m].
+    It is a rectangle, given by ``length``, ``width`` and ``center``, or any polygon,
+    given by its ``corners``.
     """
 
-    rows = 6
+    rows: ClassVar[int] = 6
 
-    def __init__(
-        self,
-        robot: Robot,
-        frame: str,
-        *,
-        corners: Sequence[Sequence[float]] | Array,
-        **options: Any,
-    ) -> None:
-        """Create the contact.
+    _: KW_ONLY
+    length: Positive | None = None
+    """Length of a rectangular sole along the frame's x axis [m]."""
+    width: Positive | None = None
+    """Width of a rectangular sole along the frame's y axis [m]."""
+    center: Vector3 | None = None
+    """Centre of a rectangular sole in the frame, shape (3,) [m]; the frame's origin by
+    default."""
+    corners: Annotated[Points, AfterValidator(_surface)] | None = None
+    """Instead: at least three corners of the sole in the frame, shape (k, 3) [m]."""
 
-        Args:
-            robot: The robot.
-            frame: Name of the frame.
-            corners: At least three points of the sole, in the frame, shape (k, 3) [m].
-            options: The arguments that all contacts have: see `Contact`.
-
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-            ContactError: If the corners span no surface, or an argument is out of its
-                range.
-        """
-        points = np.array(corners, dtype=float)
-        flat = (
-            points.ndim == 2 and points.shape[1:] == (3,) and np.isfinite(points).all()
-        )
-        spread = points - points.mean(axis=0) if flat and len(points) >= 3 else None
-        if spread is None or np.linalg.matrix_rank(spread, tol=1e-6) < 2:
+    def __post_init__(self) -> None:
+        """Check that the sole is given in one way."""
+        sizes = [self.length is not None, self.width is not None]
+        if self.corners is not None and (any(sizes) or self.center is not None):
             raise ContactError(
-                f"contact at {frame!r}: corners {corners!r} span no surface; needs "
-                "three points or more, not on one line"
+                "give either length and width (and center) of the sole, or its "
+                "corners; not both"
             )
-        super().__init__(robot, frame, points, **options)
+        if self.corners is None and not all(sizes):
+            raise ContactError("give length and width of the sole, or its corners")
 
-    @classmethod
-    def rectangle(
-        cls,
-        robot: Robot,
-        frame: str,
-        *,
-        length: float,
-        width: float,
-        center: Sequence[float] = (0.0, 0.0, 0.0),
-        **options: Any,
-    ) -> "SurfaceContact":
-        """Return a rectangular sole.
-
-        Args:
-            robot: The robot.
-            frame: Name of the frame.
-            length: Length along the frame's x axis [m].
-            width: Width along the frame's y axis [m].
-            center: Centre of the rectangle in the frame [m].
-            options: The arguments that all contacts have: see `Contact`.
-        """
-        x, y = 0.5 * length, 0.5 * width
+    @cached_property
+    def points(self) -> Array:
+        """The corners in the frame, shape (k, 3) [m]."""
+        if self.corners is not None:
+            return np.asarray(self.corners)
+        assert self.length is not None
+        assert self.width is not None
+        x, y = 0.5 * self.length, 0.5 * self.width
         square = np.array([[x, y, 0.0], [x, -y, 0.0], [-x, y, 0.0], [-x, -y, 0.0]])
-        return cls(robot, frame, corners=square + np.array(center), **options)
+        center = np.zeros(3) if self.center is None else np.asarray(self.center)
+        return read_only(square + center)
 
     def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
         """Write the six rows of the frame: it neither moves nor turns."""

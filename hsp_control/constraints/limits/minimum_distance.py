@@ -1,10 +1,22 @@
 """Minimum distances, as bounds on the acceleration."""
 
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, replace
+from functools import cached_property
+from typing import Annotated, Self
+
 import numpy as np
+from pydantic import AfterValidator, Field, InstanceOf
+from pydantic.json_schema import SkipJsonSchema
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LimitError
-from hsp_control.geometry import Proximity
+from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import Name, Names, NonNegative
+from hsp_control.geometry.scene import Obstacle
+from hsp_control.geometry.start import Start
+from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClearance
 from hsp_control.robot import RobotState
 
 _STEP = 3e-4
@@ -15,28 +27,34 @@ _AHEAD = 0.5
 at its present rate."""
 
 
-class MinimumDistance:
+class MinimumDistance(Part, ABC, family="distances", error=LimitError):
     """The distances of some pairs of shapes stay above a minimum.
 
     With h = d - minimum, the rows require h'' + 2α h' + α² h ≥ 0 (an exponential
     control barrier function). h'' = ∇d·a + the drift of d' at constant velocity; the
     drift includes the motion of the obstacles and of the nearest points.
 
-    Attributes:
-        proximity: The pairs and their distances.
-        minimum: The minimum distance [m].
+    A subclass implements `clearance` and, if it refers to the scene, `placed`. `rows`
+    and `check_start` are for placed ones.
     """
 
-    def __init__(self, proximity: Proximity, minimum: float) -> None:
-        """Set the pairs and their minimum distance [m].
+    minimum: NonNegative
+    """The minimum distance [m]."""
+
+    @property
+    @abstractmethod
+    def clearance(self) -> Clearance:
+        """The field that knows the pairs of shapes."""
+
+    def placed(self, start: Start) -> Self:
+        """Return the distances with obstacles instead of their names, checked.
 
         Raises:
-            LimitError: If the minimum is negative or not finite.
+            SceneError: If the scene has no such obstacle.
+            FieldError: If there is no pair, or a link has no geometry.
         """
-        if not 0.0 <= minimum < np.inf:
-            raise LimitError(f"minimum distance is {minimum} m; must be at least 0")
-        self.proximity = proximity
-        self.minimum = float(minimum)
+        self.clearance.proximity(start.state)
+        return self
 
     def rows(self, state: RobotState, bandwidth: float) -> tuple[Array, Array]:
         """Return the rows A a ≥ b of the pairs that are close or approaching.
@@ -48,9 +66,10 @@ class MinimumDistance:
         Returns:
             A, shape (k, nv), and b, shape (k,).
         """
-        d = self.proximity.measure(state).copy()
-        ahead = self.proximity.measure(state.ahead(_STEP)).copy()
-        behind = self.proximity.measure(state.ahead(-_STEP)).copy()
+        proximity = self.clearance.proximity(state)
+        d = proximity.measure(state).copy()
+        ahead = proximity.measure(state.ahead(_STEP)).copy()
+        behind = proximity.measure(state.ahead(-_STEP)).copy()
         rate = (ahead - behind) / (2.0 * _STEP)
         drift = (ahead - 2.0 * d + behind) / _STEP**2
         h = d - self.minimum
@@ -59,7 +78,7 @@ class MinimumDistance:
         for row, k in enumerate(near):
             slopes = np.zeros(len(d))
             slopes[k] = 1.0
-            A[row] = self.proximity.gradient(state, slopes)
+            A[row] = proximity.gradient(state, slopes)
         b = -drift - 2.0 * bandwidth * rate - bandwidth**2 * h
         return A, b[near]
 
@@ -69,9 +88,51 @@ class MinimumDistance:
         Raises:
             LimitError: Names the nearest pair and its distance.
         """
-        distance, pair = self.proximity.nearest(state)
+        distance, pair = self.clearance.proximity(state).nearest(state)
         if distance < self.minimum:
             raise LimitError(
                 f"the start is outside the limits: {pair} are {distance:.4g} m apart, "
                 f"must be at least {self.minimum:g} m"
             )
+
+
+class ObstacleDistance(MinimumDistance, type="obstacles"):
+    """Minimum distance between links and obstacles."""
+
+    minimum: NonNegative = 0.02
+    """The minimum distance [m]."""
+    _: KW_ONLY
+    obstacles: (
+        Annotated[
+            Sequence[Name | SkipJsonSchema[InstanceOf[Obstacle]]],
+            Field(min_length=1),
+            AfterValidator(tuple),
+        ]
+        | None
+    ) = None
+    """Names of the obstacles; or, in Python, the obstacles themselves [-]; all of the
+    scene by default."""
+    links: Names | None = None
+    """Names of the links [-]; all moving links by default."""
+
+    @cached_property
+    def clearance(self) -> ObstacleClearance:
+        """The field that knows the pairs of shapes."""
+        return ObstacleClearance(obstacles=self.obstacles, links=self.links)
+
+    def placed(self, start: Start) -> Self:
+        """Return the distances, checked; see `MinimumDistance.placed`."""
+        obstacles = self.clearance.fitted(start).obstacles
+        return super(ObstacleDistance, replace(self, obstacles=obstacles)).placed(start)
+
+
+class SelfDistance(MinimumDistance, type="self"):
+    """Minimum distance between links."""
+
+    minimum: NonNegative = 0.01
+    """The minimum distance [m]."""
+
+    @cached_property
+    def clearance(self) -> SelfClearance:
+        """The field that knows the pairs of shapes."""
+        return SelfClearance()

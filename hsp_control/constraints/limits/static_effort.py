@@ -1,11 +1,12 @@
 """Limits on the effort against gravity, as bounds on the acceleration."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.common.exceptions import LimitError
-from hsp_control.robot import Robot, RobotState
+from hsp_control.robot import RobotState
 
 _STEP = 3e-4
 """Step of the differences along the motion [s]: rounding and truncation errors are
@@ -15,6 +16,7 @@ _AHEAD, _NEAR = 0.5, 0.5
 or within the time _AHEAD [s] at the present rate."""
 
 
+@dataclass(frozen=True, eq=False)
 class StaticEffort:
     """Gravity takes at most a part of every motor's effort.
 
@@ -24,36 +26,15 @@ class StaticEffort:
     h = share - |G_i|/effort_i, the rows require h'' + 2α h' + α² h ≥ 0 (an exponential
     control barrier function), with G_i'' = ∇G_i·a + the drift of G_i' at constant
     velocity.
+    Robots with mimic joints are not supported.
 
     Attributes:
-        effort: Maximum effort, shape (nv,) [N·m or N].
-        share: The part of it that gravity may take.
+        effort: Maximum effort, shape (nv,) [N·m or N]; inf where unlimited.
+        share: The part of it that gravity may take, in (0, 1].
     """
 
-    def __init__(self, robot: Robot, effort: Array, share: float) -> None:
-        """Set the limit.
-
-        Args:
-            robot: The robot.
-            effort: Maximum effort, shape (nv,) [N·m or N].
-            share: The part of it that gravity may take, in (0, 1].
-
-        Raises:
-            LimitError: If the share is not in (0, 1], or the robot has mimic joints.
-        """
-        if not 0.0 < share <= 1.0:
-            raise LimitError(
-                f"static_effort is {share}; must be a part of the effort: greater than "
-                "0, at most 1"
-            )
-        if robot.mimics:
-            raise LimitError(
-                f"static_effort does not support mimic joints; {robot.name} has some"
-            )
-        self.effort, self.share = effort, float(share)
-        self._model, self._data = robot.model, robot.model.createData()
-        self._motors = np.isfinite(effort)
-        self._motors[list(robot.unactuated)] = False
+    effort: Array
+    share: float
 
     def rows(
         self, state: RobotState, bandwidth: float, excluded: Indices
@@ -69,23 +50,24 @@ class StaticEffort:
         Returns:
             A, shape (k, nv), and b, shape (k,).
         """
-        slope = pin.computeGeneralizedGravityDerivatives(
-            self._model, self._data, state.q
-        )
-        G, ahead, behind = (self._gravity(state, step) for step in (0.0, _STEP, -_STEP))
+        robot, model = state.robot, state.robot.model
+        data = state.made(self, model.createData)
+        slope = pin.computeGeneralizedGravityDerivatives(model, data, state.q)
+
+        def gravity(dt: float) -> Array:
+            """Return G(q ⊕ v dt), shape (nv,)."""
+            q = pin.integrate(model, state.q, dt * state.v) if dt else state.q
+            return np.array(pin.computeGeneralizedGravity(model, data, q))
+
+        G, ahead, behind = gravity(0.0), gravity(_STEP), gravity(-_STEP)
         rate = slope @ state.v
         sign = np.where(G < 0.0, -1.0, 1.0)
         used, growth = sign * G / self.effort, sign * rate / self.effort
         soon = used + _AHEAD * np.maximum(growth, 0.0)
-        near = self._motors & (soon > _NEAR * self.share)
-        near[excluded] = False
+        near = np.isfinite(self.effort) & (soon > _NEAR * self.share)
+        near[[*robot.unactuated, *excluded]] = False
         i = np.flatnonzero(near)
         side = (sign / self.effort)[i]
         drift = side * (ahead - 2.0 * G + behind)[i] / _STEP**2
         b = drift + 2.0 * bandwidth * growth[i] - bandwidth**2 * (self.share - used[i])
         return -side[:, None] * slope[i], b
-
-    def _gravity(self, state: RobotState, dt: float) -> Array:
-        """Return G(q ⊕ v dt), shape (nv,)."""
-        q = pin.integrate(self._model, state.q, dt * state.v) if dt else state.q
-        return np.array(pin.computeGeneralizedGravity(self._model, self._data, q))

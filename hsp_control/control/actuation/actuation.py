@@ -28,8 +28,7 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.native import bind
-from hsp_control.constraints.contacts import Contact
-from hsp_control.constraints.limits import Limits
+from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import (
     EFFORT,
     MOTION,
@@ -41,6 +40,7 @@ from hsp_control.control.actuation.deviation_cost import deviation_cost, null_sp
 from hsp_control.control.actuation.qp import Rows, solve, stacked
 from hsp_control.control.actuation.status import EXACT, Status
 from hsp_control.control.actuation.support import Support
+from hsp_control.control.planned_contact import PlannedContact
 from hsp_control.law import Resolution
 from hsp_control.robot import Robot, RobotState
 
@@ -82,7 +82,7 @@ class Actuation:
     """
 
     def __init__(
-        self, robot: Robot, limits: Limits | None, base: Sequence[int] = ()
+        self, robot: Robot, limits: RobotLimits | None, base: Sequence[int] = ()
     ) -> None:
         """Allocate.
 
@@ -102,18 +102,18 @@ class Actuation:
         self._a_lower, self._a_upper = np.full(nv, -np.inf), np.full(nv, np.inf)
         self._tau_lower, self._tau_upper = np.full(nv, -np.inf), np.full(nv, np.inf)
         self._no_forces = np.zeros(0)
-        self._no_support = Support((), nv, self._weight)
+        self._no_support = Support((), robot, self._weight)
         self._check = IdentityCache(self._compile_check)
         self._only_box_limits = not self._floating and (
             limits is None or not (limits.distances or limits.static_effort)
         )
         self.forget()
 
-    def support(self, contacts: Sequence[Contact]) -> Support:
+    def support(self, contacts: Sequence[PlannedContact]) -> Support:
         """Return the forces that these contacts can exert; with no contacts, none."""
         if not contacts:
             return self._no_support
-        return Support(contacts, self._robot.nv, self._weight)
+        return Support(contacts, self._robot, self._weight)
 
     def applied(self, tau: Array, period: float) -> None:
         """Record the effort that is sent now, for the limit on the effort rate.
@@ -137,6 +137,14 @@ class Actuation:
             self._tau_lower[:] = -self.limits.effort
             self._tau_upper[:] = self.limits.effort
 
+    def memory(self) -> tuple[Array, Array]:
+        """Return a copy of the memory of the last effort."""
+        return self._tau_lower.copy(), self._tau_upper.copy()
+
+    def remember(self, memory: tuple[Array, Array]) -> None:
+        """Set the memory that `memory` returned."""
+        self._tau_lower[:], self._tau_upper[:] = memory
+
     def deliver(
         self,
         state: RobotState,
@@ -157,6 +165,8 @@ class Actuation:
         """
         wanted = state.inverse_dynamics(a)  # M a + N
         violated = self._violations(state, a)
+        if not violated and offset is None and self._only_box_limits:
+            return wanted, a, self._no_forces, EXACT, 0.0
         motion_ok, effort_ok = violated in (0, EFFORT), violated in (0, MOTION)
         if offset is not None:
             wanted = wanted + offset

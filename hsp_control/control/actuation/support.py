@@ -13,7 +13,8 @@ from hsp_control.control.actuation.contact_forces import (
     minimum_norm_forces,
     within_cones,
 )
-from hsp_control.robot import RobotState
+from hsp_control.control.planned_contact import PlannedContact
+from hsp_control.robot import Robot, RobotState
 
 _MAX_FORCE = 3.0
 """Maximum normal force at a point of a scheduled contact when fully active, in robot
@@ -37,16 +38,19 @@ class Support:
         inverse_cost: e, shape (size,): the closed form minimises Σ f²/e.
     """
 
-    def __init__(self, contacts: Sequence[Contact], nv: int, weight: float) -> None:
+    def __init__(
+        self, contacts: Sequence[PlannedContact], robot: Robot, weight: float
+    ) -> None:
         """Allocate for contacts of a robot.
 
         Args:
             contacts: The active contacts.
-            nv: The robot's degrees of freedom.
+            robot: The robot.
             weight: The robot's weight [N].
         """
-        self.contacts = tuple(contacts)
-        counts = [len(contact.points) for contact in contacts]
+        nv = robot.nv
+        self.contacts = tuple(each.contact for each in contacts)
+        counts = [len(contact.points) for contact in self.contacts]
         points = sum(counts)
         self.size = 3 * points
         self.map: Array = np.zeros((nv, self.size))
@@ -57,7 +61,7 @@ class Support:
         self.lower[2::3] = 0.0
         self.inverse_cost = np.ones(self.size)
         self._weight = weight
-        self.supporting_dofs = _supporting_dofs(contacts)
+        self.supporting_dofs = _supporting_dofs(robot, self.contacts)
         ends = np.cumsum([0, *counts])
         self.points = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         for contact, where in zip(self.contacts, self.points, strict=True):
@@ -69,25 +73,26 @@ class Support:
                     self.cone[4 * k + row, 3 * k + axis] = sign
                     self.cone[4 * k + row, 3 * k + 2] = side
 
-        self._parts: list[tuple[Contact, Array, Array, slice, Array]] = []
-        for contact, where in zip(self.contacts, self.points, strict=True):
+        self._parts: list[tuple[PlannedContact, Array, Array, slice, Array]] = []
+        for planned, where in zip(contacts, self.points, strict=True):
             columns = slice(3 * where.start, 3 * where.stop)
-            friction = contact.friction
+            friction = planned.contact.friction
             full = np.tile([friction**2, friction**2, 1.0], where.stop - where.start)
             self.inverse_cost[columns] = full
             positions, part = self.positions[where], self.map[:, columns]
-            self._parts.append((contact, positions, part, columns, full))
+            self._parts.append((planned, positions, part, columns, full))
         self._tau, self._forces = np.zeros(nv), np.zeros(self.size)
         self._scratch = IdentityCache(self._allocate)
 
     def update(self, state: RobotState) -> None:
         """Compute the map, the positions, and the bounds that the schedules set."""
-        for contact, positions, part, columns, full in self._parts:
+        for planned, positions, part, columns, full in self._parts:
+            contact = planned.contact
             frame = state.frame(contact.frame)
             arms, axes = contact.arms(frame), contact.axes
             force_map(frame.jacobian, frame.position, arms, axes, positions, part)
-            if not contact.schedule.constant or contact.schedule.ramp:
-                on = max(contact.schedule.weight(state.t), 1e-6)
+            if not planned.always:
+                on = max(planned.weight(state.t), 1e-6)
                 self.upper[columns][2::3] = on * _MAX_FORCE * self._weight
                 self.inverse_cost[columns] = on * full
 
@@ -130,12 +135,12 @@ class Support:
         return out
 
 
-def _supporting_dofs(contacts: Sequence[Contact]) -> Indices:
+def _supporting_dofs(robot: Robot, contacts: Sequence[Contact]) -> Indices:
     """Return the degrees of freedom between the root and a contact."""
     found: set[int] = set()
+    model = robot.model
     for contact in contacts:
-        model = contact.robot.model
-        joint = model.frames[contact.robot.frame_id(contact.frame)].parentJoint
+        joint = model.frames[robot.frame_id(contact.frame)].parentJoint
         for k in model.supports[joint]:
             start = model.joints[k].idx_v
             found.update(range(start, start + model.joints[k].nv))

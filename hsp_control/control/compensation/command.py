@@ -19,8 +19,9 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation.compensation import Compensation
-from hsp_control.control.controller import Controller, ControlOutput
+from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.output import ControlOutput
 from hsp_control.robot import RobotState
 
 
@@ -54,7 +55,7 @@ class Command:
         robot = controller.robot
         self.compensation.check(robot, controller.tasks, controller.limits)
         own = self.compensation
-        self.state = RobotState(robot)
+        self.state = controller.state
         self._measured = self.state if own.predictor is None else RobotState(robot)
         self._tau, self._zero = np.zeros(robot.nv), np.zeros(robot.nv)
         self._changes_state = (own.velocity_filter or own.predictor) is not None
@@ -79,7 +80,7 @@ class Command:
         if own.friction_feed_forward is not None:
             own.friction_feed_forward.restart(robot)
         if own.integral_action is not None:
-            own.integral_action.restart(self.controller.tasks)
+            own.integral_action.restart(self.controller)
         if own.effort_rate is not None:
             own.effort_rate.restart(robot)
         if own.start_up_ramp is not None:
@@ -207,9 +208,8 @@ class Command:
         return t + predictor.effort_delay * period, q, v
 
     def _law(self, state: RobotState) -> ControlOutput:
-        return self.controller.compute(
-            state, self._modify if self._changes_effort else None
-        )
+        modifier = self._modify if self._changes_effort else None
+        return self.controller.compute(state, modifier=modifier)
 
     def _modify(
         self, state: RobotState, active: ActiveStack, a: Array
@@ -249,7 +249,6 @@ class Command:
         saturated = output.damped or limited or clipped or starting
         errors: dict[str, Array | None] = {}
         for name, rows in controller.task_rows.items():
-            schedule = controller.schedules.get(name)
-            if schedule is None or schedule.weight(t) >= 1.0:
+            if controller.weight_of(name, t) >= 1.0:
                 errors[name] = output.task.error[rows]
         action.advance(errors, period, saturated)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.constraints.limits import Limits
+from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.compensation.effort_rate import EffortRateClip
 from hsp_control.control.compensation.friction_feed_forward import FrictionFeedForward
 from hsp_control.control.compensation.integral_action import IntegralAction
@@ -49,7 +49,7 @@ class Compensation:
         return tuple(f.name for f in fields(self) if getattr(self, f.name) is not None)
 
     def check(
-        self, robot: Robot, tasks: Sequence[Task], limits: Limits | None = None
+        self, robot: Robot, tasks: Sequence[Task], limits: RobotLimits | None = None
     ) -> None:
         """Check that the compensators fit a robot, its tasks and its limits.
 

@@ -9,7 +9,8 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, GainError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.control.compensation.checks import positive
-from hsp_control.tasks import AngularMomentum, Task
+from hsp_control.control.controller import Controller
+from hsp_control.tasks import Task
 from hsp_control.tasks.gains import as_gain, as_matrix
 
 
@@ -85,10 +86,10 @@ class IntegralAction:
                 what = f"ki of task {task.name!r}"
                 Ki = as_matrix(as_gain(self.ki[task.name], what), task.rows, what)
             elif self.rate is not None:
-                Ki = self.rate * task.Kp
+                Ki = self.rate * task.feedback().Kp
             else:
                 continue
-            if isinstance(task, AngularMomentum):
+            if task.order == 1:
                 raise CompensationError(
                     f"integral_action: task {task.name!r} has a first-order error "
                     "equation; list the other tasks in tasks"
@@ -97,12 +98,16 @@ class IntegralAction:
             gains[task.name] = Ki
         return gains
 
-    def restart(self, tasks: Sequence[Task]) -> None:
-        """Set all integrals to zero."""
-        self._gains = self.gains(tasks)
-        self._tasks = [task for task in tasks if task.name in self._gains]
+    def restart(self, controller: Controller) -> None:
+        """Set all integrals to zero.
+
+        Args:
+            controller: The controller, in whose feedback the action is written.
+        """
+        self._gains = self.gains(controller.tasks)
+        self._feedback = {name: controller.feedback(name) for name in self._gains}
         self.integrals: dict[str, Array] = {
-            task.name: np.zeros(task.rows) for task in self._tasks
+            name: np.zeros(len(Ki)) for name, Ki in self._gains.items()
         }
 
     def advance(
@@ -115,33 +120,32 @@ class IntegralAction:
             period: The period [s].
             saturated: Whether the law was not delivered exactly.
         """
-        for task in self._tasks:
-            integral, e = self.integrals[task.name], errors.get(task.name)
+        for name, feedback in self._feedback.items():
+            integral, e = self.integrals[name], errors.get(name)
             if e is None:
                 continue
             grows = e * integral >= 0.0 if saturated else False
             integral += np.where(grows, 0.0, e) * period
-            action = self._gains[task.name] @ integral
+            action = self._gains[name] @ integral
             largest = float(np.abs(action).max(initial=0.0))
             if largest > self.limit:
                 integral *= self.limit / largest
                 action *= self.limit / largest
-            task.offset[:] = action
+            feedback.offset[:] = action
 
 
 def _check_decay(task: Task, Ki: Array) -> None:
     m = task.rows
+    Kp, Kv, _ = task.feedback()
     zero, one = np.zeros((m, m)), np.eye(m)
-    companion = np.block(
-        [[zero, one, zero], [zero, zero, one], [-Ki, -task.Kp, -task.Kv]]
-    )
+    companion = np.block([[zero, one, zero], [zero, zero, one], [-Ki, -Kp, -Kv]])
     slowest = float(np.linalg.eigvals(companion).real.max())
     if slowest >= 0.0:
         # For each row separately (Routh): Ki < Kv Kp.
-        bound = float((np.diag(task.Kv) * np.diag(task.Kp)).min())
+        bound = float((np.diag(Kv) * np.diag(Kp)).min())
         raise GainError(
             f"integral action of task {task.name!r} does not decay: e'' + Kv e' + "
             f"Kp e + Ki ∫e = 0 has a mode with real part {slowest:.3g} 1/s; Ki must be "
             f"below Kv Kp = {bound:.4g} 1/s³ (a rate below Kv = "
-            f"{np.diag(task.Kv).min():.4g} 1/s)"
+            f"{np.diag(Kv).min():.4g} 1/s)"
         )

@@ -21,7 +21,6 @@ from hsp_control.control.controller import Controller
 from hsp_control.null_space.fields import FieldSample
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks import AngularMomentum
 
 RULE = 0.2
 """Recommended maximum of K_N h, and of ω0 h without delay: up to it the loop is close
@@ -132,17 +131,16 @@ def _task_findings(
     integral = {} if action is None else action.gains(controller.tasks)
     found = []
     for task in controller.tasks:
-        zero = np.zeros_like(task.Kp)
+        Kp, Kv, _ = controller.feedback(task.name)
+        zero = np.zeros_like(Kp)
         Ki = integral.get(task.name, zero)
-        if isinstance(task, AngularMomentum):  # of first order: only a rate
-            loop = LinearLoop(
-                zero, task.rate * np.eye(task.rows), zero, period, *delays
-            )
-            label = f"K of task {task.name!r}", task.rate
+        if task.order == 1:  # e' + K e = 0 with K in the place of Kp
+            loop = LinearLoop(zero, Kp.copy(), zero, period, *delays)
+            label = f"K of task {task.name!r}", float(np.diag(Kp).max())
             path: tuple[str, ...] = ("tasks", task.name)
         else:
-            loop = LinearLoop(task.Kp, task.Kv, Ki, period, *delays)
-            frequency = float(np.sqrt(np.abs(np.linalg.eigvals(task.Kp)).max()))
+            loop = LinearLoop(Kp.copy(), Kv.copy(), Ki, period, *delays)
+            frequency = float(np.sqrt(np.abs(np.linalg.eigvals(Kp)).max()))
             label = f"ω0 of task {task.name!r}", frequency
             path = ("tasks", task.name, "gains")
         delayed = delays[0] + delays[1] > 0 and delays[2].predictor is None

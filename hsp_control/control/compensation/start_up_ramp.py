@@ -50,7 +50,7 @@ class StartUpRamp:
     def begin(self, state: RobotState) -> None:
         """Store the first state; later states have no effect."""
         if self._schedule is None:
-            self._schedule = Schedule([(state.t, np.inf)], ramp=self.duration)
+            self._schedule = Schedule([(state.t, None)], ramp=self.duration)
             self._q0 = state.q.copy()
 
     def weight(self, t: float) -> float:

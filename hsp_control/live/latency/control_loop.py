@@ -3,7 +3,6 @@
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.controller import Controller
-from hsp_control.robot import RobotState
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation.plants import (
     ContinuousPlant,
@@ -55,7 +54,6 @@ class ControlLoop:
                 f"{type(plant).__name__} is neither a continuous nor a sampled plant"
             )
         self._plant = plant
-        self._state = RobotState(controller.robot)
         self._start = q0.copy(), v0.copy()
         self.period = period
         self.restart()
@@ -67,14 +65,11 @@ class ControlLoop:
         self.q, self.v = (part.copy() for part in self._start)
         self._plant.reset(self.t, self.q, self.v)
         self._controller.restart()
-        self.tau = self._controller.compute(
-            self._state.update(self.t, self.q, self.v)
-        ).tau
+        self.control()
 
     def control(self) -> None:
         """Update the state and compute the effort: a user's period without its I/O."""
-        state = self._state.update(self.t, self.q, self.v)
-        self.tau = self._controller.compute(state).tau
+        self.tau = self._controller.compute(self.t, self.q, self.v).tau
 
     def move(self) -> None:
         """Apply the effort to the plant for a period."""

@@ -2,22 +2,26 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
-from functools import cached_property
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.identity_cache import IdentityCache, without_caches
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.null_space.fields.cost import Cost, descend
 from hsp_control.null_space.fields.field import FieldSample
 from hsp_control.null_space.metrics import MetricSample
-from hsp_control.robot import Robot, RobotState
+from hsp_control.robot import RobotState
 
 Derivatives = Callable[[], float]
 """A call that reads a state, writes ∇f and (∇f)', and returns f."""
+
+
+class _Own(NamedTuple):
+    gradient: Array
+    rate: Array
+    derivatives: Derivatives
 
 
 class CompiledCost(Cost):
@@ -25,11 +29,6 @@ class CompiledCost(Cost):
 
     `value`, `gradient` and `gradient_rate` follow from it and are exact.
     """
-
-    def __init__(self, robot: Robot, name: str) -> None:
-        """Set the robot, and the name of the field in the log."""
-        super().__init__(robot, name)
-        self._own = np.zeros(robot.nv), np.zeros(robot.nv)
 
     @abstractmethod
     def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
@@ -51,33 +50,31 @@ class CompiledCost(Cost):
 
     def value(self, state: RobotState) -> float:
         """Return f."""
-        return float(self._own_derivatives.get(state)())
+        return float(self._own(state).derivatives())
 
     def gradient(self, state: RobotState) -> Array:
         """Return ∇f, exact, shape (nv,)."""
-        self._own_derivatives.get(state)()
-        return self._own[0].copy()
+        own = self._own(state)
+        own.derivatives()
+        return own.gradient.copy()
 
     def gradient_rate(self, state: RobotState) -> Array:
         """Return (∇f)', exact, shape (nv,)."""
-        self._own_derivatives.get(state)()
-        return self._own[1].copy()
+        own = self._own(state)
+        own.derivatives()
+        return own.rate.copy()
 
     def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
         """Write ∇f and (∇f)'; see `Cost.differentiate`."""
-        self._derivatives.get(state, gradient, rate)()
+        own = self._own(state)
+        own.derivatives()
+        gradient[:], rate[:] = own.gradient, own.rate
 
-    @cached_property
-    def _own_derivatives(self) -> IdentityCache[Derivatives]:
-        return IdentityCache(self._compile_own)
+    def _own(self, state: RobotState) -> _Own:
+        """Return the call that writes into memory of its own."""
 
-    @cached_property
-    def _derivatives(self) -> IdentityCache[Derivatives]:
-        return IdentityCache(self._compile)
+        def make() -> _Own:
+            gradient, rate = np.zeros((2, state.robot.nv))
+            return _Own(gradient, rate, self._compile(state, gradient, rate))
 
-    def __getstate__(self) -> dict[str, Any]:
-        return without_caches(self)
-
-    def _compile_own(self, state: RobotState) -> Derivatives:
-        """Return the call that writes into the cost's own arrays."""
-        return self._compile(state, *self._own)
+        return state.made(self, make)

@@ -2,21 +2,22 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
-from functools import cached_property
+from dataclasses import KW_ONLY
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
+from hsp_control.common.step_plan import StepPlan
 from hsp_control.null_space.differences import gradient, rate_along_flow
 from hsp_control.null_space.fields.field import FieldSample, NullSpaceField
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.null_space.metrics.metric import VARYING, raise_covector
-from hsp_control.robot import Robot, RobotState
+from hsp_control.robot import RobotState
 
 
 class Cost(NullSpaceField):
@@ -25,8 +26,20 @@ class Cost(NullSpaceField):
     While the end effector is at rest, q converges to a local minimum of f under the
     constraint of the task, with any metric (Proposition 3).
 
-    A subclass calls ``super().__init__(robot, name)`` and implements `value`. It may
-    override these methods, which by default use differences (error about 1e-9):
+    A subclass declares its parameters as fields and implements `value`::
+
+        class ElbowHeight(hsp.Cost, type="elbow_height"):
+            \"\"\"The elbow stays at a height.\"\"\"
+
+            frame: str
+            \"\"\"Name of the elbow's frame.\"\"\"
+            height: Number
+            \"\"\"The height [m].\"\"\"
+
+            def value(self, state: RobotState) -> float:
+                return (state.position(self.frame)[2] - self.height) ** 2
+
+    It may override these methods, which by default use differences (error about 1e-9):
 
     * `gradient` returns ∇f in the tangent space, shape (nv,).
     * `gradient_rate` returns (∇f)' = ∇²f v + ∂∇f/∂t, shape (nv,).
@@ -74,8 +87,9 @@ class Cost(NullSpaceField):
         Raises:
             FieldError: If either is not numeric or does not have shape (nv,).
         """
-        gradient[:] = self._tangent(self.gradient(state), "gradient")
-        rate[:] = self._tangent(self.gradient_rate(state), "gradient rate")
+        nv = state.robot.nv
+        gradient[:] = self._tangent(self.gradient(state), "gradient", nv)
+        rate[:] = self._tangent(self.gradient_rate(state), "gradient rate", nv)
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -85,62 +99,58 @@ class Cost(NullSpaceField):
         Raises:
             FieldError: If the gradient or its rate is not nv finite numbers.
         """
+        self._evaluate(state, lambda: descend(metric.L, metric.W_dot, form, *out), out)
+        return out
+
+    def compile(
+        self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
+    ) -> StepPlan:
+        """Return the step plan; see `NullSpaceField.compile`."""
+        descent = bind(descend, metric.L, metric.W_dot, form, *out)
+        return StepPlan(write=(partial(self._evaluate, state, descent, out),))
+
+    def _evaluate(
+        self, state: RobotState, descent: Callable[[], bool], out: FieldSample
+    ) -> None:
         self.differentiate(state, out.g, out.g_dot)
-        if not self._descent.get(metric, form, out)():
+        if not descent():
             raise FieldError(
                 f"cost {self.name!r} has the gradient {self.gradient(state)!r} and the "
                 f"gradient rate {self.gradient_rate(state)!r} at t = {state.t:.6g} s; "
                 "needs finite numbers"
             )
-        return out
 
-    @cached_property
-    def _descent(self) -> IdentityCache[Callable[[], bool]]:
-        """The call that turns (∇f, (∇f)') into (g, g'), in place."""
-        return IdentityCache(_compile_descent)
-
-    def _tangent(self, value: Array, what: str) -> Array:
+    def _tangent(self, value: Array, what: str, nv: int) -> Array:
         try:
             array = np.asarray(value, dtype=float)
         except (TypeError, ValueError):
             raise FieldError(
                 f"cost {self.name!r} has the {what} {value!r}; needs numbers"
             ) from None
-        if array.shape != (self.robot.nv,):
+        if array.shape != (nv,):
             raise FieldError(
                 f"cost {self.name!r} has a {what} of shape {array.shape}; "
-                f"needs ({self.robot.nv},): the tangent space, not the configuration"
+                f"needs ({nv},): the tangent space, not the configuration"
             )
         return array
 
 
 class FunctionCost(Cost):
-    """f = function(state): a cost given as a Python function."""
+    """f = function(state): a cost given as a Python function.
 
-    def __init__(
-        self,
-        robot: Robot,
-        function: Callable[[RobotState], float],
-        *,
-        gradient: Callable[[RobotState], Array] | None = None,
-        gradient_rate: Callable[[RobotState], Array] | None = None,
-        name: str = "function",
-    ) -> None:
-        """Set the cost.
+    YAML cannot say it: declare a subclass of `Cost` for that.
+    """
 
-        Args:
-            robot: The robot.
-            function: f of a state, one number; it may use q, t and frames, but not v.
-            gradient: ∇f of a state in the tangent space, shape (nv,); None: by
-                differences.
-            gradient_rate: (∇f)' = ∇²f v + ∂∇f/∂t of a state, shape (nv,); None: by
-                differences.
-            name: Name of the field in the log.
-        """
-        super().__init__(robot, name)
-        self._function = function
-        self._gradient = gradient
-        self._gradient_rate = gradient_rate
+    function: Callable[[RobotState], float]
+    """f of a state, one number [rad²/s, m²/s]; it may use q, t and frames, but not
+    v."""
+    _: KW_ONLY
+    gradient_function: Callable[[RobotState], Array] | None = None
+    """∇f of a state in the tangent space, shape (nv,) [rad/s, m/s]; by differences by
+    default."""
+    rate_function: Callable[[RobotState], Array] | None = None
+    """(∇f)' = ∇²f v + ∂∇f/∂t of a state, shape (nv,) [rad/s², m/s²]; by differences by
+    default."""
 
     def value(self, state: RobotState) -> float:
         """Return f.
@@ -148,7 +158,7 @@ class FunctionCost(Cost):
         Raises:
             FieldError: If the function does not return one finite number.
         """
-        value = self._function(state)
+        value = self.function(state)
         try:
             number = float(value)
         except (TypeError, ValueError):
@@ -162,21 +172,15 @@ class FunctionCost(Cost):
 
     def gradient(self, state: RobotState) -> Array:
         """Return ∇f from the given function, or by differences."""
-        if self._gradient is None:
+        if self.gradient_function is None:
             return super().gradient(state)
-        return self._gradient(state)
+        return self.gradient_function(state)
 
     def gradient_rate(self, state: RobotState) -> Array:
         """Return (∇f)' from the given function, or by differences along the flow."""
-        if self._gradient_rate is None:
+        if self.rate_function is None:
             return super().gradient_rate(state)
-        return self._gradient_rate(state)
-
-
-def _compile_descent(
-    metric: MetricSample, form: int, out: FieldSample
-) -> Callable[[], bool]:
-    return bind(descend, metric.L, metric.W_dot, form, *out)
+        return self.rate_function(state)
 
 
 @kernel

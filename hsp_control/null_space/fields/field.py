@@ -1,22 +1,28 @@
 """The abstract null-space field, and weighted sums of fields."""
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from functools import cached_property, partial
+from dataclasses import KW_ONLY, replace
+from functools import partial
 from numbers import Real
-from typing import Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
+from pydantic import AfterValidator, InstanceOf
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.common.identity_cache import IdentityCache, without_caches
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
-from hsp_control.null_space.fields.weight import Product, Weight, as_weight
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.quantities import NonNegative
+from hsp_control.geometry.start import Start
+from hsp_control.null_space.fields.in_python import OrInstance
+from hsp_control.null_space.fields.weight import Ramp, Weight, product, sample_weight
 from hsp_control.null_space.metrics import MetricSample
-from hsp_control.robot import Robot, RobotState
+from hsp_control.robot import RobotState
 
 
 class FieldSample(NamedTuple):
@@ -36,7 +42,7 @@ class FieldSample(NamedTuple):
         return cls(np.zeros(nv), np.zeros(nv))
 
 
-class NullSpaceField(ABC):
+class NullSpaceField(Part, ABC, family="fields", error=FieldError):
     """g(q, t): a desired joint velocity, of which the null space keeps P g.
 
     The null-space velocity converges exponentially to P g (Proposition 2). g is in the
@@ -44,26 +50,56 @@ class NullSpaceField(ABC):
     ``2.0 * centering + obstacle``.
 
     Most fields derive from `Cost` (g = -W⁻¹∇f) or from `VectorField` (g as given). A
-    direct subclass calls ``super().__init__`` and implements two methods:
+    direct subclass declares its parameters as fields (see `Part`) and implements two
+    methods:
 
     * `evaluate` writes g and its exact total time derivative g'.
     * `value` returns one number to plot.
 
     It may override `compile` to make a step faster (by default the step plan calls
-    `evaluate` at every step), and `minimum_distance` if the field measures distances.
+    `evaluate` at every step), `placed` if it refers to the start, to obstacles or to
+    frames, and `minimum_distance` if it measures distances. A field has no memory: what
+    a computation needs is kept by the state (see `RobotState.made`).
+
+    All methods are about the field without its weight. The sum applies the weight.
 
     Attributes:
-        robot: The robot.
-        name: Name of the field in the log.
         controls: False only for `Uncontrolled`, which sets φ_N = 0.
     """
 
-    controls: bool = True
+    controls: ClassVar[bool] = True
 
-    def __init__(self, robot: Robot, name: str) -> None:
-        """Set the robot, and the name of the field in the log."""
-        self.robot = robot
-        self.name = name
+    _: KW_ONLY
+    weight: Annotated[float | Weight, OrInstance(NonNegative | Ramp, Weight)] = 1.0
+    """Weight of the field in the sum [-]: a number, or a ramp in time."""
+    name: str = ""
+    """Name of the field in the log [-]; its type by default."""
+
+    def _complete(self) -> None:
+        if not self.name:
+            self._set_default("name", self._default_name())
+
+    def _default_name(self) -> str:
+        words = re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", type(self).__name__).lower()
+        return self.yaml_type or words
+
+    def changed_fields(self) -> dict[str, Any]:
+        """Return the fields that are not their defaults, by name."""
+        changed = super().changed_fields()
+        if self.name == self._default_name():
+            changed.pop("name", None)
+        return changed
+
+    def placed(self, start: Start) -> Self:
+        """Return the field for a robot and a start, checked.
+
+        What is relative to the start, and what is omitted because the robot knows it,
+        is replaced by numbers and names. By default nothing is.
+
+        Raises:
+            HspControlError: If the field does not fit the robot or the scene.
+        """
+        return self
 
     def __init_subclass__(cls, **arguments: Any) -> None:
         """Reset `compile` if a subclass overrides `evaluate` only.
@@ -109,105 +145,120 @@ class NullSpaceField(ABC):
         """Return the minimum distance that the field measures [m], or None."""
         return None
 
-    def __add__(self, other: "NullSpaceField") -> "WeightedSum":
+    def __add__(self, other: "NullSpaceField") -> "FieldSum":
         if not isinstance(other, NullSpaceField):
             return NotImplemented
-        return WeightedSum([(1.0, self), (1.0, other)])
+        return FieldSum((*terms_of(self), *terms_of(other)))
 
-    def __rmul__(self, weight: Weight | float) -> "WeightedSum":
-        if not isinstance(weight, Real | Weight):
+    def __rmul__(self, factor: Weight | float) -> Self:
+        if not isinstance(factor, Real | Weight):
             return NotImplemented
-        return WeightedSum([(weight, self)])
+        return replace(self, weight=product(factor, self.weight))
 
 
-class WeightedSum(NullSpaceField):
-    """g = Σ w_k g_k, g' = Σ (w_k g_k' + w_k' g_k); a sum of sums is flattened.
+class FieldSum(NullSpaceField):
+    """g = Σ w_k g_k, g' = Σ (w_k g_k' + w_k' g_k).
 
-    Attributes:
-        terms: The (weight, field) pairs.
-        samples: The weighted sample of each term at the last step.
+    A sum of sums is flattened, and a weight of the sum goes to its terms.
     """
 
-    def __init__(self, terms: Sequence[tuple[Weight | float, NullSpaceField]]) -> None:
-        """Add fields of one robot.
+    terms: Annotated[Sequence[InstanceOf[NullSpaceField]], AfterValidator(tuple)]
+    """The fields, each with its weight [-]."""
+    _: KW_ONLY
+    name: str = ""
+    """Name of the field in the log [-]; the names of its terms by default."""
 
-        Args:
-            terms: (weight, field) pairs; a weight is a number ≥ 0 or a `Weight`.
-
-        Raises:
-            FieldError: If there is no term, a weight is negative or not finite, a term
-                is `Uncontrolled`, or the fields belong to different robots.
-        """
-        if not terms:
+    def __post_init__(self) -> None:
+        """Check the terms."""
+        if not self.terms:
             raise FieldError("a sum of fields needs at least one term")
-        flat: list[tuple[Weight, NullSpaceField]] = []
-        for weight, field in terms:
-            try:
-                flat.extend(_flatten(as_weight(weight), field))
-            except FieldError as error:
-                raise FieldError(f"field {field.name!r}: {error}") from error
-        robot = flat[0][1].robot
-        if not all(field.controls for _, field in flat):
+        if not all(term.controls for term in self.terms):
             raise FieldError("an uncontrolled null space cannot be part of a sum")
-        if any(field.robot is not robot for _, field in flat):
-            raise FieldError("the fields of a sum belong to different robots")
-        super().__init__(robot, " + ".join(field.name for _, field in flat))
-        self.terms: tuple[tuple[Weight, NullSpaceField], ...] = tuple(flat)
-        self.samples = tuple(FieldSample.allocate(robot.nv) for _ in flat)
+
+    def _complete(self) -> None:
+        terms = tuple(flat for term in self.terms for flat in terms_of(term))
+        if self.weight != 1.0:
+            terms = tuple(self.weight * term for term in terms)
+        self._set_default("terms", terms)
+        self._set_default("weight", 1.0)
+        super()._complete()
+
+    def _default_name(self) -> str:
+        return " + ".join(term.name for term in self.terms)
+
+    def placed(self, start: Start) -> Self:
+        """Return the sum of the placed fields; see `NullSpaceField.placed`."""
+        placed = []
+        for k, term in enumerate(self.terms):
+            with within(k):
+                placed.append(term.placed(start))
+        return replace(self, terms=tuple(placed))
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
         """Write the weighted sums of g and g'; see `NullSpaceField.evaluate`."""
-        for weight, field, sample, weights, add in self._compiled.get(out):
-            field.evaluate(state, metric, form, sample)
-            weights[:] = weight.sample(state)
-            add()
+        sample = FieldSample.allocate(state.robot.nv)
+        for k, term in enumerate(self.terms):
+            term.evaluate(state, metric, form, sample)
+            weights = np.array(sample_weight(term.weight, state))
+            bind(_add, k == 0, weights, *sample, *out)()
         return out
 
     def compile(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> StepPlan:
         """Return the step plan; see `NullSpaceField.compile`."""
+        return self.compile_terms(
+            state, metric, form, out, self.allocate_terms(state.robot.nv)
+        )
+
+    def allocate_terms(self, nv: int) -> tuple[FieldSample, ...]:
+        """Return a sample of zeros for each term."""
+        return tuple(FieldSample.allocate(nv) for _ in self.terms)
+
+    def compile_terms(
+        self,
+        state: RobotState,
+        metric: MetricSample,
+        form: int,
+        out: FieldSample,
+        samples: Sequence[FieldSample],
+    ) -> StepPlan:
+        """Return the step plan, which also writes the weighted sample of each term.
+
+        Args:
+            state: See `NullSpaceField.compile`; so are the next three.
+            metric: The metric's sample.
+            form: The metric's form.
+            out: The sample of the sum.
+            samples: The samples of the terms, as `allocate_terms` returns them.
+        """
         follow: list[Callable[[float], object]] = []
         write: list[Callable[[], object]] = []
-        for weight, field, sample, weights, add in self._compile(out):
-            term = field.compile(state, metric, form, sample)
-            follow += term.follow
-            write += term.write
-            if weight.constant:
-                weights[:] = weight.sample(state)
-            else:
-                write.append(partial(_update, weight, state, weights))
-            write.append(add)
-        return StepPlan(tuple(follow), tuple(write))
-
-    def _compile(self, out: FieldSample) -> "list[_Term]":
-        terms = []
-        for k, ((weight, field), sample) in enumerate(
-            zip(self.terms, self.samples, strict=True)
-        ):
+        for k, (term, sample) in enumerate(zip(self.terms, samples, strict=True)):
+            plan = term.compile(state, metric, form, sample)
+            follow += plan.follow
+            write += plan.write
             weights = np.zeros(2)
-            add = bind(_add, k == 0, weights, *sample, *out)
-            terms.append((weight, field, sample, weights, add))
-        return terms
-
-    @cached_property
-    def _compiled(self) -> "IdentityCache[list[_Term]]":
-        return IdentityCache(self._compile)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return without_caches(self)
+            if isinstance(term.weight, Weight) and not term.weight.constant:
+                write.append(partial(_update, term.weight, state, weights))
+            else:
+                weights[:] = sample_weight(term.weight, state)
+            write.append(bind(_add, k == 0, weights, *sample, *out))
+        return StepPlan(tuple(follow), tuple(write))
 
     def value(self, state: RobotState) -> float:
         """Return Σ w_k value_k."""
         return sum(
-            weight.sample(state)[0] * field.value(state) for weight, field in self.terms
+            sample_weight(term.weight, state)[0] * term.value(state)
+            for term in self.terms
         )
 
 
-_Term = tuple[Weight, NullSpaceField, FieldSample, Array, Callable[[], object]]
-"""A weight, its field, the field's sample, (w, w'), and a call that adds to the sum."""
+def terms_of(field: NullSpaceField) -> tuple[NullSpaceField, ...]:
+    """Return the terms of a sum, or the field itself as the only one."""
+    return tuple(field.terms) if isinstance(field, FieldSum) else (field,)
 
 
 def _update(weight: Weight, state: RobotState, weights: Array) -> None:
@@ -230,11 +281,3 @@ def _add(
         g[i] *= w
         sum_g[i] = g[i] if first else sum_g[i] + g[i]
         sum_g_dot[i] = g_dot[i] if first else sum_g_dot[i] + g_dot[i]
-
-
-def _flatten(
-    weight: Weight, field: NullSpaceField
-) -> list[tuple[Weight, NullSpaceField]]:
-    if not isinstance(field, WeightedSum):
-        return [(weight, field)]
-    return [(Product(weight, inner), term) for inner, term in field.terms]

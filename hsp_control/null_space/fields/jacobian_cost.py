@@ -17,20 +17,34 @@ because J' is known exactly.
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from dataclasses import KW_ONLY, replace
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
+from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import CallSequence
+from hsp_control.declaration import within
+from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
 from hsp_control.robot import Robot, RobotState
 
 Rows = Literal["position", "orientation", "pose"]
-_ROWS = {"position": "xyz", "orientation": "rpq", "pose": "xyzrpq"}
+
+
+def _axes(letters: str) -> str:
+    """Return the letters of world axes.
+
+    Raises:
+        ValueError: If they are not distinct letters of "xyz", at least one.
+    """
+    if not letters or len(set(letters)) < len(letters) or set(letters) - set("xyz"):
+        raise ValueError(f"{letters!r} must be distinct letters of x, y and z")
+    return letters
 
 
 class JacobianTerms(NamedTuple):
@@ -50,68 +64,58 @@ class JacobianTerms(NamedTuple):
 class JacobianCost(CompiledCost):
     """f = φ(J) of k rows of a frame's Jacobian, in world axes at the frame's origin.
 
-    A subclass calls ``super().__init__`` and implements `terms`, which returns φ, ∂φ/∂J
-    and the rate of ∂φ/∂J. Value, gradient and gradient rate follow exactly. If one
-    kernel computes the terms, derive from `CompiledJacobianCost` instead.
-
-    Attributes:
-        frame: Name of the frame.
-        rows: The rows: ``position``, ``orientation`` or ``pose``.
+    A subclass implements `terms`, which returns φ, ∂φ/∂J and the rate of ∂φ/∂J. Value,
+    gradient and gradient rate follow exactly. If one kernel computes the terms, derive
+    from `CompiledJacobianCost` instead. The rows are those of the position, unless the
+    subclass declares fields ``rows`` and ``length``, with defaults.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        frame: str,
-        *,
-        rows: Rows = "position",
-        axes: str = "xyz",
-        length: float = 1.0,
-        name: str,
-    ) -> None:
-        """Select the rows.
+    frame: str | None = None
+    """Name of the frame [-]; the robot's end effector by default."""
+    _: KW_ONLY
+    axes: Annotated[str, AfterValidator(_axes)] = "xyz"
+    """World axes of the position rows of the Jacobian, such as ``xy`` for a planar arm
+    [-]; the rows are always in the order x, y, z."""
 
-        Args:
-            robot: The robot.
-            frame: Name of the frame.
-            rows: ``position``, ``orientation`` or ``pose``.
-            axes: World axes of the position rows, for example ``"xy"`` for a planar
-                arm. The rows are always in the order x, y, z.
-            length: Characteristic length > 0 [m/rad] that scales the orientation rows
-                of a ``pose``.
-            name: Name of the field in the log.
+    @property
+    def rows(self) -> Rows:
+        """Which rows of the Jacobian count."""
+        return "position"
+
+    @property
+    def length(self) -> float:
+        """Length by which the orientation rows of a ``pose`` are multiplied [m]."""
+        return 1.0
+
+    def placed(self, start: Start) -> Self:
+        """Return the cost with the name of its frame, checked.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
-            FieldError: If rows, axes or length are wrong, there are more rows than
-                degrees of freedom that move the frame, or a mimic joint moves it.
+            FieldError: If there are more rows than degrees of freedom that move the
+                frame, or a mimic joint moves it.
         """
-        super().__init__(robot, name)
-        robot.frame_id(frame)
-        if rows not in _ROWS:
+        robot = start.state.robot
+        frame = self._frame(robot)
+        with within("frame"):
+            dofs, _ = _chain(robot, frame)
+        selected = self._selected()
+        if len(selected) > len(dofs):
             raise FieldError(
-                f"field {name!r}: unknown rows {rows!r}; choose one of {list(_ROWS)}"
+                f"{len(selected)} rows of frame {frame!r}, which only {len(dofs)} "
+                "degrees of freedom move; these rows are singular everywhere"
             )
-        if not axes or set(axes) - set("xyz") or len(set(axes)) < len(axes):
-            raise FieldError(
-                f"field {name!r}: axes {axes!r} must be distinct letters of x, y and z"
-            )
-        if not 0.0 < length < np.inf:
-            raise FieldError(f"field {name!r}: length {length} must be positive")
-        kept = [i for i, axis in enumerate("xyz") if axis in axes]
-        if rows != "position":
-            kept = (kept if rows == "pose" else []) + [3, 4, 5]
-        self.frame = frame
-        self.rows = rows
-        self._selected: Indices = np.array(kept, dtype=np.int64)
-        self._scale = np.where(self._selected < 3, 1.0, length if rows == "pose" else 1)
-        self._dofs, self._first = _chain(robot, frame)
-        if len(kept) > len(self._dofs):
-            raise FieldError(
-                f"field {name!r}: {len(kept)} rows of frame {frame!r}, which only "
-                f"{len(self._dofs)} degrees of freedom move; these rows are singular "
-                "everywhere"
-            )
+        return self if self.frame is not None else replace(self, frame=frame)
+
+    def _frame(self, robot: Robot) -> str:
+        return robot.end_effector if self.frame is None else self.frame
+
+    def _selected(self) -> Indices:
+        """Return the indices of the rows that count, shape (k,)."""
+        kept = [i for i, axis in enumerate("xyz") if axis in self.axes]
+        if self.rows != "position":
+            kept = (kept if self.rows == "pose" else []) + [3, 4, 5]
+        return np.array(kept, dtype=np.int64)
 
     @abstractmethod
     def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
@@ -134,9 +138,12 @@ class JacobianCost(CompiledCost):
         return write
 
     def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
-        frame, nv = state.frame(self.frame), self.robot.nv
-        J, J_dot, slope, slope_rate = np.zeros((4, len(self._selected), nv))
-        rows = self._selected, self._scale
+        frame, nv = state.frame(self._frame(state.robot)), state.robot.nv
+        dofs, first = _chain(state.robot, self._frame(state.robot))
+        selected = self._selected()
+        length = self.length if self.rows == "pose" else 1.0
+        rows = selected, np.where(selected < 3, 1.0, length)
+        J, J_dot, slope, slope_rate = np.zeros((4, len(selected), nv))
         select = bind(_select, frame.jacobian, frame.jacobian_dot, *rows, J, J_dot)
         terms = self._compile_terms(J, J_dot, slope, slope_rate)
         raise_slope = bind(
@@ -147,9 +154,9 @@ class JacobianCost(CompiledCost):
             slope_rate,
             *rows,
             np.zeros((2, 6, nv)),
-            self._dofs,
-            self._first,
-            np.zeros((4, len(self._dofs) + 1, 3)),
+            dofs,
+            first,
+            np.zeros((4, len(dofs) + 1, 3)),
             gradient,
             rate,
         )
@@ -163,12 +170,15 @@ class CompiledJacobianCost(JacobianCost):
     """
 
     @abstractmethod
-    def _kernel(self) -> tuple[Callable[..., float], tuple[Any, ...]]:
+    def _kernel(self, nv: int) -> tuple[Callable[..., float], tuple[Any, ...]]:
         """Return the kernel and its first arguments.
 
         The further arguments are J, J', ∂φ/∂J and its rate, shape (k, nv) each, and a
         scratch array of shape (8, k, nv). The kernel writes ∂φ/∂J and its rate, and
         returns φ.
+
+        Args:
+            nv: Number of degrees of freedom of the robot.
         """
 
     def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
@@ -180,7 +190,7 @@ class CompiledJacobianCost(JacobianCost):
     def _compile_terms(
         self, J: Array, J_dot: Array, slope: Array, slope_rate: Array
     ) -> Derivatives:
-        function, parameters = self._kernel()
+        function, parameters = self._kernel(J.shape[1])
         scratch = np.zeros((8, *J.shape))
         return bind(function, *parameters, J, J_dot, slope, slope_rate, scratch)
 

@@ -1,59 +1,62 @@
 """The cost of joints far from the middle of their range."""
 
-from typing import Any
+from dataclasses import KW_ONLY
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Weights
+from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
 from hsp_control.robot import Robot, RobotState
 
 
-class JointCentering(CompiledCost):
+class JointCentering(CompiledCost, type="joint_centering"):
     """f = ½ Σ w_i ((q_i - m_i)/r_i)², m_i the middle and r_i half of the range.
 
     Joints without limits, continuous joints and a floating root do not count. After
     Liégeois (1977), equation (11), scaled such that (q_i - m_i)/r_i is ±1 at a limit.
     """
 
-    def __init__(
-        self, robot: Robot, *, weights: Any = 1.0, name: str = "joint_centering"
-    ) -> None:
-        """Set the cost.
+    _: KW_ONLY
+    weights: Weights = 1.0
+    """w_i of the joints [1/s], one number or nv."""
 
-        Args:
-            robot: The robot.
-            weights: w_i ≥ 0, one number or one per degree of freedom, shape (nv,).
-            name: Name of the field in the log.
+    def placed(self, start: Start) -> Self:
+        """Return the cost, checked.
 
         Raises:
-            FieldError: If a weight is negative or not finite, or no joint has limits.
+            FieldError: If the weights do not fit the robot, or no joint has limits.
         """
-        super().__init__(robot, name)
-        w = check_weights(weights, robot.nv, name)
-        lower, upper = robot.position_limits()
-        self._limited = limited_joints(robot)
-        if not self._limited.size:
+        robot = start.state.robot
+        with within("weights"):
+            per_dof(self.weights, robot.nv)
+        if not limited_joints(robot).size:
             raise FieldError(
-                f"field {name!r}: no joint of {robot.name} has limits, so no range has "
-                "a middle; use a target posture instead"
+                f"no joint of {robot.name} has limits, so no range has a middle; use a "
+                "target posture instead"
             )
-        dofs = self._limited[:, 0]
-        low, high = lower[dofs], upper[dofs]
-        self._middle = 0.5 * (low + high)
-        self._stiffness = w[dofs] / (0.5 * (high - low)) ** 2
+        return self
 
     def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        robot = state.robot
+        limited, (lower, upper) = limited_joints(robot), robot.position_limits()
+        dofs = limited[:, 0]
+        low, high = lower[dofs], upper[dofs]
+        stiffness = per_dof(self.weights, robot.nv)[dofs] / (0.5 * (high - low)) ** 2
         return bind(
             _centering,
             state.q,
             state.v,
-            self._limited,
-            self._middle,
-            self._stiffness,
+            limited,
+            0.5 * (low + high),
+            stiffness,
             gradient,
             rate,
         )
@@ -89,22 +92,15 @@ def _centering(
     return f
 
 
-def check_weights(weights: Any, size: int, name: str) -> Array:
-    """Return weights as an array of shape (size,).
+def per_dof(weights: ArrayLike, nv: int) -> Array:
+    """Return weights of the joints as an array of shape (nv,).
 
     Raises:
-        FieldError: If they have another size, or one is negative or not finite.
+        FieldError: If they are neither one number nor nv.
     """
     array = np.array(weights, dtype=float)
     if array.ndim == 0:
-        array = np.full(size, float(array))
-    if array.shape != (size,):
-        raise FieldError(
-            f"field {name!r}: weights have shape {array.shape}; "
-            f"needs one number or {size}"
-        )
-    if not ((array >= 0.0) & np.isfinite(array)).all():
-        raise FieldError(
-            f"field {name!r}: weights {array.tolist()} must be finite and at least 0"
-        )
+        return np.full(nv, float(array))
+    if array.shape != (nv,):
+        raise FieldError(f"weights have shape {array.shape}; needs one number or {nv}")
     return array

@@ -1,18 +1,24 @@
 """The cost of joints near their limits, zero in the middle of the range."""
 
-from typing import Any
+from dataclasses import KW_ONLY
+from typing import Annotated, Self
+
+from pydantic import Field
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Positive, Weights
+from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.barrier import barrier_at
 from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
-from hsp_control.null_space.fields.joint_centering import check_weights, limited_joints
-from hsp_control.robot import Robot, RobotState
+from hsp_control.null_space.fields.joint_centering import limited_joints, per_dof
+from hsp_control.robot import RobotState
 
 
-class LimitBarrier(CompiledCost):
+class LimitBarrier(CompiledCost, type="limit_barrier"):
     """f = Σ w_i (b((q_i - lower_i)/u_i) + b((upper_i - q_i)/u_i)).
 
     u_i is ``zone`` times half the range, and b the function `barrier_at`: a joint adds
@@ -20,51 +26,40 @@ class LimitBarrier(CompiledCost):
     joints and a floating root do not count.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        *,
-        zone: float = 0.3,
-        weights: Any = 1.0,
-        name: str = "limit_barrier",
-    ) -> None:
-        """Set the cost.
+    zone: Annotated[Positive, Field(le=1.0)] = 0.3
+    """Width of the zone before a limit, as a fraction of half the range, at most 1
+    [-]."""
+    _: KW_ONLY
+    weights: Weights = 1.0
+    """w_i of the joints [1/s], one number or nv."""
 
-        Args:
-            robot: The robot.
-            zone: Distance from a limit at which the cost begins, as a fraction of half
-                the range, within (0, 1].
-            weights: w_i ≥ 0, one number or one per degree of freedom, shape (nv,).
-            name: Name of the field in the log.
+    def placed(self, start: Start) -> Self:
+        """Return the cost, checked; see `NullSpaceField.placed`.
 
         Raises:
-            FieldError: If the zone is out of range, a weight is negative or not finite,
-                or no joint has limits.
+            FieldError: If the weights do not fit the robot, or no joint has limits.
         """
-        super().__init__(robot, name)
-        if not 0.0 < zone <= 1.0:
-            raise FieldError(f"field {name!r}: zone {zone} must be within (0, 1]")
-        w = check_weights(weights, robot.nv, name)
-        lower, upper = robot.position_limits()
-        self._limited = limited_joints(robot)
-        if not self._limited.size:
-            raise FieldError(f"field {name!r}: no joint of {robot.name} has limits")
-        dofs = self._limited[:, 0]
-        self._weights = w[dofs]
-        self._lower, self._upper = lower[dofs], upper[dofs]
-        # u_i, the width of the zone: the barrier begins at a distance of 1 unit.
-        self._unit = 0.5 * zone * (self._upper - self._lower)
+        robot = start.state.robot
+        with within("weights"):
+            per_dof(self.weights, robot.nv)
+        if not limited_joints(robot).size:
+            raise FieldError(f"no joint of {robot.name} has limits")
+        return self
 
     def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        robot = state.robot
+        limited, (low, high) = limited_joints(robot), robot.position_limits()
+        dofs = limited[:, 0]
+        lower, upper = low[dofs], high[dofs]
         return bind(
             _limit_barrier,
             state.q,
             state.v,
-            self._limited,
-            self._lower,
-            self._upper,
-            self._unit,
-            self._weights,
+            limited,
+            lower,
+            upper,
+            0.5 * self.zone * (upper - lower),  # u_i
+            per_dof(self.weights, robot.nv)[dofs],
             gradient,
             rate,
         )

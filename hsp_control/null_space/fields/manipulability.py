@@ -1,8 +1,9 @@
 """Yoshikawa's manipulability of a frame, as a cost."""
 
 from collections.abc import Callable
+from dataclasses import KW_ONLY
 from math import exp, log
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -10,69 +11,60 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import cholesky, gram, multiply_transposed, solve_columns
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Matrix, Positive
+from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.jacobian_cost import CompiledJacobianCost, Rows
-from hsp_control.robot import Robot
-
-Form = Literal["determinant", "root", "log"]
 
 FLOOR = 1e-6
 """Its square is added to the squared singular values, so that all slopes are finite."""
 
 
-class Manipulability(CompiledJacobianCost):
+class Manipulability(CompiledJacobianCost, type="manipulability"):
     """f = -det(G), -√det(G) or -½ log det(G), with G = J W⁻¹ Jᵀ of a frame's rows.
 
     Yoshikawa (1985) maximises √det(J Jᵀ). Towards a singularity the slope of the
     logarithm grows, and the slope of the determinant vanishes. W is a constant metric.
-
-    Attributes:
-        form: ``determinant``, ``root`` or ``log``.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        frame: str,
-        *,
-        form: Form = "root",
-        rows: Rows = "position",
-        axes: str = "xyz",
-        length: float = 1.0,
-        metric: Any = None,
-        name: str = "manipulability",
-    ) -> None:
-        """Set the cost.
+    _: KW_ONLY
+    form: Literal["determinant", "root", "log"] = "root"
+    """Function of det(G) [-]: the determinant itself, its square root, or its
+    logarithm."""
+    rows: Rows = "position"
+    """Rows of the Jacobian [-]."""
+    length: Positive = 1.0
+    """Length that is equivalent to one radian [m], for rows of metres and radians."""
+    metric: Matrix | None = None
+    """W, symmetric and positive definite, shape (nv, nv) [-]; the identity by
+    default."""
 
-        Args:
-            robot: The robot.
-            frame: Name of the frame.
-            form: ``determinant``, ``root`` or ``log``.
-            rows: ``position``, ``orientation`` or ``pose``.
-            axes: World axes of the position rows.
-            length: Characteristic length [m/rad] that scales the orientation rows of a
-                ``pose``.
-            metric: A constant metric W, shape (nv, nv); None: the identity.
-            name: Name of the field in the log.
+    def __post_init__(self) -> None:
+        """Check the metric."""
+        if self.metric is None:
+            return
+        W = np.asarray(self.metric)
+        if W.shape[0] != W.shape[1] or not np.allclose(W, W.T):
+            raise FieldError(f"metric has shape {W.shape}; needs (nv, nv), symmetric")
+        if np.linalg.eigvalsh(W)[0] <= 0.0:
+            raise FieldError("metric is not positive definite")
 
-        Raises:
-            FieldError: If the form is unknown, W is not symmetric and positive
-                definite, or an argument does not fit; see `JacobianCost`.
-            FrameNotFoundError: If the robot has no such frame.
-        """
-        super().__init__(robot, frame, rows=rows, axes=axes, length=length, name=name)
-        if form not in ("determinant", "root", "log"):
-            raise FieldError(
-                f"field {name!r}: form {form!r}; choose determinant, root or log"
-            )
-        self.form = form
-        self._weighted = metric is not None
-        self._W_inv = _inverse(metric, robot.nv) if self._weighted else np.eye(robot.nv)
+    def placed(self, start: Start) -> Self:
+        """Return the cost with the name of its frame; see `JacobianCost.placed`."""
+        nv = start.state.robot.nv
+        if self.metric is not None and len(np.asarray(self.metric)) != nv:
+            with within("metric"):
+                shape = np.shape(self.metric)
+                raise FieldError(f"metric has shape {shape}; needs ({nv}, {nv})")
+        return super().placed(start)
+
+    def _kernel(self, nv: int) -> tuple[Callable[..., float], tuple[Any, ...]]:
+        weighted = self.metric is not None
+        W_inv = np.linalg.inv(np.array(self.metric)) if weighted else np.eye(nv)
         # Larger if the entries of W are small: it must exceed the rounding error of G.
-        self._floor = FLOOR**2 * max(1.0, 0.1 * float(np.trace(self._W_inv)) / robot.nv)
-
-    def _kernel(self) -> tuple[Callable[..., float], tuple[Any, ...]]:
+        floor = FLOOR**2 * max(1.0, 0.1 * float(np.trace(W_inv)) / nv)
         power = {"log": 0, "root": 1, "determinant": 2}[self.form]
-        return _manipulability, (self._W_inv, self._weighted, self._floor, power)
+        return _manipulability, (np.asarray(W_inv), weighted, floor, power)
 
 
 @kernel
@@ -128,12 +120,3 @@ def _manipulability(
             slope_rate[i, j] = outer * slope_rate[i, j] + outer_rate * slope[i, j]
             slope[i, j] *= outer
     return value
-
-
-def _inverse(metric: Any, nv: int) -> Array:
-    W = np.asarray(metric, dtype=float)
-    if W.shape != (nv, nv) or not np.allclose(W, W.T):
-        raise FieldError(f"metric has shape {W.shape}; needs ({nv}, {nv}), symmetric")
-    if np.linalg.eigvalsh(W)[0] <= 0.0:
-        raise FieldError("metric is not positive definite")
-    return np.asarray(np.linalg.inv(W))

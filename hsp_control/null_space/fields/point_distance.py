@@ -1,75 +1,68 @@
 """The paper's obstacle cost: the distance of frames from an obstacle's centre."""
 
-from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated, Self
 
 import numpy as np
+from pydantic import Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Name, Names
 from hsp_control.geometry.scene import Obstacle
+from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
-from hsp_control.robot import Robot, RobotState
+from hsp_control.null_space.fields.in_python import OrInstance
+from hsp_control.robot import RobotState
 from hsp_control.trajectories import TrajectorySample
 
 
-class PointDistance(CompiledCost):
-    """f = weight · Σ 1/d_k², d_k from the origin of frame k to the obstacle's centre.
+class PointDistance(CompiledCost, type="point_distance"):
+    """f = Σ 1/d_k² [m²/s], d_k from the origin of frame k to the obstacle's centre.
 
     The paper's fourth simulation uses joints two and three of the planar arm and a
     moving disk. (∇f)' contains the motion of the centre.
-
-    Attributes:
-        frames: Names of the frames.
-        obstacle: The obstacle.
-        weight: The weight [m²/s].
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        frames: Sequence[str],
-        obstacle: Obstacle,
-        *,
-        weight: float = 1.0,
-        name: str = "point_distance",
-    ) -> None:
-        """Set the cost.
+    frames: Annotated[Names, Field(min_length=1)]
+    """Names of the frames that move away from the obstacle [-]."""
+    obstacle: Annotated[str | Obstacle, OrInstance(Name, Obstacle)]
+    """Name of the obstacle in the scene, of which only the centre counts [-]; or, in
+    Python, the obstacle itself."""
 
-        Args:
-            robot: The robot.
-            frames: Names of the frames that move away from the obstacle.
-            obstacle: The obstacle, of which only the centre counts.
-            weight: Weight ≥ 0 [m²/s].
-            name: Name of the field in the log.
+    def placed(self, start: Start) -> Self:
+        """Return the cost with its obstacle from the scene, checked.
 
         Raises:
             FrameNotFoundError: If a frame does not exist.
-            FieldError: If there is no frame, or the weight is negative or not finite.
+            SceneError: If the scene has no such obstacle.
         """
-        super().__init__(robot, name)
-        if not frames:
-            raise FieldError(f"field {name!r} needs at least one frame")
-        if not 0.0 <= weight < np.inf:
-            raise FieldError(f"field {name!r}: weight {weight} must be at least 0")
-        for frame in frames:
-            robot.frame_id(frame)
-        self.frames = tuple(frames)
-        self.obstacle = obstacle
-        self.weight = float(weight)
-        self._center = TrajectorySample.allocate(3)
+        for k, frame in enumerate(self.frames):
+            with within("frames", k):
+                start.state.robot.frame_id(frame)
+        if isinstance(self.obstacle, Obstacle):
+            return self
+        with within("obstacle"):
+            return replace(self, obstacle=start.scene[self.obstacle])
+
+    @property
+    def _placed_obstacle(self) -> Obstacle:
+        assert isinstance(self.obstacle, Obstacle), "the field is not placed"
+        return self.obstacle
 
     def minimum_distance(self, state: RobotState) -> float:
         """Return the minimum distance from a frame to the obstacle's centre [m]."""
-        c = self.obstacle.center.sample(state.t, self._center).position
+        c = self._placed_obstacle.center.sample(state.t).position
         return min(
             float(np.linalg.norm(state.position(frame) - c)) for frame in self.frames
         )
 
     def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
-        center = TrajectorySample.allocate(3)
-        follow = self.obstacle.center.follow(center)
+        obstacle, center = self._placed_obstacle, TrajectorySample.allocate(3)
+        follow = obstacle.center.follow(center)
         pushes = []
         for name in self.frames:
             frame = state.frame(name)
@@ -81,7 +74,6 @@ class PointDistance(CompiledCost):
                 frame.velocity,
                 center.position,
                 center.velocity,
-                self.weight,
                 gradient,
                 rate,
             )
@@ -98,9 +90,9 @@ class PointDistance(CompiledCost):
                 if square < 1e-24:  # a distance of 1e-12 m
                     raise FieldError(
                         f"field {self.name!r}: frame {name!r} is at the centre of "
-                        f"obstacle {self.obstacle.name!r}, where the cost is infinite"
+                        f"obstacle {obstacle.name!r}, where the cost is infinite"
                     )
-                total += self.weight / square
+                total += 1.0 / square
             return total
 
         return derivatives
@@ -114,14 +106,13 @@ def _push(
     velocity: Array,
     center: Array,
     center_velocity: Array,
-    weight: float,
     gradient: Array,
     rate: Array,
 ) -> float:
     """Add the terms of one frame to ∇f and (∇f)', and return d².
 
     With r from the centre to the frame and r' = J v - c' the terms are
-    -2 weight Jᵀr/d⁴ and -2 weight (J'ᵀr + Jᵀr' - 4 (r·r'/d²) Jᵀr)/d⁴.
+    -2 Jᵀr/d⁴ and -2 (J'ᵀr + Jᵀr' - 4 (r·r'/d²) Jᵀr)/d⁴.
     """
     square = nearing = 0.0
     for a in range(3):
@@ -130,7 +121,7 @@ def _push(
         nearing += r * r_dot
     if square == 0.0:
         return square
-    scale = -2.0 * weight / (square * square)
+    scale = -2.0 / (square * square)
     for i in range(gradient.shape[0]):
         for a in range(3):
             r, r_dot = position[a] - center[a], velocity[a] - center_velocity[a]

@@ -1,17 +1,13 @@
-"""Fields without a goal: self-motion comes to rest, or is not controlled."""
+"""The field of rest: self-motion stops."""
 
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.null_space.fields.field import FieldSample, NullSpaceField
 from hsp_control.null_space.metrics import MetricSample
-from hsp_control.robot import Robot, RobotState
+from hsp_control.robot import RobotState
 
 
-class Rest(NullSpaceField):
+class Rest(NullSpaceField, type="rest"):
     """g = 0: self-motion comes to rest. The paper's second simulation."""
-
-    def __init__(self, robot: Robot, name: str = "rest") -> None:
-        """Set the robot, and the name of the field in the log."""
-        super().__init__(robot, name)
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -31,17 +27,3 @@ class Rest(NullSpaceField):
     def value(self, state: RobotState) -> float:
         """Return 0."""
         return 0.0
-
-
-class Uncontrolled(Rest):
-    """φ_N = 0: self-motion is not controlled. The paper's first simulation.
-
-    Only for demonstration. The task is tracked, but nothing damps the self-motion, and
-    the joints drift away while the task error shows nothing.
-    """
-
-    controls = False
-
-    def __init__(self, robot: Robot, name: str = "uncontrolled") -> None:
-        """Set the robot, and the name of the field in the log."""
-        super().__init__(robot, name)

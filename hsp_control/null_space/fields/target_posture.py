@@ -1,65 +1,87 @@
 """The cost of joints far from a target posture."""
 
+from dataclasses import KW_ONLY, replace
 from math import cos, sin
-from typing import Any
+from typing import Literal, Self
+
+import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Vector, Weights
+from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
-from hsp_control.null_space.fields.joint_centering import check_weights
-from hsp_control.robot import Robot, RobotState
+from hsp_control.null_space.fields.joint_centering import per_dof
+from hsp_control.robot import RobotState
 from hsp_control.robot.configuration_space import joint_displacements
 
 
-class TargetPosture(CompiledCost):
+class TargetPosture(CompiledCost, type="target_posture"):
     """f = Σ w_i ½d_i², d = q ⊖ target; Σ w_i (1 - cos d_i) for continuous joints.
 
     The two forms differ by terms of fourth order. The second is smooth at all angles,
     whereas ½d² has a kink at an angle of π from the target. Joints with several degrees
     of freedom, such as a floating root, do not count: use a task for them.
-
-    Attributes:
-        target: The posture, shape (nq,).
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        target: Any,
-        *,
-        weights: Any = 1.0,
-        name: str = "target_posture",
-    ) -> None:
-        """Set the cost.
+    target: Literal["start", "home"] | Vector | None = None
+    """Joint positions, shape (nv,) [rad or m], or ``start`` or ``home``; ``start`` by
+    default."""
+    _: KW_ONLY
+    configuration: Vector | None = None
+    """Instead of a target: a configuration q, shape (nq,) [rad, m or -]."""
+    weights: Weights = 1.0
+    """w_i of the joints [1/s], one number or nv."""
 
-        Args:
-            robot: The robot.
-            target: Configuration, shape (nq,).
-            weights: w_i ≥ 0 [1/s], one number or one per degree of freedom, shape
-                (nv,).
-            name: Name of the field in the log.
+    def __post_init__(self) -> None:
+        """Check that there is one posture."""
+        if self.target is not None and self.configuration is not None:
+            raise FieldError("give a target or a configuration, not both")
+
+    def _complete(self) -> None:
+        if self.target is None and self.configuration is None:
+            self._set_default("target", "start")
+        super()._complete()
+
+    def placed(self, start: Start) -> Self:
+        """Return the cost with its posture as a configuration, checked.
 
         Raises:
-            FieldError: If a weight is negative or not finite, or every weight of a
-                joint with one degree of freedom is 0.
-            ShapeError: If the target has the wrong shape.
+            FieldError: If the weights do not fit the robot, or every weight of a joint
+                with one degree of freedom is 0.
+            HspControlError: If the posture does not fit the robot.
         """
-        super().__init__(robot, name)
-        self.target = robot.check_configuration(target).copy()
-        self._weights = check_weights(weights, robot.nv, name)
-        if not self._weights[robot.single_dof_joints[:, 0]].any():
-            raise FieldError(f"field {name!r}: every weight is 0")
+        robot = start.state.robot
+        with within("weights"):
+            weights = per_dof(self.weights, robot.nv)
+            if not weights[robot.single_dof_joints[:, 0]].any():
+                raise FieldError("every weight is 0")
+        given = "target" if self.configuration is None else "configuration"
+        with within(given):
+            q = self._configuration(start.state)
+        return replace(self, target=None, configuration=q)
+
+    def _configuration(self, start: RobotState) -> Array:
+        robot = start.robot
+        if self.configuration is not None:
+            return robot.check_configuration(self.configuration)
+        if isinstance(self.target, str):
+            return start.q if self.target == "start" else robot.home()
+        positions = robot.check_tangent(self.target, "the list of joint positions")
+        return robot.integrate(robot.neutral(), positions)
 
     def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
+        robot = state.robot
         return bind(
             _posture,
             state.q,
             state.v,
-            self.target,
-            self.robot.single_dof_joints,
-            self._weights,
+            np.array(self.configuration),
+            robot.single_dof_joints,
+            per_dof(self.weights, robot.nv),
             gradient,
             rate,
         )

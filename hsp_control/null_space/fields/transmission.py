@@ -1,6 +1,7 @@
 """Directional manipulability: velocity or force of a frame along one direction."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import KW_ONLY
 from math import sqrt
 from typing import Any, Literal
 
@@ -17,63 +18,46 @@ from hsp_control.common.linalg import (
     solve_lower,
     solve_lower_transposed,
 )
+from hsp_control.declaration.quantities import Vector
 from hsp_control.null_space.fields.jacobian_cost import CompiledJacobianCost
 from hsp_control.null_space.fields.manipulability import FLOOR
-from hsp_control.robot import Robot
 
 
-class Transmission(CompiledJacobianCost):
+class Transmission(CompiledJacobianCost, type="transmission"):
     """f = -(uᵀG⁻¹u)^(-1/2) for velocity, -(uᵀGu)^(-1/2) for force, G = J Jᵀ.
 
     -f is the transmission ratio along the world direction u, the radius of the
     manipulability ellipsoid in that direction (Chiu 1988): the velocity or force of the
     frame for joint velocities or efforts of norm 1.
-
-    Attributes:
-        kind: ``velocity`` or ``force``.
-        direction: u of length 1, one number per axis in the order x, y, z.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        frame: str,
-        direction: Sequence[float],
-        *,
-        kind: Literal["velocity", "force"] = "velocity",
-        axes: str = "xyz",
-        name: str = "transmission",
-    ) -> None:
-        """Set the cost.
+    _: KW_ONLY
+    direction: Vector
+    """The direction, of any length but zero [-]: one number for each letter of
+    ``axes``, in the same order."""
+    kind: Literal["velocity", "force"] = "velocity"
+    """Transmission of velocity (fast motion) or of force (large force) [-]."""
 
-        Args:
-            robot: The robot.
-            frame: Name of the frame.
-            direction: u in world axes, of any length but zero, one number per letter of
-                ``axes``, in the same order.
-            kind: ``velocity`` or ``force``.
-            axes: World axes of the position rows.
-            name: Name of the field in the log.
-
-        Raises:
-            FieldError: If the direction has another size, is zero or not finite, the
-                kind is unknown, or an argument does not fit; see `JacobianCost`.
-            FrameNotFoundError: If the robot has no such frame.
-        """
-        super().__init__(robot, frame, rows="position", axes=axes, name=name)
-        u = np.asarray(direction, dtype=float)
-        if u.shape != (len(axes),) or not 0.0 < np.linalg.norm(u) < np.inf:
+    def __post_init__(self) -> None:
+        """Check the direction."""
+        given = np.asarray(self.direction)
+        with np.errstate(over="ignore"):
+            length = np.linalg.norm(given)
+        if len(given) != len(self.axes) or not 0.0 < length < np.inf:
             raise FieldError(
-                f"field {name!r}: direction {list(direction)} needs {len(axes)} "
-                "finite numbers, not all zero"
+                f"direction {given.tolist()} needs {len(self.axes)} numbers, one for "
+                f"each of the axes {self.axes!r}, of a length that is not 0 or infinite"
             )
-        if kind not in ("velocity", "force"):
-            raise FieldError(f"field {name!r}: kind {kind!r}; choose velocity or force")
-        self.kind = kind
-        self.direction: Array = u[np.argsort(list(axes))] / np.linalg.norm(u)
 
-    def _kernel(self) -> tuple[Callable[..., float], tuple[Any, ...]]:
-        return _transmission, (self.direction, self.kind == "force", FLOOR**2)
+    @property
+    def unit_direction(self) -> Array:
+        """u, the direction of length 1 in the order x, y, z, shape (k,)."""
+        given = np.asarray(self.direction)
+        unit: Array = given[np.argsort(list(self.axes))] / np.linalg.norm(given)
+        return unit
+
+    def _kernel(self, nv: int) -> tuple[Callable[..., float], tuple[Any, ...]]:
+        return _transmission, (self.unit_direction, self.kind == "force", FLOOR**2)
 
 
 @kernel

@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
+from dataclasses import KW_ONLY
 
 import numpy as np
 
@@ -10,15 +11,15 @@ from hsp_control.common.exceptions import FieldError
 from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.null_space.fields.field import FieldSample, NullSpaceField
 from hsp_control.null_space.metrics import MetricSample
-from hsp_control.robot import Robot, RobotState
+from hsp_control.robot import RobotState
 
 
 class VectorField(NullSpaceField):
     """g(q, t) = vector(state): a field that does not depend on a metric.
 
-    A subclass calls ``super().__init__(robot, name)`` and implements `vector`. It may
-    override `rate`, which by default uses differences along the flow (error about
-    1e-9), and `value`.
+    A subclass declares its parameters as fields (see `Part`) and implements `vector`.
+    It may override `rate`, which by default uses differences along the flow (error
+    about 1e-9), and `value`.
     """
 
     @abstractmethod
@@ -37,20 +38,20 @@ class VectorField(NullSpaceField):
         Raises:
             FieldError: If either is not an array of nv finite numbers.
         """
-        out.g[:] = self._tangent(self.vector(state), "g", state.t)
-        out.g_dot[:] = self._tangent(self.rate(state), "g'", state.t)
+        out.g[:] = self._tangent(self.vector(state), "g", state)
+        out.g_dot[:] = self._tangent(self.rate(state), "g'", state)
         return out
 
-    def _tangent(self, value: Array, what: str, t: float) -> Array:
-        nv = self.robot.nv
+    def _tangent(self, value: Array, what: str, state: RobotState) -> Array:
+        nv = state.robot.nv
         try:
             array = np.asarray(value, dtype=float)
         except (TypeError, ValueError):
             array = np.empty(0)
         if array.shape != (nv,) or not np.isfinite(array).all():
             raise FieldError(
-                f"field {self.name!r} returned {what} = {value!r} at t = {t:.6g} s; "
-                f"needs {nv} finite numbers"
+                f"field {self.name!r} returned {what} = {value!r} at t = "
+                f"{state.t:.6g} s; needs {nv} finite numbers"
             )
         return array
 
@@ -60,33 +61,24 @@ class VectorField(NullSpaceField):
 
 
 class FunctionField(VectorField):
-    """g = function(state): a vector field given as a Python function."""
+    """g = function(state): a vector field given as a Python function.
 
-    def __init__(
-        self,
-        robot: Robot,
-        function: Callable[[RobotState], Array],
-        *,
-        rate: Callable[[RobotState], Array] | None = None,
-        name: str = "function",
-    ) -> None:
-        """Set the field.
+    YAML cannot say it: declare a subclass of `VectorField` for that.
+    """
 
-        Args:
-            robot: The robot.
-            function: g of a state, shape (nv,) [rad/s, m/s]; it may use q, t and
-                frames, but not v.
-            rate: g' = ∂g/∂q·v + ∂g/∂t of a state, shape (nv,); None: by differences.
-            name: Name of the field in the log.
-        """
-        super().__init__(robot, name)
-        self._function = function
-        self._rate = rate
+    function: Callable[[RobotState], Array]
+    """g of a state, shape (nv,) [rad/s, m/s]; it may use q, t and frames, but not v."""
+    _: KW_ONLY
+    rate_function: Callable[[RobotState], Array] | None = None
+    """g' = ∂g/∂q·v + ∂g/∂t of a state, shape (nv,) [rad/s², m/s²]; by differences by
+    default."""
 
     def vector(self, state: RobotState) -> Array:
         """Return g."""
-        return self._function(state)
+        return self.function(state)
 
     def rate(self, state: RobotState) -> Array:
         """Return g' from the given function, or by differences along the flow."""
-        return super().rate(state) if self._rate is None else self._rate(state)
+        if self.rate_function is None:
+            return super().rate(state)
+        return self.rate_function(state)

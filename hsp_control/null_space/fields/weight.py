@@ -2,25 +2,29 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import KW_ONLY, replace
 
 import numpy as np
+from pydantic import InstanceOf
 
 from hsp_control.common.exceptions import FieldError
+from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import NonNegative, Number, Positive
 from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.robot import RobotState
 
 
-class Weight(ABC):
+class Weight(Part, ABC, error=FieldError):
     """w(q, t) ≥ 0: a weight of a field, continuous together with its rate w'.
 
     A subclass implements `sample`. If w never changes, it may set `constant` to True:
     a step plan then calls `sample` only once.
-
-    Attributes:
-        constant: Whether w never changes.
     """
 
-    constant: bool = False
+    @property
+    def constant(self) -> bool:
+        """Whether w never changes."""
+        return False
 
     @abstractmethod
     def sample(self, state: RobotState) -> tuple[float, float]:
@@ -28,21 +32,15 @@ class Weight(ABC):
 
 
 class ConstantWeight(Weight):
-    """w = value, w' = 0.
+    """w = value, w' = 0."""
 
-    Attributes:
-        value: w ≥ 0.
-    """
+    value: NonNegative
+    """w [-]."""
 
-    constant = True
-
-    def __init__(self, value: float) -> None:
-        """Set w.
-
-        Raises:
-            FieldError: If it is negative or not finite.
-        """
-        self.value = _non_negative(value)
+    @property
+    def constant(self) -> bool:
+        """True."""
+        return True
 
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w and 0; see `Weight.sample`."""
@@ -53,36 +51,17 @@ class Ramp(Weight):
     """w = a + (b - a)(10 s³ - 15 s⁴ + 6 s⁵), s = (t - start)/duration within [0, 1].
 
     A smooth change from one weight to another, C² in t.
-
-    Attributes:
-        initial: a.
-        final: b.
-        start: Start of the ramp [s].
-        duration: Duration of the ramp [s].
     """
 
-    def __init__(
-        self, initial: float, final: float, *, start: float, duration: float
-    ) -> None:
-        """Set the ramp.
-
-        Args:
-            initial: a ≥ 0, the weight before the ramp.
-            final: b ≥ 0, the weight after the ramp.
-            start: Start of the ramp [s].
-            duration: Duration of the ramp > 0 [s].
-
-        Raises:
-            FieldError: If a weight is negative or not finite, the start is not finite,
-                or the duration is not positive and finite.
-        """
-        self.initial, self.final = _non_negative(initial), _non_negative(final)
-        if not (0.0 < duration < np.inf and np.isfinite(start)):
-            raise FieldError(
-                f"a ramp from {start} s over {duration} s; needs a finite start and a "
-                "positive, finite duration"
-            )
-        self.start, self.duration = float(start), float(duration)
+    _: KW_ONLY
+    initial: NonNegative = 0.0
+    """a, the weight before the ramp [-]."""
+    final: NonNegative
+    """b, the weight after the ramp [-]."""
+    start: Number = 0.0
+    """Time at which the ramp begins [s]."""
+    duration: Positive
+    """Duration of the ramp [s]."""
 
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w and w'; see `Weight.sample`."""
@@ -96,14 +75,9 @@ class Ramp(Weight):
 class StateWeight(Weight):
     """w = function(state), with w' by differences along the flow."""
 
-    def __init__(self, function: Callable[[RobotState], float]) -> None:
-        """Set the function.
-
-        Args:
-            function: w of a state, ≥ 0 and continuously differentiable; it may use q, t
-                and frames, but not v.
-        """
-        self.function = function
+    function: Callable[[RobotState], float]
+    """w of a state, ≥ 0 and continuously differentiable [-]; it may use q, t and
+    frames, but not v."""
 
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w and w'; see `Weight.sample`.
@@ -111,17 +85,24 @@ class StateWeight(Weight):
         Raises:
             FieldError: If w is negative or not finite.
         """
-        value = _non_negative(self.function(state))
+        value = float(self.function(state))
+        if not 0.0 <= value < np.inf:
+            raise FieldError(f"weight is {value}; must be at least 0")
         return value, float(rate_along_flow(self.function, state))
 
 
 class Product(Weight):
     """w = a b, w' = a' b + a b': the product of two weights."""
 
-    def __init__(self, first: Weight, second: Weight) -> None:
-        """Set the factors."""
-        self.first, self.second = first, second
-        self.constant = first.constant and second.constant
+    first: InstanceOf[Weight]
+    """a [-]."""
+    second: InstanceOf[Weight]
+    """b [-]."""
+
+    @property
+    def constant(self) -> bool:
+        """Whether neither factor changes."""
+        return self.first.constant and self.second.constant
 
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w and w'; see `Weight.sample`."""
@@ -129,16 +110,27 @@ class Product(Weight):
         return a * b, a_dot * b + a * b_dot
 
 
-def as_weight(weight: "Weight | float") -> Weight:
-    """Return a number as a `ConstantWeight`, and a weight unchanged.
+def sample_weight(weight: Weight | float, state: RobotState) -> tuple[float, float]:
+    """Return w [-] and w' [1/s] of a weight or a number."""
+    return weight.sample(state) if isinstance(weight, Weight) else (weight, 0.0)
+
+
+def product(first: Weight | float, second: Weight | float) -> Weight | float:
+    """Return the product of two weights; of numbers it is a number.
 
     Raises:
-        FieldError: If a number is negative or not finite.
+        FieldError: If a number is negative or not finite, and the other one no number.
     """
-    return weight if isinstance(weight, Weight) else ConstantWeight(weight)
-
-
-def _non_negative(value: float) -> float:
-    if not 0.0 <= value < np.inf:
-        raise FieldError(f"weight is {value}; must be at least 0")
-    return float(value)
+    if isinstance(first, Weight) and isinstance(second, Weight):
+        return Product(first, second)
+    if not isinstance(first, Weight) and not isinstance(second, Weight):
+        return float(first) * float(second)
+    factor, weight = (second, first) if isinstance(first, Weight) else (first, second)
+    assert isinstance(weight, Weight)
+    assert not isinstance(factor, Weight)
+    if factor == 1.0:
+        return weight
+    if isinstance(weight, Ramp):
+        initial, final = weight.initial * factor, weight.final * factor
+        return replace(weight, initial=initial, final=final)
+    return Product(ConstantWeight(factor), weight)

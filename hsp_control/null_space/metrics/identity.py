@@ -7,7 +7,7 @@ from hsp_control.null_space.metrics.metric import IDENTITY, Metric, MetricSample
 from hsp_control.robot import RobotState
 
 
-class IdentityMetric(Metric):
+class IdentityMetric(Metric, type="identity"):
     """W = I: the motions of all joints count the same. The default."""
 
     form: ClassVar[int] = IDENTITY

@@ -15,7 +15,7 @@ from hsp_control.null_space.metrics.metric import VARYING, Metric, MetricSample
 from hsp_control.robot import RobotState
 
 
-class MassMatrixMetric(Metric):
+class MassMatrixMetric(Metric, type="mass_matrix"):
     """W = M(q), W' = C + Cᵀ: the kinetic energy is ½ vᵀWv.
 
     Null-space efforts do not accelerate the task (dynamically consistent). M is badly

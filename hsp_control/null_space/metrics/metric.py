@@ -2,14 +2,17 @@
 
 from abc import ABC, abstractmethod
 from functools import partial
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import MetricError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import solve_lower, solve_lower_transposed
 from hsp_control.common.step_plan import StepPlan
+from hsp_control.declaration import Part
+from hsp_control.geometry.start import Start
 from hsp_control.robot import RobotState
 
 IDENTITY, CONSTANT, VARYING = 0, 1, 2
@@ -35,16 +38,18 @@ class MetricSample(NamedTuple):
         return cls(np.eye(nv), np.eye(nv), np.zeros((nv, nv)))
 
 
-class Metric(ABC):
+class Metric(Part, ABC, family="metrics", error=MetricError):
     """‖v‖²_W = vᵀ W(q) v: a joint-space metric, W symmetric positive definite.
 
     The law minimises joint motion in this norm: the pseudo-inverse is
     J# = W⁻¹Jᵀ(JW⁻¹Jᵀ)⁻¹, the null-space projector P = I - J#J, and the field of a cost
     -W⁻¹∇f. W acts on the tangent space: v has shape (nv,) and is in rad/s and m/s.
 
-    A subclass sets `form` to CONSTANT or VARYING and implements `evaluate`. It may
-    override `check`, and `compile` to make a step faster; by default the step plan
-    calls `evaluate` at every step.
+    A subclass declares its parameters as fields (see `Part`), sets `form` to CONSTANT
+    or VARYING and implements `evaluate`; if W is constant, derive from `FixedMetric`
+    instead. It may override `placed`, and `compile` to make a step faster (by default
+    the step plan calls `evaluate` at every step). A metric has no memory: what a
+    computation needs is kept by the state (see `RobotState.made`).
 
     Attributes:
         form: IDENTITY, CONSTANT or VARYING, by which the law skips terms that are zero.
@@ -52,14 +57,16 @@ class Metric(ABC):
 
     form: ClassVar[int]
 
-    def check(self, nv: int) -> None:  # noqa: B027 (most metrics fit every robot)
-        """Check that the metric fits a robot of nv degrees of freedom.
+    def placed(self, start: Start) -> Self:
+        """Return the metric for a robot and a start, checked.
 
-        By default every robot fits.
+        What is omitted because the robot knows it is replaced by numbers. By default
+        nothing is, and every robot fits.
 
         Raises:
-            MetricError: If it does not fit.
+            MetricError: If the metric does not fit the robot.
         """
+        return self
 
     def __init_subclass__(cls, **arguments: Any) -> None:
         """Reset `compile` if a subclass overrides `evaluate` only.

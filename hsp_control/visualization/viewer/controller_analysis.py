@@ -7,7 +7,8 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
-from hsp_control.null_space.fields import NullSpaceField, WeightedSum
+from hsp_control.null_space.fields import NullSpaceField
+from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.robot import RobotState
 
@@ -16,10 +17,7 @@ _Term = TypeVar("_Term", bound=NullSpaceField)
 
 def terms_of_type(field: NullSpaceField, kind: type[_Term]) -> Iterator[_Term]:
     """Yield the terms of a field that are instances of a class."""
-    each = [field]
-    if isinstance(field, WeightedSum):
-        each = [term for _, term in field.terms]
-    yield from (term for term in each if isinstance(term, kind))
+    yield from (term for term in terms_of(field) if isinstance(term, kind))
 
 
 def null_space_projector(controller: Controller, state: RobotState) -> Array:

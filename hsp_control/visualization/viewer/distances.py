@@ -7,6 +7,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
+from hsp_control.geometry.scene import Obstacle
 from hsp_control.null_space.fields import Clearance, PointDistance
 from hsp_control.robot import RobotState
 from hsp_control.visualization.viewer.appearance import BAR_RADIUS
@@ -50,13 +51,15 @@ class Distances:
         self._color = color
         field = controller.field
         self._distances: dict[str, _PairDistance | _FrameDistance] = {}
-        for clearance in terms_of_type(field, Clearance):
-            for name, pairs in _by_obstacle(clearance).items():
+        for clearance in terms_of_type(field, Clearance):  # type: ignore[type-abstract]
+            for name, pairs in _by_obstacle(clearance, controller.state).items():
                 self._distances[f"{clearance.name} {name}"] = _PairDistance(
                     clearance, pairs
                 )
         for term in terms_of_type(field, PointDistance):
-            self._distances[f"{term.name} {term.obstacle.name}"] = _FrameDistance(term)
+            if isinstance(term.obstacle, Obstacle):  # in a placed field it is
+                name = f"{term.name} {term.obstacle.name}"
+                self._distances[name] = _FrameDistance(term, term.obstacle)
 
     def draw(self, size: float) -> Iterator[Command]:
         """Yield the commands that draw it in a scene of the given size [m]."""
@@ -90,7 +93,7 @@ class _PairDistance:
         self._pairs = np.array(pairs)
 
     def closest_points(self, state: RobotState) -> ClosestPoints:
-        proximity = self._clearance.proximity
+        proximity = self._clearance.proximity(state)
         distances = proximity.measure(state)[self._pairs]
         k = int(np.argmin(distances))
         start, end, _ = proximity.witness(int(self._pairs[k]))
@@ -102,18 +105,18 @@ class _PairDistance:
 class _FrameDistance:
     """The distance of frames to an obstacle's centre: the paper's cost, always on."""
 
-    def __init__(self, cost: PointDistance) -> None:
-        self._cost = cost
+    def __init__(self, cost: PointDistance, obstacle: Obstacle) -> None:
+        self._cost, self._obstacle = cost, obstacle
 
     def closest_points(self, state: RobotState) -> ClosestPoints:
-        center = self._cost.obstacle.center.sample(state.t).position.copy()
+        center = self._obstacle.center.sample(state.t).position.copy()
         positions = [np.array(state.position(frame)) for frame in self._cost.frames]
         lengths = [np.linalg.norm(position - center) for position in positions]
         return ClosestPoints(positions[int(np.argmin(lengths))], center, True)
 
 
-def _by_obstacle(clearance: Clearance) -> dict[str, list[int]]:
-    proximity = clearance.proximity
+def _by_obstacle(clearance: Clearance, state: RobotState) -> dict[str, list[int]]:
+    proximity = clearance.proximity(state)
     links = len(proximity.links)
     found: dict[str, list[int]] = {}
     for k, (_, second) in enumerate(proximity.pairs):

@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull
 from hsp_control.common.arrays import Array
 from hsp_control.geometry import shapes
 from hsp_control.geometry.hulls import hull_corners
+from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.shapes import Shape
 from hsp_control.null_space.fields import ObstacleClearance
 from hsp_control.visualization.viewer import threejs
@@ -39,9 +40,9 @@ class Influence:
         self._root = root
         self._zones: dict[str, tuple[Shape, float]] = {}
         for term in terms_of_type(field, ObstacleClearance):
-            for obstacle in term.proximity.obstacles:
-                name, shape = obstacle.name, obstacle.shape
-                if name in shown:
+            for obstacle in term.obstacles or ():
+                if isinstance(obstacle, Obstacle) and obstacle.name in shown:
+                    name, shape = obstacle.name, obstacle.shape
                     known = self._zones.get(name, (shape, 0.0))[1]
                     self._zones[name] = shape, max(known, term.influence)
 

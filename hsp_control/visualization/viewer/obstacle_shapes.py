@@ -65,7 +65,7 @@ def obstacle(shape: Shape, extent: float) -> Json:
         case shapes.Cylinder():
             solid = threejs.cylinder(shape.radius, shape.length)
         case shapes.Box():
-            solid = threejs.box(shape.size)
+            solid = threejs.box(np.asarray(shape.size).tolist())
         case shapes.HalfSpace():
             solid = threejs.plane(extent)
             surface |= {"opacity": 0.3 * OBSTACLE_OPACITY, "side": 2}

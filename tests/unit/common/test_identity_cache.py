@@ -53,14 +53,14 @@ def test_a_shallow_copy_compiles_for_itself() -> None:
     q = robot.integrate(robot.home(), np.array([0.3, 0.2, 0.1]))
     state = robot.state(0.0, q, np.ones(3))
     gains, path = hsp.Gains(25.0, 10.0), hsp.Hold([1.0, 1.0])
-    task = hsp.FramePosition(robot, "tip", path, gains, axes="xy")
+    task = hsp.FramePosition("tip", path, gains=gains, axes="xy")
     task.evaluate(state)
     other = copy.copy(task)
     other.Kp = 4.0 * task.Kp
     mine, theirs = task.evaluate(state), other.evaluate(state)
     extra = 3.0 * task.Kp @ mine.error
     np.testing.assert_allclose(theirs.acceleration, mine.acceleration + extra)
-    cost = hsp.EqualJointAngles(robot, list(robot.joint_names)[-2:])
+    cost = hsp.EqualJointAngles(list(robot.joint_names)[-2:])
     assert cost.gradient(state).any()
     assert copy.copy(cost)._own_derivatives is not cost._own_derivatives
     total = 2.0 * cost

@@ -71,10 +71,10 @@ from hsp_control.trajectories import (
 )
 
 HERE = Path(__file__).parent
-GAINS = Gains.from_frequency(8.0)
-CIRCLE = Circle([0.5, 0.0, 0.4], 0.1, 2.0, normal=[0.0, 0.6, 0.8])
+GAINS = Gains(natural_frequency=8.0)
+CIRCLE = Circle(0.1, 2.0, [0.5, 0.0, 0.4], normal=[0.0, 0.6, 0.8])
 TURNED = pin.exp3(np.array([0.3, -0.5, 0.4]))
-SPIN = Spin(TURNED, [0.0, 0.6, 0.8], 0.7)
+SPIN = Spin([0.0, 0.6, 0.8], 0.7, rotation=TURNED)
 SHAPES: dict[str, Shape] = {
     "sphere": Sphere(0.1),
     "capsule": Capsule(0.05, 0.3),
@@ -86,30 +86,24 @@ SHAPES: dict[str, Shape] = {
 
 def obstacle(shape: Shape) -> Obstacle:
     height = -0.5 if isinstance(shape, HalfSpace) else 0.5
-    path = Lissajous([0.4, 0.3, height], [0.1, 0.2, 0.1], [1.0, 2.0, 1.5])
+    path = Lissajous([0.1, 0.2, 0.1], [1.0, 2.0, 1.5], center=[0.4, 0.3, height])
     return Obstacle("it", shape, path, SPIN)
 
 
 def tasks(robot: Robot, frame: str) -> dict[str, Task]:
-    blended = Blend([0.4, 0.1, 0.5], CIRCLE, 2.0)
+    blended = Blend(CIRCLE, 2.0, start=[0.4, 0.1, 0.5])
     path = OrientationPath([np.eye(3), TURNED], [0.0, 2.0])
-    turning = BlendOrientation(TURNED, SPIN, 2.0)
+    turning = BlendOrientation(SPIN, 2.0, rotation=TURNED)
     motion = Spline(np.eye(3, 7)[:, : len(robot.single_dof_joints)], [0.0, 0.5, 1.0])
     all_joints = motion.dimension == len(robot.single_dof_joints)
     return {
-        "position": FramePosition(robot, frame, blended, GAINS),
-        "axes": FramePosition(
-            robot, frame, Lissajous([0, 0], [1, 1], [1, 2]), GAINS, axes="zx"
-        ),
-        "orientation": FrameOrientation(robot, frame, path, GAINS),
-        "pose": FramePose(robot, frame, ComposedPose(CIRCLE, turning), GAINS),
-        "held pose": FramePose(
-            robot, frame, HoldPose(pin.SE3(TURNED, np.array([0.4, 0, 0.5]))), GAINS
-        ),
-        "pointing": Pointing(robot, frame, [0.0, 0.6, 0.8], SPIN, GAINS),
-        "posture": JointPosture(
-            robot, robot.home(), GAINS, displacement=motion if all_joints else None
-        ),
+        "position": FramePosition(frame, blended, gains=GAINS),
+        "axes": FramePosition(frame, Lissajous([1, 1], [1, 2], center=[0, 0]), gains=GAINS, axes="zx"),
+        "orientation": FrameOrientation(frame, path, gains=GAINS),
+        "pose": FramePose(frame, ComposedPose(CIRCLE, turning), gains=GAINS),
+        "held pose": FramePose(frame, HoldPose([0.4, 0, 0.5], TURNED), gains=GAINS),
+        "pointing": Pointing(frame, axis=[0.0, 0.6, 0.8], trajectory=SPIN, gains=GAINS),
+        "posture": JointPosture(robot.home(), gains=GAINS, displacement=motion if all_joints else None),
     }
 
 
@@ -117,29 +111,29 @@ def fields(robot: Robot, frame: str) -> dict[str, NullSpaceField]:
     ball = obstacle(Sphere(0.1))
     middle = robot.joint_names[len(robot.joint_names) // 2]
     made: dict[str, NullSpaceField] = {
-        "rest": Rest(robot),
-        "centering": JointCentering(robot),
-        "limits": LimitBarrier(robot, zone=1.0),
-        "posture": TargetPosture(robot, robot.home()),
-        "equal": EqualJointAngles(robot, [robot.joint_names[0], middle]),
-        "root": Manipulability(robot, frame, rows="pose", length=0.5),
-        "log": Manipulability(robot, frame, form="log", metric=2.0 * np.eye(robot.nv)),
-        "condition": InverseCondition(robot, frame),
-        "velocity": Transmission(robot, frame, [0.0, 0.6, 0.8]),
-        "force": Transmission(robot, frame, [0.0, 0.6, 0.8], kind="force"),
-        "point": PointDistance(robot, [frame], ball),
-        "sum": JointCentering(robot)
-        + Ramp(0.0, 1.0, start=0.0, duration=2.0) * Manipulability(robot, frame),
+        "rest": Rest(),
+        "centering": JointCentering(),
+        "limits": LimitBarrier(zone=1.0),
+        "posture": TargetPosture(robot.home()),
+        "equal": EqualJointAngles([robot.joint_names[0], middle]),
+        "root": Manipulability(frame, rows="pose", length=0.5),
+        "log": Manipulability(frame, form="log", metric=2.0 * np.eye(robot.nv)),
+        "condition": InverseCondition(frame),
+        "velocity": Transmission(frame, [0.0, 0.6, 0.8]),
+        "force": Transmission(frame, [0.0, 0.6, 0.8], kind="force"),
+        "point": PointDistance([frame], ball),
+        "sum": JointCentering()
+        + Ramp(initial=0.0, final=1.0, start=0.0, duration=2.0) * Manipulability(frame),
     }
     return made
 
 
 def clearances(robot: Robot) -> dict[str, NullSpaceField]:
     made: dict[str, NullSpaceField] = {
-        name: ObstacleClearance(robot, [obstacle(shape)], influence=0.8)
+        name: ObstacleClearance([obstacle(shape)], influence=0.8)
         for name, shape in SHAPES.items()
     }
-    return made | {"self": SelfClearance(robot, influence=0.5)}
+    return made | {"self": SelfClearance(influence=0.5)}
 
 
 METRICS = {
@@ -384,11 +378,9 @@ def test_no_allocation_in_a_field(name: str, chain: Robot) -> None:
     robot = chain
     frame = f"link{JOINTS}"
     if name in SHAPES:
-        field: NullSpaceField = ObstacleClearance(
-            robot, [obstacle(SHAPES[name])], influence=9.0
-        )
+        field: NullSpaceField = ObstacleClearance([obstacle(SHAPES[name])], influence=9.0)
     elif name == "self":
-        field = SelfClearance(robot, influence=0.5)
+        field = SelfClearance(influence=0.5)
     else:
         field = fields(robot, frame)[name]
     state = robot.state(0.1, robot.home() + 0.1, np.full(JOINTS, 0.1))
@@ -411,11 +403,11 @@ def test_a_step_allocates_what_pinocchio_returns_and_nothing_else(
     name, q, v = f"link{JOINTS}", chain.home() + 0.1, np.full(JOINTS, 1e-3)
     state = chain.state(0.1, q, v)
     frame = state.frame(name)
-    here = HoldPose(pin.SE3(frame.rotation, frame.position))
-    pose = FramePose(chain, name, here, GAINS)
-    clearance = ObstacleClearance(chain, [obstacle(Sphere(0.1))], influence=9.0)
-    field = JointCentering(chain) + 0.1 * clearance
-    controller = Controller(chain, [pose], field, limits=Limits(chain))
+    here = HoldPose(frame.position, frame.rotation)
+    pose = FramePose(name, here, gains=GAINS)
+    clearance = ObstacleClearance([obstacle(Sphere(0.1))], influence=9.0)
+    field = JointCentering() + 0.1 * clearance
+    controller = Controller(chain, [pose], field, limits=Limits())
     assert controller.compute(state).status == Status.EXACT
 
     peak, left = allocated(lambda: state.update(0.1, q, v), 500)

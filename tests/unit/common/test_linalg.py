@@ -417,7 +417,7 @@ def test_every_kernel_of_linalg_has_arguments() -> None:
 
 METRICS: dict[str, Callable[[int], Metric]] = {
     "identity": lambda nv: IdentityMetric(),
-    "constant": lambda nv: ConstantMetric.from_coordinates(np.tril(np.ones((nv, nv)))),
+    "constant": lambda nv: CoordinatesMetric(np.tril(np.ones((nv, nv)))),
     "mass_matrix": lambda nv: MassMatrixMetric(),
 }
 SINGULAR = np.zeros(7)  # the Panda upright: rank 5 of 6
@@ -431,10 +431,10 @@ def step_results() -> dict[str, list[float]]:
     frame = at.frame("panda_tcp")
     gains = Gains(25.0, 10.0)
     tasks = (
-        FramePosition(panda, "panda_tcp", Hold(frame.position + 0.1), gains),
-        FrameOrientation(panda, "panda_tcp", HoldOrientation(frame.rotation), gains),
+        FramePosition("panda_tcp", Hold(frame.position + 0.1), gains=gains),
+        FrameOrientation("panda_tcp", HoldOrientation(frame.rotation), gains=gains),
     )
-    field = TargetPosture(panda, home, weights=3.0)
+    field = TargetPosture(home, weights=3.0)
     results = {}
     for name, metric in METRICS.items():
         controller = Controller(
@@ -443,7 +443,7 @@ def step_results() -> dict[str, list[float]]:
         for where, q in (("general", home), ("singular", SINGULAR)):
             state = panda.state(0.2, q, v)
             out = controller.compute(state)
-            diagnosis = controller.diagnose(state)
+            diagnosis = controller.diagnose()
             results[f"{name} {where}"] = [
                 *(*out.tau, *out.acceleration, *out.null_space_error),
                 *(*out.task.acceleration, *diagnosis.singular_values),

@@ -235,9 +235,9 @@ def test_ordinary_calls_give_the_same_efforts(monkeypatch: pytest.MonkeyPatch) -
     def effort() -> Array:
         robot = hsp.Robot.load("panda")
         hold = hsp.Hold([0.4, 0.1, 0.5])
-        task = hsp.FramePosition(robot, "panda_tcp", hold, hsp.Gains(25.0, 10.0))
-        field = hsp.JointCentering(robot) + hsp.Manipulability(robot, "panda_tcp")
-        controller = hsp.Controller(robot, [task], field, limits=hsp.Limits(robot))
+        task = hsp.FramePosition("panda_tcp", hold, gains=hsp.Gains(25.0, 10.0))
+        field = hsp.JointCentering() + hsp.Manipulability("panda_tcp")
+        controller = hsp.Controller(robot, [task], field, limits=hsp.Limits())
         state = robot.state(0.2, robot.home(), np.linspace(-0.5, 0.5, 7))
         return np.array(controller.compute(state).tau)
 

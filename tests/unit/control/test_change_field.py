@@ -48,13 +48,13 @@ def panda() -> Robot:
 def posture() -> NullSpaceField:
     q = panda().home().copy()
     q[2] += 0.5
-    return TargetPosture(panda(), q, weights=2.0)
+    return TargetPosture(q, weights=2.0)
 
 
 def controller(field: NullSpaceField, metric: Metric | None = None) -> Controller:
     start = panda().state(0.0, panda().home(), np.zeros(7)).position("panda_tcp")
-    path = Circle(start + np.array([0.0, 0.0, 0.05]), 0.05, 2.0, normal=[1.0, 0.0, 0.0])
-    task = FramePosition(panda(), "panda_tcp", path, Gains.from_frequency(10.0))
+    path = Circle(0.05, 2.0, start + np.array([0.0, 0.0, 0.05]), normal=[1.0, 0.0, 0.0])
+    task = FramePosition("panda_tcp", path, gains=Gains(natural_frequency=10.0))
     return Controller(panda(), [task], field, null_space_gain=K_N, metric=metric)
 
 
@@ -70,7 +70,7 @@ def g_at(field: NullSpaceField, metric: Metric, state: RobotState) -> FieldSampl
 def test_the_rate_of_what_is_in_between_is_exact(t: float, seed: int) -> None:
     assume(min(abs(t), abs(t - 1.0)) > 0.01)  # there the ramp is C², not more
     rng = np.random.default_rng(seed)
-    field = crossfade(JointCentering(panda()), 3.0 * posture(), start=0.0, duration=1.0)
+    field = crossfade(JointCentering(), 3.0 * posture(), start=0.0, duration=1.0)
     metric = IdentityMetric()
     state = panda().state(t, panda().random_configuration(rng), rng.standard_normal(7))
     exact = g_at(field, metric, state).g_dot.copy()
@@ -87,8 +87,8 @@ def test_the_rate_of_what_is_in_between_is_exact(t: float, seed: int) -> None:
 @pytest.mark.parametrize("metric", [IdentityMetric(), MassMatrixMetric()])
 def test_proposition_2_holds_all_the_way(metric: Metric) -> None:
     """‖e_N‖_W decays like exp(-K_N t) before, through and after the change."""
-    law = controller(JointCentering(panda()), metric)
-    after = Manipulability(panda(), "panda_tcp")
+    law = controller(JointCentering(), metric)
+    after = Manipulability("panda_tcp")
     law.change_field(after, start=START, ramp=RAMP)
     v0 = 0.2 * np.ones(7)
     run = simulate(law, panda().home(), v0, duration=0.8, log_period=0.02)
@@ -100,7 +100,7 @@ def test_proposition_2_holds_all_the_way(metric: Metric) -> None:
 
 
 def test_the_effort_does_not_jump_and_ends_as_the_new_field_s() -> None:
-    law = controller(JointCentering(panda()))
+    law = controller(JointCentering())
     new = posture()
     state = panda().state(0.0, panda().home(), np.full(7, 0.1))
     law.change_field(new, start=START, ramp=RAMP)
@@ -112,7 +112,7 @@ def test_the_effort_does_not_jump_and_ends_as_the_new_field_s() -> None:
 
     # One state, moving time: what is left is the circle's own motion and the ramp's.
     changing = efforts(law)
-    old, final = (efforts(controller(f)) for f in (JointCentering(panda()), posture()))
+    old, final = (efforts(controller(f)) for f in (JointCentering(), posture()))
     rtol = {"rtol": 1e-12, "atol": 1e-12}
     np.testing.assert_allclose(changing[times < START], old[times < START], **rtol)
     over = times >= START + RAMP
@@ -125,13 +125,13 @@ def test_the_effort_does_not_jump_and_ends_as_the_new_field_s() -> None:
 
 
 def test_a_change_of_mind_begins_where_the_field_is() -> None:
-    law = controller(JointCentering(panda()))
+    law = controller(JointCentering())
     law.change_field(posture(), start=0.1, ramp=0.4)
     state = panda().state(0.0, panda().home(), np.zeros(7))
     taus = []
     for t in np.arange(0.0, 1.2, 1e-3):
         if abs(t - 0.3) < 1e-9:  # half-way: back to rest
-            final = Rest(panda())
+            final = Rest()
             law.change_field(final, start=0.3, ramp=0.4)
         taus.append(law.compute(state.update(t, state.q, state.v)).tau.copy())
     assert law.field is final
@@ -141,26 +141,19 @@ def test_a_change_of_mind_begins_where_the_field_is() -> None:
 
 
 def test_what_cannot_change_is_refused() -> None:
-    law = controller(JointCentering(panda()))
+    law = controller(JointCentering())
     with pytest.raises(FieldError, match="uncontrolled"):
-        law.change_field(Uncontrolled(panda()), start=0.0, ramp=1.0)
+        law.change_field(Uncontrolled(), start=0.0, ramp=1.0)
     with pytest.raises(FieldError, match="positive, finite duration"):
         law.change_field(posture(), start=0.0, ramp=0.0)
     with pytest.raises(ControllerError):
-        law.change_field(Rest(Robot.load("panda")), start=0.0, ramp=1.0)
+        law.change_field(Rest(), start=0.0, ramp=1.0)
     assert isinstance(law.field, JointCentering)
 
 
 def test_the_log_has_the_terms_of_both_and_of_tasks_that_come() -> None:
-    law = controller(JointCentering(panda()))
-    other = FramePosition(
-        panda(),
-        "panda_link4",
-        Hold([0.3]),
-        Gains.from_frequency(5.0),
-        name="elbow",
-        axes="x",
-    )
+    law = controller(JointCentering())
+    other = FramePosition("panda_link4", Hold([0.3]), gains=Gains(natural_frequency=5.0), name="elbow", axes="x")
 
     def change(recorder: Recorder) -> None:
         done = len(recorder.rows(0)["t"])

@@ -4,7 +4,6 @@ import pickle
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
@@ -66,17 +65,15 @@ def circle(
     """Return a circle of 5 cm that begins ``away`` [m] from where the hand is."""
     start = robot.state(0.0, robot.home(), np.zeros(robot.nv)).position("panda_tcp")
     center = start + np.array([away - 0.05, 0.0, 0.0])
-    path = Circle(center, 0.05, 2.0, axes=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    return FramePosition(
-        robot, "panda_tcp", path, Gains.from_frequency(frequency), name="hand"
-    )
+    path = Circle(0.05, 2.0, center, axes=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    return FramePosition("panda_tcp", path, gains=Gains(natural_frequency=frequency), name="hand")
 
 
 def controller(robot: Robot = PANDA, away: float = 0.05, **options: Any) -> Controller:
     return Controller(
         robot,
         [circle(robot, away=away)],
-        2.0 * TargetPosture(robot, robot.home()),
+        2.0 * TargetPosture(robot.home()),
         **options,
     )
 
@@ -111,7 +108,7 @@ def everything() -> Compensation:
 
 def test_without_compensators_it_is_the_controller_to_the_last_bit() -> None:
     """Beside a loop written by hand, as a user would, on a noisy plant."""
-    made = controller(limits=Limits(PANDA, effort_rate=1000.0))
+    made = controller(limits=Limits(effort_rate=1000.0))
     engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
     plant = ImperfectPlant(engine, [VelocityNoise(0.02, 3)], [])
     ours = run(made, Compensation(), plant=plant, duration=0.1)
@@ -231,7 +228,7 @@ def test_limits_are_kept_by_the_whole_effort() -> None:
     """The observer asks for more than the limits leave; where they do not bind: all."""
     heavy = changed(PANDA, [ScaledInertias(1.4)])
     most = np.array([87.0, 45.0, 87.0, 87.0, 12.0, 12.0, 12.0])
-    made = controller(limits=Limits(PANDA, effort=most, velocity=None, position=None))
+    made = controller(limits=Limits(effort=most, velocity=None, position=None))
     log = run(
         made,
         Compensation(momentum_observer=MomentumObserver(50.0)),
@@ -243,7 +240,7 @@ def test_limits_are_kept_by_the_whole_effort() -> None:
 
 
 def test_the_observer_leaves_the_effort_rate_to_the_limits() -> None:
-    made = controller(limits=Limits(PANDA, effort_rate=100.0))
+    made = controller(limits=Limits(effort_rate=100.0))
     plant = RigidBodyPlant(changed(PANDA, [ScaledInertias(1.4)]))
     log = run(made, Compensation(momentum_observer=MomentumObserver(50.0)), plant=plant)
     assert np.abs(np.diff(log.tau, axis=0)).max() <= 100.0 * H + 1e-9
@@ -289,18 +286,14 @@ def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
     from hsp_control.control.compensation.friction_feed_forward import desired_velocity
 
     robot, rng = PANDA, np.random.default_rng(2)
-    turned = FrameOrientation(
-        robot, "panda_tcp", HoldOrientation(np.eye(3)), Gains.from_frequency(5.0)
-    )
-    again = FramePosition(
-        robot, "panda_tcp", circle().trajectory, Gains.from_frequency(5.0), name="more"
-    )
+    turned = FrameOrientation("panda_tcp", HoldOrientation(np.eye(3)), gains=Gains(natural_frequency=5.0))
+    again = FramePosition("panda_tcp", circle().trajectory, gains=Gains(natural_frequency=5.0), name="more")
     tasks: list[Any] = {
         1: [circle(), turned],
         2: [[circle()], [turned]],
         3: [[circle()], [turned], [again]],  # nine rows on seven freedoms
     }[levels]
-    made = Controller(robot, tasks, TargetPosture(robot, np.zeros(7) + Q0 * 0.9))
+    made = Controller(robot, tasks, TargetPosture(np.zeros(7) + Q0 * 0.9))
     q = robot.integrate(Q0, rng.uniform(-0.3, 0.3, 7))
     flow = made.flow(0.4, q)
     for _ in range(5):
@@ -316,18 +309,18 @@ def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
 
 
 def all_tasks() -> list[Task]:
-    robot, gains = PANDA, Gains.from_frequency(3.0)
+    robot, gains = PANDA, Gains(natural_frequency=3.0)
     here = robot.state(0.0, Q0, np.zeros(7)).frame("panda_tcp")
     turn = HoldOrientation(here.rotation)
-    pose = HoldPose(pin.SE3(here.rotation, here.position))
+    pose = HoldPose(here.position, here.rotation)
     return [
         circle(),
-        FrameOrientation(robot, "panda_tcp", turn, gains),
-        FramePose(robot, "panda_tcp", pose, gains),
-        Pointing(robot, "panda_tcp", [0.0, 0.0, 1.0], turn, gains),
-        JointPosture(robot, Q0, gains),
-        CenterOfMass(robot, Hold([0.1, 0.0, 0.4]), gains),
-        RelativePose(robot, "panda_tcp", "panda_link0", pose, gains),
+        FrameOrientation("panda_tcp", turn, gains=gains),
+        FramePose("panda_tcp", pose, gains=gains),
+        Pointing("panda_tcp", axis=[0.0, 0.0, 1.0], trajectory=turn, gains=gains),
+        JointPosture(Q0, gains=gains),
+        CenterOfMass(Hold([0.1, 0.0, 0.4]), gains=gains),
+        RelativePose("panda_tcp", pose, reference="panda_link0", gains=gains),
     ]
 
 
@@ -379,10 +372,7 @@ def test_with_an_integral_the_error_is_that_of_the_third_order() -> None:
 
 def test_a_lasting_error_dies_and_the_null_space_keeps_its_own() -> None:
     plant = RigidBodyPlant(changed(PANDA, [ScaledInertias(1.2)]))
-    hold = FramePosition(
-        PANDA, "panda_tcp", Hold(circle().trajectory.sample(0.0).position),
-        Gains.from_frequency(20.0), name="hand",
-    )  # fmt: skip
+    hold = FramePosition("panda_tcp", Hold(circle().trajectory.sample(0.0).position), gains=Gains(natural_frequency=20.0), name="hand")  # fmt: skip
     made = Controller(PANDA, [hold])
     options = {"plant": plant, "duration": 1.5}
     alone = run(made, **options)
@@ -406,7 +396,7 @@ def test_a_payload_s_error_dies_as_the_linear_equation_says(
     All joints are led, so that no self-motion is left; the rest is of second order.
     """
     loaded = changed(PANDA, [Payload("panda_tcp", mass)])
-    task = JointPosture(PANDA, Q0, Gains.from_frequency(20.0), name="hand")
+    task = JointPosture(Q0, gains=Gains(natural_frequency=20.0), name="hand")
 
     def dynamics(robot: Robot, q: Array) -> tuple[Array, Array]:
         state = robot.state(0.0, q, np.zeros(7))
@@ -440,10 +430,8 @@ def test_too_much_integral_action_is_lost_with_a_payload() -> None:
     """2 kg at the hand leave 0.3 of the feedback: as little as Ki/(Kv Kp) = 12/40."""
     loaded = RigidBodyPlant(changed(PANDA, [Payload("panda_tcp", 2.0)]))
     point = circle(away=0.0).trajectory.sample(0.0).position
-    hold = FramePosition(
-        PANDA, "panda_tcp", Hold(point), Gains.from_frequency(20.0), name="hand"
-    )
-    made = Controller(PANDA, [hold], 2.0 * TargetPosture(PANDA, Q0))
+    hold = FramePosition("panda_tcp", Hold(point), gains=Gains(natural_frequency=20.0), name="hand")
+    made = Controller(PANDA, [hold], 2.0 * TargetPosture(Q0))
     largest = {}
     for rate in (5.0, 12.0):
         compensation = Compensation(integral_action=IntegralAction(rate))
@@ -499,7 +487,7 @@ def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:
 def test_an_arm_that_is_too_weak_does_not_wind_up() -> None:
     """While its limits bind, errors are not gathered."""
     weak = np.array([87.0, 20.0, 87.0, 87.0, 12.0, 12.0, 12.0])  # gravity takes 30
-    made = controller(limits=Limits(PANDA, effort=weak, velocity=None, position=None))
+    made = controller(limits=Limits(effort=weak, velocity=None, position=None))
     log = run(made, Compensation(integral_action=IntegralAction(20.0)), duration=0.015)
     assert (log["status"] >= Status.LIMITED).all()
     assert np.abs(log["task.hand.error"][-1]).max() > 1e-4
@@ -715,11 +703,11 @@ def on(part: Any) -> None:
 
 
 def test_two_guards_of_the_effort_rate_are_one_too_many() -> None:
-    made = controller(limits=Limits(PANDA, effort_rate=500.0))
+    made = controller(limits=Limits(effort_rate=500.0))
     with pytest.raises(CompensationError, match=r"limits\.effort_rate keeps the rate"):
         Command(made, Compensation(effort_rate=EffortRateClip(500.0)))
     Command(
-        controller(limits=Limits(PANDA)), Compensation(effort_rate=EffortRateClip(5.0))
+        controller(limits=Limits()), Compensation(effort_rate=EffortRateClip(5.0))
     )
 
 

@@ -31,7 +31,7 @@ from hsp_control.null_space.metrics import MetricSample
 @metrics
 def test_effort_is_m_a_plus_n(kind: str) -> None:
     """Equation (7), with M and N by plain Pinocchio."""
-    field = TargetPosture(panda(), panda().home())
+    field = TargetPosture(panda().home())
     controller = Controller(panda(), [track()], field, metric=METRICS[kind](7))
     model, data = panda().model, panda().model.createData()
     for t, q, v in states(5):
@@ -70,7 +70,7 @@ def test_tasks_are_stacked_in_order() -> None:
 
 def test_order_of_tasks_does_not_matter() -> None:
     """One level: the same law whichever comes first."""
-    field = TargetPosture(panda(), panda().home())
+    field = TargetPosture(panda().home())
     first = Controller(panda(), [track(), hold_orientation()], field)
     second = Controller(panda(), [hold_orientation(), track()], field)
     for t, q, v in states(5):
@@ -87,7 +87,7 @@ def test_order_of_tasks_does_not_matter() -> None:
 def test_defaults_are_rest_the_identity_and_ten() -> None:
     plain = Controller(panda(), [track()])
     said = Controller(
-        panda(), [track()], Rest(panda()), metric=IdentityMetric(), null_space_gain=10.0
+        panda(), [track()], Rest(), metric=IdentityMetric(), null_space_gain=10.0
     )
     state = panda().state(*states(1)[0])
     assert_same(copied(plain.compute(state)), copied(said.compute(state)))
@@ -111,7 +111,7 @@ def test_uncontrolled_leaves_self_motion_alone(kind: str) -> None:
     controller = Controller(
         panda(),
         [track()],
-        Uncontrolled(panda()),
+        Uncontrolled(),
         metric=metric,
         singularity_threshold=EXACT,
     )
@@ -134,14 +134,14 @@ def test_uncontrolled_leaves_self_motion_alone(kind: str) -> None:
 @metrics
 def test_diagnosis(kind: str) -> None:
     metric = METRICS[kind](7)
-    field = TargetPosture(panda(), panda().home(), weights=2.0)
+    field = TargetPosture(panda().home(), weights=2.0)
     controller = Controller(
         panda(), [track(), hold_orientation()], field, metric=metric
     )
     for t, q, v in states(3, seed=1):
         state = panda().state(t, q, v)
         out = copied(controller.compute(state))
-        diagnosis = controller.diagnose(state)
+        diagnosis = controller.diagnose()
         W = metric.evaluate(state, MetricSample.allocate(7)).W
         J, e_N = out["task.jacobian"], out["null_space_error"]
         whitened = J @ np.linalg.inv(np.linalg.cholesky(W)).T
@@ -159,7 +159,7 @@ def test_diagnosis(kind: str) -> None:
         )
         assert diagnosis.field_value == field.value(state)
         # To look changes nothing.
-        again = controller.diagnose(state)
+        again = controller.diagnose()
         np.testing.assert_array_equal(again.singular_values, diagnosis.singular_values)
         assert_same(copied(controller.compute(state)), out)
 
@@ -171,7 +171,7 @@ def test_diagnosis(kind: str) -> None:
 def test_same_state_same_effort(kind: str) -> None:
     """Whatever was computed before: elsewhere, near a singularity, or an error."""
     tasks = [track(), hold_orientation()]
-    field = TargetPosture(panda(), panda().home())
+    field = TargetPosture(panda().home())
     controller = Controller(panda(), tasks, field, metric=METRICS[kind](7))
     fresh = Controller(panda(), tasks, field, metric=METRICS[kind](7))
     somewhere, *others = states(6, seed=2)
@@ -180,7 +180,7 @@ def test_same_state_same_effort(kind: str) -> None:
     assert_same(copied(controller.compute(state)), expected)
     for t, q, v in others:
         controller.compute(panda().state(t, q, v))
-        controller.diagnose(panda().state(t, q, v))
+        controller.diagnose()
     upright = panda().state(0.0, np.zeros(7), np.ones(7))
     assert controller.compute(upright).damped
     controller.flow(0.7, others[0][1])
@@ -192,7 +192,7 @@ def test_same_state_same_effort(kind: str) -> None:
 
 def test_states_take_turns() -> None:
     """Two robots of one kind, one controller: each state gets its own effort."""
-    field = TargetPosture(panda(), panda().home())
+    field = TargetPosture(panda().home())
     controller = Controller(panda(), [track()], field, metric=MassMatrixMetric())
     first, second = (panda().state(*where) for where in states(2, seed=3))
     a, b = copied(controller.compute(first)), copied(controller.compute(second))
@@ -209,7 +209,7 @@ def test_states_take_turns() -> None:
 def test_singular_posture_gives_a_bounded_effort(kind: str) -> None:
     """The Panda upright cannot move its hand up: damped, bounded and smooth there."""
     tasks = [track(), hold_orientation()]
-    field = TargetPosture(panda(), panda().home())
+    field = TargetPosture(panda().home())
     threshold = 0.05
     controller = Controller(
         panda(),
@@ -234,7 +234,7 @@ def test_singular_posture_gives_a_bounded_effort(kind: str) -> None:
     uncontrolled = Controller(
         panda(),
         tasks,
-        Uncontrolled(panda()),
+        Uncontrolled(),
         metric=METRICS[kind](7),
         singularity_threshold=threshold,
     )

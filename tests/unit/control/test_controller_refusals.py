@@ -87,7 +87,7 @@ W1 = np.array([100.0, 1, 1, 1, 1, 1, 1])
         ),
         (
             lambda: [track()],
-            {"field": lambda: Rest(Robot.load("panda"))},
+            {"field": lambda: Rest()},
             ControllerError,
             r"field 'rest' was built for another robot object \(panda\); build it with",
         ),
@@ -196,7 +196,7 @@ def test_a_gain_is_judged_in_its_metric() -> None:
 
 
 def test_as_many_rows_as_freedoms_are_allowed() -> None:
-    posture = JointPosture(panda(), panda().home(), GAINS)
+    posture = JointPosture(panda().home(), gains=GAINS)
     assert posture.rows == 7
     Controller(panda(), [posture])
 
@@ -207,11 +207,8 @@ def test_as_many_rows_as_freedoms_are_allowed() -> None:
 class Broken(Trajectory):
     """A user's trajectory that goes wrong after half a second."""
 
-    __slots__ = ("value", "where")
-
-    def __init__(self, value: float, where: str) -> None:
-        self.value = value
-        self.where = where
+    value: float
+    where: str
 
     @property
     def dimension(self) -> int:
@@ -282,7 +279,7 @@ def late(wrong: Any, right: Any) -> Callable[..., Any]:
 def position(function: Callable[[float], Any]) -> FramePosition:
     still = late(np.zeros(3), np.zeros(3))
     trajectory = CallableTrajectory(function, 3, velocity=still, acceleration=still)
-    return FramePosition(panda(), TCP, trajectory, GAINS)
+    return FramePosition(TCP, trajectory, gains=GAINS)
 
 
 Parts = dict[str, Any]
@@ -292,9 +289,7 @@ FAILURES: dict[str, tuple[Callable[[], Parts], type[Exception], str]] = {
         f"{value} in a trajectory's {where}": (
             lambda value=value, where=where: {
                 "tasks": [
-                    FramePosition(
-                        panda(), TCP, Broken(value, where), GAINS, name="mine"
-                    )
+                    FramePosition(TCP, Broken(value, where), gains=GAINS, name="mine")
                 ]
             },
             NonFiniteError,
@@ -332,41 +327,30 @@ FAILURES: dict[str, tuple[Callable[[], Parts], type[Exception], str]] = {
         for where in ("g", "g_dot")
     },
     "NaN from a field's function": (
-        lambda: {"field": FunctionField(panda(), late(NAN, np.zeros(7)), name="mine")},
+        lambda: {"field": FunctionField(late(NAN, np.zeros(7)), name="mine")},
         FieldError,
         r"field 'mine' returned g = array\(.*nan.* at t = 0\.75 s; needs 7 finite",
     ),
     "infinity from a field's rate": (
         lambda: {
-            "field": FunctionField(
-                panda(),
-                late(np.zeros(7), np.zeros(7)),
-                rate=late(np.full(7, np.inf), np.zeros(7)),
-                name="mine",
-            )
+            "field": FunctionField(late(np.zeros(7), np.zeros(7)), rate_function=late(np.full(7, np.inf), np.zeros(7)), name="mine")
         },
         FieldError,
         r"field 'mine' returned g' = array\(.*inf.* at t = 0\.75 s",
     ),
     "a field of another size": (
-        lambda: {"field": FunctionField(panda(), late(np.zeros(6), np.zeros(7)))},
+        lambda: {"field": FunctionField(late(np.zeros(6), np.zeros(7)))},
         FieldError,
         "needs 7 finite numbers",
     ),
     "NaN from a cost": (
-        lambda: {"field": FunctionCost(panda(), late(np.nan, 1.0), name="mine")},
+        lambda: {"field": FunctionCost(late(np.nan, 1.0), name="mine")},
         FieldError,
         r"cost 'mine' returned nan at t = 0\.7",
     ),
     "NaN from a cost's gradient": (
         lambda: {
-            "field": FunctionCost(
-                panda(),
-                late(1.0, 1.0),
-                gradient=late(NAN, np.zeros(7)),
-                gradient_rate=late(np.zeros(7), np.zeros(7)),
-                name="mine",
-            )
+            "field": FunctionCost(late(1.0, 1.0), gradient_function=late(NAN, np.zeros(7)), rate_function=late(np.zeros(7), np.zeros(7)), name="mine")
         },
         FieldError,
         r"'mine'.*t = 0\.75 s",
@@ -398,7 +382,7 @@ def test_nan_of_a_user_is_an_error_and_never_an_effort(what: str) -> None:
 
 def test_user_mistake_in_a_simulation_names_the_time() -> None:
     """The loop stops with the cause and what had been computed."""
-    task = FramePosition(panda(), TCP, Broken(np.nan, "position"), GAINS, name="mine")
+    task = FramePosition(TCP, Broken(np.nan, "position"), gains=GAINS, name="mine")
     controller = Controller(panda(), [task])
     with pytest.raises(
         HspControlError, match=r"the simulation stopped: task 'mine' is not finite"

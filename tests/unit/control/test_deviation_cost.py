@@ -49,8 +49,8 @@ def panda() -> Robot:
 
 def hand(**circle: Any) -> FramePosition:
     options = {"angular_rate": 2.0, "normal": [0.0, 0.0, 1.0], **circle}
-    path = Circle([0.45, 0.0, 0.45], 0.15, **options)
-    return FramePosition(panda(), "panda_tcp", path, Gains.from_frequency(10.0))
+    path = Circle(0.15, center=[0.45, 0.0, 0.45], **options)
+    return FramePosition("panda_tcp", path, gains=Gains(natural_frequency=10.0))
 
 
 METRICS: dict[str, Metric] = {
@@ -71,9 +71,9 @@ def test_the_bound_leaves_the_law_alone(metric: str, seed: int) -> None:
     robot, rng = panda(), np.random.default_rng(seed)
     q, v = robot.random_configuration(rng), 2.0 * rng.standard_normal(7)
     options: dict[str, Any] = {"metric": METRICS[metric]}
-    field = JointCentering(robot)
+    field = JointCentering()
     wide = {"effort": 1e6, "velocity": None, "position": None}
-    limits = Limits(robot, **wide, null_space_speed=1e-3)
+    limits = Limits(**wide, null_space_speed=1e-3)
     state = robot.state(0.3, q, v)
     free = Controller(robot, [hand()], field, **options)
     bounded = Controller(robot, [hand()], field, limits=limits, **options)
@@ -97,7 +97,7 @@ def test_the_projector_is_the_law_s(metric: str, seed: int) -> None:
     robot, rng = panda(), np.random.default_rng(seed)
     state = robot.state(0.1, robot.random_configuration(rng), rng.standard_normal(7))
     controller = Controller(
-        robot, [hand()], JointCentering(robot), metric=METRICS[metric]
+        robot, [hand()], JointCentering(), metric=METRICS[metric]
     )
     out = controller.compute(state)
     if out.damped:  # then e_N keeps a part of the direction that is being lost
@@ -128,17 +128,11 @@ def test_decay_rate_is_the_least(seed: int) -> None:
 def limited(seed: int, **options: Any) -> tuple[Controller, Array]:
     """Return a weak arm that is asked for more than it can do, and a start."""
     robot, rng = panda(), np.random.default_rng(seed)
-    own = Limits(robot)
-    limits = Limits(
-        robot,
-        effort=own.effort * rng.uniform(0.45, 0.6),
-        velocity=None,
-        position=None,
-        **options,
-    )
-    path = Circle([0.45, 0.0, 0.45], 0.2, rng.uniform(4.0, 6.0), normal=[0, 0, 1])
-    task = FramePosition(robot, "panda_tcp", path, Gains.from_frequency(10.0))
-    field = JointCentering(robot)
+    own = Limits()
+    limits = Limits(effort=own.effort * rng.uniform(0.45, 0.6), velocity=None, position=None, **options)
+    path = Circle(0.2, rng.uniform(4.0, 6.0), [0.45, 0.0, 0.45], normal=[0, 0, 1])
+    task = FramePosition("panda_tcp", path, gains=Gains(natural_frequency=10.0))
+    field = JointCentering()
     return Controller(robot, [task], field, limits=limits), robot.home()
 
 
@@ -188,9 +182,9 @@ def test_the_bound_gives_way_to_every_limit() -> None:
     q[6], v[6] = upper[6] - 0.1, 1.5
     outs = []
     for speed in (None, 0.01):
-        limits = Limits(robot, effort=1e4, velocity=None, null_space_speed=speed)
+        limits = Limits(effort=1e4, velocity=None, null_space_speed=speed)
         here = robot.state(0.0, q, v).position("panda_tcp").copy()
-        task = FramePosition(robot, "panda_tcp", Hold(here), Gains.from_frequency(10))
+        task = FramePosition("panda_tcp", Hold(here), gains=Gains(natural_frequency=10))
         controller = Controller(robot, [task], null_space_gain=1.0, limits=limits)
         out = controller.compute(robot.state(0.0, q, v))
         assert out.status == Status.LIMITED
@@ -239,12 +233,10 @@ def test_an_arm_goes_where_it_can_be_held() -> None:
     robot = panda()
     q0 = robot.home()
     share = 0.35  # of 87 N·m at the shoulder, which takes 37 with the arm stretched
-    far = FramePosition(
-        robot, "panda_tcp", Hold([0.7, 0.0, 0.4]), Gains.from_frequency(6.0)
-    )
+    far = FramePosition("panda_tcp", Hold([0.7, 0.0, 0.4]), gains=Gains(natural_frequency=6.0))
     used = {}
     for static in (None, share):
-        limits = Limits(robot, static_effort=static)
+        limits = Limits(static_effort=static)
         rollout = run(Controller(robot, [far], limits=limits), q0, 1.5)
         assert rollout["status"].max() < Status.RELAXED
         held = np.array(

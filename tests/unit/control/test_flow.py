@@ -50,7 +50,7 @@ def swaying_posture(state: RobotState) -> Array:
 def test_flow_meets_the_task_and_follows_the_field(kind: str) -> None:
     """v = J#x_d' + P g: J v = x_d', and v - g is as small as the metric can tell."""
     metric = METRICS[kind](7)
-    field = FunctionField(panda(), swaying_posture)
+    field = FunctionField(swaying_posture)
     tasks = [track(), hold_orientation()]
     controller = Controller(
         panda(), tasks, field, metric=metric, singularity_threshold=EXACT
@@ -80,7 +80,7 @@ def test_robot_becomes_the_flow(kind: str) -> None:
     controller = Controller(
         panda(),
         [track()],
-        FunctionField(panda(), swaying_posture),
+        FunctionField(swaying_posture),
         metric=METRICS[kind](7),
         null_space_gain=20.0,
         singularity_threshold=EXACT,
@@ -107,13 +107,13 @@ def test_robot_becomes_the_flow(kind: str) -> None:
 
 def test_a_start_on_the_flow_has_no_transient() -> None:
     """v0 = flow(0, q0) from a point of the path: e and e_N are zero from the start."""
-    field = FunctionField(panda(), swaying_posture)
+    field = FunctionField(swaying_posture)
     home = panda().home()
     start = panda().state(0.0, home, np.zeros(7)).position(TCP).copy()
     path = Circle(
-        start - np.array([0.1, 0.0, 0.0]), 0.1, 2.0, axes=[[1, 0, 0], [0, 0, 1]]
+        0.1, 2.0, start - np.array([0.1, 0.0, 0.0]), axes=[[1, 0, 0], [0, 0, 1]]
     )
-    task = FramePosition(panda(), TCP, path, GAINS)
+    task = FramePosition(TCP, path, gains=GAINS)
     controller = Controller(panda(), [task], field, singularity_threshold=EXACT)
     rollout = simulate(
         controller,
@@ -133,8 +133,8 @@ def test_hold_still() -> None:
     """A robot at rest at its posture and its point stays there: a = 0, tau = N."""
     home = panda().home()
     point = panda().state(0.0, home, np.zeros(7)).position(TCP).copy()
-    task = FramePosition(panda(), TCP, Hold(point), GAINS)
-    field = TargetPosture(panda(), home)
+    task = FramePosition(TCP, Hold(point), gains=GAINS)
+    field = TargetPosture(home)
     for kind in METRICS:
         controller = Controller(panda(), [task], field, metric=METRICS[kind](7))
         state = panda().state(0.0, home, np.zeros(7))

@@ -48,9 +48,9 @@ def panda() -> Robot:
 
 def hand(frequency: float = 10.0, **circle: Any) -> FramePosition:
     options = {"angular_rate": 2.0, "normal": [0.0, 0.0, 1.0], **circle}
-    path = Circle([0.45, 0.0, 0.45], 0.15, **options)
-    gains = Gains.from_frequency(frequency)
-    return FramePosition(panda(), "panda_tcp", path, gains, name="hand")
+    path = Circle(0.15, center=[0.45, 0.0, 0.45], **options)
+    gains = Gains(natural_frequency=frequency)
+    return FramePosition("panda_tcp", path, gains=gains, name="hand")
 
 
 # --- the bounds ----------------------------------------------------------------------
@@ -71,7 +71,7 @@ def bounds(limits: Limits, q: Array, v: Array) -> tuple[Array, Array]:
 
 def test_bounds_are_the_barriers() -> None:
     robot = panda()
-    limits = Limits(robot, bandwidth=8.0, position_margin=0.0, velocity_margin=0.0)
+    limits = Limits(bandwidth=8.0, position_margin=0.0, velocity_margin=0.0)
     q, v = robot.home(), np.full(7, 0.1)
     a_lower, a_upper = bounds(limits, q, v)
     lower, upper = robot.position_limits()
@@ -85,7 +85,7 @@ def test_bounds_are_the_barriers() -> None:
 def test_position_bounds_are_the_barriers_of_both_limits(seed: int) -> None:
     """h'' + 2αh' + α²h ≥ 0 for the room h to either limit, also beyond it."""
     robot, rng = panda(), np.random.default_rng(seed)
-    limits = Limits(robot, velocity=None, position_margin=0.0, bandwidth=8.0)
+    limits = Limits(velocity=None, position_margin=0.0, bandwidth=8.0)
     lower, upper = robot.position_limits()
     q = lower + (upper - lower) * rng.uniform(-0.1, 1.1, 7)
     v = rng.normal(0.0, 2.0, 7)
@@ -97,7 +97,7 @@ def test_position_bounds_are_the_barriers_of_both_limits(seed: int) -> None:
 
 def test_too_fast_is_slowed_down_more_steeply() -> None:
     """Beyond the guarded speed the barrier is four times as steep."""
-    limits = Limits(panda(), velocity=1.0, position=None, bandwidth=8.0)
+    limits = Limits(velocity=1.0, position=None, bandwidth=8.0)
     guarded = limits.guarded_velocity[0]
     for excess, slope in ((-0.01, 16.0), (0.01, 64.0)):
         _, a_upper = bounds(limits, panda().home(), np.full(7, guarded + excess))
@@ -110,7 +110,7 @@ def test_too_fast_is_slowed_down_more_steeply() -> None:
 def test_bounds_never_cross(seed: int) -> None:
     """Position has priority over velocity and acceleration: a range always remains."""
     rng = np.random.default_rng(seed)
-    limits = Limits(panda(), acceleration=rng.uniform(0.1, 5.0))
+    limits = Limits(acceleration=rng.uniform(0.1, 5.0))
     lower, upper = panda().position_limits()
     q = lower + (upper - lower) * rng.uniform(-0.2, 1.2, 7)
     a_lower, a_upper = bounds(limits, q, rng.normal(0.0, 5.0, 7))
@@ -157,9 +157,9 @@ def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
     """Wide limits: the optimum is δ = 0, solved or not; to 1e-8 over random states."""
     robot, rng = panda(), np.random.default_rng(seed)
     q, v = robot.random_configuration(rng), 0.3 * rng.standard_normal(7)
-    field = JointCentering(robot)
+    field = JointCentering()
     free = Controller(robot, [hand()], field)
-    wide = Limits(robot, effort=1e6, velocity=None, position=None)
+    wide = Limits(effort=1e6, velocity=None, position=None)
     limited = Controller(robot, [hand()], field, limits=wide)
     state = robot.state(0.3, q, v)
     out, same = free.compute(state), limited.compute(state)
@@ -184,15 +184,9 @@ def test_null_space_gives_way_first_then_the_lower_task() -> None:
     """One effort limit that binds: what is left exact shows the order."""
     robot = panda()
     q, v = robot.home(), np.zeros(7)
-    posture = JointPosture(
-        robot,
-        robot.integrate(q, np.full(7, 0.5)),
-        Gains.from_frequency(10.0),
-        joints=["panda_joint1", "panda_joint2"],
-        name="posture",
-    )
+    posture = JointPosture(robot.integrate(q, np.full(7, 0.5)), gains=Gains(natural_frequency=10.0), joints=["panda_joint1", "panda_joint2"], name="posture")
     levels = [[hand()], [posture]]
-    field = 20.0 * JointCentering(robot)
+    field = 20.0 * JointCentering()
     free = Controller(robot, levels, field)
     state = robot.state(0.3, q, v)
     wanted = free.compute(state)
@@ -202,7 +196,7 @@ def test_null_space_gives_way_first_then_the_lower_task() -> None:
         effort = np.full(7, 1e3)
         still = state.nonlinear_effects[joint]
         effort[joint] = abs(still + shrink * (tau[joint] - still))
-        limits = Limits(robot, effort=effort, velocity=None, position=None)
+        limits = Limits(effort=effort, velocity=None, position=None)
         controller = Controller(robot, levels, field, limits=limits)
         out = controller.compute(state)
         assert out.status == Status.LIMITED
@@ -249,24 +243,13 @@ def test_no_limit_is_violated(seed: int) -> None:
     robot, rng = panda(), np.random.default_rng(seed)
     lower, upper = robot.position_limits()
     q0 = 0.5 * (lower + upper) + 0.35 * (upper - lower) * rng.uniform(-1.0, 1.0, 7)
-    own = Limits(robot)
-    limits = Limits(
-        robot,
-        effort=own.effort * rng.uniform(0.7, 1.0),
-        effort_rate=1000.0,
-        velocity=own.velocity * rng.uniform(0.2, 0.5),
-    )
+    own = Limits()
+    limits = Limits(effort=own.effort * rng.uniform(0.7, 1.0), effort_rate=1000.0, velocity=own.velocity * rng.uniform(0.2, 0.5))
     start = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp")
-    path = Circle(
-        start + rng.normal(0.0, 0.4, 3),
-        0.2,
-        rng.uniform(1, 6),
-        normal=rng.normal(size=3),
-    )
-    task = FramePosition(
-        robot, "panda_tcp", path, Gains.from_frequency(rng.uniform(5, 12))
-    )
-    controller = Controller(robot, [task], JointCentering(robot), limits=limits)
+    center = start + rng.normal(0.0, 0.4, 3)
+    path = Circle(0.2, rng.uniform(1, 6), center, normal=rng.normal(size=3))
+    task = FramePosition("panda_tcp", path, gains=Gains(natural_frequency=rng.uniform(5, 12)))
+    controller = Controller(robot, [task], JointCentering(), limits=limits)
     rollout = run(controller, q0, 0.8)
     assert rollout.meta["status"] == "completed"
     assert (rollout["status"] == Status.LIMITED).any()  # limits did bind
@@ -281,8 +264,8 @@ def test_a_joint_limit_is_approached_and_not_crossed() -> None:
     _, upper = robot.position_limits()
     beyond = robot.home()
     beyond[3] = upper[3] + 0.5
-    task = JointPosture(robot, beyond, Gains.from_frequency(6.0), name="beyond")
-    limits = Limits(robot)
+    task = JointPosture(beyond, gains=Gains(natural_frequency=6.0), name="beyond")
+    limits = Limits()
     rollout = run(Controller(robot, [task], limits=limits), robot.home(), 2.5)
     joint = rollout["q"][:, 3]
     assert joint.max() <= upper[3]
@@ -297,7 +280,7 @@ def test_contradiction_is_relaxed_and_told() -> None:
     q, v = robot.home(), np.zeros(7)
     _, upper = robot.position_limits()
     q[3], v[3] = upper[3] - 0.02, 2.0
-    limits = Limits(robot, effort=1.0)
+    limits = Limits(effort=1.0)
     out = Controller(robot, [hand()], limits=limits).compute(robot.state(0.0, q, v))
     assert np.isfinite(out.tau).all()
     assert (np.abs(out.tau) <= 1.0).all()
@@ -353,7 +336,7 @@ def test_what_is_dearer_is_relaxed_less(kept: str, relaxed: str) -> None:
 
 def test_effort_rate_needs_to_know_what_went_out() -> None:
     robot = panda()
-    limits = Limits(robot, effort_rate=1000.0)
+    limits = Limits(effort_rate=1000.0)
     controller = Controller(robot, [hand()], limits=limits)
     state = RobotState(robot).update(0.0, robot.home(), np.zeros(7))
     before = state.nonlinear_effects.copy()
@@ -386,26 +369,26 @@ def test_effort_rate_needs_to_know_what_went_out() -> None:
 )
 def test_impossible_limits(options: dict[str, Any], message: str) -> None:
     with pytest.raises(LimitError, match=message):
-        Limits(panda(), **options)
+        Limits(**options)
 
 
 def test_start_outside_the_limits_names_the_joint() -> None:
     q = panda().home()
     q[3] = 0.1
     with pytest.raises(LimitError, match=r"panda_joint4 is at 0.1, its limits are"):
-        Limits(panda()).check_start(q, np.zeros(7))
+        Limits().check_start(q, np.zeros(7))
     fast = np.zeros(7)
     fast[0] = 3.0
     with pytest.raises(LimitError, match=r"joint1 moves at 3, its limit is 2.175"):
-        Limits(panda()).check_start(panda().home(), fast)
+        Limits().check_start(panda().home(), fast)
 
 
 def test_hold_with_limits_is_still_the_paper() -> None:
     """A still target within all limits: not one step is limited."""
     robot = panda()
     here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
-    task = FramePosition(robot, "panda_tcp", Hold(here), Gains.from_frequency(10.0))
-    rollout = run(Controller(robot, [task], limits=Limits(robot)), robot.home(), 0.2)
+    task = FramePosition("panda_tcp", Hold(here), gains=Gains(natural_frequency=10.0))
+    rollout = run(Controller(robot, [task], limits=Limits()), robot.home(), 0.2)
     assert not rollout["status"].any()
 
 
@@ -417,25 +400,23 @@ def swinging() -> Obstacle:
     robot = panda()
     elbow = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_link4")
     center = elbow + np.array([0.0, 0.35, 0.0])
-    path = Lissajous(center, [0.0, 0.28, 0.0], [1.0, 2.0, 1.0], [0.0, 3.14, 0.0])
+    path = Lissajous([0.0, 0.28, 0.0], [1.0, 2.0, 1.0], [0.0, 3.14, 0.0], center)
     return Obstacle("ball", Sphere(0.08), path)
 
 
 def elbow(limits: Limits | None) -> Controller:
     robot = panda()
     here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
-    task = FramePosition(
-        robot, "panda_tcp", Hold(here), Gains.from_frequency(10.0), name="hand"
-    )
+    task = FramePosition("panda_tcp", Hold(here), gains=Gains(natural_frequency=10.0), name="hand")
     return Controller(
-        robot, [task], JointCentering(robot), null_space_gain=6.0, limits=limits
+        robot, [task], JointCentering(), null_space_gain=6.0, limits=limits
     )
 
 
 def test_distance_rows_are_its_second_derivative() -> None:
     """∇d·a + drift = d'' along q ⊕ (s v + ½ s² a) at t + s, by differences."""
     robot = panda()
-    proximity = ObstacleClearance(robot, [swinging()]).proximity
+    proximity = ObstacleClearance([swinging()]).proximity
     limit = MinimumDistance(proximity, 0.02)
     rng = np.random.default_rng(2)
     q, v, a = robot.home(), 0.3 * rng.standard_normal(7), rng.standard_normal(7)
@@ -460,10 +441,10 @@ def test_distance_rows_are_its_second_derivative() -> None:
 def test_things_stay_apart() -> None:
     """A ball swings into the elbow: without the limit it hits, with it it does not."""
     robot = panda()
-    proximity = ObstacleClearance(robot, [swinging()]).proximity
+    proximity = ObstacleClearance([swinging()]).proximity
     least: dict[bool, float] = {}
     for limited in (False, True):
-        limits = Limits(robot, distances=[MinimumDistance(proximity, 0.02)])
+        limits = Limits(distances=[MinimumDistance(proximity, 0.02)])
         rollout = run(elbow(limits if limited else None), robot.home(), 1.6)
         least[limited] = min(
             float(proximity.measure(robot.state(t, q, v)).min())
@@ -478,8 +459,8 @@ def test_things_stay_apart() -> None:
 def test_start_too_near() -> None:
     robot = panda()
     ball = Obstacle("ball", Sphere(0.1), Hold([0.3, 0.0, 0.5]))
-    proximity = ObstacleClearance(robot, [ball]).proximity
-    limits = Limits(robot, distances=[MinimumDistance(proximity, 0.05)])
+    proximity = ObstacleClearance([ball]).proximity
+    limits = Limits(distances=[MinimumDistance(proximity, 0.05)])
     with pytest.raises(LimitError, match=r"to ball are .* must be at least 0.05 m"):
         limits.check_start(robot.home(), np.zeros(7))
     with pytest.raises(LimitError, match="minimum distance is -1"):

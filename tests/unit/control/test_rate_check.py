@@ -157,7 +157,7 @@ def test_the_linear_loop_is_the_chain_link_by_link(
     file.write_text(CARRIAGE)
     robot = Robot.load(str(file))
     h, frequency = 0.01, 12.0
-    task = JointPosture(robot, np.zeros(1), Gains.from_frequency(frequency))
+    task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=frequency))
     made, parts = Controller(robot, [task]), Compensation(**compensation)
     plant = ImperfectPlant(
         IntegratedPlant(
@@ -188,7 +188,7 @@ def test_the_linear_loop_is_the_chain_link_by_link(
 def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
     """The weightless arm agrees: 10 % beside what is told its motion dies or grows."""
     robot = Robot.load("panda", gravity=[0.0, 0.0, 0.0])
-    task = JointPosture(robot, Q0, Gains.from_frequency(20.0))
+    task = JointPosture(Q0, gains=Gains(natural_frequency=20.0))
     made = Controller(robot, [task])
     for observer in (None, MomentumObserver(20.0)):
         strong = Compensation(
@@ -232,9 +232,9 @@ def holding(
     frequency: float = 50.0, gain: float = 100.0, stiffness: float = 1.0, **more: Any
 ) -> Controller:
     position = PANDA.state(0.0, Q0, np.zeros(7)).position("panda_tcp") + 1e-4
-    gains = Gains.from_frequency(frequency)
-    hand = FramePosition(PANDA, "panda_tcp", Hold(position), gains, name="hand")
-    field = stiffness * TargetPosture(PANDA, TARGET)
+    gains = Gains(natural_frequency=frequency)
+    hand = FramePosition("panda_tcp", Hold(position), gains=gains, name="hand")
+    field = stiffness * TargetPosture(TARGET)
     return Controller(PANDA, [hand], field, null_space_gain=gain, **more)
 
 
@@ -378,10 +378,8 @@ def test_a_field_s_slope_is_taken_in_the_null_space_and_the_metric() -> None:
     np.testing.assert_allclose(got, wanted, rtol=0.05)
     for low, high in pairwise(got):
         assert 0.0 < low < high
-    for field in (Rest(PANDA), Uncontrolled(PANDA)):
-        hand = FramePosition(
-            PANDA, "panda_tcp", Hold([0.4, 0.0, 0.5]), Gains.from_frequency(10.0)
-        )
+    for field in (Rest(), Uncontrolled()):
+        hand = FramePosition("panda_tcp", Hold([0.4, 0.0, 0.5]), gains=Gains(natural_frequency=10.0))
         K, A = null_space_rates(Controller(PANDA, [hand], field), state)
         assert np.allclose(A, 0.0)
         assert len(K) == (4 if field.controls else 0)

@@ -157,7 +157,7 @@ def test_capsules_hold_every_vertex_of_a_mesh() -> None:
         assert share < (1.0 + 1e-9 if len(points) == 8 else 0.9)  # a cube's is a ball
     obstacle = Obstacle("ball", Sphere(0.05), Hold([0.4, 0.3, 0.5]))
     both = [
-        ObstacleClearance(robot, [obstacle], proxy=proxy)  # type: ignore[arg-type]
+        ObstacleClearance([obstacle], proxy=proxy)  # type: ignore[arg-type]
         for proxy in ("capsules", "meshes")
     ]
     rng = np.random.default_rng(2)

@@ -215,7 +215,7 @@ def test_a_pair_that_is_named_twice_counts_once() -> None:
         once.gradient(state, np.ones(3)), twice.gradient(state, np.ones(3))
     )
     ball = Obstacle("ball", Sphere(0.1), Hold([0.4, 0.2, 0.6]))
-    one, two = (ObstacleClearance(robot, [ball] * k, influence=1.0) for k in (1, 2))
+    one, two = (ObstacleClearance([ball] * k, influence=1.0) for k in (1, 2))
     # A vectorised sum may depend, by rounding, on where its arrays lie in memory.
     assert one.value(state) == pytest.approx(two.value(state), rel=1e-14)
     assert one.value(state) > 0.1

@@ -8,7 +8,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from clearance_cases import ends, load, outside, placed, turned
+from clearance_cases import ends, load, outside, placed, still, turned
 from odd_robots import FACES, OCTAHEDRON, collision, odd_robot, write_stl
 
 from hsp_control import (
@@ -158,7 +158,7 @@ def test_flat_meshes_are_links_too(which: str, proxy: Any, tmp_path: Path) -> No
         ]
         assert np.min(gaps, axis=0).max() < 1e-6
     ball = Obstacle("ball", Sphere(0.05), Hold(own.act(np.array([0.0, 0.0, 0.9]))))
-    field = ObstacleClearance(robot, [ball], proxy=proxy)
+    field = ObstacleClearance([ball], proxy=proxy)
     state = robot.state(0.0, robot.neutral(), np.zeros(2))
     assert 0.3 < field.minimum_distance(state) < 0.9
 
@@ -195,10 +195,11 @@ def test_a_robot_without_geometry_gets_capsules_and_one_warning(
     robot = odd_robot(tmp_path)
     rounded = Obstacle("ball", Sphere(0.1), Hold([1.0, 0.0, 0.0]))
     flat = Obstacle("box", Box((0.1, 0.1, 0.1)), Hold([-1.0, 0.0, 0.0]))
+    state = robot.state(0.0, robot.neutral(), np.zeros(2))
     with caplog.at_level(logging.WARNING):
         stand, arm, hand = link_shapes(robot)
-        ObstacleClearance(robot, [rounded, flat])
-        SelfClearance(robot)
+        ObstacleClearance([rounded, flat]).value(state)
+        SelfClearance().value(state)
     assert [record.getMessage() for record in caplog.records] == [
         "odd has no collision geometry: using capsules of radius 0.05 m between its "
         "joints"
@@ -228,7 +229,7 @@ def test_robots_without_geometry_keep_clear_of_each_other(
     np.testing.assert_allclose(
         ends(stand)[:2], [[2.0, 0.0, 0.1], [2.0, 0.0, 0.4]], atol=1e-12
     )
-    pairs = SelfClearance(both, influence=5.0).proximity.pairs
+    pairs = SelfClearance(influence=5.0).proximity(still(both)).pairs
     names = {frozenset((shapes[i].link, shapes[j].link)) for i, j in pairs}
     assert frozenset(("odd_universe", "arm_panda_link1")) in names
     assert frozenset(("odd_universe", "odd_turn")) not in names

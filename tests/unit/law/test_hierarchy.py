@@ -155,7 +155,7 @@ def test_priorities_meet_the_stack_where_they_take_over(seed: int) -> None:
 
 # --- along motions -------------------------------------------------------------------
 
-GAINS = Gains.from_frequency(8.0)
+GAINS = Gains(natural_frequency=8.0)
 SIDES = ("left", "right")
 
 
@@ -176,18 +176,14 @@ def conflicting(kind: str) -> Controller:
     The second level's x row is the first's, at every state: rank 5 of 6, for good.
     """
     robot = panda()
-    circle = Circle([0.45, 0.0, 0.4], 0.1, 1.5, normal=[0.0, 0.0, 1.0])
-    hand = FramePosition(robot, "panda_tcp", circle, GAINS, name="hand")
-    rival = FramePosition(
-        robot, "panda_tcp", Hold([0.6]), GAINS, axes="x", name="rival"
-    )
-    wrist = JointPosture(
-        robot, robot.home(), GAINS, joints=["panda_joint7"], name="wrist"
-    )
+    circle = Circle(0.1, 1.5, [0.45, 0.0, 0.4], normal=[0.0, 0.0, 1.0])
+    hand = FramePosition("panda_tcp", circle, gains=GAINS, name="hand")
+    rival = FramePosition("panda_tcp", Hold([0.6]), gains=GAINS, axes="x", name="rival")
+    wrist = JointPosture(robot.home(), gains=GAINS, joints=["panda_joint7"], name="wrist")
     return Controller(
         robot,
         [[hand], [rival, wrist]],
-        2.0 * JointCentering(robot),
+        2.0 * JointCentering(),
         null_space_gain=4.0,
         metric=metric_of(kind),
     )
@@ -247,18 +243,14 @@ def test_propositions_hold_for_two_arms() -> None:
     x_axis = np.array([1.0, 0.0, 0.0])
     levels = [
         [
-            FramePosition(
-                robot, "left_gripper", Circle(left, 0.08, 1.5, normal=x_axis), GAINS
-            )
+            FramePosition("left_gripper", Circle(0.08, 1.5, left, normal=x_axis), gains=GAINS)
         ],
         [
-            FramePosition(robot, "right_gripper", Hold(right + 0.05), GAINS),
-            FramePosition(  # the first level's own row, wanted elsewhere
-                robot, "left_gripper", Hold([0.3]), GAINS, axes="x", name="rival"
-            ),
+            FramePosition("right_gripper", Hold(right + 0.05), gains=GAINS),
+            FramePosition("left_gripper", Hold([0.3]), gains=GAINS, axes="x", name="rival"),
         ],
     ]
-    controller = Controller(robot, levels, JointCentering(robot), null_space_gain=4.0)
+    controller = Controller(robot, levels, JointCentering(), null_space_gain=4.0)
     v0 = 0.2 * np.cos(np.arange(robot.nv))
     rollout = simulate(
         controller,

@@ -140,7 +140,7 @@ def test_constant_metric_is_the_papers_law_in_other_coordinates(
         K_N=A @ x.K_N @ A_inverse,
     )
     a_theta, e_theta, _ = resolve(theta, IDENTITY)
-    metric = ConstantMetric.from_coordinates(A)
+    metric = CoordinatesMetric(A)
     sample = metric.evaluate(None, MetricSample.allocate(7))  # type: ignore[arg-type]
     np.testing.assert_allclose(sample.W, A.T @ A, rtol=0, atol=1e-14)
     a, e_N, _ = resolve(x._replace(W=sample.W), CONSTANT)

@@ -73,37 +73,37 @@ def moving_field(robot: Robot) -> NullSpaceField:
     def rate(state: RobotState) -> Array:
         return np.cos(angle(state)) * (single * state.v + 1.0)
 
-    return FunctionField(robot, lambda s: np.sin(angle(s)), rate=rate)
+    return FunctionField(lambda s: np.sin(angle(s)), rate_function=rate)
 
 
 def case(name: str) -> Case:
     """Return one of the robots that the law is tried on, at a random state."""
     rng = np.random.default_rng(sum(map(ord, name)))
-    circle = Circle([0.4, 0.1, 0.5], 0.1, 2.0, normal=[0.0, 1.0, 1.0])
+    circle = Circle(0.1, 2.0, [0.4, 0.1, 0.5], normal=[0.0, 1.0, 1.0])
     if name == "planar3r":
         robot = load("planar3r")
-        path = Circle([1.0, 1.0], 1.0, 3.0)
-        tasks: list[Any] = [FramePosition(robot, "tip", path, GAINS, axes="xy")]
+        path = Circle(1.0, 3.0, [1.0, 1.0])
+        tasks: list[Any] = [FramePosition("tip", path, gains=GAINS, axes="xy")]
     elif name == "panda":
         robot = load("panda")
-        tasks = [FramePosition(robot, "panda_tcp", circle, GAINS)]
+        tasks = [FramePosition("panda_tcp", circle, gains=GAINS)]
     elif name == "panda_pose":  # six rows in two tasks
         robot = load("panda")
         tasks = [
-            FramePosition(robot, "panda_tcp", circle, GAINS),
-            FrameOrientation(robot, "panda_tcp", HoldOrientation(np.eye(3)), GAINS),
+            FramePosition("panda_tcp", circle, gains=GAINS),
+            FrameOrientation("panda_tcp", HoldOrientation(np.eye(3)), gains=GAINS),
         ]
     elif name == "panda_fingers":  # one finger mimics the other, both in the task
         robot = load("panda_fingers")
-        tasks = [FramePosition(robot, "panda_rightfinger", circle, GAINS)]
+        tasks = [FramePosition("panda_rightfinger", circle, gains=GAINS)]
     elif name == "tiago_no_hand":  # continuous joints in a chain
         robot = load("tiago_no_hand")
-        tasks = [FramePosition(robot, "arm_tool_link", circle, GAINS)]
+        tasks = [FramePosition("arm_tool_link", circle, gains=GAINS)]
     else:  # a floating root, as if it were driven
         robot = load("solo12")
         tasks = [
-            FramePosition(robot, "FL_FOOT", circle, GAINS),
-            FrameOrientation(robot, "base_link", HoldOrientation(np.eye(3)), GAINS),
+            FramePosition("FL_FOOT", circle, gains=GAINS),
+            FrameOrientation("base_link", HoldOrientation(np.eye(3)), gains=GAINS),
         ]
     q = robot.random_configuration(rng)
     return Case(
@@ -121,7 +121,7 @@ def coordinates(nv: int) -> Array:
 METRICS: dict[str, Callable[[int], Metric]] = {
     "identity": lambda nv: IdentityMetric(),
     "diagonal": lambda nv: ConstantMetric(np.linspace(1.0, 5.0, nv)),
-    "coordinates": lambda nv: ConstantMetric.from_coordinates(coordinates(nv)),
+    "coordinates": lambda nv: CoordinatesMetric(coordinates(nv)),
     "mass_matrix": lambda nv: MassMatrixMetric(),
 }
 
@@ -245,7 +245,7 @@ def test_coordinates_metric_is_equation_13_in_those_coordinates(name: str) -> No
     nv = c.robot.nv
     A = coordinates(nv)
     A_inverse = np.linalg.inv(A)
-    metric = ConstantMetric.from_coordinates(A)
+    metric = CoordinatesMetric(A)
     state = c.robot.state(0.3, c.q, c.v)
     x = terms(c, state, metric)
     J_plus_dot = slope(
@@ -272,7 +272,7 @@ def test_coordinates_metric_is_equation_13_in_those_coordinates(name: str) -> No
     )
     # A cost's field is raised with the metric: -∇_θ f in the other coordinates.
     robot = c.robot
-    cost = TargetPosture(robot, c.posture, weights=2.0)
+    cost = TargetPosture(c.posture, weights=2.0)
     sample = metric.evaluate(state, MetricSample.allocate(nv))
     state = robot.state(0.3, robot.integrate(c.q, 0.3 * c.v), c.v)
     g = cost.evaluate(state, sample, metric.form, FieldSample.allocate(nv)).g
@@ -374,8 +374,8 @@ def test_law_of_a_rank_deficient_task(kind: str) -> None:
     """
     c = case("planar3r")
     metric = METRICS[kind](3)
-    space = Circle([1.0, 1.0, 0.0], 1.0, 3.0, axes=np.eye(3)[:2])
-    task = FramePosition(c.robot, "tip", space, GAINS)
+    space = Circle(1.0, 3.0, [1.0, 1.0, 0.0], axes=np.eye(3)[:2])
+    task = FramePosition("tip", space, gains=GAINS)
     state = c.robot.state(0.3, c.q, c.v)
     flat = controller(c, metric, 7.0).compute(state)
     spatial = controller(c._replace(tasks=[task]), metric, 7.0).compute(state)
@@ -409,7 +409,7 @@ def test_metrics_differ() -> None:
 def test_a_task_that_takes_every_freedom_leaves_no_null_space() -> None:
     """J square: P = 0, e_N = 0, and the field changes nothing."""
     c = case("panda")
-    task = JointPosture(c.robot, c.posture, GAINS)
+    task = JointPosture(c.posture, gains=GAINS)
     state = c.robot.state(0.3, c.q, c.v)
     full = c._replace(tasks=[task])
     for kind in METRICS:

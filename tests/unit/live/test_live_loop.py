@@ -314,7 +314,7 @@ def bad_field(t: float, what: Any) -> FunctionField:
             raise what
         return np.full(7, what)
 
-    return FunctionField(panda(), g, rate=lambda _: np.zeros(7))
+    return FunctionField(g, rate_function=lambda _: np.zeros(7))
 
 
 @pytest.mark.slow
@@ -385,7 +385,7 @@ def test_a_second_ctrl_c_leaves_it_to_the_robot() -> None:
 @pytest.mark.slow
 def test_what_a_change_raises_stops_it() -> None:
     requests, rig = OperatorRequests(), Rig()
-    gains = Gains.from_frequency(5.0)
+    gains = Gains(natural_frequency=5.0)
     requests.call(lambda: law().change_gains("tipp", gains, start=0.0, ramp=1.0))
     report = run_loop(law(), rig, requests=requests)
     assert "'tipp'" in report.reason
@@ -480,15 +480,12 @@ def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
     controller, requests, rig = law(), OperatorRequests(), Rig()
     q = start()
     q[0] -= 0.5
-    new = TargetPosture(panda(), q, name="other")
-    elbow = FramePosition(
-        panda(), "panda_link4", Hold([0.6]), Gains.from_frequency(5.0),
-        name="elbow", axes="z",
-    )  # fmt: skip
+    new = TargetPosture(q, name="other")
+    elbow = FramePosition("panda_link4", Hold([0.6]), gains=Gains(natural_frequency=5.0), name="elbow", axes="z")  # fmt: skip
     changes = {
         0.1: lambda: controller.change_field(new, start=0.12, ramp=0.2),
         0.2: lambda: controller.change_gains(
-            "tip", Gains.from_frequency(15.0), start=0.22, ramp=0.2
+            "tip", Gains(natural_frequency=15.0), start=0.22, ramp=0.2
         ),
         0.3: lambda: controller.add_task(elbow, start=0.32, ramp=0.2),
         0.6: lambda: controller.remove_task("elbow", start=0.62, ramp=0.2),
@@ -522,7 +519,7 @@ def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
 
 def test_a_floating_base_is_refused() -> None:
     robot = hsp.Robot.load("panda", root="free_flyer")
-    task = hsp.JointPosture(robot, robot.neutral(), Gains.from_frequency(5.0))
+    task = hsp.JointPosture(robot.neutral(), gains=Gains(natural_frequency=5.0))
     controller = hsp.Controller(robot, [task], base="driven")
     rig = Rig()
     with pytest.raises(
@@ -594,7 +591,7 @@ def test_a_robot_that_is_silent_or_unfit_is_not_started() -> None:
 
 def test_the_monitor_uses_the_limits_of_the_controller() -> None:
     q = start()
-    limits = Limits(panda(), position=(q - 0.05, q + 0.05))
+    limits = Limits(position=(q - 0.05, q + 0.05))
     controller = law()  # does not know of them, and swings by 0.5 rad
     controller.limits = limits
     report = run_loop(controller, Rig(), duration=5.0)

@@ -14,7 +14,9 @@ from hsp_control import (
     Cost,
     IdentityMetric,
     Obstacle,
+    RobotState,
 )
+from hsp_control.geometry import Proxy
 from hsp_control.geometry.shapes import (
     Sphere,
 )
@@ -117,13 +119,13 @@ def test_exactly_zero_beyond_the_influence(gap: float) -> None:
     robot = load("panda")
     state = robot.state(0.3, robot.home(), np.linspace(-0.3, 0.3, 7))
     ball = Obstacle("ball", Sphere(0.1), Hold([0.5, 0.5, 0.5]))
-    d = ObstacleClearance(robot, [ball]).minimum_distance(state)
-    field = ObstacleClearance(robot, [ball], influence=d - gap)
+    d = ObstacleClearance([ball]).minimum_distance(state)
+    field = ObstacleClearance([ball], influence=d - gap)
     g, g_dot = evaluate(field, state)
     np.testing.assert_array_equal(g, 0.0)
     np.testing.assert_array_equal(g_dot, 0.0)
     assert field.value(state) == 0.0
-    within = ObstacleClearance(robot, [ball], influence=d + 0.05)
+    within = ObstacleClearance([ball], influence=d + 0.05)
     assert np.abs(evaluate(within, state).g).max() > 1e-4
     assert np.abs(evaluate(within, state).g_dot).max() > 1e-4
 
@@ -138,16 +140,17 @@ def test_the_rate_is_zero_however_quick_the_obstacle() -> None:
     start = np.array([0.5, 0.5, 0.5])
     state = robot.state(0.0, robot.home(), np.zeros(7))
     resting = Obstacle("ball", Sphere(0.1), Hold(start))
-    field = ObstacleClearance(robot, [resting])
+    field = ObstacleClearance([resting])
     d = field.minimum_distance(state)
-    k = int(np.argmin(field.proximity.distances))
-    n = field.proximity.witness(k)[0] - field.proximity.witness(k)[1]
-    ball = Obstacle("ball", Sphere(0.1), UniformLine(start, 20.0 * n / d))
+    proximity = field.proximity(state)
+    k = int(np.argmin(proximity.distances))
+    n = proximity.witness(k)[0] - proximity.witness(k)[1]
+    ball = Obstacle("ball", Sphere(0.1), UniformLine(20.0 * n / d, start))
     for gap in (0.001, 0.03, 0.051):
-        quick = ObstacleClearance(robot, [ball], influence=d - gap)
+        quick = ObstacleClearance([ball], influence=d - gap)
         np.testing.assert_array_equal(evaluate(quick, state).g, 0.0)
         np.testing.assert_array_equal(quick.gradient_rate(state), 0.0)
-    near = ObstacleClearance(robot, [ball], influence=d + 0.01)
+    near = ObstacleClearance([ball], influence=d + 0.01)
     assert np.abs(near.gradient_rate(state)).max() > 0.0
 
 
@@ -172,13 +175,13 @@ def test_distances_are_measured_once_per_state(calls: list[int]) -> None:
     """
     robot = load("panda")
     ball = Obstacle("ball", Sphere(0.1), AIR)
-    field = ObstacleClearance(robot, [ball], influence=1.0, proxy="hulls")
+    field = ObstacleClearance([ball], influence=1.0, proxy="hulls")
     state = still(robot)
     for _ in range(2):
         field.value(state)
         field.gradient(state)
         field.minimum_distance(state)
-        field.proximity.nearest(state)
+        field.proximity(state).nearest(state)
     assert len(calls) == 1
     evaluate(field, state)
     assert len(calls) == 5
@@ -186,19 +189,19 @@ def test_distances_are_measured_once_per_state(calls: list[int]) -> None:
     field.gradient(state)
     field.value(state)
     assert len(calls) == 6
-    far = ObstacleClearance(robot, [ball], influence=0.01, proxy="hulls")
+    far = ObstacleClearance([ball], influence=0.01, proxy="hulls")
     del calls[:]
     evaluate(far, state)
     assert len(calls) == 1
     del calls[:]
-    evaluate(ObstacleClearance(robot, [ball], influence=1.0), state)
+    evaluate(ObstacleClearance([ball], influence=1.0), state)
     assert not calls
 
 
 def test_distances_are_those_of_the_state_that_is_asked_for() -> None:
     """Also where a state is gone and another has taken its place in memory."""
     robot = load("panda")
-    field = ObstacleClearance(robot, [Obstacle("ball", Sphere(0.1), AIR)])
+    field = ObstacleClearance([Obstacle("ball", Sphere(0.1), AIR)])
     rng = np.random.default_rng(13)
     postures = [robot.random_configuration(rng) for _ in range(8)]
     passing = [
@@ -209,3 +212,54 @@ def test_distances_are_those_of_the_state_that_is_asked_for() -> None:
     assert len(set(passing)) == len(postures)
     first = field.minimum_distance(kept[0])
     assert first == field.minimum_distance(kept[0]) == passing[0]
+
+
+@pytest.mark.parametrize("proxy", ["capsules", "hulls"])
+def test_what_is_measured_elsewhere_does_not_disturb(proxy: Proxy) -> None:
+    """Companions of a state, other states and other robots have memory of their own.
+
+    Distances, nearest points, gradient and rate stay the same to the last bit, although
+    the rate by hulls comes from distances at the companion.
+    """
+    field = ObstacleClearance(
+        [Obstacle("ball", Sphere(0.1), AIR)], influence=1.0, proxy=proxy
+    )
+    q, v = load("panda").home(), np.linspace(-0.5, 0.5, 7)
+
+    def found(state: RobotState) -> list[Any]:
+        proximity = field.proximity(state)
+        near = int(np.argmin(proximity.measure(state)))
+        return [
+            field.value(state),
+            field.minimum_distance(state),
+            *proximity.witness(near),
+            field.gradient(state),
+            field.gradient_rate(state),
+            *evaluate(field, state),
+        ]
+
+    state = load("panda").state(0.3, q, v)
+    expected = [np.array(each) for each in found(state)]
+    ahead = state.ahead(0.05)
+    moved = [np.array(each) for each in found(ahead)]
+    other = load("panda").state(0.3, q + 0.2, v)
+    found(load("iiwa14").state(0.3, load("iiwa14").home(), v))
+    found(other)
+    assert field.proximity(state) is field.proximity(state)
+    assert len({id(field.proximity(each)) for each in (state, ahead, other)}) == 3
+    for actual, wanted in zip(found(state), expected, strict=True):
+        np.testing.assert_array_equal(actual, wanted)
+    assert np.abs(moved[4] - expected[4]).max() > 1e-3
+
+
+def test_the_gradient_by_hulls_is_that_of_the_state_after_its_rate() -> None:
+    """The rate moves Coal's nearest points of the companion, not those of the state."""
+    robot = load("panda")
+    field = ObstacleClearance(
+        [Obstacle("ball", Sphere(0.1), AIR)], influence=1.0, proxy="hulls"
+    )
+    state = robot.state(0.0, robot.home(), np.linspace(-1.0, 1.0, 7))
+    before = field.gradient(state)
+    field.gradient_rate(state)
+    np.testing.assert_array_equal(field.gradient(state), before)
+    np.testing.assert_array_equal(evaluate(field, state).g, -before)

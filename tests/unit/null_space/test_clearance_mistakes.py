@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from clearance_cases import AIR, load, still
+from field_cases import placed
 from odd_robots import collision, odd_robot
 
 from hsp_control import (
+    NullSpaceField,
     Obstacle,
+    Robot,
     Scene,
     load_experiment,
 )
@@ -43,70 +46,86 @@ pytestmark = pytest.mark.filterwarnings("error")
 
 
 BALL = Obstacle("ball", Sphere(0.1), Hold([0.5, 0.3, 0.5]))
+
+
+def on(robot: Robot, field: NullSpaceField) -> NullSpaceField:
+    """Place a field on a robot at rest at home, beside the ball."""
+    return placed(field, still(robot), [BALL])
+
+
 MISTAKES: list[tuple[Callable[[Path], Any], type[HspControlError], str]] = [
-    (lambda _: ObstacleClearance(load("panda"), []), FieldError,
-     "field 'obstacle_clearance' needs at least one obstacle"),
-    (lambda _: ObstacleClearance(load("panda"), [BALL], influence=0.0), FieldError,
-     "field 'obstacle_clearance': influence 0.0 must be positive"),
-    (lambda _: ObstacleClearance(load("panda"), [BALL], influence=-1.0), FieldError,
-     "influence -1.0 must be positive"),
-    (lambda _: SelfClearance(load("panda"), influence=float("nan"), name="mine"),
-     FieldError, "field 'mine': influence nan must be positive"),
-    (lambda _: SelfClearance(load("panda"), influence=float("inf")), FieldError,
-     "influence inf must be positive"),
-    (lambda _: ObstacleClearance(load("panda"), [BALL], links=["panda_lnk3"]),
-     FieldError, "field 'obstacle_clearance': link 'panda_lnk3' has no geometry; did "
+    (lambda _: ObstacleClearance([]), FieldError,
+     "ObstacleClearance: obstacles: needs at least one obstacle"),
+    (lambda _: placed(ObstacleClearance(), still(load("panda"))), FieldError,
+     "the scene has no obstacle"),
+    (lambda _: on(load("panda"), ObstacleClearance(["ball", "bell"])), SceneError,
+     "obstacles.1: no obstacle 'bell'; did you mean 'ball'? (the scene has ball)"),
+    (lambda _: ObstacleClearance([BALL], influence=0.0), FieldError,
+     "ObstacleClearance: influence: 0.0 is too small; must be greater than 0"),
+    (lambda _: ObstacleClearance([BALL], influence=-1.0), FieldError,
+     "influence: -1.0 is negative; must be greater than 0"),
+    (lambda _: SelfClearance(influence=float("nan")), FieldError,
+     "SelfClearance: influence: .nan is not a finite number"),
+    (lambda _: SelfClearance(influence=float("inf")), FieldError,
+     "influence: .inf is not a finite number"),
+    (lambda _: on(load("panda"), ObstacleClearance([BALL], links=["panda_lnk3"])),
+     FieldError, "links.0: link 'panda_lnk3' has no geometry; did "
      "you mean 'panda_link3'? (links with geometry: panda_link0, panda_link1, "),
-    (lambda _: ObstacleClearance(load("panda"), [BALL], links=["panda_link0"]),
+    (lambda _: on(load("panda"), ObstacleClearance(links=["panda_link0"])),
      FieldError, "there are no pairs of shapes to keep apart"),
-    (lambda _: ObstacleClearance(load("panda"), [BALL], links=[]), FieldError,
+    (lambda _: on(load("panda"), ObstacleClearance([BALL], links=[])), FieldError,
      "there are no pairs of shapes to keep apart"),
     (lambda _: Proximity(load("panda"), link_shapes(load("panda")), [], []), FieldError,
      "there are no pairs of shapes to keep apart"),
-    (lambda at: SelfClearance(odd_robot(at, collision('<sphere radius="1"/>'))),
+    (lambda at: on(odd_robot(at, collision('<sphere radius="1"/>')), SelfClearance()),
      FieldError, "there are no pairs of shapes to keep apart"),
-    (lambda _: ObstacleClearance(load("panda"), [BALL], proxy="boxes"),  # type: ignore[arg-type]
+    (lambda _: ObstacleClearance([BALL], proxy="boxes"),  # type: ignore[arg-type]
+     FieldError, "ObstacleClearance: proxy: unknown value 'boxes' (allowed: capsules, "
+     "spheres, hulls, meshes)"),
+    (lambda _: link_shapes(load("panda"), "boxes"),  # type: ignore[arg-type]
      ModelError, "proxy 'boxes' is not one of capsules, spheres, hulls, meshes"),
-    (lambda at: ObstacleClearance(
-        load("panda"), [Obstacle("it", Mesh(at / "no.stl"), AIR)]),
+    (lambda at: on(load("panda"), ObstacleClearance(
+        [Obstacle("it", Mesh(at / "no.stl"), AIR)])),
      SceneError, "/no.stl"),
     (lambda at: Mesh(at / "no.stl").geometry(), SceneError, "mesh: no such file "),
     (lambda at: Mesh(at).geometry(), SceneError, "mesh: no such file "),
     (lambda at: Mesh(junk(at)).geometry(), SceneError, "mesh: cannot read "),
     (lambda at: Mesh(junk(at)).bounding_radius, SceneError, "junk.stl: "),
     (lambda at: Mesh(at / "a.stl", scale=0.0), SceneError,
-     "mesh: scale is 0.0; must be greater than 0"),
-    (lambda _: Sphere(-0.1), SceneError, "sphere: radius is -0.1; must be at least 0"),
-    (lambda _: Sphere(float("nan")), SceneError, "sphere: radius is nan"),
-    (lambda _: Sphere(float("inf")), SceneError, "sphere: radius is inf"),
+     "Mesh: scale: 0.0 is too small; must be greater than 0"),
+    (lambda _: Sphere(-0.1), SceneError,
+     "Sphere: radius: -0.1 is negative; must be at least 0"),
+    (lambda _: Sphere(float("nan")), SceneError, "Sphere: radius: .nan is not a fin"),
+    (lambda _: Sphere(float("inf")), SceneError, "Sphere: radius: .inf is not a fin"),
     (lambda _: Capsule(0.0, 0.1), SceneError,
-     "capsule: radius is 0.0; must be greater than 0"),
+     "Capsule: radius: 0.0 is too small; must be greater than 0"),
     (lambda _: Capsule(0.1, -0.1), SceneError,
-     "capsule: length is -0.1; must be at least 0"),
-    (lambda _: Cylinder(0.1, 0.0), SceneError, "cylinder: length is 0.0"),
-    (lambda _: Box((0.1, 0.2)), SceneError, "box: size is [0.1, 0.2]; needs 3 lengths"),  # type: ignore[arg-type]
-    (lambda _: Box((0.1, 0.0, 0.2)), SceneError, "box: y is 0.0; must be greater"),
+     "Capsule: length: -0.1 is negative; must be at least 0"),
+    (lambda _: Cylinder(0.1, 0.0), SceneError, "Cylinder: length: 0.0 is too small"),
+    (lambda _: Box((0.1, 0.2)), SceneError, "Box: size: [0.1, 0.2] has 2 entries, "),
+    (lambda _: Box((0.1, 0.0, 0.2)), SceneError, "Box: size.1: 0.0 is too small; must"),
     (lambda _: PointCloud([]), SceneError,
-     "point cloud: needs one or more points of 3 finite numbers"),
-    (lambda _: PointCloud(np.zeros((0, 3))), SceneError, "one or more points"),  # type: ignore[arg-type]
-    (lambda _: PointCloud([[0.0, 0.0]]), SceneError, "points of 3 finite numbers"),
+     "PointCloud: points: [] has 0 entries, needs at least 1"),
+    (lambda _: PointCloud(np.zeros((0, 3))), SceneError, "points: [] has 0 entries"),
+    (lambda _: PointCloud([[0.0, 0.0]]), SceneError, "points.0: [0.0, 0.0] has 2 entr"),
     (lambda _: PointCloud([[0.0, 0.0, 0.0], [1.0]]), SceneError,
-     "points of 3 finite numbers"),
+     "points.1: [1.0] has 1 entry, needs 3"),
     (lambda _: PointCloud([[0.0, 0.0, np.nan]]), SceneError,
-     "points of 3 finite numbers"),
-    (lambda _: PointCloud([[0.0, 0.0, 0.0]], 0.0), SceneError, "resolution is 0.0"),
+     "PointCloud: points.0.2: .nan is not a finite number"),
+    (lambda _: PointCloud([[0.0, 0.0, 0.0]], 0.0), SceneError,
+     "PointCloud: resolution: 0.0 is too small; must be greater than 0"),
     (lambda _: HeightField((1.0, 0.0), [[0, 0], [0, 0]]), SceneError,
-     "heightfield: y is 0.0; must be greater than 0"),
-    (lambda _: HeightField((1.0,), [[0, 0], [0, 0]]), SceneError,  # type: ignore[arg-type]
-     "height field: size is [1.0]; needs 2 lengths"),
+     "HeightField: size.1: 0.0 is too small; must be greater than 0"),
+    (lambda _: HeightField((1.0,), [[0, 0], [0, 0]]), SceneError,
+     "HeightField: size: [1.0] has 1 entry, needs 2"),
     (lambda _: HeightField((1.0, 1.0), [[0, 0]]), SceneError,
-     "height field: heights must be at least 2 rows of 2 finite numbers"),
+     "HeightField: heights: [[0, 0]] has 1 entry, needs at least 2"),
     (lambda _: HeightField((1.0, 1.0), [[0, 0], [0]]), SceneError,
-     "height field: its rows have different lengths"),
+     "HeightField: heights.1: [0] has 1 entry, needs at least 2"),
     (lambda _: HeightField((1.0, 1.0), [[0, 0], [0, float("inf")]]), SceneError,
-     "height field: heights must"),
-    (lambda _: Obstacle("it", Sphere(0.1), Hold([0.0, 0.0])), SceneError,
-     "obstacle 'it': its centre has dimension 2; needs 3 (x, y, z)"),
+     "HeightField: heights.1.1: .inf is not a finite number"),
+    (lambda _: Obstacle("it", Sphere(0.1), center=Hold([0.0, 0.0])), SceneError,
+     "Obstacle: center: its dimension is 2; needs 3 (x, y, z)"),
     (lambda _: Scene([BALL, BALL]), SceneError, "two obstacles have the name 'ball'"),
     (lambda _: Scene([BALL])["bell"], SceneError,
      "no obstacle 'bell'; did you mean 'ball'? (the scene has ball)"),
@@ -157,8 +176,8 @@ def test_a_start_in_contact_is_refused_where_the_configuration_says_so() -> None
         load_experiment(TOUCHING)
     robot = load("panda")
     ball = Obstacle("ball", Sphere(0.1), Hold([0.2, 0.0, 0.7]))
-    field = ObstacleClearance(robot, [ball])
-    d, pair = field.proximity.nearest(still(robot))
+    state = still(robot)
+    d, pair = ObstacleClearance([ball]).proximity(state).nearest(state)
     assert d < 0.0
     assert str(caught.value).endswith(
         f"null_space.fields.0: the robot starts in contact: {pair}, {-d:.3g} m deep; "

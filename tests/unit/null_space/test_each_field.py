@@ -1,10 +1,11 @@
 """Check what each field promises by itself, and sums of fields."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from field_cases import draw, evaluate, metrics
+from field_cases import draw, evaluate, metrics, placed, posture
 from field_oracles import (
     JOINTS,
     OBSTACLE,
@@ -13,6 +14,7 @@ from field_oracles import (
     load,
     plain,
     point_distance,
+    spread,
     swirl_field,
     target,
 )
@@ -29,11 +31,21 @@ from hsp_control import (
     RobotState,
     TargetPosture,
     Uncontrolled,
-    WeightedSum,
 )
+from hsp_control.common.exceptions import FieldError
 from hsp_control.null_space.fields import (
+    FieldSum,
+    InverseCondition,
     LimitBarrier,
+    Manipulability,
+    ObstacleClearance,
+    PointDistance,
+    StateWeight,
+    Transmission,
+    crossfade,
 )
+from hsp_control.null_space.fields.weight import Product, sample_weight
+from hsp_control.trajectories import Hold
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -42,18 +54,17 @@ pytestmark = pytest.mark.filterwarnings("error")
 
 
 def test_rest_and_uncontrolled() -> None:
-    robot = load("panda")
-    assert Rest(robot).controls
-    assert Rest(robot).name == "rest"
-    assert not Uncontrolled(robot).controls
-    assert Uncontrolled(robot).name == "uncontrolled"
-    assert (2.0 * Rest(robot)).controls
+    assert Rest().controls
+    assert Rest().name == "rest"
+    assert not Uncontrolled().controls
+    assert Uncontrolled().name == "uncontrolled"
+    assert (2.0 * Rest()).controls
 
 
 def test_joint_centering_is_one_half_at_a_limit() -> None:
     """Each joint at a limit costs ½ w; in the middle nothing, and the slope is 0."""
     robot = load("panda")
-    field = JointCentering(robot, weights=2.0)
+    field = JointCentering(weights=2.0)
     low, high = robot.position_limits()
     middle = robot.state(0.0, 0.5 * (low + high), np.zeros(7))
     assert field.value(middle) == pytest.approx(0.0, abs=1e-30)
@@ -65,7 +76,7 @@ def test_joint_centering_is_one_half_at_a_limit() -> None:
 def test_joint_centering_leaves_unlimited_joints_alone() -> None:
     robot = load("kinova")
     q, _ = draw("kinova", 6)
-    gradient = JointCentering(robot).gradient(robot.state(0.0, q, np.zeros(robot.nv)))
+    gradient = JointCentering().gradient(robot.state(0.0, q, np.zeros(robot.nv)))
     continuous = [robot.velocity_index(j).start for j in JOINTS["kinova"]]
     np.testing.assert_array_equal(gradient[continuous], 0.0)
     assert (np.delete(gradient, continuous) != 0.0).all()
@@ -74,7 +85,7 @@ def test_joint_centering_leaves_unlimited_joints_alone() -> None:
 def test_limit_barrier_is_zero_in_the_middle_and_finite_beyond_a_limit() -> None:
     """And smooth through its core, 2 % of the zone: slope and bend have no jump."""
     robot = load("panda")
-    field = LimitBarrier(robot, zone=0.3)
+    field = LimitBarrier(zone=0.3)
     low, high = robot.position_limits()
     middle = robot.state(0.0, 0.5 * (low + high), np.ones(7))
     assert field.value(middle) == 0.0
@@ -102,7 +113,7 @@ def test_target_posture_is_smooth_all_the_way_round() -> None:
     changes them by 1e-3 of that; ½d² would jump by 2 pi w.
     """
     robot = load("planar3r")
-    field = TargetPosture(robot, target("planar3r"), weights=[2.0, 3.0, 0.0])
+    field = posture("planar3r", weights=[2.0, 3.0, 0.0])
     v, step = np.array([1.0, -1.0, 1.0]), 1e-3
     q = target("planar3r")
     slopes, rates, values = [], [], []
@@ -124,7 +135,7 @@ def test_target_posture_is_smooth_all_the_way_round() -> None:
 
 def test_target_posture_agrees_with_the_square_to_fourth_order() -> None:
     robot = load("planar3r")
-    field = TargetPosture(robot, robot.neutral())
+    field = TargetPosture(configuration=robot.neutral())
     for d in (0.1, 0.05):
         q = robot.integrate(robot.neutral(), np.array([d, 0.0, 0.0]))
         value = field.value(robot.state(0.0, q, np.zeros(3)))
@@ -141,14 +152,14 @@ def test_target_posture_holds_limited_joints_beyond_pi() -> None:
     state = robot.state(
         0.0, robot.integrate(robot.neutral(), moved), np.zeros(robot.nv)
     )
-    gradient = TargetPosture(robot, robot.neutral()).gradient(state)
+    gradient = TargetPosture(configuration=robot.neutral()).gradient(state)
     np.testing.assert_allclose(gradient, moved, rtol=0, atol=1e-14)
 
 
 def test_target_posture_leaves_a_root_alone() -> None:
     robot = load("floating ur5")
     q, v = draw("floating ur5", 7)
-    field = TargetPosture(robot, robot.neutral())
+    field = TargetPosture(configuration=robot.neutral())
     state = robot.state(0.0, q, v)
     for vector in (field.gradient(state), field.gradient_rate(state)):
         np.testing.assert_array_equal(vector[:6], 0.0)
@@ -164,7 +175,7 @@ def test_point_distance_returns_its_minimum_distance() -> None:
     least = min(np.linalg.norm(p - c) for p in positions)
     found = field.minimum_distance(robot.state(TIME, q, v))
     assert found == pytest.approx(least, abs=1e-14)
-    assert Rest(robot).minimum_distance(robot.state(TIME, q, v)) is None
+    assert Rest().minimum_distance(robot.state(TIME, q, v)) is None
 
 
 def test_given_derivatives_are_used() -> None:
@@ -176,12 +187,14 @@ def test_given_derivatives_are_used() -> None:
         raise AssertionError("called")
 
     cost = FunctionCost(
-        robot, never, gradient=lambda s: np.arange(3.0), gradient_rate=lambda s: s.v
+        never,
+        gradient_function=lambda s: np.arange(3.0),
+        rate_function=lambda s: s.v,
     )
     g, g_dot = evaluate(cost, IdentityMetric(), state)
     np.testing.assert_array_equal(g, [0.0, -1.0, -2.0])
     np.testing.assert_array_equal(g_dot, [-1.0, -1.0, -1.0])
-    field = FunctionField(robot, lambda s: np.arange(3.0), rate=lambda s: 2.0 * s.v)
+    field = FunctionField(lambda s: np.arange(3.0), rate_function=lambda s: 2.0 * s.v)
     g, g_dot = evaluate(field, MassMatrixMetric(), state)
     np.testing.assert_array_equal(g, [0.0, 1.0, 2.0])
     np.testing.assert_array_equal(g_dot, [2.0, 2.0, 2.0])
@@ -198,8 +211,8 @@ weights = st.floats(0.0, 1e3)
 def test_sums_are_linear(a: float, b: float, c: float) -> None:
     robot = load("panda")
     terms = [
-        JointCentering(robot),
-        TargetPosture(robot, target("panda")),
+        JointCentering(),
+        posture("panda"),
         swirl_field("panda", rate=True),
     ]
     state = robot.state(TIME, *draw("panda", 30))
@@ -214,23 +227,126 @@ def test_sums_are_linear(a: float, b: float, c: float) -> None:
 
 
 def test_operators() -> None:
-    robot = load("panda")
-    a, b = JointCentering(robot), TargetPosture(robot, target("panda"))
-    total = 2.0 * a + np.float64(3.0) * b + Rest(robot, name="still")
-    assert isinstance(total, WeightedSum)
-    assert [f.name for _, f in total.terms] == [
+    a, b = JointCentering(), posture("panda")
+    total = 2.0 * a + np.float64(3.0) * b + Rest(name="still")
+    assert isinstance(total, FieldSum)
+    assert [f.name for f in total.terms] == [
         "joint_centering",
         "target_posture",
         "still",
     ]
-    state = robot.state(0.0, robot.home(), np.zeros(7))
-    assert [w.sample(state) for w, _ in total.terms] == [(2, 0), (3, 0), (1, 0)]
+    assert [f.weight for f in total.terms] == [2.0, 3.0, 1.0]
     assert total.name == "joint_centering + target_posture + still"
-    assert total.robot is robot
     assert total.controls
-    twice = [w.sample(state) for w, _ in (2 * total).terms]
-    assert twice == [(4, 0), (6, 0), (2, 0)]
-    assert [f for _, f in WeightedSum([(0.0, a)]).terms] == [a]
+    assert [f.weight for f in (2 * total).terms] == [4.0, 6.0, 2.0]
+    assert (2 * total).name == total.name
+    assert FieldSum([0.0 * a]).terms == (JointCentering(weight=0.0),)
     for wrong in (lambda: a + 1.0, lambda: "2" * a, lambda: None + a):  # type: ignore
         with pytest.raises(TypeError, match=r"unsupported operand|can't multiply"):
             wrong()
+
+
+def test_a_weight_is_a_part_of_the_field() -> None:
+    """It may be given to the field, to the sum, or written before them."""
+    robot, twice = load("panda"), 2.0 * posture("panda")
+    assert twice == posture("panda", weight=2.0)
+    assert 1.5 * twice == posture("panda", weight=3.0)
+    total = FieldSum([twice, Rest()], weight=3.0, name="both")
+    assert total == 3.0 * FieldSum([twice, Rest()], name="both")
+    assert total.weight == 1.0
+    assert [f.weight for f in total.terms] == [6.0, 3.0]
+    assert FieldSum([total, twice]).terms == (*total.terms, twice)
+    state = robot.state(TIME, *draw("panda", 31))
+    for found in (twice, posture("panda")):  # only a sum applies the weight
+        assert found.value(state) == posture("panda").value(state)
+    assert sample_weight(2.0, state) == (2.0, 0.0)
+    assert total.value(state) == 6.0 * twice.value(state)
+    metric = IdentityMetric()
+    g, g_dot = evaluate(total, metric, state)
+    alone = evaluate(twice, metric, state)
+    np.testing.assert_array_equal(g, 6.0 * alone.g)
+    np.testing.assert_array_equal(g_dot, 6.0 * alone.g_dot)
+
+
+# --- placing -------------------------------------------------------------------------
+
+
+def test_postures_are_placed() -> None:
+    """Joint positions have shape (nv,), configurations (nq,): both mean one posture."""
+    for name in ("planar3r", "rolling ur5", "panda"):
+        robot = load(name)
+        q, _ = draw(name, 32)
+        start = robot.state(0.0, q, np.zeros(robot.nv))
+        positions = spread(robot.nv, -0.7, 0.9)
+        for field, expected in (
+            (TargetPosture(), q),
+            (TargetPosture("start"), q),
+            (TargetPosture("home"), robot.home()),
+            (TargetPosture(positions), target(name)),
+            (posture(name), target(name)),
+        ):
+            found = placed(field, start)
+            np.testing.assert_array_equal(found.configuration, expected)
+            assert found == TargetPosture(configuration=expected)
+            assert placed(found, robot.state(0.0, robot.home(), start.v)) == found
+    assert TargetPosture() == TargetPosture("start")
+
+
+def test_frames_obstacles_and_terms_are_placed() -> None:
+    robot = load("panda")
+    state = robot.state(0.0, robot.home(), np.zeros(7))
+    far = replace(OBSTACLE, name="far", center=Hold([9.0, 9.0, 9.0]))
+    scene = [OBSTACLE, far]
+    for field in (
+        Manipulability(),
+        InverseCondition(axes="xy"),
+        Transmission(direction=[0, 0, 1]),
+    ):
+        found = placed(field, state)
+        assert found.frame == robot.end_effector
+        assert found == replace(field, frame=robot.end_effector)
+        assert placed(found, state) == found
+    distance = PointDistance(["panda_link4"], "far")
+    assert placed(distance, state, scene) == replace(distance, obstacle=far)
+    for obstacles, expected in (
+        (None, (OBSTACLE, far)),
+        (["far"], (far,)),
+        ([far, "ball"], (far, OBSTACLE)),
+    ):
+        found = placed(ObstacleClearance(obstacles), state, scene)
+        assert found.obstacles == expected
+        assert placed(found, state) == found
+    total = 2.0 * distance + TargetPosture("home") + Manipulability(weight=3.0)
+    found = placed(total, state, scene)
+    assert found.name == total.name
+    assert [f.weight for f in found.terms] == [2.0, 1.0, 3.0]
+    assert found.terms == tuple(placed(term, state, scene) for term in total.terms)
+    named = FieldSum([Rest(), Rest()], name="two rests")
+    assert placed(named, state) == named
+
+
+# --- fading --------------------------------------------------------------------------
+
+
+def test_a_crossfade_is_exact_at_both_ends_and_flat() -> None:
+    """Before the start it is one field, after the end the other, to the last bit."""
+    robot = load("panda")
+    before = 0.3 * JointCentering() + swirl_field("panda", rate=True)
+    slow = StateWeight(lambda s: 1.5 + np.sin(s.t))
+    after = 0.7 * posture("panda") + slow * swirl_field("panda", rate=True)
+    faded = crossfade(before, after, start=1.0, duration=0.5)
+    assert len(faded.terms) == 4
+    assert isinstance(faded.terms[3].weight, Product)
+    for t, only in ((0.9, before), (1.0, before), (1.5, after), (1.7, after)):
+        state = robot.state(t, *draw("panda", 33))
+        metric = metrics(robot)["mass matrix"][0]
+        for found, expected in zip(
+            evaluate(faded, metric, state), evaluate(only, metric, state), strict=True
+        ):
+            np.testing.assert_array_equal(found, expected)
+        assert faded.value(state) == only.value(state)
+    for wrong in (0.0, -1.0, np.inf):
+        with pytest.raises(FieldError, match="Ramp: duration: "):
+            crossfade(before, after, start=0.0, duration=wrong)
+    with pytest.raises(FieldError, match="an uncontrolled null space has no weight"):
+        crossfade(before, Uncontrolled(), start=0.0, duration=1.0)

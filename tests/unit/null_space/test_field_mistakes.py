@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from field_cases import evaluate
+from field_cases import evaluate, placed
 from field_oracles import OBSTACLE, ValueOnly, load, target
 from numpy.typing import NDArray
 
@@ -26,19 +26,21 @@ from hsp_control import (
     RobotState,
     TargetPosture,
     Uncontrolled,
-    WeightedSum,
 )
 from hsp_control.common.exceptions import (
     FieldError,
     FrameNotFoundError,
     JointNotFoundError,
+    SceneError,
     ShapeError,
 )
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import (
     FieldSample,
+    FieldSum,
     LimitBarrier,
     Manipulability,
+    ObstacleClearance,
     Ramp,
     StateWeight,
     Transmission,
@@ -53,27 +55,36 @@ def arm() -> Robot:
     return load("planar3r")
 
 
+def at_rest(name: str) -> RobotState:
+    robot = load(name)
+    return robot.state(0.0, robot.neutral(), np.zeros(robot.nv))
+
+
+def on(name: str, field: NullSpaceField) -> NullSpaceField:
+    """Place a field on a robot without obstacles."""
+    return placed(field, at_rest(name))
+
+
 def used(field: NullSpaceField, metric: Metric | None = None) -> FieldSample:
-    robot = field.robot
+    robot = arm()
     state = robot.state(0.25, robot.neutral(), np.ones(robot.nv))
     return evaluate(field, metric or IdentityMetric(), state)
 
 
-def cost(value: Any = 0.0, **options: Any) -> FunctionCost:
+def cost(value: Any = 0.0, *, name: str = "", **options: Any) -> FunctionCost:
     """Return a cost of the planar arm whose functions return constants."""
-    options = {
-        key: (lambda s, given=given: given) if key != "name" else given
+    functions = {
+        f"{key}_function": lambda s, given=given: given
         for key, given in options.items()
     }
-    return FunctionCost(arm(), lambda s: value, **options)
+    return FunctionCost(lambda s: value, name=name, **functions)
 
 
 class Wrong(ValueOnly):
     """A cost whose value or gradient is what it is told."""
 
-    def __init__(self, value: Any, gradient: Any = None) -> None:
-        super().__init__(arm(), "tip")
-        self.given, self.slope = value, gradient
+    given: Any
+    slope: Any = None
 
     def value(self, state: RobotState) -> float:
         return self.given
@@ -85,7 +96,7 @@ class Wrong(ValueOnly):
 def at_the_centre() -> PointDistance:
     tip = arm().state(0.0, arm().neutral(), np.zeros(3)).position("tip").copy()
     ball = Obstacle("ball", Sphere(0.1), Hold(tip))
-    return PointDistance(arm(), ["link2", "tip"], ball, name="away")
+    return PointDistance(["link2", "tip"], ball, name="away")
 
 
 CENTRE = (
@@ -94,184 +105,227 @@ CENTRE = (
 )
 ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
     # construction
-    "centering, no limits": (
-        lambda: JointCentering(arm()),
-        FieldError,
-        r"^field 'joint_centering': no joint of planar3r has limits, so no range has a "
-        r"middle; use a target posture instead$",
-    ),
     "centering, negative weight": (
-        lambda: JointCentering(load("panda"), weights=-1.0, name="middle"),
+        lambda: JointCentering(weights=-1.0),
         FieldError,
-        r"^field 'middle': weights \[-1.0, .*\] must be finite and at least 0$",
+        r"^JointCentering: weights: -1.0 is negative; must be at least 0$",
     ),
     "centering, infinite weight": (
-        lambda: JointCentering(load("panda"), weights=[1, 2, 3, np.inf, 5, 6, 7]),
+        lambda: JointCentering(weights=[1, 2, 3, np.inf, 5, 6, 7]),
         FieldError,
-        r"must be finite and at least 0$",
-    ),
-    "centering, number of weights": (
-        lambda: JointCentering(load("panda"), weights=[1.0, 2.0]),
-        FieldError,
-        r"^field 'joint_centering': weights have shape \(2,\); needs one number or 7$",
-    ),
-    "posture, shape": (
-        lambda: TargetPosture(arm(), [0.0, 0.0, 0.0]),
-        ShapeError,
-        r"^configuration q has shape \(3,\); planar3r needs \(6,\)",
-    ),
-    "posture, no weight": (
-        lambda: TargetPosture(arm(), arm().neutral(), weights=0.0),
-        FieldError,
-        r"^field 'target_posture': every weight is 0$",
-    ),
-    "posture, only a root weighted": (
-        lambda: TargetPosture(
-            load("rolling ur5"),
-            load("rolling ur5").neutral(),
-            weights=[1.0] * 3 + [0.0] * 6,
-        ),
-        FieldError,
-        r"^field 'target_posture': every weight is 0$",
+        r"^JointCentering: weights.3: .inf is not a finite number$",
     ),
     "posture, nan": (
-        lambda: TargetPosture(arm(), arm().neutral(), weights=np.nan),
+        lambda: TargetPosture("home", weights=np.nan),
         FieldError,
-        r"weights \[nan, nan, nan\] must be finite and at least 0$",
+        r"^TargetPosture: weights: .nan is not a finite number$",
+    ),
+    "posture, word": (
+        lambda: TargetPosture("hom"),  # type: ignore
+        FieldError,
+        r"^TargetPosture: target: 'hom' is text; expected 'start', 'home' or a list "
+        r"of numbers; did you mean 'home'\?",
+    ),
+    "posture, twice": (
+        lambda: TargetPosture("home", configuration=[0.0]),
+        FieldError,
+        r"^TargetPosture: give a target or a configuration, not both$",
     ),
     "equal angles, one joint": (
-        lambda: EqualJointAngles(arm(), ["joint1"]),
+        lambda: EqualJointAngles(["joint1"]),
         FieldError,
-        r"^field 'equal_joint_angles' needs at least two joints; got \['joint1'\]$",
+        r"^EqualJointAngles: joints: \['joint1'\] has 1 entry, needs at least 2$",
+    ),
+    "equal angles, text": (
+        lambda: EqualJointAngles("joint1"),
+        FieldError,
+        r"^EqualJointAngles: joints: 'joint1'",
     ),
     "equal angles, weight": (
-        lambda: EqualJointAngles(arm(), ["joint1", "joint2"], weight=-0.1),
+        lambda: EqualJointAngles(["joint1", "joint2"], weight=-0.1),
         FieldError,
-        r"^field 'equal_joint_angles': weight -0.1 must be at least 0$",
-    ),
-    "equal angles, joint": (
-        lambda: EqualJointAngles(arm(), ["joint1", "joint4"]),
-        JointNotFoundError,
-        r"^no joint 'joint4'; did you mean 'joint\d'\?",
-    ),
-    "equal angles, root": (
-        lambda: EqualJointAngles(load("rolling ur5"), ["root_joint", "elbow_joint"]),
-        FieldError,
-        r"^field 'equal_joint_angles': each joint needs exactly one degree of freedom$",
+        r"^EqualJointAngles: weight: -0.1 is negative; must be at least 0$",
     ),
     "distance, no frame": (
-        lambda: PointDistance(arm(), [], OBSTACLE),
+        lambda: PointDistance([], OBSTACLE),
         FieldError,
-        r"^field 'point_distance' needs at least one frame$",
-    ),
-    "distance, frame": (
-        lambda: PointDistance(arm(), ["link2", "tipp"], OBSTACLE),
-        FrameNotFoundError,
-        r"^no frame 'tipp'; did you mean 'tip'\?",
+        r"^PointDistance: frames: \[\] has 0 entries, needs at least 1$",
     ),
     "distance, weight": (
-        lambda: PointDistance(arm(), ["tip"], OBSTACLE, weight=np.inf),
+        lambda: PointDistance(["tip"], OBSTACLE, weight=np.inf),
         FieldError,
-        r"^field 'point_distance': weight inf must be at least 0$",
+        r"^PointDistance: weight: .inf is not a finite number$",
+    ),
+    "clearance, obstacle": (
+        lambda: ObstacleClearance([0.3]),  # type: ignore
+        FieldError,
+        r"^ObstacleClearance: obstacles.0: 0.3 is a decimal number; expected text",
     ),
     "sum, empty": (
-        lambda: WeightedSum([]),
+        lambda: FieldSum([]),
         FieldError,
-        r"^a sum of fields needs at least one term$",
+        r"^FieldSum: a sum of fields needs at least one term$",
     ),
     "sum, negative": (
-        lambda: -2.0 * Rest(arm()),
+        lambda: -2.0 * Rest(),
         FieldError,
-        r"^field 'rest': weight is -2.0; must be at least 0$",
+        r"^Rest: weight: -2.0 is negative; must be at least 0$",
     ),
     "sum, nan": (
-        lambda: np.nan * Rest(arm()),
+        lambda: np.nan * Rest(),
         FieldError,
-        r"^field 'rest': weight is nan; must be at least 0$",
+        r"^Rest: weight: .nan is not a finite number$",
     ),
     "sum, uncontrolled": (
-        lambda: Uncontrolled(arm()) + Rest(arm()),
+        lambda: Uncontrolled() + Rest(),
         FieldError,
-        r"^an uncontrolled null space cannot be part of a sum$",
+        r"^FieldSum: an uncontrolled null space cannot be part of a sum$",
     ),
-    "sum, other robot": (
-        lambda: Rest(arm()) + Rest(load("panda")),
+    "uncontrolled, weight": (
+        lambda: 2.0 * Uncontrolled(),
         FieldError,
-        r"^the fields of a sum belong to different robots$",
+        r"^Uncontrolled: an uncontrolled null space has no weight$",
     ),
-    "sum, other robot inside": (
-        lambda: Rest(arm()) + (2.0 * Rest(load("panda"))),
+    "uncontrolled, ramp": (
+        lambda: Uncontrolled(weight=Ramp(final=1.0, duration=1.0)),
         FieldError,
-        r"^the fields of a sum belong to different robots$",
+        r"^Uncontrolled: an uncontrolled null space has no weight$",
     ),
     "barrier, zone": (
-        lambda: LimitBarrier(load("panda"), zone=1.5),
+        lambda: LimitBarrier(zone=1.5),
         FieldError,
-        r"^field 'limit_barrier': zone 1.5 must be within \(0, 1\]$",
-    ),
-    "barrier, no limits": (
-        lambda: LimitBarrier(arm()),
-        FieldError,
-        r"^field 'limit_barrier': no joint of planar3r has limits$",
+        r"^LimitBarrier: zone: 1.5 is too large; must be at most 1$",
     ),
     "barrier, weight": (
-        lambda: LimitBarrier(load("panda"), weights=-1.0),
+        lambda: LimitBarrier(weights=-1.0),
         FieldError,
-        r"^field 'limit_barrier': weights .* must be finite and at least 0$",
+        r"^LimitBarrier: weights: -1.0 is negative; must be at least 0$",
     ),
     "manipulability, form": (
-        lambda: Manipulability(arm(), "tip", axes="xy", form="square"),  # type: ignore
+        lambda: Manipulability("tip", axes="xy", form="square"),  # type: ignore
         FieldError,
-        r"^field 'manipulability': form 'square'; choose determinant, root or log$",
+        r"^Manipulability: form: unknown value 'square' \(allowed: determinant, root, "
+        r"log\)$",
     ),
     "manipulability, rows": (
-        lambda: Manipulability(arm(), "tip", rows="all"),  # type: ignore
+        lambda: Manipulability("tip", rows="all"),  # type: ignore
         FieldError,
-        r"^field 'manipulability': unknown rows 'all'; choose one of \['position', ",
+        r"^Manipulability: rows: unknown value 'all' \(allowed: position, orientation, "
+        r"pose\)$",
     ),
     "manipulability, axes": (
-        lambda: Manipulability(arm(), "tip", axes="xx"),
+        lambda: Manipulability("tip", axes="xx"),
         FieldError,
-        r"^field 'manipulability': axes 'xx' must be distinct letters of x, y and z$",
+        r"^Manipulability: axes: 'xx' must be distinct letters of x, y and z$",
     ),
     "manipulability, length": (
-        lambda: Manipulability(arm(), "tip", axes="xy", length=0.0),
+        lambda: Manipulability("tip", axes="xy", length=0.0),
         FieldError,
-        r"^field 'manipulability': length 0.0 must be positive$",
-    ),
-    "manipulability, too many rows": (
-        lambda: Manipulability(arm(), "link2", axes="xyz"),
-        FieldError,
-        r"^field 'manipulability': 3 rows of frame 'link2', which only 2 degrees of ",
-    ),
-    "manipulability, frame": (
-        lambda: Manipulability(arm(), "tipp"),
-        FrameNotFoundError,
-        r"^no frame 'tipp'; did you mean 'tip'\?",
+        r"^Manipulability: length: 0.0 is too small; must be greater than 0$",
     ),
     "transmission, direction": (
-        lambda: Transmission(arm(), "tip", [1.0, 0.0, 0.0], axes="xy"),
+        lambda: Transmission("tip", direction=[1.0, 0.0, 0.0], axes="xy"),
         FieldError,
-        r"^field 'transmission': direction \[1.0, 0.0, 0.0\] needs 2 finite numb",
+        r"^Transmission: direction \[1.0, 0.0, 0.0\] needs 2 numbers, one for each "
+        r"of the axes 'xy', of a length that is not 0 or infinite$",
     ),
     "transmission, kind": (
-        lambda: Transmission(arm(), "tip", [1, 0], axes="xy", kind="x"),  # type: ignore
+        lambda: Transmission("tip", direction=[1, 0], axes="xy", kind="x"),  # type: ignore
         FieldError,
-        r"^field 'transmission': kind 'x'; choose velocity or force$",
+        r"^Transmission: kind: unknown value 'x' \(allowed: velocity, force\)$",
     ),
     "ramp, duration": (
-        lambda: Ramp(0.0, 1.0, start=0.0, duration=0.0),
+        lambda: Ramp(initial=0.0, final=1.0, start=0.0, duration=0.0),
         FieldError,
-        r"^a ramp from 0.0 s over 0.0 s; needs a finite start and a posi",
+        r"^Ramp: duration: 0.0 is too small; must be greater than 0$",
     ),
     "ramp, weight": (
-        lambda: Ramp(0.0, -1.0, start=0.0, duration=1.0),
+        lambda: Ramp(initial=0.0, final=-1.0, start=0.0, duration=1.0),
         FieldError,
-        r"^weight is -1.0; must be at least 0$",
+        r"^Ramp: final: -1.0 is negative; must be at least 0$",
+    ),
+    # placing
+    "centering, no limits": (
+        lambda: on("planar3r", JointCentering()),
+        FieldError,
+        r"^no joint of planar3r has limits, so no range has a middle; use a target "
+        r"posture instead$",
+    ),
+    "centering, number of weights": (
+        lambda: on("panda", JointCentering(weights=[1.0, 2.0])),
+        FieldError,
+        r"^weights: weights have shape \(2,\); needs one number or 7$",
+    ),
+    "posture, shape of the configuration": (
+        lambda: on("planar3r", TargetPosture(configuration=[0.0, 0.0, 0.0])),
+        ShapeError,
+        r"^configuration: configuration q has shape \(3,\); planar3r needs \(6,\)",
+    ),
+    "posture, shape of the joint positions": (
+        lambda: on("planar3r", TargetPosture(arm().neutral())),
+        ShapeError,
+        r"^target: the list of joint positions has shape \(6,\); planar3r needs \(3,\)",
+    ),
+    "posture, no weight": (
+        lambda: on("planar3r", TargetPosture("home", weights=0.0)),
+        FieldError,
+        r"^weights: every weight is 0$",
+    ),
+    "posture, only a root weighted": (
+        lambda: on("rolling ur5", TargetPosture(weights=[1.0] * 3 + [0.0] * 6)),
+        FieldError,
+        r"^weights: every weight is 0$",
+    ),
+    "equal angles, joint": (
+        lambda: on("planar3r", EqualJointAngles(["joint1", "joint4"])),
+        JointNotFoundError,
+        r"^joints.1: no joint 'joint4'; did you mean 'joint\d'\?",
+    ),
+    "equal angles, root": (
+        lambda: on("rolling ur5", EqualJointAngles(["root_joint", "elbow_joint"])),
+        FieldError,
+        r"^joints.0: joint 'root_joint' has 3 degrees of freedom; needs 1$",
+    ),
+    "distance, frame": (
+        lambda: on("planar3r", PointDistance(["link2", "tipp"], OBSTACLE)),
+        FrameNotFoundError,
+        r"^frames.1: no frame 'tipp'; did you mean 'tip'\?",
+    ),
+    "distance, obstacle": (
+        lambda: placed(
+            PointDistance(["link2"], "bal"), at_rest("planar3r"), [OBSTACLE]
+        ),
+        SceneError,
+        r"^obstacle: no obstacle 'bal'; did you mean 'ball'\? \(the scene has ball\)$",
+    ),
+    "barrier, no limits": (
+        lambda: on("planar3r", LimitBarrier()),
+        FieldError,
+        r"^no joint of planar3r has limits$",
+    ),
+    "barrier, number of weights": (
+        lambda: on("panda", LimitBarrier(weights=[1.0, 2.0])),
+        FieldError,
+        r"^weights: weights have shape \(2,\); needs one number or 7$",
+    ),
+    "manipulability, too many rows": (
+        lambda: on("planar3r", Manipulability("link2", axes="xyz")),
+        FieldError,
+        r"^3 rows of frame 'link2', which only 2 degrees of freedom move; these rows ",
+    ),
+    "manipulability, frame": (
+        lambda: on("planar3r", Manipulability("tipp")),
+        FrameNotFoundError,
+        r"^frame: no frame 'tipp'; did you mean 'tip'\?",
+    ),
+    "in a sum, placed": (
+        lambda: on("planar3r", Rest() + LimitBarrier()),
+        FieldError,
+        r"^1: no joint of planar3r has limits$",
     ),
     # evaluation
     "weight of the state, negative": (
-        lambda: used(StateWeight(lambda s: -s.t) * Rest(arm())),
+        lambda: used(FieldSum([StateWeight(lambda s: -s.t) * Rest()])),
         FieldError,
         r"weight is -0.25; must be at least 0$",
     ),
@@ -283,7 +337,7 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
     "value, infinite": (
         lambda: cost(-np.inf).value(arm().state(1.5, arm().neutral(), np.zeros(3))),
         FieldError,
-        r"^cost 'function' returned -inf at t = 1.5 s; needs one finite number$",
+        r"^cost 'function_cost' returned -inf at t = 1.5 s; needs one finite number$",
     ),
     "value, none": (lambda: used(cost(None)), FieldError, r"returned None at t = 0.25"),
     "value, array": (
@@ -294,23 +348,23 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
     "gradient, shape of q": (
         lambda: used(cost(gradient=np.zeros(6))),
         FieldError,
-        r"^cost 'function' has a gradient of shape \(6,\); needs \(3,\): the tangent "
-        r"space, not the configuration$",
+        r"^cost 'function_cost' has a gradient of shape \(6,\); needs \(3,\): the "
+        r"tangent space, not the configuration$",
     ),
     "gradient, number": (
         lambda: used(cost(gradient=1.0)),
         FieldError,
-        r"^cost 'function' has a gradient of shape \(\); needs \(3,\)",
+        r"^cost 'function_cost' has a gradient of shape \(\); needs \(3,\)",
     ),
     "gradient, words": (
         lambda: used(cost(gradient="steep")),
         FieldError,
-        r"^cost 'function' has the gradient 'steep'; needs numbers$",
+        r"^cost 'function_cost' has the gradient 'steep'; needs numbers$",
     ),
     "gradient, nan": (
         lambda: used(cost(gradient=[0.0, np.nan, 0.0])),
         FieldError,
-        r"^cost 'function' has the gradient .*nan.* at t = 0.25 s; needs finite num",
+        r"^cost 'function_cost' has the gradient .*nan.* at t = 0.25 s; needs finite",
     ),
     "gradient, nan, mass matrix": (
         lambda: used(cost(gradient=[0.0, np.nan, 0.0]), MassMatrixMetric()),
@@ -318,69 +372,69 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
         r"needs finite numbers$",
     ),
     "gradient rate, shape": (
-        lambda: used(cost(gradient=np.zeros(3), gradient_rate=np.zeros((3, 1)))),
+        lambda: used(cost(gradient=np.zeros(3), rate=np.zeros((3, 1)))),
         FieldError,
-        r"^cost 'function' has a gradient rate of shape \(3, 1\); needs \(3,\)",
+        r"^cost 'function_cost' has a gradient rate of shape \(3, 1\); needs \(3,\)",
     ),
     "gradient rate, number": (
-        lambda: used(cost(gradient=np.zeros(3), gradient_rate=0.0)),
+        lambda: used(cost(gradient=np.zeros(3), rate=0.0)),
         FieldError,
-        r"^cost 'function' has a gradient rate of shape \(\); needs \(3,\)",
+        r"^cost 'function_cost' has a gradient rate of shape \(\); needs \(3,\)",
     ),
     "gradient rate, infinite": (
-        lambda: used(cost(gradient=np.zeros(3), gradient_rate=[0.0, np.inf, 0.0])),
+        lambda: used(cost(gradient=np.zeros(3), rate=[0.0, np.inf, 0.0])),
         FieldError,
         r"the gradient rate .*inf.*; needs finite numbers$",
     ),
     "own cost, nan": (
-        lambda: used(Wrong(np.nan)),
+        lambda: used(Wrong("tip", np.nan, name="mine")),
         FieldError,
-        r"^cost 'value_only' has the gradient .*nan.*; needs finite numbers$",
+        r"^cost 'mine' has the gradient .*nan.*; needs finite numbers$",
     ),
     "own cost, gradient": (
-        lambda: used(Wrong(0.0, np.zeros(2))),
+        lambda: used(Wrong("tip", 0.0, np.zeros(2), name="mine")),
         FieldError,
-        r"^cost 'value_only' has a gradient of shape \(2,\); needs \(3,\)",
+        r"^cost 'mine' has a gradient of shape \(2,\); needs \(3,\)",
     ),
     "vector, shape": (
-        lambda: used(FunctionField(arm(), lambda s: np.zeros(6))),
+        lambda: used(FunctionField(lambda s: np.zeros(6))),
         FieldError,
-        r"^field 'function' returned g = array\(\[0., .*\]\) at t = 0.25 s; needs 3 "
-        r"finite numbers$",
+        r"^field 'function_field' returned g = array\(\[0., .*\]\) at t = 0.25 s; "
+        r"needs 3 finite numbers$",
     ),
     "vector, number": (
-        lambda: used(FunctionField(arm(), lambda s: 1.0)),  # type: ignore
+        lambda: used(FunctionField(lambda s: 1.0)),  # type: ignore
         FieldError,
         r"returned g = 1.0 at t",
     ),
     "vector, words": (
-        lambda: used(FunctionField(arm(), lambda s: "fast")),  # type: ignore
+        lambda: used(FunctionField(lambda s: "fast")),  # type: ignore
         FieldError,
         r"returned g = 'fast' at t",
     ),
     "vector, nan": (
-        lambda: used(FunctionField(arm(), lambda s: np.full(3, np.nan))),
+        lambda: used(FunctionField(lambda s: np.full(3, np.nan))),
         FieldError,
         r"returned g = array\(\[nan, nan, nan\]\)",
     ),
     "rate, shape": (
         lambda: used(
-            FunctionField(arm(), lambda s: np.zeros(3), rate=lambda s: np.zeros(1))
+            FunctionField(lambda s: np.zeros(3), rate_function=lambda s: np.zeros(1))
         ),
         FieldError,
-        r"^field 'function' returned g' = array\(\[0.\]\) at t = 0.25 s; needs 3",
+        r"^field 'function_field' returned g' = array\(\[0.\]\) at t = 0.25 s; needs 3",
     ),
     "rate, infinite": (
         lambda: used(
             FunctionField(
-                arm(), lambda s: np.zeros(3), rate=lambda s: np.full(3, np.inf)
+                lambda s: np.zeros(3), rate_function=lambda s: np.full(3, np.inf)
             )
         ),
         FieldError,
         r"returned g' = array\(\[inf, inf, inf\]\)",
     ),
     "in a sum": (
-        lambda: used(Rest(arm()) + cost(np.nan, name="mine")),
+        lambda: used(Rest() + cost(np.nan, name="mine")),
         FieldError,
         r"^cost 'mine' returned nan",
     ),
@@ -409,12 +463,12 @@ def test_a_user_s_own_exception_passes() -> None:
         raise ZeroDivisionError("mine")
 
     with pytest.raises(ZeroDivisionError, match=r"^mine$"):
-        used(FunctionCost(arm(), fails))
+        used(FunctionCost(fails))
 
 
 def test_arguments_are_copied() -> None:
     goal, w = target("planar3r"), np.ones(3)
-    field = TargetPosture(arm(), goal, weights=w)
+    field = TargetPosture(configuration=goal, weights=w)
     state = arm().state(0.0, target("planar3r"), np.zeros(3))
     goal[:] = arm().neutral()
     w[:] = 7.0

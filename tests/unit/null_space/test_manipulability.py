@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from field_cases import placed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -28,9 +29,14 @@ from hsp_control.common.exceptions import (
     HspControlError,
 )
 from hsp_control.common.resources import bundled_robots
+from hsp_control.declaration.quantities import Positive
 from hsp_control.null_space import differences
 from hsp_control.null_space.fields import InverseCondition, Manipulability, Transmission
-from hsp_control.null_space.fields.jacobian_cost import JacobianCost
+from hsp_control.null_space.fields.jacobian_cost import (
+    JacobianCost,
+    JacobianTerms,
+    Rows,
+)
 from hsp_control.robot.description.sources import example_robots
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -204,7 +210,6 @@ def manipulability(form: str, rows: str, **options: Any) -> Member:
 
     def build(robot: Robot, frame: str) -> JacobianCost:
         return Manipulability(
-            robot,
             frame,
             form=form,  # type: ignore[arg-type]
             rows=kind,  # type: ignore[arg-type]
@@ -223,7 +228,10 @@ def inverse_condition(rows: str, length: float = 1.0) -> Member:
     kind = "position" if "r" not in rows else "pose"
     return Member(
         lambda robot, frame: InverseCondition(
-            robot, frame, rows=kind, axes=axes, length=length
+            frame,
+            rows=kind,  # type: ignore[arg-type]
+            axes=axes,
+            length=length,
         ),
         lambda s: -float(len(s.s2) ** 2 / s.s2.sum() / (1.0 / s.s2).sum()),
         rows,
@@ -245,7 +253,7 @@ def transmission(kind: str, direction: list[float], axes: str = "xyz") -> Member
         return -float(((along * (s.s2 - 1e-12)).sum() + 1e-12) ** -0.5)
 
     def build(robot: Robot, frame: str) -> JacobianCost:
-        return Transmission(robot, frame, direction, kind=kind, axes=axes)  # type: ignore[arg-type]
+        return Transmission(frame, direction=direction, kind=kind, axes=axes)  # type: ignore[arg-type]
 
     return Member(build, oracle, axes)
 
@@ -371,7 +379,7 @@ def test_gradient_by_the_kinematic_hessian(
     robot = load(name)
     joint = robot.model.njoints - 1
     frame = robot.model.names[joint]
-    field = Manipulability(robot, frame, form="log", rows=rows)  # type: ignore[arg-type]
+    field = Manipulability(frame, form="log", rows=rows)  # type: ignore[arg-type]
     kept = {"position": [0, 1, 2], "orientation": [3, 4, 5], "pose": [*range(6)]}[rows]
     sharpest = 0.0
     for k, (q, v) in enumerate(states(robot, 8, seed=2)):
@@ -427,7 +435,7 @@ def test_forms_are_functions_of_each_other(load: Callable[[str], Robot]) -> None
     robot, frame = load("panda"), hand("panda")
     forms = ("root", "determinant", "log")
     w, d, log = (
-        Manipulability(robot, frame, form=form, rows="pose", length=0.4)  # type: ignore[arg-type]
+        Manipulability(frame, form=form, rows="pose", length=0.4)  # type: ignore[arg-type]
         for form in forms
     )
     for q, v in states(robot, 5, seed=4):
@@ -451,7 +459,7 @@ def test_the_planar_arm_in_closed_form(load: Callable[[str], Robot]) -> None:
     Rows (-s1 - s12, c1 + c12) and (-s12, c12) of two links of 1 m.
     """
     robot = load("planar3r")
-    field = Manipulability(robot, "link3", axes="xy")
+    field = Manipulability("link3", axes="xy")
     for q1, q2 in np.random.default_rng(5).uniform(0.3, 2.8, (10, 2)):
         q = robot.integrate(robot.neutral(), np.array([q1, q2, 0.4]))
         state = robot.state(0.0, q, np.array([0.3, -0.7, 0.2]))
@@ -470,9 +478,9 @@ def test_joints_beyond_the_frame_are_left_alone(load: Callable[[str], Robot]) ->
     ((q, v),) = states(robot, 1, seed=6)
     state = robot.state(0.0, q, v)
     for field in (
-        Manipulability(robot, "panda_link5", form="log"),
-        InverseCondition(robot, "panda_link5"),
-        Transmission(robot, "panda_link5", [0.0, 0.0, 1.0]),
+        Manipulability("panda_link5", form="log"),
+        InverseCondition("panda_link5"),
+        Transmission("panda_link5", direction=[0.0, 0.0, 1.0]),
     ):
         np.testing.assert_array_equal(field.gradient(state)[5:], 0.0)
         np.testing.assert_array_equal(field.gradient_rate(state)[5:], 0.0)
@@ -485,7 +493,7 @@ def test_isotropy_is_1_where_all_singular_values_agree() -> None:
     """Two links of l and l/√2 at 135° are isotropic (Salisbury and Craig 1982)."""
     tool = ToolFrame("link2", (2.0**-0.5, 0.0, 0.0))
     robot = Robot.load("planar3r", tool_frames={"short": tool})
-    field = InverseCondition(robot, "short", axes="xy")
+    field = InverseCondition("short", axes="xy")
     q = robot.integrate(robot.neutral(), np.array([0.4, 0.75 * np.pi, 0.0]))
     state = robot.state(0.0, q, np.ones(3))
     assert field.value(state) == pytest.approx(-1.0, abs=1e-12)
@@ -500,10 +508,10 @@ def test_the_direction_goes_with_the_axes_as_they_are_named(
     robot, frame = load("panda"), hand("panda")
     ((q, v),) = states(robot, 1, seed=8)
     state = robot.state(0.0, q, v)
-    one = Transmission(robot, frame, [1.0, 2.0], axes="zx")
-    two = Transmission(robot, frame, [2.0, 1.0], axes="xz")
+    one = Transmission(frame, direction=[1.0, 2.0], axes="zx")
+    two = Transmission(frame, direction=[2.0, 1.0], axes="xz")
     assert one.value(state) == two.value(state)
-    np.testing.assert_array_equal(one.direction, two.direction)
+    np.testing.assert_array_equal(one.unit_direction, two.unit_direction)
 
 
 # -- singularities ---------------------------------------------------------------------
@@ -517,7 +525,6 @@ def singular_members(robot: Robot, frame: str, axes: str) -> dict[str, JacobianC
         for form in ("determinant", "root", "log"):
             for unit in (1.0, 1e-8, 1e4):
                 members[f"{form} {rows} {unit}"] = Manipulability(
-                    robot,
                     frame,
                     form=form,  # type: ignore[arg-type]
                     rows=rows,  # type: ignore[arg-type]
@@ -525,7 +532,6 @@ def singular_members(robot: Robot, frame: str, axes: str) -> dict[str, JacobianC
                     metric=unit * coupling(robot.nv),
                 )
         members[f"condition {rows}"] = InverseCondition(
-            robot,
             frame,
             rows=rows,  # type: ignore[arg-type]
             axes=axes,
@@ -533,9 +539,8 @@ def singular_members(robot: Robot, frame: str, axes: str) -> dict[str, JacobianC
     for kind in ("velocity", "force"):
         for u in np.eye(len(axes)):
             members[f"{kind} {u}"] = Transmission(
-                robot,
                 frame,
-                u,
+                direction=u,
                 kind=kind,  # type: ignore[arg-type]
                 axes=axes,
             )
@@ -588,43 +593,55 @@ def test_finite_at_every_singularity(name: str, load: Callable[[str], Robot]) ->
 # -- what cannot be --------------------------------------------------------------------
 
 PANDA = {"frame": "panda_tcp"}
+UP = {"direction": [0.0, 0.0, 1.0]}
 MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
     (Manipulability, {"frame": "panda_tpc"}, FrameNotFoundError,
-     "no frame 'panda_tpc'; did you mean 'panda_tcp'? (the model has "),
-    (InverseCondition, {"frame": ""}, FrameNotFoundError, "no frame ''"),
+     "frame: no frame 'panda_tpc'; did you mean 'panda_tcp'? (the model has "),
+    (InverseCondition, {"frame": ""}, FrameNotFoundError, "frame: no frame ''"),
+    (Transmission, UP | {"frame": "x"}, FrameNotFoundError, "frame: no frame 'x'"),
     (Manipulability, {"form": "rot"}, FieldError,
-     "field 'manipulability': form 'rot'; choose determinant, root or log"),
+     "Manipulability: form: unknown value 'rot'; did you mean 'root'?"),
     (Manipulability, {"rows": "positions"}, FieldError,
-     "field 'manipulability': unknown rows 'positions'; "
-     "choose one of ['position', 'orientation', 'pose']"),
+     "Manipulability: rows: unknown value 'positions'; did you mean 'position'?"),
     (InverseCondition, {"axes": ""}, FieldError,
-     "field 'inverse_condition': axes '' must be distinct letters of x, y and z"),
-    (InverseCondition, {"axes": "xx"}, FieldError, "axes 'xx' must be distinct"),
-    (InverseCondition, {"axes": "xw"}, FieldError, "axes 'xw' must be distinct"),
-    (Manipulability, {"length": 0.0}, FieldError, "length 0.0 must be positive"),
-    (Manipulability, {"length": np.nan}, FieldError, "length nan must be positive"),
-    (Manipulability, {"length": np.inf}, FieldError, "length inf must be positive"),
+     "InverseCondition: axes: '' must be distinct letters of x, y and z"),
+    (InverseCondition, {"axes": "xx"}, FieldError, "axes: 'xx' must be distinct"),
+    (InverseCondition, {"axes": "xw"}, FieldError, "axes: 'xw' must be distinct"),
+    (Manipulability, {"length": 0.0}, FieldError, "length: 0.0 is too small; must be"),
+    (Manipulability, {"length": np.nan}, FieldError, "length: .nan is not a finite nu"),
+    (Manipulability, {"length": np.inf}, FieldError, "length: .inf is not a finite nu"),
+    (Transmission, UP | {"length": 1.0}, FieldError, "length: unknown key 'length'"),
     (Manipulability, {"metric": np.ones(7)}, FieldError,
-     "metric has shape (7,); needs (7, 7), symmetric"),
+     "Manipulability: metric.0: 1.0 is a decimal number; expected a list of numbers"),
+    (Manipulability, {"metric": np.ones((6, 7))}, FieldError,
+     "Manipulability: metric has shape (6, 7); needs (nv, nv), symmetric"),
     (Manipulability, {"metric": np.triu(np.ones((7, 7)))}, FieldError,
-     "metric has shape (7, 7); needs (7, 7), symmetric"),
+     "Manipulability: metric has shape (7, 7); needs (nv, nv), symmetric"),
     (Manipulability, {"metric": np.ones((7, 7))}, FieldError,
-     "metric is not positive definite"),
-    (Manipulability, {"metric": np.full((7, 7), np.nan)}, FieldError, "symmetric"),
+     "Manipulability: metric is not positive definite"),
+    (Manipulability, {"metric": np.full((7, 7), np.nan)}, FieldError,
+     "Manipulability: metric.0.0: .nan is not a finite number"),
+    (Manipulability, {"metric": np.eye(6)}, FieldError,
+     "metric: metric has shape (6, 6); needs (7, 7)"),
     (Manipulability, {"frame": "panda_link2"}, FieldError,
-     "field 'manipulability': 3 rows of frame 'panda_link2', which only 2 degrees of "
-     "freedom move; these rows are singular everywhere"),
-    (InverseCondition, {"frame": "panda_link5", "rows": "pose", "name": "mine"},
-     FieldError, "field 'mine': 6 rows of frame 'panda_link5', which only 5 degrees"),
+     "3 rows of frame 'panda_link2', which only 2 degrees of freedom move; these rows "
+     "are singular everywhere"),
+    (InverseCondition, {"frame": "panda_link5", "rows": "pose"}, FieldError,
+     "6 rows of frame 'panda_link5', which only 5 degrees"),
     (Transmission, {"direction": [0, 0, 0]}, FieldError,
-     "field 'transmission': direction [0, 0, 0] needs 3 finite numbers, not all zero"),
-    (Transmission, {"direction": [1, 0]}, FieldError, "needs 3 finite numbers"),
+     "Transmission: direction [0.0, 0.0, 0.0] needs 3 numbers, one for each of the "
+     "axes 'xyz', of a length that is not 0 or infinite"),
+    (Transmission, {}, FieldError, "Transmission: missing key 'direction'"),
+    (Transmission, {"direction": [1, 0]}, FieldError, "needs 3 numbers, one for each"),
     (Transmission, {"direction": [1, 0, 0], "axes": "xy"}, FieldError,
-     "needs 2 finite numbers, not all zero"),
-    (Transmission, {"direction": [1, np.nan, 0]}, FieldError, "needs 3 finite numbers"),
-    (Transmission, {"direction": [1, 0, np.inf]}, FieldError, "needs 3 finite numbers"),
-    (Transmission, {"direction": [1, 0, 0], "kind": "speed"}, FieldError,
-     "field 'transmission': kind 'speed'; choose velocity or force"),
+     "needs 2 numbers, one for each of the axes 'xy'"),
+    (Transmission, {"direction": [1e200, 1e200, 1e200]}, FieldError, "needs 3 numbers"),
+    (Transmission, {"direction": [1, np.nan, 0]}, FieldError,
+     "Transmission: direction.1: .nan is not a finite number"),
+    (Transmission, {"direction": [1, 0, np.inf]}, FieldError,
+     "Transmission: direction.2: .inf is not a finite number"),
+    (Transmission, UP | {"kind": "speed"}, FieldError,
+     "Transmission: kind: unknown value 'speed' (allowed: velocity, force)"),
 ]  # fmt: skip
 
 
@@ -638,9 +655,51 @@ def test_every_mistake_is_named(
     message: str,
     load: Callable[[str], Robot],
 ) -> None:
+    robot = load("panda")
     with pytest.raises(error) as caught:
-        kind(load("panda"), **(PANDA | options))
+        placed(
+            kind(**(PANDA | options)),
+            robot.state(0.0, robot.home(), np.zeros(robot.nv)),
+        )
     assert message in str(caught.value)
+
+
+class Reach(JacobianCost):
+    """What a user writes: minus half the square of the pose rows' Frobenius norm."""
+
+    rows: Rows = "pose"
+    length: Positive = 0.5
+
+    def terms(self, J: Array, J_dot: Array) -> JacobianTerms:
+        return JacobianTerms(-0.5 * float((J * J).sum()), -J, -J_dot)
+
+
+@pytest.mark.parametrize("rows", ["position", "orientation", "pose"])
+def test_a_user_s_own_cost_of_the_jacobian(
+    rows: Rows, load: Callable[[str], Robot]
+) -> None:
+    """Its terms are all that it needs: value, gradient and rate follow."""
+    robot, frame = load("panda"), hand("panda")
+    ((q, v),) = states(robot, 1, seed=10)
+    state = robot.state(0.0, q, v)
+    field = placed(Reach(rows=rows), state)
+    assert field.frame == robot.end_effector == frame
+    kept = {"position": [0, 1, 2], "orientation": [3, 4, 5], "pose": [*range(6)]}[rows]
+    scale = np.array([1.0 if k < 3 or rows != "pose" else 0.5 for k in kept])[:, None]
+    J = scale * frame_jacobian(robot, q, frame)[kept]
+    assert field.value(state) == pytest.approx(-0.5 * (J * J).sum(), rel=1e-14)
+    np.testing.assert_allclose(
+        field.gradient(state),
+        differences.gradient(field.value, state),
+        rtol=0,
+        atol=1e-10,
+    )
+    np.testing.assert_allclose(
+        field.gradient_rate(state),
+        differences.rate_along_flow(field.gradient, state),
+        rtol=0,
+        atol=1e-9,
+    )
 
 
 def test_frames_beyond_a_joint_that_mimics(load: Callable[[str], Robot]) -> None:
@@ -648,15 +707,18 @@ def test_frames_beyond_a_joint_that_mimics(load: Callable[[str], Robot]) -> None
     robot = Robot.load("panda", locked={})
     assert robot.mimics
     with pytest.raises(FieldError) as caught:
-        Manipulability(robot, "panda_rightfinger")
+        placed(
+            Manipulability("panda_rightfinger"),
+            robot.state(0.0, robot.home(), np.zeros(robot.nv)),
+        )
     assert str(caught.value) == (
-        "frame 'panda_rightfinger' is moved by 'panda_finger_joint2', which mimics "
-        "another joint; choose a frame before it, or load with mimic: false"
+        "frame: frame 'panda_rightfinger' is moved by 'panda_finger_joint2', which "
+        "mimics another joint; choose a frame before it, or load with mimic: false"
     )
     free = Robot.load("panda", locked={}, mimic=False)
     q = free.random_configuration(np.random.default_rng(9))
     state = free.state(0.0, q, np.ones(9))
-    beyond = Manipulability(free, "panda_rightfinger", rows="pose")
+    beyond = Manipulability("panda_rightfinger", rows="pose")
     np.testing.assert_allclose(
         beyond.gradient(state),
         differences.gradient(beyond.value, state),
@@ -664,10 +726,9 @@ def test_frames_beyond_a_joint_that_mimics(load: Callable[[str], Robot]) -> None
         atol=1e-9,
     )
     # The finger that leads is an ordinary prismatic joint, also where it is followed.
-    leading = Manipulability(robot, "panda_leftfinger")
+    leading = Manipulability("panda_leftfinger")
     state = robot.state(0.0, q[:8], np.ones(8))
-    twin = Manipulability(free, "panda_leftfinger")
     other = free.state(0.0, q, np.ones(9))
     np.testing.assert_allclose(
-        leading.gradient(state), twin.gradient(other)[:8], rtol=0, atol=1e-13
+        leading.gradient(state), leading.gradient(other)[:8], rtol=0, atol=1e-13
     )

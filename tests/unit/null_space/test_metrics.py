@@ -12,12 +12,16 @@ from law_cases import load
 from hsp_control import (
     ConstantMetric,
     Cost,
+    IdentityMetric,
     MassMatrixMetric,
+    RobotState,
+    Scene,
     TargetPosture,
 )
 from hsp_control.common.exceptions import MetricError
+from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import FieldSample
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.metrics import CoordinatesMetric, MetricSample
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -37,7 +41,7 @@ def test_natural_gradient_descends_where_the_plain_one_need_not() -> None:
     robot = load("panda")
     frame = "panda_tcp"
     rng = np.random.default_rng(31)
-    cost: Cost = TargetPosture(robot, robot.home())
+    cost: Cost = TargetPosture(configuration=robot.home())
     metric = MassMatrixMetric()
     rises = 0
     for _ in range(200):
@@ -58,15 +62,23 @@ def test_natural_gradient_descends_where_the_plain_one_need_not() -> None:
 @pytest.mark.parametrize(
     ("W", "message"),
     [
-        (np.zeros((2, 3)), r"metric has shape \(2, 3\); needs \(nv, nv\)"),
-        (2.0, r"metric has shape \(\)"),
-        ([], r"metric has shape \(0, 0\)"),
-        (np.zeros((2, 2, 2)), r"metric has shape \(2, 2, 2\)"),
-        ([1.0, np.nan], "metric contains NaN or inf"),
-        ([1.0, np.inf], "metric contains NaN or inf"),
-        ([[1.0, 2.0], [0.0, 1.0]], "metric is not symmetric"),
+        (np.ones((2, 3)), r"^ConstantMetric: the metric has shape \(2, 3\); needs"),
+        (2.0, r"^ConstantMetric: matrix: 2.0 is a decimal number; expected a list"),
+        ([], r"^ConstantMetric: matrix: \[\] has 0 entries, needs at least 1$"),
+        (
+            np.ones((2, 2, 2)),
+            "^ConstantMetric: matrix.0.0: .* is a list; expected a number$",
+        ),
+        ([1.0, np.nan], "^ConstantMetric: matrix.1: .nan is not a finite number$"),
+        ([1.0, np.inf], "^ConstantMetric: matrix.1: .inf is not a finite number$"),
+        ([[1.0, np.nan], [np.nan, 1.0]], "^ConstantMetric: matrix.0.1: .nan is not a "),
+        ([[1.0, 2.0], [0.0, 1.0]], "^ConstantMetric: the metric is not symmetric$"),
+        ([[1.0, 2.0], [0.0]], r"rows have different lengths \[1, 2\]; need the same$"),
+        ([1.0, [2.0]], "^ConstantMetric: matrix: mixes numbers and rows; needs rows, "),
         ([1.0, -1.0], "not positive definite: its smallest eigenvalue is -1"),
         ([1.0, 0.0], "not positive definite: its smallest eigenvalue is 0"),
+        ([1.0, 1e-13], "not positive definite: its smallest eigenvalue is 1e-13"),
+        (np.diag([1.0, 0.0]), "not positive definite: its smallest eigenvalue is 0"),
         (-np.eye(3), "not positive definite: its smallest eigenvalue is -1"),
         (np.ones((3, 3)), "not positive definite"),
     ],
@@ -82,11 +94,11 @@ def test_coordinates_that_are_singular_but_for_rounding(seed: int, n: int) -> No
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((n, n - 1)) @ rng.standard_normal((n - 1, n))
     with pytest.raises(MetricError, match="not positive definite"):
-        ConstantMetric.from_coordinates(A)
+        CoordinatesMetric(A)
     with pytest.raises(
-        MetricError, match=r"coordinates A have shape .*; need \(nv, nv\)"
+        MetricError, match=r"the coordinates have shape .*; need \(nv, nv\)"
     ):
-        ConstantMetric.from_coordinates(A[:, 1:])
+        CoordinatesMetric(A[:, 1:])
 
 
 def test_constant_metric_keeps_a_copy() -> None:
@@ -95,3 +107,55 @@ def test_constant_metric_keeps_a_copy() -> None:
     W[:] = 0.0
     np.testing.assert_array_equal(metric.W, np.eye(3))
     np.testing.assert_array_equal(ConstantMetric([1.0, 2.0]).W, np.diag([1.0, 2.0]))
+    with pytest.raises(ValueError, match="read-only"):
+        metric.W[0, 0] = 2.0
+
+
+def test_coordinates_of_the_robot_s_source() -> None:
+    """θ = A q of the planar arm are the absolute angles of its links."""
+    robot = load("planar3r")
+    start = Start(robot.state(0.0, robot.home(), np.zeros(3)), Scene())
+    A = robot.joint_coordinates
+    assert A is not None
+    metric = CoordinatesMetric().placed(start)
+    assert metric == CoordinatesMetric(A)
+    assert metric.placed(start) == metric
+    np.testing.assert_array_equal(metric.W, A.T @ A)
+    np.testing.assert_array_equal(metric.W[0], [3.0, 2.0, 1.0])
+    with pytest.raises(MetricError, match="place the metric"):
+        CoordinatesMetric().evaluate(start.state, MetricSample.allocate(3))
+
+
+def test_metrics_are_checked_for_the_robot() -> None:
+    robot = load("panda")
+    start = Start(robot.state(0.0, robot.home(), np.zeros(7)), Scene())
+    for metric in (IdentityMetric(), MassMatrixMetric(), ConstantMetric(np.ones(7))):
+        assert metric.placed(start) == metric
+    for wrong, message in (
+        (ConstantMetric(np.ones(6)), r"^matrix: the metric has shape \(6, 6\); the ro"),
+        (
+            CoordinatesMetric(np.eye(3)),
+            r"^matrix: the metric has shape \(3, 3\); the r",
+        ),
+        (CoordinatesMetric(), "^panda defines no joint coordinates; give matrix$"),
+    ):
+        with pytest.raises(MetricError, match=message):
+            wrong.placed(start)
+
+
+def test_a_metric_s_own_evaluate_is_compiled() -> None:
+    """A subclass that overrides `evaluate` only does not inherit a step plan."""
+
+    class Halved(ConstantMetric):
+        """Half of a matrix."""
+
+        def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
+            super().evaluate(state, out)
+            out.W[:] *= 0.5
+            return out
+
+    robot = load("panda")
+    state, out = robot.state(0.0, robot.home(), np.zeros(7)), MetricSample.allocate(7)
+    (write,) = Halved(np.full(7, 3.0)).compile(state, out).write
+    write()
+    np.testing.assert_array_equal(out.W, 1.5 * np.eye(7))

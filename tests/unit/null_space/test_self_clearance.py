@@ -21,10 +21,11 @@ pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
 
 
-def names(field: SelfClearance) -> set[frozenset[str]]:
+def names(robot: Robot) -> set[frozenset[str]]:
     """Return the pairs of links that are watched."""
-    links = field.proximity.links
-    return {frozenset((links[i].link, links[j].link)) for i, j in field.proximity.pairs}
+    proximity = SelfClearance().proximity(still(robot))
+    links = proximity.links
+    return {frozenset((links[i].link, links[j].link)) for i, j in proximity.pairs}
 
 
 def disabled(robot: Robot) -> set[frozenset[str]]:
@@ -40,7 +41,7 @@ def test_pairs_of_links_that_are_watched() -> None:
     """All pairs but neighbours, links of one joint, the SRDF's, and what overlaps."""
     robot = load("panda")
     links = link_shapes(robot)
-    watched = names(SelfClearance(robot))
+    watched = names(robot)
     without = disabled(robot)
     parents = list(robot.model.parents)
     expected = {
@@ -69,8 +70,8 @@ def test_pairs_of_links_that_are_watched() -> None:
         for pair, d in zip(state_of.pairs, state_of.measure(home), strict=True)
         if d <= 0.0
     }
-    field = SelfClearance(robot)
-    assert set(field.proximity.pairs) == set(state_of.pairs) - overlap
+    field = SelfClearance()
+    assert set(field.proximity(home).pairs) == set(state_of.pairs) - overlap
     assert field.minimum_distance(home) > 0.0
 
 
@@ -79,15 +80,15 @@ def test_pairs_between_robots_are_all_kept() -> None:
     panda, iiwa = load("panda"), load("iiwa14")
     beside = pin.SE3(turned(0.0, 0.0, np.pi), np.array([1.1, 0.0, 0.0]))
     both = Robot.combine({"a": (panda, pin.SE3.Identity()), "b": (iiwa, beside)})
-    watched = names(SelfClearance(both))
+    watched = names(both)
     mine = {shape.link for shape in link_shapes(panda)}
     theirs = {shape.link for shape in link_shapes(iiwa)}
     for a in mine:
         for b in theirs:
             standing = a == "panda_link0" and b == "iiwa_link_0"
             assert (frozenset((f"a_{a}", f"b_{b}")) in watched) is not standing
-    own = {frozenset(f"a_{x}" for x in pair) for pair in names(SelfClearance(panda))}
-    own |= {frozenset(f"b_{x}" for x in pair) for pair in names(SelfClearance(iiwa))}
+    own = {frozenset(f"a_{x}" for x in pair) for pair in names(panda)}
+    own |= {frozenset(f"b_{x}" for x in pair) for pair in names(iiwa)}
     across = {pair for pair in watched if len({name[0] for name in pair}) == 2}
     assert watched - across == own
     assert own
@@ -98,8 +99,8 @@ def test_pairs_that_overlap_at_home_are_left_out() -> None:
     panda = load("panda")
     near = pin.SE3(turned(0.0, 0.0, np.pi), np.array([-0.15, 0.0, 0.0]))
     both = Robot.combine({"a": (panda, pin.SE3.Identity()), "b": (panda, near)})
-    field = SelfClearance(both)
-    watched = names(field)
+    field = SelfClearance()
+    watched = names(both)
     assert frozenset(("a_panda_link1", "b_panda_link1")) not in watched
     assert frozenset(("a_panda_link0", "b_panda_link1")) not in watched
     assert frozenset(("a_panda_link1", "b_panda_hand")) in watched
@@ -112,13 +113,13 @@ def test_each_robot_is_the_others_moving_obstacle() -> None:
     panda = load("panda")
     beside = pin.SE3(turned(0.0, 0.0, np.pi), np.array([1.0, 0.1, 0.0]))
     both = Robot.combine({"a": (panda, pin.SE3.Identity()), "b": (panda, beside)})
-    field = SelfClearance(both, influence=0.3)
+    field = SelfClearance(influence=0.3)
     rng = np.random.default_rng(14)
     agreed = 0
     while agreed < 4:
         q, v = both.random_configuration(rng), 0.5 * rng.normal(size=14)
         state = both.state(0.0, q, v)
-        d, pair = field.proximity.nearest(state)
+        d, pair = field.proximity(state).nearest(state)
         one, two = (name[:2] for name in pair.split(" to "))
         if not 0.06 < d < 0.25 or one == two:
             continue

@@ -237,7 +237,7 @@ def test_each_arm_moves_as_if_alone() -> None:
 
     def task(robot: Robot, prefix: str, target: Array) -> FramePosition:
         name = f"{prefix}panda_tcp"
-        return FramePosition(robot, name, Hold(target), Gains(100.0, 20.0))
+        return FramePosition(name, Hold(target), gains=Gains(100.0, 20.0))
 
     away = np.array([0.05, -0.05, 0.03])
     state = both.state(0.0, q0, np.zeros(14))
@@ -246,7 +246,7 @@ def test_each_arm_moves_as_if_alone() -> None:
     ]
     options = {"duration": 0.3, "log_period": 0.1, "integrator": Rk4(0.005)}
     together = simulate(
-        Controller(both, tasks, JointCentering(both)),
+        Controller(both, tasks, JointCentering()),
         q0,
         **options,  # type: ignore[arg-type]
     )
@@ -256,7 +256,7 @@ def test_each_arm_moves_as_if_alone() -> None:
         turned = place.rotation.T @ away
         apart = simulate(
             Controller(
-                single, [task(single, "", start + turned)], JointCentering(single)
+                single, [task(single, "", start + turned)], JointCentering()
             ),
             q0[own],
             **options,  # type: ignore[arg-type]

@@ -124,8 +124,8 @@ def test_the_plant_may_be_another_robot() -> None:
     model, real = Robot.load("ur5"), Robot.load("ur5", gravity=(0.0, 0.0, -9.0))
     q0 = model.random_configuration(np.random.default_rng(1))
     x = model.state(0.0, q0, np.zeros(6)).position("tool0").copy()
-    circle = Lissajous(x, [0.02, 0.02, 0.02], [1.0, 1.0, 1.0])
-    task = FramePosition(model, "tool0", circle, Gains.from_frequency(10.0))
+    circle = Lissajous([0.02, 0.02, 0.02], [1.0, 1.0, 1.0], center=x)
+    task = FramePosition("tool0", circle, gains=Gains(natural_frequency=10.0))
     controller = Controller(model, [task])
     runs = [
         simulate(controller, q0, duration=1.0, log_period=0.1, plant=plant)
@@ -150,14 +150,14 @@ def test_a_floating_robot_follows_the_law() -> None:
     here = robot.state(0.0, q0, v0).frame(frame)
     axis = np.array([1.0, -2.0, 2.0]) / 3.0
     path = ComposedPose(
-        Lissajous(here.position + 0.1 * LEFT, [0.2, 0.1, 0.2], [3.0, 4.0, 5.0]),
-        Spin(pin.exp3(np.array([0.5, 0.8, -0.3])) @ here.rotation, axis, 4.0),
+        Lissajous([0.2, 0.1, 0.2], [3.0, 4.0, 5.0], center=here.position + 0.1 * LEFT),
+        Spin(axis, 4.0, rotation=pin.exp3(np.array([0.5, 0.8, -0.3])) @ here.rotation),
     )
-    task = FramePose(robot, frame, path, Gains.from_frequency(6.0))
+    task = FramePose(frame, path, gains=Gains(natural_frequency=6.0))
     controller = Controller(
         robot,
         [task],
-        TargetPosture(robot, robot.home()),
+        TargetPosture(robot.home()),
         null_space_gain=6.0,
         base="driven" if robot.unactuated else None,
     )

@@ -506,8 +506,8 @@ def panda_controller() -> Controller:
     robot = load("panda")
     start = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
     center = start - [0.0, 0.1, 0.0]
-    circle = Circle(center, 0.1, 2.0, phase=np.pi / 2, normal=(0.0, 0.0, 1.0))
-    task = FramePosition(robot, "panda_tcp", circle, Gains.from_frequency(20.0))
+    circle = Circle(0.1, 2.0, center, phase=np.pi / 2, normal=(0.0, 0.0, 1.0))
+    task = FramePosition("panda_tcp", circle, gains=Gains(natural_frequency=20.0))
     return Controller(robot, [task])
 
 

@@ -99,10 +99,8 @@ def test_the_norm_is_that_of_the_metric() -> None:
 def test_joint_positions_of_continuous_joints_wind_up() -> None:
     """Joints that are led to 17 and -34 rad have gone there, not to some of ±pi."""
     robot = load("planar3r", gravity=False)
-    away = Lissajous([0.0, 0.0, 0.0], [20.0, -40.0, 0.1], [0.5, 0.5, 1.0])
-    task = JointPosture(
-        robot, robot.neutral(), Gains.from_frequency(10.0), displacement=away
-    )
+    away = Lissajous([20.0, -40.0, 0.1], [0.5, 0.5, 1.0], center=[0.0, 0.0, 0.0])
+    task = JointPosture(robot.neutral(), gains=Gains(natural_frequency=10.0), displacement=away)
     run = simulate(
         Controller(robot, [task]), robot.neutral(), [10.0, -20.0, 0.1], duration=2.0
     )
@@ -112,7 +110,7 @@ def test_joint_positions_of_continuous_joints_wind_up() -> None:
 
 
 def test_obstacles_are_logged() -> None:
-    center = Lissajous([-1, 1.7, 0], [0, 0.75, 0], [0, 3, 0])
+    center = Lissajous([0, 0.75, 0], [0, 3, 0], center=[-1, 1.7, 0])
     scene = Scene([Obstacle("disk", Sphere(0.2), center)])
     run = simulate(planar_controller(), planar_start(), duration=0.1, scene=scene)
     expected = np.array([center.sample(t).position for t in run.t])
@@ -142,8 +140,8 @@ def test_efforts_have_the_units_of_their_joints(name: str, efforts: str) -> None
     robot = load(name)
     q0 = robot.integrate(robot.home(), np.full(robot.nv, 0.3))
     start = robot.state(0.0, q0, np.zeros(robot.nv)).position(robot.end_effector)
-    gains = Gains.from_frequency(5.0)
-    task = FramePosition(robot, robot.end_effector, Hold(start[:2]), gains, axes="xy")
+    gains = Gains(natural_frequency=5.0)
+    task = FramePosition(robot.end_effector, Hold(start[:2]), gains=gains, axes="xy")
     run = simulate(Controller(robot, [task]), q0, duration=0.01)
     assert run.meta["columns"]["tau"]["unit"] == efforts
 

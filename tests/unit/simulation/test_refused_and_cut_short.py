@@ -161,7 +161,7 @@ def test_ctrl_c_in_the_middle_of_a_row(
             signal.raise_signal(signal.SIGINT)
         return np.zeros(3)
 
-    field = FunctionField(robot, pressed, rate=lambda state: np.zeros(3))
+    field = FunctionField(pressed, rate_function=lambda state: np.zeros(3))
     controller = Controller(robot, planar_controller().tasks, field)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
@@ -185,7 +185,7 @@ def test_ctrl_c_before_the_first_row() -> None:
             raise KeyboardInterrupt
         return np.zeros(3)
 
-    field = FunctionField(robot, pressed)
+    field = FunctionField(pressed)
     controller = Controller(robot, planar_controller().tasks, field)
     built.append(True)
     run = simulate_until_interrupted(controller, planar_start(), duration=0.5)
@@ -245,12 +245,7 @@ def test_a_runaway_is_told_with_its_speed() -> None:
 def test_an_error_on_the_way_keeps_the_rollout() -> None:
     """A field that returns NaN at some time is named; the rows before are kept."""
     robot = load("planar3r", gravity=False)
-    field = FunctionField(
-        robot,
-        lambda state: np.full(3, np.nan if state.t > 0.25 else 0.0),
-        rate=lambda state: np.zeros(3),
-        name="mine",
-    )
+    field = FunctionField(lambda state: np.full(3, np.nan if state.t > 0.25 else 0.0), rate_function=lambda state: np.zeros(3), name="mine")
     controller = Controller(robot, planar_controller().tasks, field)
     with pytest.raises(
         SimulationError, match=r"^the simulation stopped: field 'mine' returned g = "

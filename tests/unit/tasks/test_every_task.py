@@ -209,7 +209,7 @@ def test_angular_momentum_obeys_its_first_order_equation(
     v, a = rng.standard_normal((2, robot.nv))
     motion = Motion(robot, q, v, a)
     target = wobble(np.array([0.1, -0.2, 0.3]))
-    task = AngularMomentum(robot, target, 7.0)
+    task = AngularMomentum(target, 7.0)
     sample = task.evaluate(robot.state(TIME, q, v))
     data, mass = robot.model.createData(), pin.computeTotalMass(robot.model)
 

@@ -39,7 +39,7 @@ def test_a_ramp_leads_both_gains_to_the_new_ones() -> None:
     """Unchanged before it, the mean of both half-way, exactly the new ones after it."""
     robot = Robot.load("planar3r")
     old, new = Gains([4.0, 5.0, 6.0], 7.0), Gains(40.0, [10.0, 20.0, 30.0])
-    task = JointPosture(robot, robot.neutral(), old)
+    task = JointPosture(robot.neutral(), gains=old)
     first, last = old.matrices(3), new.matrices(3)
     half = [0.5 * (a + b) for a, b in zip(first, last, strict=True)]
     ramp = GainRamp(task, new, start=1.0, ramp=0.5)
@@ -68,15 +68,15 @@ positive = st.floats(1e-3, 1e3)
 @given(positive, st.floats(0.05, 5.0))
 def test_gains_from_frequency(frequency: float, ratio: float) -> None:
     """s² + Kv s + Kp has |s| = ω0, and real parts of -ζ ω0 in the mean."""
-    Kp, Kv = Gains.from_frequency(frequency, ratio).matrices(1)
+    Kp, Kv = Gains(natural_frequency=frequency, damping_ratio=ratio).matrices(1)
     roots = np.roots([1.0, Kv[0, 0], Kp[0, 0]])
     assert np.prod(roots).real == pytest.approx(frequency**2, rel=1e-9)
     assert np.sum(roots).real == pytest.approx(-2.0 * ratio * frequency, rel=1e-9)
 
 
 def test_gains_from_frequency_defaults_and_lists() -> None:
-    assert repr(Gains.from_frequency(3.0)) == "Gains(kp=9.0, kv=6.0)"
-    Kp, Kv = Gains.from_frequency([2.0, 3.0], [1.0, 0.5]).matrices(2)
+    assert repr(Gains(natural_frequency=3.0)) == "Gains(kp=9.0, kv=6.0)"
+    Kp, Kv = Gains(natural_frequency=[2.0, 3.0], damping_ratio=[1.0, 0.5]).matrices(2)
     np.testing.assert_array_equal(Kp, np.diag([4.0, 9.0]))
     np.testing.assert_array_equal(Kv, np.diag([4.0, 3.0]))
 
@@ -118,19 +118,19 @@ GAIN_ERRORS: dict[str, tuple[Callable[[], Any], str]] = {
         r"^with these gains the error does not decay: .* real part 1 1/s; needs less",
     ),
     "frequency": (
-        lambda: Gains.from_frequency(0.0),
+        lambda: Gains(natural_frequency=0.0),
         r"^natural_frequency is 0.0; must be greater than 0$",
     ),
     "ratio": (
-        lambda: Gains.from_frequency(1.0, -1.0),
+        lambda: Gains(natural_frequency=1.0, damping_ratio=-1.0),
         r"^damping_ratio is -1.0; must be greater than 0$",
     ),
     "frequency matrix": (
-        lambda: Gains.from_frequency(np.eye(2) + 1.0),
+        lambda: Gains(natural_frequency=np.eye(2) + 1.0),
         r"^natural_frequency and damping_ratio must be numbers or lists$",
     ),
     "lists of different length": (
-        lambda: Gains.from_frequency([1.0, 2.0], [1.0, 1.0, 1.0]),
+        lambda: Gains(natural_frequency=[1.0, 2.0], damping_ratio=[1.0, 1.0, 1.0]),
         r"^natural_frequency and damping_ratio: ",
     ),
 }

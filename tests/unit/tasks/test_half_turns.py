@@ -74,7 +74,7 @@ def test_orientation_through_half_a_turn(angle: float, axis: Array) -> None:
     state = panda_state()
     R = state.frame("panda_tcp").rotation
     reference = Tumble(R @ pin.exp3(-angle * axis))
-    task = FrameOrientation(state.robot, "panda_tcp", reference, GAINS)
+    task = FrameOrientation("panda_tcp", reference, gains=GAINS)
     sample = task.evaluate(state)
     assert np.linalg.norm(sample.error) <= np.pi * (1 + 1e-15)
     shortest = min(angle, 2.0 * np.pi - angle)
@@ -101,7 +101,7 @@ def test_pointing_through_the_antipode(angle: float, side: float, kind: str) -> 
     n = np.sin(angle) * across + np.array([0.0, 0.0, np.cos(angle)])
     R_d = frame_along(m) @ frame_along(n / np.linalg.norm(n)).T
     reference = Tumble(R_d) if kind == "tumbling" else HoldOrientation(R_d)
-    task = Pointing(state.robot, "panda_tcp", TOOL, reference, GAINS)
+    task = Pointing("panda_tcp", axis=TOOL, trajectory=reference, gains=GAINS)
     sample = task.evaluate(state)
     assert all(np.isfinite(array).all() for array in sample)
     length = np.linalg.norm(sample.error)
@@ -118,7 +118,7 @@ def test_pointing_exactly_opposite() -> None:
     """To the last bit: any way is as good, so the length is told, and no NaN."""
     robot = planar()
     opposite = HoldOrientation(np.diag([1.0, -1.0, -1.0]))
-    task = Pointing(robot, "tip", TOOL, opposite, GAINS)
+    task = Pointing("tip", axis=TOOL, trajectory=opposite, gains=GAINS)
     for v in (np.zeros(3), np.ones(3)):
         sample = task.evaluate(robot.state(0.0, robot.neutral(), v))
         np.testing.assert_array_equal(
@@ -136,7 +136,7 @@ def test_pointing_is_led_back_from_near_the_antipode(degrees: float) -> None:
     angle = np.radians(degrees)
     seen = np.array([np.sin(angle), 0.0, np.cos(angle)])
     wanted = HoldOrientation(frame_along(here) @ frame_along(seen).T)
-    task = Pointing(robot, "panda_tcp", TOOL, wanted, Gains.from_frequency(3.0))
+    task = Pointing("panda_tcp", axis=TOOL, trajectory=wanted, gains=Gains(natural_frequency=3.0))
     run = simulate(Controller(robot, [task]), q0, duration=8.0, log_period=0.1)
     n = run["task.panda_tcp_pointing.actual"] @ wanted.rotation
     angles = np.arctan2(np.hypot(n[:, 0], n[:, 1]), n[:, 2])

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from task_cases import GAINS, TOOL, load, panda, planar, single_joints
 
@@ -36,22 +35,22 @@ pytestmark = pytest.mark.filterwarnings("error")
 
 
 def posture(robot: Robot, **options: Any) -> JointPosture:
-    return JointPosture(robot, robot.neutral(), GAINS, **options)
+    return JointPosture(robot.neutral(), gains=GAINS, **options)
 
 
 def pose(robot: Robot, frame: str) -> FramePose:
-    return FramePose(robot, frame, HoldPose(pin.SE3.Identity()), GAINS)
+    return FramePose(frame, HoldPose(np.zeros(3), np.eye(3)), gains=GAINS)
 
 
 HOLD = HoldOrientation(np.eye(3))
 ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
     "frame of a position": (
-        lambda: FramePosition(panda(), "panda_tpc", Hold([0, 0, 0]), GAINS),
+        lambda: FramePosition("panda_tpc", Hold([0, 0, 0]), gains=GAINS),
         FrameNotFoundError,
         r"no frame 'panda_tpc'; did you mean 'panda_tcp'\?",
     ),
     "frame of an orientation": (
-        lambda: FrameOrientation(panda(), "hand", HOLD, GAINS),
+        lambda: FrameOrientation("hand", HOLD, gains=GAINS),
         FrameNotFoundError,
         r"^no frame 'hand'; did you mean 'panda_hand'\?",
     ),
@@ -61,27 +60,27 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
         r"^no frame 'nowhere' \(the model has universe",
     ),
     "frame of a pointing": (
-        lambda: Pointing(panda(), "panda_hnad", TOOL, HOLD, GAINS),
+        lambda: Pointing("panda_hnad", axis=TOOL, trajectory=HOLD, gains=GAINS),
         FrameNotFoundError,
         r"did you mean 'panda_hand'",
     ),
     "twice the same axis": (
-        lambda: FramePosition(panda(), "panda_tcp", Hold([0, 0]), GAINS, axes="xx"),
+        lambda: FramePosition("panda_tcp", Hold([0, 0]), gains=GAINS, axes="xx"),
         TaskError,
         r"^axes 'xx': must be distinct letters of x, y and z$",
     ),
     "no axis": (
-        lambda: FramePosition(panda(), "panda_tcp", Hold([0]), GAINS, axes=""),
+        lambda: FramePosition("panda_tcp", Hold([0]), gains=GAINS, axes=""),
         TaskError,
         r"^axes '': must be distinct letters",
     ),
     "another axis": (
-        lambda: FramePosition(panda(), "panda_tcp", Hold([0]), GAINS, axes=["u"]),
+        lambda: FramePosition("panda_tcp", Hold([0]), gains=GAINS, axes=["u"]),
         TaskError,
         r"^axes 'u': must be distinct letters",
     ),
     "dimension of the trajectory": (
-        lambda: FramePosition(panda(), "panda_tcp", Hold([0, 0]), GAINS),
+        lambda: FramePosition("panda_tcp", Hold([0, 0]), gains=GAINS),
         TaskError,
         r"^task 'panda_tcp' tracks the axes 'xyz'; its trajectory has dimension 2, "
         r"needs 3$",
@@ -92,24 +91,22 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
         r"^task 'tip' has 6 rows; planar3r has 3 degrees of freedom$",
     ),
     "name": (
-        lambda: FramePosition(
-            panda(), "panda_tcp", Hold([0, 0, 0]), GAINS, name="the hand"
-        ),
+        lambda: FramePosition("panda_tcp", Hold([0, 0, 0]), gains=GAINS, name="the hand"),
         TaskError,
         r"^task name 'the hand': use letters, digits, '_' and '-'",
     ),
     "no direction": (
-        lambda: Pointing(panda(), "panda_tcp", [0, 0, 0], HOLD, GAINS),
+        lambda: Pointing("panda_tcp", axis=[0, 0, 0], trajectory=HOLD, gains=GAINS),
         TaskError,
         r"^axis must be 3 finite numbers, not all zero; got \[0, 0, 0\]$",
     ),
     "direction of two numbers": (
-        lambda: Pointing(panda(), "panda_tcp", [1, 0], HOLD, GAINS),
+        lambda: Pointing("panda_tcp", axis=[1, 0], trajectory=HOLD, gains=GAINS),
         TaskError,
         r"^axis must be 3 finite numbers, not all zero; got \[1, 0\]",
     ),
     "infinite direction": (
-        lambda: Pointing(panda(), "panda_tcp", [1, 0, np.inf], HOLD, GAINS),
+        lambda: Pointing("panda_tcp", axis=[1, 0, np.inf], trajectory=HOLD, gains=GAINS),
         TaskError,
         r"^axis must be 3 finite numbers, not all zero",
     ),
@@ -139,12 +136,12 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
         r"^task 'posture' has 7 joints; its displacement has dimension 2$",
     ),
     "shape of the reference": (
-        lambda: JointPosture(planar(), [0.0, 0.0, 0.0], GAINS),
+        lambda: JointPosture([0.0, 0.0, 0.0], gains=GAINS),
         ShapeError,
         r"^configuration q has shape \(3,\); planar3r needs \(6,\) \(nq = 6, nv = 3\)$",
     ),
     "gains of another size": (
-        lambda: FramePosition(panda(), "panda_tcp", Hold([0, 0, 0]), Gains([1, 2], 1)),
+        lambda: FramePosition("panda_tcp", Hold([0, 0, 0]), gains=Gains([1, 2], 1)),
         GainError,
         r"^kp has shape \(2,\); needs a number, 3 numbers or a 3 × 3 matrix$",
     ),
@@ -163,10 +160,10 @@ def test_errors(which: str) -> None:
 def test_names() -> None:
     robot = panda()
     assert pose(robot, "panda_tcp").name == "panda_tcp"
-    assert FrameOrientation(robot, "panda_tcp", HOLD, GAINS).name == (
+    assert FrameOrientation("panda_tcp", HOLD, gains=GAINS).name == (
         "panda_tcp_orientation"
     )
-    assert Pointing(robot, "panda_tcp", TOOL, HOLD, GAINS).name == "panda_tcp_pointing"
+    assert Pointing("panda_tcp", axis=TOOL, trajectory=HOLD, gains=GAINS).name == "panda_tcp_pointing"
     assert posture(robot).name == "posture"
     assert posture(robot, name="left-arm_2").name == "left-arm_2"
     assert posture(load("ur5", "planar")).joints == tuple(
@@ -178,7 +175,7 @@ def test_arguments_are_copied() -> None:
     """Changing what was given in changes nothing."""
     robot = planar()
     reference, kp = robot.neutral(), np.array([1.0, 2.0, 3.0])
-    task = JointPosture(robot, reference, Gains(kp, 4.0))
+    task = JointPosture(reference, gains=Gains(kp, 4.0))
     state = robot.state(0.0, robot.neutral(), np.zeros(3))
     reference[:] = robot.integrate(robot.neutral(), np.ones(3))
     kp[:] = 7.0
@@ -189,5 +186,5 @@ def test_arguments_are_copied() -> None:
 def test_a_task_is_named_after_its_frame_as_a_column_may_be() -> None:
     frames = {"tip/1.0": ToolFrame("panda_hand")}
     robot = Robot.load("panda", tool_frames=frames)
-    task = FramePosition(robot, "tip/1.0", Hold([0.4, 0, 0.4]), Gains(1, 1))
+    task = FramePosition("tip/1.0", Hold([0.4, 0, 0.4]), gains=Gains(1, 1))
     assert task.name == "tip_1_0"

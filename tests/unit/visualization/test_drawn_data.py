@@ -256,7 +256,7 @@ def test_frames_are_even_in_time_or_where_they_are_asked_for(
 
 
 def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
-    turned = Spin(pin.utils.rotate("x", 0.5), [0.0, 0.0, 1.0], 2.0)
+    turned = Spin([0.0, 0.0, 1.0], 2.0, rotation=pin.utils.rotate("x", 0.5))
     bumps = [[0.0, 0.1], [0.1, 0.0]]
     scene = Scene(
         [
@@ -271,7 +271,7 @@ def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
         ]
     )
     arm = Arm()
-    task = FramePosition(arm.robot, arm.tcp, arm.circle([1.0, 0.0, 1.0]), GAINS)
+    task = FramePosition(arm.tcp, arm.circle([1.0, 0.0, 1.0]), gains=GAINS)
     log = arm.run(task, scene=scene)
     found = {body.name: body for body in obstacles.logged_obstacles(log)}
     assert [name for name, body in found.items() if body.oversized] == [
@@ -337,14 +337,14 @@ def test_a_matrix_gain_predicts_a_band_and_the_log_lies_in_it(
     logs: dict[str, Rollout],
 ) -> None:
     robot = Robot.load("planar3r", gravity=(0, 0, 0))
-    task = FramePosition(robot, "tip", Round([1, 1], 1, 3), GAINS, axes="xy")
+    task = FramePosition("tip", Round(1, 3, [1, 1]), gains=GAINS, axes="xy")
     q0 = robot.integrate(robot.neutral(), np.array([-0.44, 0.9, 0.9]))
     controller = Controller(
         robot,
         [task],
-        Rest(robot),
+        Rest(),
         null_space_gain=[5.0, 10.0, 15.0],
-        metric=ConstantMetric.from_coordinates(A),
+        metric=CoordinatesMetric(A),
     )
     run = simulate(controller, q0, [1.0, 0.0, -1.0], duration=1.0)
     for log in (run, logs["space"]):

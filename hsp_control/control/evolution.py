@@ -1,0 +1,129 @@
+"""Values that change smoothly, as functions of time."""
+
+from bisect import insort
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.null_space.fields.weight import Weight
+from hsp_control.robot import RobotState
+from hsp_control.trajectories.timing import smooth_step
+
+Value = TypeVar("Value", float, Array)
+
+
+@dataclass(frozen=True)
+class Transition(Generic[Value]):
+    """A smooth change to a value.
+
+    Attributes:
+        start: When it begins [s].
+        ramp: How long it takes [s]; 0 is a jump.
+        target: The new value.
+    """
+
+    start: float
+    ramp: float
+    target: Value
+
+    @property
+    def end(self) -> float:
+        """When it is complete [s]."""
+        return self.start + self.ramp
+
+    def share(self, t: float) -> tuple[float, float]:
+        """Return s(t) from 0 to 1, and s' [1/s]; C² in t."""
+        if self.ramp == 0.0:
+            return float(t >= self.start), 0.0
+        s, s_dot, _ = smooth_step(t, self.start, self.ramp)
+        return s, s_dot
+
+
+@dataclass(frozen=True)
+class Evolution(Generic[Value]):
+    """x(t): a value and the transitions that change it, in order of time.
+
+    Transition k crossfades from whatever x would have been without it:
+
+        x_k(t) = (1 - s_k(t)) x_{k-1}(t) + s_k(t) target_k.
+
+    So a transition that begins while another is under way continues its motion, and x
+    is C² however they overlap. x depends on time alone, not on when it is asked for.
+
+    Attributes:
+        initial: The value before all transitions.
+        transitions: The transitions, in order of their start.
+    """
+
+    initial: Value
+    transitions: tuple[Transition[Value], ...] = ()
+
+    def then(self, start: float, ramp: float, target: Value) -> "Evolution[Value]":
+        """Return the evolution with one more transition."""
+        ordered = list(self.transitions)
+        insort(ordered, Transition(start, ramp, target), key=lambda each: each.start)
+        return Evolution(self.initial, tuple(ordered))
+
+    @property
+    def constant(self) -> bool:
+        """Whether the value never changes."""
+        return not self.transitions
+
+    @property
+    def end(self) -> float:
+        """When the last transition is complete [s]; -inf without one."""
+        return max((each.end for each in self.transitions), default=-np.inf)
+
+    @property
+    def target(self) -> Value:
+        """The value after all transitions."""
+        return self.transitions[-1].target if self.transitions else self.initial
+
+    def at(self, t: float) -> Value:
+        """Return x(t)."""
+        return self.with_rate(t)[0]
+
+    def with_rate(self, t: float) -> tuple[Value, Value]:
+        """Return x(t) and x'(t)."""
+        x: Value = self.initial
+        x_dot: Value = 0.0 * x
+        for each in self.transitions:
+            s, s_dot = each.share(t)
+            if s == 1.0:
+                x, x_dot = each.target, 0.0 * each.target
+            elif s > 0.0:
+                x_dot = (1.0 - s) * x_dot + s_dot * (each.target - x)
+                x = (1.0 - s) * x + s * each.target
+        return x, x_dot
+
+    def settled(self, t: float) -> "Evolution[Value]":
+        """Return the evolution for times from t on: complete transitions are folded."""
+        done = [k for k, each in enumerate(self.transitions) if each.end <= t]
+        if not done:
+            return self
+        last = done[-1]
+        return Evolution(self.transitions[last].target, self.transitions[last + 1 :])
+
+
+class EvolvingWeight(Weight):
+    """w(t) that an `Evolution` gives."""
+
+    evolution: Evolution[float]
+    """w(t) [-]."""
+
+    @property
+    def constant(self) -> bool:
+        """Whether w never changes."""
+        return self.evolution.constant
+
+    def sample(self, state: RobotState) -> tuple[float, float]:
+        """Return w and w'; see `Weight.sample`."""
+        return self.evolution.with_rate(state.t)
+
+
+PRESENT: Evolution[float] = Evolution(1.0)
+"""Of a part that is there at all times."""
+ABSENT: Evolution[float] = Evolution(0.0)
+"""Of a part that is not there; a transition adds it."""

@@ -1,0 +1,100 @@
+"""What a controller returns: an effort, and everything that explains it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.control.actuation.status import Status
+from hsp_control.law.problem import Record
+from hsp_control.null_space.fields import FieldSample
+from hsp_control.tasks import TaskSample
+
+
+class ControlOutput:
+    """The effort at one state, and everything that explains it.
+
+    It belongs to the caller: the controller does not write into it again, unless it is
+    given to `Controller.compute` as ``out``.
+
+    Attributes:
+        tau: Effort M a + N minus what the contact forces supply, shape (nv,)
+            [N·m or N].
+        damped: Whether a task is so near a singularity that its inverse is bounded,
+            and the law not exact.
+        forces: Forces at the points of the active contacts, in the axes of each
+            contact (two tangents, normal), shape (3 points,) [N]; see
+            `ActiveStack.support`.
+        status: What the limits left of the law's acceleration.
+        relaxation: The largest violation of a limit, where limits contradict each
+            other [rad/s² or m/s²].
+    """
+
+    __slots__ = (
+        "_acceleration",
+        "_memory",
+        "_rows",
+        "damped",
+        "forces",
+        "relaxation",
+        "status",
+        "tau",
+    )
+
+    tau: Array
+    damped: bool
+    forces: Array
+    status: Status
+    relaxation: float
+    _acceleration: Array | None  # None: the law's own
+    _memory: Array
+    _rows: int
+
+    @property
+    def acceleration(self) -> Array:
+        """The acceleration that the effort produces, shape (nv,)."""
+        own = self._acceleration
+        return self._record.acceleration if own is None else own
+
+    @property
+    def task(self) -> TaskSample:
+        """All tasks stacked: J, J', e, e', a_x."""
+        return self._record.task
+
+    @property
+    def field(self) -> FieldSample:
+        """G and g', shape (nv,) each."""
+        return self._record.field
+
+    @property
+    def null_space_error(self) -> Array:
+        """e_N = (I - J#J)(g - v), shape (nv,)."""
+        return self._record.null_space_error
+
+    def _keep(self, memory: Array) -> None:
+        """Copy the record of a step, into the memory of the last one if it fits."""
+        if self._memory.shape == memory.shape:
+            np.copyto(self._memory, memory)
+        else:
+            self._memory = memory.copy()
+
+    @property
+    def _record(self) -> Record:
+        return Record.over(self._memory, self._rows, len(self.tau))
+
+
+class Diagnostics(NamedTuple):
+    """Quantities to plot beside the effort.
+
+    Attributes:
+        field_value: The field's cost f, or its norm.
+        null_space_norm: ‖e_N‖_W, which decays like exp(-K_N t) for a scalar gain.
+        singular_values: Of the tasks' stacked Jacobian in the metric, J L⁻ᵀ, largest
+            first.
+        manipulability: det(J W⁻¹ Jᵀ), the product of their squares.
+    """
+
+    field_value: float
+    null_space_norm: float
+    singular_values: Array
+    manipulability: float

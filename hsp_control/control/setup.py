@@ -1,0 +1,200 @@
+"""What a controller is made of, and how that evolves: a function of time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.control.composition import priority_of
+from hsp_control.control.evolution import ABSENT, PRESENT, Evolution, EvolvingWeight
+from hsp_control.control.planned_contact import PlannedContact
+from hsp_control.geometry.start import Start
+from hsp_control.null_space.fields import FieldSum, NullSpaceField
+from hsp_control.null_space.fields.field import terms_of
+from hsp_control.null_space.fields.weight import product
+from hsp_control.null_space.metrics import Metric
+from hsp_control.robot import Robot
+from hsp_control.tasks import Task
+
+
+@dataclass(frozen=True)
+class PlannedTask:
+    """A task, when it counts, and its gains.
+
+    Attributes:
+        key: Tells it from every other task of the controller, also of the same name.
+        task: The task, placed.
+        presence: 1 while it is part of the controller, 0 while not.
+        gains: Kp and Kv, shape (2, m, m) [1/s², 1/s].
+    """
+
+    key: int
+    task: Task
+    presence: Evolution[float]
+    gains: Evolution[Array]
+
+    def weight(self, t: float) -> float:
+        """Return how much the task counts at time t [s], in [0, 1]."""
+        present = self.presence.at(t)
+        schedule = self.task.schedule
+        return present if schedule is None else present * schedule.weight(t)
+
+    @property
+    def always(self) -> bool:
+        """Whether it counts fully at all times."""
+        schedule = self.task.schedule
+        unscheduled = schedule is None or (schedule.constant and not schedule.ramp)
+        return unscheduled and self.presence == PRESENT
+
+
+@dataclass(frozen=True)
+class PlannedTerm:
+    """A term of the field, and when it counts.
+
+    Attributes:
+        field: The term, placed, with its own weight.
+        presence: The factor of its weight.
+    """
+
+    field: NullSpaceField
+    presence: Evolution[float]
+
+    @property
+    def weighted(self) -> NullSpaceField:
+        """The term with both weights."""
+        if self.presence == PRESENT:
+            return self.field
+        weight = product(EvolvingWeight(self.presence), self.field.weight)
+        return replace(self.field, weight=weight)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """All parts of a controller, as a function of time.
+
+    Attributes:
+        start: Where the parts were placed.
+        metric: The metric.
+        tasks: The tasks.
+        terms: The terms of the field; their sum is the field.
+        gain: K_N, shape (nv, nv) [1/s].
+        contacts: The contacts.
+    """
+
+    start: Start
+    metric: Metric
+    tasks: tuple[PlannedTask, ...]
+    terms: tuple[PlannedTerm, ...]
+    gain: Evolution[Array]
+    contacts: tuple[PlannedContact, ...]
+
+    @property
+    def field(self) -> NullSpaceField:
+        """The field: the sum of the terms, or the only one if it has weight 1."""
+        terms = tuple(term.weighted for term in self.terms)
+        if len(terms) == 1 and terms[0].weight == 1.0:
+            return terms[0]
+        return FieldSum(terms)
+
+    @property
+    def end(self) -> float:
+        """When the last change is complete [s]; -inf without changes."""
+        evolutions: list[Evolution[Any]] = [
+            self.gain,
+            *(task.presence for task in self.tasks),
+            *(task.gains for task in self.tasks),
+            *(term.presence for term in self.terms),
+            *(contact.presence for contact in self.contacts),
+        ]
+        return max(each.end for each in evolutions)
+
+    @property
+    def steady(self) -> bool:
+        """Whether tasks and contacts are the same at all times."""
+        return all(each.always for each in self.tasks) and all(
+            each.always for each in self.contacts
+        )
+
+    def find_task(self, name: str) -> int:
+        """Return the index of the task that has a name, after all changes so far.
+
+        Raises:
+            ControllerError: If there is none.
+        """
+        there = {
+            each.task.name: k
+            for k, each in enumerate(self.tasks)
+            if each.presence.target == 1.0
+        }
+        if name not in there:
+            raise ControllerError(
+                f"there is no task {name!r}{did_you_mean(name, there)} "
+                f"(there are {listing(there) or 'none'})"
+            )
+        return there[name]
+
+    def with_task(self, index: int, **changes: Any) -> "Setup":
+        """Return the setup with some attributes of one `PlannedTask` replaced."""
+        tasks = list(self.tasks)
+        tasks[index] = replace(tasks[index], **changes)
+        return replace(self, tasks=tuple(tasks))
+
+    def settled(self, t: float) -> "Setup":
+        """Return the setup for times from t on: complete changes are folded."""
+        tasks = [
+            _changed(
+                each, presence=each.presence.settled(t), gains=each.gains.settled(t)
+            )
+            for each in self.tasks
+        ]
+        terms = [
+            _changed(each, presence=each.presence.settled(t)) for each in self.terms
+        ]
+        contacts = [
+            _changed(each, presence=each.presence.settled(t)) for each in self.contacts
+        ]
+        return Setup(
+            self.start,
+            self.metric,
+            tuple(each for each in tasks if each.presence != ABSENT),
+            tuple(each for each in terms if each.presence != ABSENT),
+            self.gain.settled(t),
+            tuple(contacts),
+        )
+
+
+Planned = TypeVar("Planned", PlannedTask, PlannedTerm, PlannedContact)
+
+
+def _changed(planned: Planned, **changes: Any) -> Planned:
+    """Return it with some attributes replaced, or itself if they are the same."""
+    if all(getattr(planned, name) is value for name, value in changes.items()):
+        return planned
+    return replace(planned, **changes)
+
+
+def planned_task(key: int, task: Task, presence: Evolution[float]) -> PlannedTask:
+    """Return a placed task with its own gains."""
+    Kp, Kv, _ = task.feedback()
+    return PlannedTask(key, task, presence, Evolution(np.stack([Kp, Kv])))
+
+
+def planned_terms(
+    field: NullSpaceField, presence: Evolution[float]
+) -> tuple[PlannedTerm, ...]:
+    """Return the terms of a placed field."""
+    return tuple(PlannedTerm(term, presence) for term in terms_of(field))
+
+
+def levels_of(
+    tasks: Sequence[PlannedTask], robot: Robot
+) -> tuple[tuple[PlannedTask, ...], ...]:
+    """Return the tasks of each level, the highest priority first."""
+    levels: dict[int, list[PlannedTask]] = {}
+    for each in tasks:
+        levels.setdefault(priority_of(each.task, robot), []).append(each)
+    return tuple(tuple(levels[priority]) for priority in sorted(levels))

@@ -1,0 +1,340 @@
+"""The base class of all parts: immutable values with checked fields."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field
+from functools import wraps
+from typing import Any, ClassVar, NoReturn, dataclass_transform
+
+import numpy as np
+from pydantic import (
+    ConfigDict,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationError,
+)
+from pydantic.dataclasses import dataclass
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from hsp_control.common.exceptions import HspControlError, ImmutableError
+from hsp_control.declaration.docstrings import attribute_docstrings
+from hsp_control.declaration.families import Family
+from hsp_control.declaration.mistakes import argument_error
+from hsp_control.declaration.plain_data import plain_data
+
+_CONFIG = ConfigDict(
+    extra="forbid",
+    arbitrary_types_allowed=True,
+    validate_default=True,  # a default given as a tuple is stored as an array, too
+)
+
+
+@dataclass_transform(frozen_default=True)
+class Part:
+    """A value that declares one part of a controller, a world or a simulation.
+
+    A subclass annotates its fields; each has a docstring that says what it is and in
+    which unit. From this one declaration come the constructor and its checks, the YAML
+    and JSON schemas, the reference pages and the messages::
+
+        class Circle(Trajectory, type="circle"):
+            \"\"\"x(t) = c + r (cos ωt, sin ωt).\"\"\"
+
+            radius: Positive
+            \"\"\"r [m].\"\"\"
+            angular_rate: Number
+            \"\"\"ω [rad/s].\"\"\"
+
+    A part knows no robot. It never changes: its fields cannot be assigned, and the
+    arrays among them are read-only; `dataclasses.replace` returns a changed copy. Parts
+    are equal if their fields are, have a hash, and can be pickled; their `repr` is the
+    call that makes them. A method ``__post_init__`` may check how the fields fit
+    together. A field may stand for a property that a base class asks for.
+
+    Attributes:
+        family: The family that the part belongs to; None for parts of parts.
+        yaml_type: What YAML calls it in ``type:``; None for parts of parts, and for
+            classes that only Python uses.
+        error: The class of the errors about its fields.
+        yaml_key: The field that YAML gives as the key of a mapping, not inside it.
+        documentation: The docstring of each field, by name.
+    """
+
+    family: ClassVar[Family | None] = None
+    yaml_type: ClassVar[str | None] = None
+    error: ClassVar[type[HspControlError]] = HspControlError
+    yaml_key: ClassVar[str | None] = None
+    documentation: ClassVar[Mapping[str, str]] = {}
+    __pydantic_core_schema__: ClassVar[CoreSchema]
+
+    def __init_subclass__(
+        cls,
+        *,
+        family: str | None = None,
+        type: str | None = None,
+        error: type[HspControlError] | None = None,
+        **arguments: Any,
+    ) -> None:
+        """Make the class a value class, and register it with its family.
+
+        Args:
+            family: For the base class of a family: its name.
+            type: For a member of a family: what YAML calls it.
+            error: The class of the errors about its fields; inherited by default.
+            **arguments: For other base classes.
+
+        Raises:
+            TypeError: If the class has an ``__init__``, which would not be called.
+        """
+        super().__init_subclass__(**arguments)
+        if "__init__" in vars(cls):
+            raise TypeError(
+                f"{cls.__name__} must not have __init__: declare its parameters as "
+                "fields, and check them in __post_init__"
+            )
+        if error is not None:
+            cls.error = error
+        if family is not None:
+            cls.family = Family(family, cls)
+        cls.yaml_type = type
+        cls.documentation = {**cls.documentation, **attribute_docstrings(cls)}
+        if "__post_init__" in vars(cls):
+            cls.__post_init__ = _completed(cls.__post_init__)  # type: ignore[assignment,method-assign]
+        hidden = _hide_properties(cls)
+        dataclass(cls, frozen=True, eq=False, repr=False, config=_CONFIG)
+        for name in hidden:
+            setattr(cls, name, _field_property(name))
+        cls.__init__ = _with_one_error(cls.__init__)  # type: ignore[method-assign]
+        cls.__setattr__ = _refuse_assignment  # type: ignore[assignment,method-assign]
+        cls.__delattr__ = _refuse_deletion  # type: ignore[assignment,method-assign]
+        if type is not None:
+            assert cls.family is not None, f"{cls.__name__} has a type, but no family"
+            cls.family.register(type, cls)
+
+    @classmethod
+    def __get_pydantic_core_schema__(
+        cls, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Return the schema; for the base of a family, that of all its members."""
+        if cls.family is not None and cls.family.base is cls and source is cls:
+            return cls.family.core_schema()
+        return handler(source)
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Return the JSON schema, with the docstrings of the fields."""
+        made = handler(schema)
+        cls.describe(handler.resolve_ref_schema(made))
+        return made
+
+    @classmethod
+    def describe(cls, schema: JsonSchemaValue) -> None:
+        """Add the docstrings of the fields to a JSON schema of the part, in place."""
+        if cls.yaml_key is not None:
+            schema.get("properties", {}).pop(cls.yaml_key, None)
+            required = schema.get("required", [])
+            schema["required"] = [name for name in required if name != cls.yaml_key]
+        for name, about in schema.get("properties", {}).items():
+            about.pop("title", None)
+            if "oneOf" in about:  # a part; its default would need its type
+                about.pop("default", None)
+            if name in cls.documentation:
+                about["description"] = cls.documentation[name]
+
+    def __post_init__(self) -> None:
+        """Check how the fields fit together; by default they always do."""
+        self._complete()
+
+    def _complete(self) -> None:
+        """Set fields whose default depends on others, by `_set_default`."""
+
+    def _set_default(self, field: str, value: object) -> None:
+        """Give a field its value while the part is made."""
+        vars(self)[field] = value
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what YAML would say: the type, and the fields that are not defaults.
+
+        Raises:
+            ConfigError: If YAML cannot say a field, such as a Python function.
+        """
+        data: dict[str, Any] = plain_data(self)
+        return data
+
+    def all_fields(self) -> dict[str, Any]:
+        """Return all fields, by name."""
+        return {f.name: getattr(self, f.name) for f in value_fields(self)}
+
+    def changed_fields(self) -> dict[str, Any]:
+        """Return the fields that are not their defaults, by name."""
+        return {
+            f.name: getattr(self, f.name)
+            for f in value_fields(self)
+            if not _is_default(self, f)
+        }
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Part) or type(self) is not type(other):
+            return NotImplemented
+        return all(
+            _same(getattr(self, f.name), getattr(other, f.name))
+            for f in value_fields(self)
+        )
+
+    def __hash__(self) -> int:
+        values = (_hashable(getattr(self, f.name)) for f in value_fields(self))
+        return hash((type(self), *values))
+
+    def __repr__(self) -> str:
+        shown = (f"{n}={_shown(v)}" for n, v in self.changed_fields().items())
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {f.name: getattr(self, f.name) for f in value_fields(self)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        _freeze(state)
+        vars(self).update(state)
+
+    def __copy__(self) -> "Part":
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Part":
+        return self
+
+
+def value_fields(part: Part | type[Part]) -> tuple["Field[Any]", ...]:
+    """Return the fields of a part."""
+    return dataclasses.fields(part)  # type: ignore[arg-type]
+
+
+def _with_one_error(init: Callable[..., None]) -> Callable[..., None]:
+    """Return a constructor that raises the part's own error instead of pydantic's."""
+
+    @wraps(init)
+    def checked(self: Part, *args: Any, **kwargs: Any) -> None:
+        try:
+            init(self, *args, **kwargs)
+        except ValidationError as error:
+            raise argument_error(type(self), error) from None
+
+    return checked
+
+
+def _hide_properties(cls: type) -> list[str]:
+    """Return the fields without default that have the name of an inherited property.
+
+    Such a property is not the default of the field.
+    """
+    own = vars(cls)
+    hidden = [
+        name
+        for name in own.get("__annotations__", {})
+        if name not in own and isinstance(getattr(cls, name, None), property)
+    ]
+    for name in hidden:
+        setattr(cls, name, dataclasses.field())
+    return hidden
+
+
+def _field_property(name: str) -> property:
+    """Return what gives and sets a field, instead of the inherited property."""
+    return property(
+        lambda part: vars(part)[name],
+        lambda part, value: vars(part).update({name: value}),
+    )
+
+
+def _completed(check: Callable[[Any], None]) -> Callable[[Any], None]:
+    """Return a ``__post_init__`` that sets the defaults first."""
+
+    @wraps(check)
+    def checked(self: Part) -> None:
+        self._complete()
+        check(self)
+
+    return checked
+
+
+def _refuse_assignment(self: Part, name: str, value: object) -> NoReturn:
+    """Raise: a value does not change.
+
+    Raises:
+        ImmutableError: Always.
+    """
+    raise ImmutableError(
+        f"{type(self).__name__}.{name} cannot be assigned: parts never change; make "
+        f"another with dataclasses.replace(part, {name}=...)"
+    )
+
+
+def _refuse_deletion(self: Part, name: str) -> NoReturn:
+    """Raise: a value does not change.
+
+    Raises:
+        ImmutableError: Always.
+    """
+    raise ImmutableError(f"{type(self).__name__}.{name} cannot be deleted")
+
+
+def _is_default(part: Part, field: "Field[Any]") -> bool:
+    if field.default_factory is not MISSING:
+        default = field.default_factory()
+    elif field.default is MISSING:
+        return False
+    else:
+        default = field.default
+    return _same(getattr(part, field.name), default)
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Return whether two values of a field are equal; arrays entry by entry."""
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        if a is None or b is None:
+            return a is b
+        try:
+            return bool(np.array_equal(a, b))
+        except (TypeError, ValueError):
+            return False
+    if isinstance(a, tuple | list) and type(a) is type(b):
+        return len(a) == len(b) and all(map(_same, a, b))
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(_same(a[key], b[key]) for key in a)
+    return bool(a == b)
+
+
+def _hashable(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.shape, (value + 0.0).tobytes()  # + 0.0: -0.0 equals 0.0
+    if isinstance(value, tuple | list):
+        return tuple(map(_hashable, value))
+    if isinstance(value, dict):
+        return frozenset((key, _hashable(each)) for key, each in value.items())
+    return value
+
+
+def _shown(value: Any) -> str:
+    """Return Python that makes the value; arrays as lists of numbers."""
+    return repr(_listed(value))
+
+
+def _listed(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, dict):
+        return {key: _listed(each) for key, each in value.items()}
+    if isinstance(value, tuple | list):
+        return type(value)(map(_listed, value))
+    return value
+
+
+def _freeze(value: Any) -> None:
+    """Make arrays read-only, those in tuples and mappings included."""
+    if isinstance(value, np.ndarray):
+        value.setflags(write=False)
+    elif isinstance(value, dict | tuple | list):
+        for each in value.values() if isinstance(value, dict) else value:
+            _freeze(each)

@@ -1,0 +1,91 @@
+"""Parts as plain data: what YAML would say."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from hsp_control.common.exceptions import ConfigError
+from hsp_control.declaration.located import within
+
+if TYPE_CHECKING:
+    from hsp_control.declaration.part import Part
+
+_SIMPLE = bool, int, float, str, type(None)
+
+
+def plain_data(value: Any, *, defaults: bool = False) -> Any:
+    """Return a value as mappings, lists, numbers and text.
+
+    Args:
+        value: A part, a model of the configuration, or what they contain.
+        defaults: Whether fields that have their default value are included.
+
+    Raises:
+        ConfigError: If YAML cannot say it: a Python function, for example.
+    """
+    if isinstance(value, _SIMPLE):
+        return value
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "changed_fields"):
+        return _of_part(value, defaults)
+    if isinstance(value, BaseModel):
+        return _of_model(value, defaults)
+    if isinstance(value, Mapping):
+        return {key: _inside(key, each, defaults) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_inside(k, each, defaults) for k, each in enumerate(value)]
+    what = getattr(value, "__qualname__", None) or f"a {type(value).__name__}"
+    raise ConfigError(f"YAML cannot say {what}: it is Python, not data")
+
+
+def named(parts: Any, *, defaults: bool = False) -> dict[str, Any]:
+    """Return parts as a mapping by name, whose entries do not repeat it.
+
+    Raises:
+        ConfigError: If YAML cannot say a part.
+    """
+    found = {}
+    for each in parts:
+        with within(each.name):
+            data = plain_data(each, defaults=defaults)
+        data.pop("name", None)
+        found[each.name] = data
+    return found
+
+
+def _of_part(part: "Part", defaults: bool) -> dict[str, Any]:
+    data: dict[str, Any] = {}
+    if part.family is not None:
+        if part.yaml_type is None:
+            raise ConfigError(
+                f"YAML has no name for {type(part).__name__}: declare it with "
+                f'class {type(part).__name__}(..., type="...")'
+            )
+        data["type"] = part.yaml_type
+    fields = part.all_fields() if defaults else part.changed_fields()
+    for name, value in fields.items():
+        data[name] = _inside(name, value, defaults)
+    return data
+
+
+def _of_model(model: BaseModel, defaults: bool) -> dict[str, Any]:
+    data = {}
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        is_default = not field.is_required() and value == field.get_default(
+            call_default_factory=True
+        )
+        if defaults or not is_default:
+            data[name] = _inside(name, value, defaults)
+    return data
+
+
+def _inside(key: str | int, value: Any, defaults: bool) -> Any:
+    with within(key):
+        return plain_data(value, defaults=defaults)

@@ -1,0 +1,139 @@
+"""The types of fields: numbers with bounds, and arrays with shapes.
+
+An array may be given as a list, a tuple or any NumPy array of numbers; it is stored as
+a read-only copy of doubles.
+"""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    GetCoreSchemaHandler,
+    Strict,
+    WithJsonSchema,
+)
+from pydantic_core import CoreSchema, core_schema
+
+from hsp_control.common.arrays import Array
+
+
+def plain(value: Any) -> Any:
+    """Return NumPy's numbers and arrays as Python's numbers and lists, others as is."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple) and any(
+        isinstance(each, np.generic | np.ndarray | tuple) for each in value
+    ):
+        return [plain(each) for each in value]
+    return value
+
+
+_PLAIN = BeforeValidator(plain)
+Number = Annotated[float, Strict(), Field(allow_inf_nan=False), _PLAIN]
+Positive = Annotated[float, Strict(), Field(gt=0.0, allow_inf_nan=False), _PLAIN]
+NonNegative = Annotated[float, Strict(), Field(ge=0.0, allow_inf_nan=False), _PLAIN]
+Count = Annotated[int, Strict(), Field(ge=0), _PLAIN]
+Flag = Annotated[bool, Strict()]
+Name = Annotated[
+    str,
+    Strict(),
+    Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$"),
+]
+"""What a user calls a part, in messages and in columns of the log."""
+FileName = Annotated[
+    str | Path,
+    AfterValidator(lambda value: str(Path(value))),
+    WithJsonSchema({"type": "string"}),
+]
+"""The path of a file, stored as text."""
+Names = Annotated[Sequence[str], AfterValidator(tuple)]
+"""Names, stored as a tuple."""
+
+
+class ArrayField:
+    """The validation of a field that holds an array, or another thing made of a list.
+
+    Attributes:
+        items: What pydantic checks first, such as nested lists of numbers.
+        convert: Makes the array of them, and may check more.
+    """
+
+    def __init__(self, items: Any, convert: Callable[[Any], object]) -> None:
+        """Set both."""
+        self.items = items
+        self.convert = convert
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Return the schema: to plain lists, checked, to a read-only array."""
+        return core_schema.no_info_before_validator_function(
+            plain,
+            core_schema.no_info_after_validator_function(
+                self.convert, handler.generate_schema(self.items)
+            ),
+            serialization=core_schema.plain_serializer_function_ser_schema(plain),
+        )
+
+
+def read_only(value: Any) -> Array:
+    """Return a read-only copy, as doubles.
+
+    Raises:
+        ValueError: If rows have different lengths.
+    """
+    if isinstance(value, list):
+        sizes = {len(row) for row in value if isinstance(row, list)}
+        if len(sizes) > 1:
+            raise ValueError(
+                f"rows have different lengths {sorted(sizes)}; need the same"
+            )
+    try:
+        array = np.array(value, dtype=float)
+    except ValueError:  # further inside
+        raise ValueError("rows have different lengths; need the same") from None
+    array.setflags(write=False)
+    return array
+
+
+_Row = Annotated[list[Number], Field(min_length=1)]
+_Rows = Annotated[list[_Row], Field(min_length=1)]
+_Row3 = Annotated[list[Number], Field(min_length=3, max_length=3)]
+_Positive2 = Annotated[list[Positive], Field(min_length=2, max_length=2)]
+_Positive3 = Annotated[list[Positive], Field(min_length=3, max_length=3)]
+_Row2OrMore = Annotated[list[Number], Field(min_length=2)]
+
+Vector = Annotated[ArrayLike, ArrayField(_Row, read_only)]
+"""Shape (n,)."""
+Vector3 = Annotated[ArrayLike, ArrayField(_Row3, read_only)]
+"""Shape (3,)."""
+PositiveVector2 = Annotated[ArrayLike, ArrayField(_Positive2, read_only)]
+"""Two positive numbers."""
+PositiveVector3 = Annotated[ArrayLike, ArrayField(_Positive3, read_only)]
+"""Three positive numbers."""
+Points = Annotated[
+    ArrayLike, ArrayField(Annotated[list[_Row3], Field(min_length=1)], read_only)
+]
+"""Shape (k, 3)."""
+Grid = Annotated[
+    ArrayLike, ArrayField(Annotated[list[_Row2OrMore], Field(min_length=2)], read_only)
+]
+"""Shape (m, n), both at least 2."""
+Matrix = Annotated[ArrayLike, ArrayField(_Rows, read_only)]
+"""Shape (m, n)."""
+Tensor = Annotated[
+    ArrayLike, ArrayField(Annotated[list[_Rows], Field(min_length=1)], read_only)
+]
+"""Shape (k, m, n)."""
+Gain = Annotated[
+    ArrayLike, ArrayField(Positive | list[Positive] | list[list[Number]], read_only)
+]
+"""A number, one number for each row, or a matrix."""
+Weights = Annotated[ArrayLike, ArrayField(NonNegative | list[NonNegative], read_only)]
+"""One number, or one for each joint."""

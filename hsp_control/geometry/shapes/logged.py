@@ -1,0 +1,39 @@
+"""The shapes that logs describe: the name of a class, and its fields."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from hsp_control.common.exceptions import SceneError
+from hsp_control.declaration.part import value_fields
+from hsp_control.declaration.quantities import plain
+from hsp_control.geometry.shapes.shape import Shape
+
+
+def shape_to_log(shape: Shape) -> dict[str, Any]:
+    """Return the fields of a shape as JSON data, for `shape_from_log`."""
+    return {f.name: plain(getattr(shape, f.name)) for f in value_fields(shape)}
+
+
+def shape_from_log(kind: str, parameters: Mapping[str, Any]) -> Shape | None:
+    """Return the shape that a log describes, or None if the kind is unknown.
+
+    Args:
+        kind: Name of the shape's class.
+        parameters: Its fields.
+
+    Raises:
+        SceneError: If the parameters are not those of this kind, or invalid.
+    """
+    assert Shape.family is not None
+    members = {each.__name__: each for each in Shape.family.members.values()}
+    shape_class = members.get(kind)
+    if shape_class is None:
+        return None
+    try:
+        shape = shape_class(**parameters)
+    except SceneError:
+        needed = ", ".join(f.name for f in value_fields(shape_class)) or "nothing"
+        found = f"{dict(parameters)!r}"[:60]
+        raise SceneError(f"{kind.lower()}: needs {needed}; got {found}") from None
+    assert isinstance(shape, Shape)
+    return shape

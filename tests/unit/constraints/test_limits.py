@@ -1,0 +1,445 @@
+"""The numbers of limits for a robot, and the distances that they keep.
+
+``tests/unit/control/test_limits.py`` has what the controller does with them.
+"""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hsp_control import (
+    Box,
+    Hold,
+    Limits,
+    Lissajous,
+    MinimumDistance,
+    Obstacle,
+    Robot,
+    RobotState,
+    Scene,
+    Sphere,
+)
+from hsp_control.common.exceptions import (
+    FieldError,
+    HspControlError,
+    JointNotFoundError,
+    LimitError,
+    SceneError,
+)
+from hsp_control.constraints.limits import (
+    ObstacleDistance,
+    PositionRange,
+    RobotLimits,
+    Scaled,
+    SelfDistance,
+    StaticEffort,
+)
+from hsp_control.constraints.limits.acceleration_bounds import acceleration_bounds
+from hsp_control.geometry.start import Start
+
+Array = NDArray[np.float64]
+
+
+@cache
+def panda() -> Robot:
+    return Robot.load("panda")
+
+
+@cache
+def fingers() -> Robot:
+    """Return a Panda whose fingers mimic each other."""
+    return Robot.load("panda", locked={})
+
+
+@cache
+def talos() -> Robot:
+    pytest.importorskip("example_robot_data")
+    return Robot.load("talos")
+
+
+def at_home(robot: Robot, scene: Sequence[Obstacle] = ()) -> Start:
+    return Start(robot.state(0.0, robot.home(), np.zeros(robot.nv)), Scene(scene))
+
+
+def of(robot: Robot, *scene: Obstacle, **options: Any) -> RobotLimits:
+    return Limits(**options).placed(at_home(robot, scene))
+
+
+# --- numbers -------------------------------------------------------------------------
+
+
+def test_by_default_they_are_the_robots_own() -> None:
+    robot = panda()
+    limits = of(robot)
+    assert limits.robot is robot
+    np.testing.assert_array_equal(limits.effort, robot.model.effortLimit)
+    np.testing.assert_array_equal(limits.velocity, robot.model.velocityLimit)
+    lower, upper = robot.position_limits()
+    np.testing.assert_array_equal(limits.lower, lower)
+    np.testing.assert_array_equal(limits.upper, upper)
+    np.testing.assert_array_equal(limits.guarded_lower, lower + 0.005)
+    np.testing.assert_array_equal(limits.guarded_upper, upper - 0.005)
+    np.testing.assert_array_equal(limits.guarded_velocity, 0.98 * limits.velocity)
+    assert np.isinf(limits.effort_rate).all()
+    assert np.isinf(limits.acceleration).all()
+    assert limits.bandwidth == 10.0
+    assert limits.distances == ()
+    assert limits.static_effort is limits.null_space_speed is None
+    assert limits.null_space_weight is None
+
+
+def test_what_no_motor_moves_has_no_limit_of_its_own() -> None:
+    limits = of(talos())
+    for each in (limits.effort, limits.velocity, -limits.lower, limits.upper):
+        assert np.isinf(each[:6]).all()
+        assert np.isfinite(each[6:]).any()
+
+
+def test_none_is_no_limit() -> None:
+    limits = of(panda(), effort="none", velocity=None, position="none")
+    for each in (limits.effort, limits.velocity, -limits.lower, limits.upper):
+        assert (each == np.inf).all()
+
+
+def test_one_number_or_one_for_each() -> None:
+    numbers = np.arange(1.0, 8.0)
+    some = [1.0, None, np.inf, 4.0, 5.0, 6.0, 7.0]
+    limits = of(
+        panda(),
+        effort=3.0,
+        effort_rate=1000.0,
+        velocity=numbers,
+        velocity_margin=0.5,
+        acceleration=some,
+        position=PositionRange(-1.0, numbers),
+        position_margin=0.25,
+        bandwidth=7.0,
+        null_space_speed=2.0,
+        null_space_weight=1e-3,
+    )
+    np.testing.assert_array_equal(limits.effort, np.full(7, 3.0))
+    np.testing.assert_array_equal(limits.effort_rate, np.full(7, 1000.0))
+    np.testing.assert_array_equal(limits.velocity, numbers)
+    np.testing.assert_array_equal(limits.guarded_velocity, 0.5 * numbers)
+    unlimited = [1.0, np.inf, np.inf, 4.0, 5.0, 6.0, 7.0]
+    np.testing.assert_array_equal(limits.acceleration, unlimited)
+    np.testing.assert_array_equal(limits.lower, np.full(7, -1.0))
+    np.testing.assert_array_equal(limits.guarded_upper, numbers - 0.25)
+    assert limits.motion.bandwidth == limits.bandwidth == 7.0
+    assert limits.null_space_weight == 1e-3
+    assert limits.null_space_speed is not None
+    np.testing.assert_array_equal(limits.null_space_speed, np.full(7, 2.0))
+
+
+def test_a_part_of_the_robots_own() -> None:
+    own = of(panda())
+    scaled = {"panda_joint3": 0.5, "panda_joint1": 2.0}
+    limits = of(panda(), effort=Scaled(0.3), velocity=Scaled(scaled))
+    np.testing.assert_array_equal(limits.effort, 0.3 * own.effort)
+    factors = [2.0, 1.0, 0.5, 1.0, 1.0, 1.0, 1.0]
+    np.testing.assert_array_equal(limits.velocity, factors * own.velocity)
+    assert np.isinf(of(talos(), effort=Scaled(0.5)).effort[:6]).all()
+
+
+def test_a_range_without_limits_for_a_root() -> None:
+    nv = talos().nv
+    lower, upper = np.full((2, nv), -np.inf)
+    lower[8], upper[:] = -0.1, np.inf
+    limits = of(talos(), position=PositionRange(lower, upper))
+    np.testing.assert_array_equal(limits.lower, lower)
+    np.testing.assert_array_equal(limits.upper, upper)
+
+
+def test_numbers_cannot_be_changed() -> None:
+    limits = of(panda(), effort_rate=1.0, null_space_speed=1.0, static_effort=1.0)
+    arrays = [*vars(limits).values(), *limits.motion, limits.static_effort.effort]  # type: ignore[union-attr]
+    arrays = [each for each in arrays if isinstance(each, np.ndarray)]
+    assert len(arrays) == 11
+    for each in arrays:
+        assert not each.flags.writeable
+    with pytest.raises(AttributeError):
+        limits.effort = np.ones(7)  # type: ignore[misc]
+
+
+def test_kernels_take_them() -> None:
+    robot = panda()
+    a_lower, a_upper = np.zeros((2, 7))
+    q, v = robot.home(), np.full(7, 0.1)
+    motion = of(robot, acceleration=3.0).motion
+    acceleration_bounds(q, v, robot.dof_indices, motion, a_lower, a_upper)
+    assert (a_upper == 3.0).all()
+    assert (a_lower >= -3.0).all()
+
+
+@pytest.mark.parametrize(
+    ("robot", "options", "error", "path", "message"),
+    [
+        (panda, {"effort": [1, 2]}, LimitError, ("effort",), "has 2 numbers; needs"),
+        (
+            panda,
+            {"effort": Scaled({"panda_joint9": 0.5})},
+            JointNotFoundError,
+            ("effort", "scale", "panda_joint9"),
+            "did you mean 'panda_joint",
+        ),
+        (
+            talos,
+            {"velocity": Scaled({"root_joint": 0.5})},
+            LimitError,
+            ("velocity", "scale", "root_joint"),
+            "root_joint has no limit that could be scaled",
+        ),
+        (
+            panda,
+            {"effort_rate": [1.0] * 8},
+            LimitError,
+            ("effort_rate",),
+            "has 8 numbers; needs one number or 7",
+        ),
+        (panda, {"velocity": [1.0]}, LimitError, ("velocity",), "has 1 number"),
+        (panda, {"acceleration": [1.0]}, LimitError, ("acceleration",), "needs one"),
+        (
+            panda,
+            {"null_space_speed": [1.0]},
+            LimitError,
+            ("null_space_speed",),
+            "needs one number or 7",
+        ),
+        (
+            panda,
+            {"position": PositionRange([0.0], 1.0)},
+            LimitError,
+            ("position", "lower"),
+            "has 1 number",
+        ),
+        (
+            panda,
+            {"position": PositionRange(0.0, [1.0, 1.0])},
+            LimitError,
+            ("position", "upper"),
+            "has 2 numbers",
+        ),
+        (
+            talos,
+            {"position": PositionRange(-1.0, 1.0)},
+            LimitError,
+            ("position",),
+            r"root_joint.x belongs to a joint without a single coordinate",
+        ),
+        (
+            panda,
+            {"position": PositionRange(-1.0, 1.0), "position_margin": 1.0},
+            LimitError,
+            ("position",),
+            "limits of panda_joint1 leave no room: -1 to 1 with a margin of 1",
+        ),
+        (
+            panda,
+            {"position_margin": 5.0},
+            LimitError,
+            ("position",),
+            "leave no room",
+        ),
+        (
+            fingers,
+            {"static_effort": 0.5},
+            LimitError,
+            ("static_effort",),
+            "does not support mimic joints; panda has some",
+        ),
+        (
+            panda,
+            {"distances": [SelfDistance(), ObstacleDistance(obstacles=["bal"])]},
+            SceneError,
+            ("distances", 1, "obstacles", 0),
+            "no obstacle 'bal'; did you mean 'ball'",
+        ),
+        (
+            panda,
+            {"distances": [ObstacleDistance(links=["panda_link3", "panda_hnd"])]},
+            FieldError,
+            ("distances", 0, "links", 1),
+            "link 'panda_hnd' has no geometry; did you mean 'panda_hand'",
+        ),
+    ],
+)
+def test_what_does_not_fit_the_robot(
+    robot: Any,
+    options: dict[str, Any],
+    error: type[HspControlError],
+    path: tuple[str | int, ...],
+    message: str,
+) -> None:
+    with pytest.raises(error, match=message) as raised:
+        of(robot(), ball(), **options)
+    assert raised.value.path == path
+
+
+# --- the start -----------------------------------------------------------------------
+
+
+def test_start_outside_the_limits_names_the_joint() -> None:
+    limits = of(panda())
+    limits.check_start(panda().home(), np.zeros(7))
+    q = panda().home()
+    q[3] = 0.1
+    with pytest.raises(LimitError, match=r"panda_joint4 is at 0.1, its limits are"):
+        limits.check_start(q, np.zeros(7))
+    fast = np.zeros(7)
+    fast[0] = 3.0
+    with pytest.raises(LimitError, match=r"joint1 moves at 3, its limit is 2.175"):
+        limits.check_start(panda().home(), fast)
+
+
+def test_start_too_near() -> None:
+    near = Obstacle("ball", Sphere(0.1), Hold([0.3, 0.0, 0.5]))
+    limits = of(panda(), near, distances=[ObstacleDistance(0.05)])
+    with pytest.raises(LimitError, match=r"to ball are .* must be at least 0.05 m"):
+        limits.check_start(panda().home(), np.zeros(7))
+    far = of(panda(), near, distances=[ObstacleDistance(0.05, links=["panda_link1"])])
+    far.check_start(panda().home(), np.zeros(7))
+
+
+# --- distances -----------------------------------------------------------------------
+
+
+def ball() -> Obstacle:
+    """Return a ball that comes into the Panda's elbow and goes again."""
+    home = panda().state(0.0, panda().home(), np.zeros(7))
+    center = home.position("panda_link4") + np.array([0.0, 0.35, 0.0])
+    path = Lissajous([0.0, 0.28, 0.0], [1.0, 2.0, 1.0], [0.0, 3.14, 0.0], center)
+    return Obstacle("ball", Sphere(0.08), path)
+
+
+def table() -> Obstacle:
+    return Obstacle("table", Box([1.0, 1.0, 0.1]), Hold([0.5, 0.0, 0.0]))
+
+
+DISTANCES: dict[str, MinimumDistance] = {
+    "all obstacles": ObstacleDistance(),
+    "a ball": ObstacleDistance(0.01, obstacles=["ball"], links=["panda_link4"]),
+    "a table": ObstacleDistance(0.1, obstacles=["table"]),
+    "itself": SelfDistance(0.05),
+}
+
+
+@pytest.mark.parametrize("kind", DISTANCES)
+def test_distance_rows_are_its_second_derivative(kind: str) -> None:
+    """∇d·a + drift = d'' along q ⊕ (s v + ½ s² a) at t + s, by differences."""
+    robot = panda()
+    limit = DISTANCES[kind].placed(at_home(robot, [ball(), table()]))
+    rng = np.random.default_rng(2)
+    v, a = 0.3 * rng.standard_normal(7), rng.standard_normal(7)
+    q = robot.integrate(robot.home(), 0.3 * rng.standard_normal(7))  # nothing parallel
+    state = robot.state(0.4, q, v)
+    A, b = limit.rows(state, 10.0)
+
+    def room(s: float) -> Array:
+        there = robot.state(0.4 + s, robot.integrate(q, s * v + 0.5 * s * s * a), v)
+        distances: Array = limit.clearance.proximity(there).measure(there)
+        return distances - limit.minimum
+
+    h = 1e-3
+    near = room(0.0)
+    rate = (room(h) - room(-h)) / (2.0 * h)
+    second = (room(h) - 2.0 * near + room(-h)) / h**2
+    barrier = second + 20.0 * rate + 100.0 * near
+    chosen = np.flatnonzero(near + 0.5 * np.minimum(rate, 0.0) < 0.2)
+    assert len(chosen) == len(A) > 0
+    np.testing.assert_allclose(A @ a - b, barrier[chosen], rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize("kind", DISTANCES)
+def test_placing_twice_is_placing_once(kind: str) -> None:
+    start = at_home(panda(), [ball(), table()])
+    once = DISTANCES[kind].placed(start)
+    assert once.placed(start) == once
+    assert once.placed(at_home(panda())) == once  # it needs no scene any more
+    assert DISTANCES[kind].placed(start) == once
+
+
+def test_all_obstacles_of_the_scene() -> None:
+    placed = ObstacleDistance(0.3).placed(at_home(panda(), [ball(), table()]))
+    assert placed == ObstacleDistance(0.3, obstacles=[ball(), table()])
+    with pytest.raises(FieldError, match="the scene has no obstacle"):
+        ObstacleDistance().placed(at_home(panda()))
+
+
+def limited_states(count: int) -> list[RobotState]:
+    rng = np.random.default_rng(7)
+    return [
+        panda().state(
+            rng.uniform(0.0, 2.0),
+            panda().integrate(panda().home(), 0.3 * rng.standard_normal(7)),
+            0.3 * rng.standard_normal(7),
+        )
+        for _ in range(count)
+    ]
+
+
+def all_rows(limits: RobotLimits, state: RobotState) -> list[Array]:
+    assert limits.static_effort is not None
+    nowhere = np.zeros(0, dtype=np.int64)
+    pairs = [each.rows(state, limits.bandwidth) for each in limits.distances]
+    pairs.append(limits.static_effort.rows(state, limits.bandwidth, nowhere))
+    return [array for pair in pairs for array in pair]
+
+
+def limits_with_rows() -> RobotLimits:
+    distances = tuple(DISTANCES.values())
+    return of(panda(), ball(), table(), distances=distances, static_effort=0.3)
+
+
+def test_states_do_not_disturb_each_other() -> None:
+    """One placed value for many states, one after the other: the same rows as alone."""
+    states = limited_states(5)
+    alone = [all_rows(limits_with_rows(), state) for state in states]
+    assert all(rows[0].size for rows in alone)
+    shared = limits_with_rows()
+    for _ in range(3):
+        for state, expected in zip(states, alone, strict=True):
+            for array, same in zip(all_rows(shared, state), expected, strict=True):
+                np.testing.assert_array_equal(array, same)
+
+
+def test_one_value_in_many_threads() -> None:
+    shared, states = limits_with_rows(), limited_states(4)
+    alone = [all_rows(limits_with_rows(), state) for state in states]
+
+    def again(k: int) -> bool:
+        return all(
+            np.array_equal(array, same)
+            for _ in range(40)
+            for array, same in zip(all_rows(shared, states[k]), alone[k], strict=True)
+        )
+
+    with ThreadPoolExecutor(4) as threads:
+        assert all(threads.map(again, range(4)))
+
+
+# --- postures that motors can hold ---------------------------------------------------
+
+
+def test_static_effort_leaves_out_what_no_motor_holds() -> None:
+    """Roots, motors without a limit, and those between the root and a contact."""
+    robot = panda()
+    state = robot.state(0.0, robot.home(), np.zeros(7))
+    effort = np.full(7, 1.0)
+    A, b = StaticEffort(effort, 1.0).rows(state, 10.0, np.zeros(0, dtype=np.int64))
+    assert len(A) == len(b) > 2
+    fewer, _ = StaticEffort(effort, 1.0).rows(state, 10.0, np.array([1, 3]))
+    assert len(fewer) == len(A) - 2
+    effort[5] = np.inf
+    fewer, _ = StaticEffort(effort, 1.0).rows(state, 10.0, np.array([1, 3]))
+    assert len(fewer) == len(A) - 3
+    robot = talos()
+    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+    limit = of(robot, effort=1e-3, static_effort=1.0).static_effort
+    assert limit is not None
+    A, _ = limit.rows(state, 10.0, np.zeros(0, dtype=np.int64))
+    assert 0 < len(A) <= robot.nv - 6

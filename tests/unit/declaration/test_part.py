@@ -1,0 +1,621 @@
+"""The declaration of parts: families, constructors, messages, schemas and values."""
+
+import copy
+import dataclasses
+import math
+import pickle
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import KW_ONLY
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter
+
+from hsp_control.common.exceptions import ConfigError, HspControlError, ImmutableError
+from hsp_control.declaration import AnyOf, Part, families
+from hsp_control.declaration.part import value_fields
+from hsp_control.declaration.quantities import (
+    Count,
+    Flag,
+    Gain,
+    Matrix,
+    Name,
+    Names,
+    NonNegative,
+    Number,
+    Positive,
+    Tensor,
+    Vector,
+    Vector3,
+    Weights,
+)
+from hsp_control.trajectories import Circle, Trajectory
+from hsp_control.trajectories.orientation import OrientationTrajectory
+from hsp_control.trajectories.pose import PoseTrajectory
+
+
+class GadgetError(HspControlError, ValueError):
+    """What is wrong with a gadget."""
+
+
+class Gadget(Part, ABC, family="gadgets", error=GadgetError):
+    """Anything with a label.
+
+    The second paragraph is not its summary.
+    """
+
+    _: KW_ONLY
+    label: str = "gadget"
+    """What it is called,
+    on one line [-]."""
+
+    @property
+    @abstractmethod
+    def size(self) -> float:
+        """How large it is."""
+
+
+class Ball(Gadget, type="ball"):
+    """A round one."""
+
+    radius: Positive
+    """Radius [m]."""
+    center: Vector3 = (0.0, 0.0, 0.0)
+    """Center [m]."""
+
+    @property
+    def size(self) -> float:
+        """The diameter."""
+        return 2.0 * self.radius
+
+
+class Rod(Gadget, type="rod"):
+    """A long one."""
+
+    size: Positive
+    """Length [m]; a field, where the base class asks for a property."""
+    mass: NonNegative = 1.0
+    """Mass [kg]."""
+
+    def __post_init__(self) -> None:
+        """Check the density."""
+        if self.mass > 10.0 * self.size:
+            raise GadgetError(f"a mass of {self.mass} is too much for this size")
+
+
+class Bag(Gadget, type="bag"):
+    """One with others in it."""
+
+    first: Gadget
+    """What is in it."""
+    spare: Gadget | None = None
+    """What may be in it."""
+    grid: Matrix = ((1.0, 0.0), (0.0, 1.0))
+    """Two rows [-]."""
+    counts: dict[str, Vector] = dataclasses.field(default_factory=dict)
+    """Numbers by name [-]."""
+
+    @property
+    def size(self) -> float:
+        """That of its content."""
+        return self.first.size
+
+
+class Tool(Part, family="tools", error=GadgetError):
+    """Something else."""
+
+
+class Hammer(Tool, type="hammer"):
+    """For nails."""
+
+    weight: Number
+    """Weight [kg]."""
+
+
+class Stick(Tool, type="rod"):
+    """Another rod."""
+
+
+class Box(Part, error=GadgetError):
+    """A part of parts, with one field of each kind."""
+
+    number: Number = 1.0
+    """A [-]."""
+    positive: Positive = 1.0
+    """B [-]."""
+    non_negative: NonNegative = 0.0
+    """C [-]."""
+    count: Count = 0
+    """D [-]."""
+    flag: Flag = False
+    """E [-]."""
+    name: Name = "box"
+    """F [-]."""
+    names: Names = ()
+    """G [-]."""
+    vector: Vector = (1.0,)
+    """H [-]."""
+    tensor: Tensor = (((1.0,),),)
+    """I [-]."""
+    gain: Gain = 1.0
+    """J [-]."""
+    weights: Weights = 1.0
+    """K [-]."""
+    either: Annotated[Gadget | Tool, AnyOf(Gadget, Tool)] = Ball(1.0)
+    """L [-]."""
+    degree: Literal[3, 5] = 3
+    """M [-]."""
+
+
+BALL = Ball(0.5, [1, 2, 3], label="red")
+BAG = Bag(BALL, Rod(2.0), counts={"a": [1, 2]})
+VALUES = {"ball": BALL, "rod": Rod(1.0), "bag": BAG, "box": Box(), "tool": Stick()}
+every_value = pytest.mark.parametrize("name", VALUES)
+
+
+# --- constructors ---------------------------------------------------------------------
+
+
+def test_fields_become_a_constructor() -> None:
+    assert (BALL.radius, BALL.label, BALL.size) == (0.5, "red", 1.0)
+    assert type(Ball(1).radius) is float
+    assert Rod(2.0).size == 2.0
+    assert dataclasses.replace(Rod(2.0), size=3) == Rod(3.0)
+    assert [field.name for field in value_fields(Ball)] == ["label", "radius", "center"]
+    assert Ball(1, label="b").changed_fields() == {"radius": 1.0, "label": "b"}
+
+
+def test_a_part_is_made_from_plain_data_too() -> None:
+    plain = {
+        "type": "bag",
+        "label": "nested",
+        "first": {"type": "bag", "first": {"type": "rod", "size": 1}},
+        "spare": {"type": "ball", "radius": 2, "center": [0, 0, 1]},
+    }
+    made = TypeAdapter(Gadget).validate_python(plain)
+    assert made == Bag(Bag(Rod(1)), Ball(2, (0, 0, 1)), label="nested")
+    assert TypeAdapter(Gadget).validate_python(made) is made
+    assert Bag({"type": "rod", "size": 1}) == Bag(Rod(1))  # type: ignore[arg-type]
+    assert Bag(BALL).first is BALL
+
+
+def test_defaults_are_stored_as_if_they_were_given() -> None:
+    for value in (Ball(1).center, Bag(BALL).grid, Box().tensor, Box().weights):
+        assert isinstance(value, np.ndarray)
+        assert not value.flags.writeable
+    assert Ball(1) == Ball(1, [0, 0, 0])
+    assert hash(Ball(1)) == hash(Ball(1, [0, 0, 0]))
+    assert Bag(BALL).counts is not Bag(BALL).counts
+
+
+def test_a_default_may_depend_on_other_fields() -> None:
+    class Pair(Part):
+        one: Number
+        other: Number | None = None
+
+        def _complete(self) -> None:
+            if self.other is None:
+                self._set_default("other", 2.0 * self.one)
+
+        def __post_init__(self) -> None:
+            assert self.other is not None
+
+    assert Pair(1.0) == Pair(1.0, 2.0)
+    assert Pair(1.0).other == 2.0
+    assert Pair(1.0, 3.0).other == 3.0
+
+
+def test_abstract_parts_and_own_constructors_are_refused() -> None:
+    with pytest.raises(TypeError, match="abstract"):
+        Gadget()  # type: ignore[abstract]
+    with pytest.raises(TypeError, match="Own must not have __init__: declare its"):
+
+        class Own(Part):
+            def __init__(self, a: float) -> None:
+                pass
+
+
+# --- families -------------------------------------------------------------------------
+
+
+def test_members_register_themselves() -> None:
+    assert Gadget.family is not None
+    assert Gadget.family.members == {"ball": Ball, "rod": Rod, "bag": Bag}
+    assert Ball.family is Gadget.family
+    assert (Gadget.yaml_type, Ball.yaml_type, Box.yaml_type) == (None, "ball", None)
+    assert Box.family is None
+
+
+def test_a_type_is_declared_once() -> None:
+    class Local(Part, family="locals"):
+        pass
+
+    class One(Local, type="one"):
+        a: Number = 0.0
+
+    with pytest.raises(ConfigError, match=r"type 'one' of locals .*One and by .*Two$"):
+
+        class Two(Local, type="one"):
+            pass
+
+    assert Local.family is not None
+    assert Local.family.members == {"one": One}
+    validated = TypeAdapter(Local)
+    assert validated.validate_python({"type": "one", "a": 3}) == One(3)
+    first = One
+
+    class One(Local, type="one"):  # type: ignore[no-redef]
+        a: Number = 5.0
+
+    # Run again, as a cell of a notebook is.
+    assert first is not One
+    assert Local.family.members == {"one": One}
+    assert type(validated.validate_python({"type": "one"})) is One
+
+
+class Entry:
+    """An entry point that declares its class when it is loaded."""
+
+    value = "package:Plugged"
+
+    def __init__(self, name: str, load: Callable[[], Any]) -> None:
+        self.name, self.load = name, load
+
+
+@pytest.fixture
+def plug(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    """Return a function that installs entry points for a family of its own."""
+
+    class Slot(Part, family="slots", error=GadgetError):
+        pass
+
+    class Known(Slot, type="known"):
+        pass
+
+    class Holder(Part, error=GadgetError):
+        slot: Slot
+
+    def install(**loaders: Callable[[type[Slot]], Any]) -> Any:
+        entries = [Entry(n, lambda f=f: f(Slot)) for n, f in loaders.items()]
+
+        def found(*, group: str) -> list[Entry]:
+            return entries if group == "hsp_control.slots" else []
+
+        monkeypatch.setattr(families, "entry_points", found)
+        return Holder
+
+    return install
+
+
+def test_a_plugin_is_imported_when_it_is_named(plug: Callable[..., Any]) -> None:
+    imported = []
+
+    def plugged(base: Any) -> Any:
+        imported.append("plugged")
+
+        class Plugged(base, type="plugged"):
+            force: Positive
+
+        return Plugged
+
+    holder = plug(plugged=plugged, broken=lambda base: 1 / 0)
+    holder({"type": "known"})
+    with pytest.raises(GadgetError, match=r"slot.type: unknown type 'pluged'"):
+        holder({"type": "pluged"})
+    assert imported == []
+    assert holder({"type": "plugged", "force": 2}).slot.force == 2.0
+    assert holder({"type": "plugged", "force": 3}).slot.force == 3.0
+    assert imported == ["plugged"]
+    with pytest.raises(GadgetError, match=r"^Holder: slot.force: -2 is negative"):
+        holder({"type": "plugged", "force": -2})
+
+
+def test_a_plugin_that_does_not_work_is_named(plug: Callable[..., Any]) -> None:
+    def missing(base: Any) -> Any:
+        raise ImportError("no module named package")
+
+    holder = plug(missing=missing, other=lambda base: int)
+    with pytest.raises(
+        ConfigError, match=r"slot: type 'missing' cannot be imported fr"
+    ):
+        holder({"type": "missing"})
+    with pytest.raises(ConfigError, match=r"package:Plugged does not declare the type"):
+        holder({"type": "other"})
+
+
+def test_entry_points_are_those_of_installed_packages() -> None:
+    assert Gadget.family is not None
+    assert Gadget.family.entry_points() == {}
+    assert EntryPoint("a", "b:c", "hsp_control.gadgets").value == "b:c"
+
+
+def test_a_field_may_be_of_several_families() -> None:
+    assert Box(either={"type": "hammer", "weight": 2}).either == Hammer(2)  # type: ignore
+    assert Box(either={"type": "rod", "size": 2}).either == Rod(2)  # type: ignore
+    assert Box(either=Stick()).either == Stick()
+    with pytest.raises(GadgetError, match="a Box is not one of the gadgets or tools"):
+        Box(either=Box())  # type: ignore[arg-type]
+
+
+# --- messages -------------------------------------------------------------------------
+
+MESSAGES: dict[str, Callable[[], Any]] = {
+    "Ball: missing key 'radius'; required here: radius": lambda: Ball(),  # type: ignore
+    "Bag: missing key 'first'; required here: first": lambda: Bag(spare=BALL),  # type: ignore
+    "Ball: radus: unknown key 'radus'; did you mean 'radius'? (allowed: label, radius, "
+    "center)": lambda: Ball(radus=1),  # type: ignore
+    "Ball: colour: unknown key 'colour' (allowed: label, radius, center)": (
+        lambda: Ball(1, colour="red")  # type: ignore
+    ),
+    "Ball: takes 2 positional arguments (radius, center); the others are given by "
+    "name": (
+        lambda: Ball(1, [1, 2, 3], "red")  # type: ignore
+    ),
+    "Hammer: takes 1 positional argument (weight); the others are given by name": (
+        lambda: Hammer(1, 2)  # type: ignore
+    ),
+    "Ball: radius: 'wide' is text; expected a number": lambda: Ball("wide"),  # type: ignore
+    "Ball: radius: -1 is negative; must be greater than 0": lambda: Ball(-1),
+    "Ball: radius: 0.0 is too small; must be greater than 0": lambda: Ball(0.0),
+    "Ball: center: [1, 2] has 2 entries, needs 3": lambda: Ball(1, [1, 2]),
+    "Ball: center.1: 'up' is text; expected a number": lambda: Ball(1, [0, "up", 0]),
+    "Ball: center: nothing given; expected a list of 3 numbers": (
+        lambda: Ball(1, None)
+    ),
+    "Rod: a mass of 11.0 is too much for this size": lambda: Rod(1.0, 11.0),
+    "Bag: first: 3 is an integer; expected a mapping": lambda: Bag(3),  # type: ignore
+    "Bag: first: a Hammer is not one of the gadgets": lambda: Bag(Hammer(1)),  # type: ignore
+    "Bag: first: missing key 'type'; type is one of: ball, rod, bag": (
+        lambda: Bag({"radius": 1})  # type: ignore
+    ),
+    "Bag: first.type: unknown type 'bal'; did you mean 'ball'? (allowed: ball, "
+    "rod, bag)": (
+        lambda: Bag({"type": "bal", "radius": 1})  # type: ignore
+    ),
+    "Bag: first.radius: 'wide' is text; expected a number": (
+        lambda: Bag({"type": "ball", "radius": "wide"})  # type: ignore
+    ),
+    "Bag: first: missing key 'radius'; required here: radius": (
+        lambda: Bag({"type": "ball"})  # type: ignore
+    ),
+    "Bag: first.radus: unknown key 'radus'; did you mean 'radius'? (allowed: label, "
+    "radius, center)": lambda: Bag({"type": "ball", "radus": 1}),  # type: ignore
+    "Bag: first: a mass of 11.0 is too much for this size": (
+        lambda: Bag({"type": "rod", "size": 1, "mass": 11})  # type: ignore
+    ),
+    "Bag: spare.first.first.center.2: .nan is not a finite number": (
+        lambda: Bag(BALL, {"type": "bag", "first": {"type": "bag", "first": {  # type: ignore
+            "type": "ball", "radius": 1, "center": [0, 0, math.nan]}}})
+    ),
+    "Bag: grid: rows have different lengths [1, 2]; need the same": (
+        lambda: Bag(BALL, grid=[[1], [2, 3]])
+    ),
+    "Bag: counts.a: 'many' is text; expected a list of numbers": (
+        lambda: Bag(BALL, counts={"a": "many"})
+    ),
+    "Box: number: .inf is not a finite number": lambda: Box(math.inf),
+    "Box: number: true is a boolean; expected a number": lambda: Box(True),
+    "Box: number: nothing given; expected a number": lambda: Box(None),  # type: ignore
+    "Box: non_negative: -0.1 is negative; must be at least 0": (
+        lambda: Box(non_negative=-0.1)
+    ),
+    "Box: count: 1.5 is a decimal number; expected an integer": lambda: Box(count=1.5),  # type: ignore
+    "Box: count: -1 is negative; must be at least 0": lambda: Box(count=-1),
+    "Box: flag: 1 is an integer; expected true or false": lambda: Box(flag=1),  # type: ignore
+    "Box: name: '' has 0 characters, needs at least 1": lambda: Box(name=""),
+    "Box: name: 3 is an integer; expected text": lambda: Box(name=3),  # type: ignore
+    "Box: names.1: 3 is an integer; expected text": lambda: Box(names=["a", 3]),  # type: ignore
+    "Box: vector: [] has 0 entries, needs at least 1": lambda: Box(vector=[]),
+    "Box: tensor: rows have different lengths; need the same": (
+        lambda: Box(tensor=[[[1], [2, 3]]])
+    ),
+    "Box: gain: -1 is negative; must be greater than 0": lambda: Box(gain=-1),
+    "Box: gain: 'stiff' is text; expected a number, a list of numbers or a matrix": (
+        lambda: Box(gain="stiff")
+    ),
+    "Box: weights.1: -1 is negative; must be at least 0": lambda: Box(weights=[1, -1]),
+    "Box: either.weight: 'heavy' is text; expected a number": (
+        lambda: Box(either={"type": "hammer", "weight": "heavy"})  # type: ignore
+    ),
+    "Box: degree: unknown value 4 (allowed: 3, 5)": lambda: Box(degree=4),  # type: ignore
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("message", MESSAGES)
+def test_a_mistake_is_one_error_in_plain_words(message: str) -> None:
+    with pytest.raises(GadgetError) as caught:
+        MESSAGES[message]()
+    assert str(caught.value) == message
+    assert caught.value.__suppress_context__  # pydantic's own report is not shown
+
+
+def test_errors_are_those_of_the_class_that_was_called() -> None:
+    class Own(Part):
+        gadget: Gadget
+
+    with pytest.raises(GadgetError, match=r"^Ball: radius: -1"):
+        Own(Ball(-1))
+    with pytest.raises(HspControlError, match=r"^Own: gadget.radius: -1") as caught:
+        Own({"type": "ball", "radius": -1})  # type: ignore[arg-type]
+    assert type(caught.value) is HspControlError
+    with pytest.raises(GadgetError, match=r"^Own: gadget: a mass of"):
+        Own({"type": "rod", "size": 1, "mass": 11})  # type: ignore[arg-type]
+
+
+# --- schemas --------------------------------------------------------------------------
+
+
+def test_the_schema_says_what_each_field_is() -> None:
+    schema = TypeAdapter(Gadget).json_schema()
+    assert schema["discriminator"] == {"propertyName": "type"}
+    assert len(schema["oneOf"]) == 3
+    by_type = {d["properties"]["type"]["const"]: d for d in schema["$defs"].values()}
+    assert set(by_type) == {"ball", "rod", "bag"}
+    for described in by_type.values():
+        assert described["additionalProperties"] is False
+        for about in described["properties"].values():
+            assert about["description"]
+            assert "title" not in about
+    ball = by_type["ball"]["properties"]
+    assert by_type["ball"]["required"] == ["type", "radius"]
+    assert ball["type"]["description"] == "ball: A round one."
+    assert ball["label"]["description"] == "What it is called, on one line [-]."
+    assert ball["radius"]["type"] == "number"
+    assert ball["radius"]["exclusiveMinimum"] == 0
+    assert ball["center"]["minItems"] == ball["center"]["maxItems"] == 3
+    assert by_type["rod"]["properties"]["mass"]["minimum"] == 0
+
+
+FAMILIES = [Gadget, Tool, Trajectory, OrientationTrajectory, PoseTrajectory]
+
+
+@pytest.mark.parametrize("base", FAMILIES, ids=lambda base: base.__name__)
+def test_every_property_has_a_description(base: type[Part]) -> None:
+    assert base.family is not None
+    schema = TypeAdapter(base).json_schema()
+    kinds = {
+        each["properties"]["type"]["const"]
+        for each in schema["$defs"].values()
+        if "type" in each["properties"]
+    }
+    assert kinds >= set(base.family.members)
+    for each in schema["$defs"].values():
+        for name, about in each["properties"].items():
+            assert about.get("description"), (each, name)
+            assert "default" not in about or "oneOf" not in about
+
+
+def test_a_part_of_parts_has_a_schema_too() -> None:
+    schema = TypeAdapter(Box).json_schema()
+    for name, about in schema["properties"].items():
+        assert about["description"] == Box.documentation[name]
+    assert schema["properties"]["count"]["type"] == "integer"
+    assert len(schema["properties"]["either"]["oneOf"]) == 5 - 1  # rod: the first one
+
+
+def test_docstrings_of_fields_are_inherited() -> None:
+    label = "What it is called, on one line [-]."
+    assert Ball.documentation == {
+        "label": label, "radius": "Radius [m].", "center": "Center [m]."
+    }  # fmt: skip
+
+    class Marble(Ball, type=None):
+        """A small one."""
+
+        radius: Positive
+        """Radius, at most 1 cm [m]."""
+        glass: Flag = True
+
+    assert Marble.documentation == {
+        "label": label, "radius": "Radius, at most 1 cm [m].", "center": "Center [m]."
+    }  # fmt: skip
+    assert Ball.documentation["radius"] == "Radius [m]."
+    assert Circle.documentation["origin"].startswith("What the points are counted from")
+    scope: dict[str, Any] = {"Part": Part, "__name__": "typed_in"}
+    exec('class Typed(Part):\n    a: float\n    """A [-]."""', scope)
+    assert scope["Typed"].documentation == {}  # without source text
+    assert scope["Typed"](1).a == 1.0
+
+
+# --- values ---------------------------------------------------------------------------
+
+
+@every_value
+def test_copies_and_pickles_are_equal(name: str) -> None:
+    value = VALUES[name]
+    assert copy.copy(value) is value
+    assert copy.deepcopy(value) is value
+    again = pickle.loads(pickle.dumps(value))
+    assert again is not value
+    assert again == value
+    assert hash(again) == hash(value)
+    assert repr(again) == repr(value)
+    assert len({value, again}) == 1
+
+
+def test_arrays_stay_read_only() -> None:
+    given = np.ones(3)
+    ball = Ball(1, given)
+    given[0] = 9.0
+    assert given.flags.writeable
+    again = pickle.loads(pickle.dumps(Bag(ball, counts={"a": given})))
+    for array in (ball.center, again.first.center, again.grid, again.counts["a"]):
+        assert isinstance(array, np.ndarray)
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 2.0
+    assert ball == Ball(1, [1, 1, 1])
+
+
+def test_equality_looks_at_class_and_fields() -> None:
+    assert Ball(1) == Ball(1.0)
+    assert Ball(1) != Ball(2)
+    assert Ball(1) != Ball(1, [0, 0, 1])
+    assert Ball(1) != Ball(1, label="other")
+    assert Rod(1) != Stick()
+    assert Ball(1) != 1
+    assert Box(gain=1) != Box(gain=[1])
+    assert Box(gain=[1]) != Box(gain=[[1]])
+    assert Box(gain=[1, 1]) != Box(gain=1)
+    assert Bag(BALL) != Bag(BALL, Rod(1))
+    assert Bag(BALL, counts={"a": [1]}) != Bag(BALL, counts={"a": [1, 2]})
+    assert Bag(BALL, counts={"a": [1]}) != Bag(BALL, counts={"b": [1]})
+    assert Box(names=["a"]) == Box(names=("a",))
+
+    class Marble(Ball):
+        """A subclass is another class."""
+
+    assert Marble(1) != Ball(1)
+
+
+def test_equal_parts_have_one_hash() -> None:
+    for one, other in (
+        (Ball(1, [0.0, -0.0, 1]), Ball(1, [-0.0, 0.0, 1])),
+        (Hammer(0.0), Hammer(-0.0)),
+        (Ball(1, np.float32([1, 2, 3])), Ball(1, (1, 2, 3))),
+        (
+            Bag(BALL, counts={"a": [1], "b": [2]}),
+            Bag(BALL, counts={"b": [2], "a": [1]}),
+        ),
+        (Box(count=np.int64(3), number=np.float32(2)), Box(count=3, number=2)),
+    ):
+        assert one == other
+        assert hash(one) == hash(other)
+
+
+def test_repr_is_the_call_that_makes_it() -> None:
+    assert repr(Ball(1)) == "Ball(radius=1.0)"
+    assert repr(Box()) == "Box()"
+    assert repr(Bag(BALL, Rod(2.0))) == (
+        "Bag(first=Ball(label='red', radius=0.5, center=[1.0, 2.0, 3.0]), "
+        "spare=Rod(size=2.0))"
+    )
+    for value in VALUES.values():
+        assert eval(repr(value), {"np": np, **globals()}) == value
+
+
+def test_assignment_is_refused() -> None:
+    for name in ("radius", "center", "label", "nothing", "_private"):
+        with pytest.raises(ImmutableError) as caught:
+            setattr(BALL, name, 1)
+        assert str(caught.value) == (
+            f"Ball.{name} cannot be assigned: parts never change; make another with "
+            f"dataclasses.replace(part, {name}=...)"
+        )
+        with pytest.raises(ImmutableError, match=f"Ball.{name} cannot be deleted"):
+            delattr(BALL, name)
+    with pytest.raises(ImmutableError, match=r"Rod.size cannot be assigned"):
+        Rod(1.0).size = 2.0  # type: ignore[misc]
+
+
+def test_names_of_files_are_stored_as_text() -> None:
+    from hsp_control.declaration.quantities import FileName
+
+    class File(Part):
+        path: FileName
+
+    assert File(Path("a") / "b.stl") == File("a/b.stl")
+    assert TypeAdapter(File).json_schema()["properties"]["path"]["type"] == "string"

@@ -1,0 +1,390 @@
+"""Check that all fields and metrics are values: of the families, by reflection.
+
+A value has no robot and no memory. So one field serves many states, of many robots, in
+many threads.
+"""
+
+import copy
+import pickle
+import re
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields, replace
+from functools import cache
+from threading import Barrier
+from typing import Any
+
+import numpy as np
+import pytest
+from clearance_cases import AIR, load
+from field_cases import evaluate, placed
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
+from hsp_control import NullSpaceField, Obstacle, Robot, RobotState, Scene, geometry
+from hsp_control import trajectories as paths
+from hsp_control.common.exceptions import ImmutableError
+from hsp_control.declaration import Part
+from hsp_control.geometry import shapes
+from hsp_control.geometry.start import Start
+from hsp_control.null_space import fields as null_space_fields
+from hsp_control.null_space import metrics
+from hsp_control.null_space.fields import FieldSum, Ramp
+from hsp_control.null_space.metrics import MassMatrixMetric, Metric, MetricSample
+from hsp_control.null_space.metrics.metric import VARYING
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+BALL = Obstacle("ball", shapes.Sphere(0.1), AIR)
+BOX = Obstacle("box", shapes.Box((0.2, 0.3, 0.1)), paths.Hold([0.6, 0.4, 0.2]))
+COMMON = {
+    "weight": Ramp(initial=0.5, final=2.0, start=0.3, duration=1.0),
+    "name": "mine",
+}
+JACOBIAN = {"frame": "panda_hand", "axes": "xz"}
+W = np.diag(np.linspace(0.5, 2.0, 7)) + 0.1
+EXAMPLES: dict[str, list[dict[str, Any]]] = {
+    "rest": [COMMON],
+    "uncontrolled": [{"name": "mine"}],
+    "joint_centering": [COMMON | {"weights": np.linspace(0.0, 2.0, 7)}],
+    "limit_barrier": [COMMON | {"zone": 1.0, "weights": [1, 2, 3, 4, 5, 6, 7]}],
+    "target_posture": [
+        COMMON | {"target": np.linspace(-0.5, 0.5, 7), "weights": 2},
+        {"target": "home"},
+        {"configuration": np.linspace(-0.5, 0.5, 7)},
+    ],
+    "equal_joint_angles": [COMMON | {"joints": ["panda_joint1", "panda_joint3"]}],
+    "point_distance": [
+        COMMON | {"frames": ("panda_hand",), "obstacle": BALL},
+        {"frames": ["panda_hand", "panda_link4"], "obstacle": "ball"},
+    ],
+    "manipulability": [
+        COMMON | JACOBIAN | {"form": "log", "rows": "pose", "length": 0.3, "metric": W},
+    ],
+    "inverse_condition": [COMMON | JACOBIAN | {"rows": "pose", "length": 0.3}],
+    "transmission": [COMMON | JACOBIAN | {"direction": [1, 2.5], "kind": "force"}],
+    "obstacle_clearance": [
+        COMMON
+        | {
+            "obstacles": [BALL, BOX],
+            "influence": 0.5,
+            "links": ["panda_link5", "panda_hand"],
+            "proxy": "hulls",
+        },
+        {"obstacles": ("ball",)},
+    ],
+    "self_clearance": [COMMON | {"influence": 0.3, "proxy": "spheres"}],
+    "identity": [{}],
+    "constant": [{"matrix": np.linspace(0.5, 2.0, 7)}, {"matrix": W}],
+    "coordinates": [{"matrix": np.tril(np.ones((7, 7)))}],
+    "mass_matrix": [{}],
+}
+OTHER: dict[str, Any] = {
+    "joints": ["panda_joint1", "panda_joint2"],
+    "frames": ["panda_link4"],
+    "obstacle": "box",
+    "direction": [1, 2],
+    "matrix": np.diag(np.linspace(1.0, 2.0, 7)),
+}
+"""Other values of fields that have no default."""
+
+
+def members() -> dict[str, type[Part]]:
+    """Return the package's own members of both families."""
+    assert NullSpaceField.family is not None
+    assert Metric.family is not None
+    found = NullSpaceField.family.members | Metric.family.members
+    return {
+        name: member
+        for name, member in found.items()
+        if member.__module__.startswith("hsp_control.")
+    }
+
+
+def examples(name: str) -> list[Part]:
+    """Return the examples of a type."""
+    return [members()[name](**arguments) for arguments in EXAMPLES[name]]
+
+
+every_member = pytest.mark.parametrize("name", EXAMPLES)
+
+
+def test_no_member_and_no_field_is_left_out() -> None:
+    """Fields that only Python can give, such as a weight of the state, are not here."""
+    assert set(EXAMPLES) == set(members())
+    for name, member in members().items():
+        given = {key for arguments in EXAMPLES[name] for key in arguments}
+        declared = {field.name for field in fields(member)}  # type: ignore[arg-type]
+        assert given == declared - ({"weight"} if name == "uncontrolled" else set())
+
+
+@every_member
+def test_equality_and_hash(name: str) -> None:
+    member = members()[name]
+    for arguments in EXAMPLES[name]:
+        value = member(**arguments)
+        again = member(**copy.deepcopy(arguments))
+        assert value == again
+        assert hash(value) == hash(again)
+        assert value != object()
+        for key in arguments:
+            if key in OTHER:
+                changed = replace(value, **{key: OTHER[key]})  # type: ignore[type-var]
+            elif key == "target":
+                changed = member(**arguments | {key: "start"})
+            elif key == "configuration":
+                changed = member(**arguments | {key: np.zeros(7)})
+            else:
+                rest = {k: v for k, v in arguments.items() if k != key}
+                if name == "transmission" and key == "axes":
+                    rest["direction"] = [1, 2.5, 0.0]
+                changed = member(**rest)
+            assert changed != value, key
+    assert len({repr(value) for value in examples(name)}) == len(EXAMPLES[name])
+
+
+@every_member
+def test_copies_pickles_and_repr(name: str) -> None:
+    """The `repr` is the call that makes an equal value."""
+    modules = (null_space_fields, metrics, geometry, shapes, paths)
+    names = {key: value for module in modules for key, value in vars(module).items()}
+    for value in examples(name):
+        for twin in (
+            copy.copy(value),
+            copy.deepcopy(value),
+            pickle.loads(pickle.dumps(value)),
+            eval(repr(value), {}, names),
+            replace(value),  # type: ignore[type-var]
+        ):
+            assert type(twin) is type(value)
+            assert twin == value
+            assert hash(twin) == hash(value)
+            assert repr(twin) == repr(value)
+
+
+@every_member
+def test_values_never_change(name: str) -> None:
+    for arguments in EXAMPLES[name]:
+        given = copy.deepcopy(arguments)
+        value = members()[name](**given)
+        before = repr(value)
+        for each in given.values():
+            if isinstance(each, np.ndarray):
+                each[:] = 7.0
+            elif isinstance(each, list):
+                each.clear()
+        assert repr(value) == before
+        for field in fields(value):  # type: ignore[arg-type]
+            with pytest.raises(ImmutableError, match="parts never change"):
+                setattr(value, field.name, getattr(value, field.name))
+            with pytest.raises(ImmutableError, match="cannot be deleted"):
+                delattr(value, field.name)
+            own = getattr(value, field.name)
+            assert not isinstance(own, list | dict | set)
+            if isinstance(own, np.ndarray):
+                with pytest.raises(ValueError, match="read-only"):
+                    own[...] = 0.0
+        with pytest.raises(ImmutableError):
+            value.memory = 1  # type: ignore[attr-defined]
+        assert repr(value) == before
+
+
+@every_member
+def test_every_field_has_a_docstring_with_a_unit(name: str) -> None:
+    member = members()[name]
+    assert member.__doc__
+    for field in fields(member):  # type: ignore[arg-type]
+        text = member.documentation.get(field.name, "")
+        assert re.search(r"\[[^\]]+\]", text), f"{field.name}: {text!r}"
+
+
+@every_member
+def test_a_mapping_makes_an_equal_value(name: str) -> None:
+    """What YAML says: lists for arrays, a mapping for a ramp, names for obstacles."""
+    assert NullSpaceField.family is not None
+    base: Any = NullSpaceField if name in NullSpaceField.family.members else Metric
+    adapter: TypeAdapter[Any] = TypeAdapter(base)
+    for arguments in EXAMPLES[name]:
+        named = {key: plain(value) for key, value in arguments.items()}
+        value = members()[name](**named)
+        ramp = {"initial": 0.5, "final": 2, "start": 0.3, "duration": 1}
+        given = named | ({"weight": ramp} if "weight" in named else {})
+        assert adapter.validate_python({"type": name, **given}) == value
+
+
+def plain(value: Any) -> Any:
+    """Return a value as YAML gives it, obstacles by their names."""
+    if isinstance(value, Obstacle):
+        return value.name
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return [plain(each) for each in value] if isinstance(value, list | tuple) else value
+
+
+@every_member
+def test_placing_needs_a_robot_and_nothing_else(name: str) -> None:
+    """Placing a placed value gives an equal one; neither it nor its use leaves a trace.
+
+    A field's attributes are its fields, before and after.
+    """
+    robot = load("panda")
+    state = robot.state(0.0, robot.home(), np.linspace(-1.0, 1.0, 7))
+    start = Start(state, Scene([BALL, BOX]))
+    for value in (*examples(name), *defaults(name)):
+        assert isinstance(value, NullSpaceField | Metric)
+        if isinstance(value, metrics.CoordinatesMetric) and value.matrix is None:
+            continue  # the panda defines none
+        before = dict(vars(value))
+        found = value.placed(start)
+        assert type(found) is type(value)
+        assert found.placed(start) == found
+        used(found, state)
+        if isinstance(found, NullSpaceField):
+            declared = {field.name for field in fields(found)}
+            assert set(vars(found)) == declared
+            assert dict(vars(value)).keys() == before.keys()
+        pickle.dumps(found)
+
+
+def defaults(name: str) -> list[Part]:
+    """Return the value without arguments, if there is one."""
+    needed = set(OTHER) - {"matrix"} | ({"matrix"} if name == "constant" else set())
+    free = all(key not in needed for case in EXAMPLES[name] for key in case)
+    return [members()[name]()] if free else []
+
+
+def used(part: NullSpaceField | Metric, state: RobotState) -> list[Array]:
+    """Return what a part computes at a state: directly, and by a step plan."""
+    nv = state.robot.nv
+    if isinstance(part, Metric):
+        direct, planned = MetricSample.allocate(nv), MetricSample.allocate(nv)
+        part.evaluate(state, direct)
+        for write in part.compile(state, planned).write:
+            write()
+        return [np.array(each) for each in (*direct, *planned)]
+    found = [np.array(part.value(state)), *evaluate(part, MassMatrixMetric(), state)]
+    metric = MassMatrixMetric().evaluate(state, MetricSample.allocate(nv))
+    out = null_space_fields.FieldSample.allocate(nv)
+    plan = part.compile(state, metric, VARYING, out)
+    for follow in plan.follow:
+        follow(state.t)
+    for write in plan.write:
+        write()
+    least = part.minimum_distance(state)
+    return [*found, *out, np.array(0.0 if least is None else least)]
+
+
+# --- threads -------------------------------------------------------------------------
+
+
+@cache
+def with_fingers() -> Robot:
+    """Return another robot with the Panda's names; one finger mimics the other."""
+    return Robot.load("panda", locked={}, mimic=False)
+
+
+OF_ANY_ROBOT: dict[str, Callable[[], NullSpaceField | Metric]] = {
+    "rest": null_space_fields.Rest,
+    "uncontrolled": null_space_fields.Uncontrolled,
+    "joint_centering": null_space_fields.JointCentering,
+    "limit_barrier": lambda: null_space_fields.LimitBarrier(1.0),
+    "equal_joint_angles": lambda: null_space_fields.EqualJointAngles(
+        ["panda_joint1", "panda_joint3", "panda_joint5"]
+    ),
+    "point_distance": lambda: null_space_fields.PointDistance(
+        ["panda_hand", "panda_link4"], BALL
+    ),
+    "manipulability": lambda: null_space_fields.Manipulability(rows="pose"),
+    "inverse_condition": lambda: null_space_fields.InverseCondition(),
+    "transmission": lambda: null_space_fields.Transmission(direction=[0, 0, 1]),
+    "obstacle_clearance": lambda: null_space_fields.ObstacleClearance(
+        [BALL, BOX], influence=1.0
+    ),
+    "obstacle_clearance, hulls": lambda: null_space_fields.ObstacleClearance(
+        [BOX], influence=1.0, proxy="hulls"
+    ),
+    "self_clearance": lambda: null_space_fields.SelfClearance(0.5),
+    "identity": metrics.IdentityMetric,
+    "mass_matrix": metrics.MassMatrixMetric,
+    "a sum": lambda: (
+        Ramp(final=2.0, duration=1.0) * null_space_fields.JointCentering()
+        + 0.5 * null_space_fields.ObstacleClearance([BALL], influence=1.0)
+        + null_space_fields.StateWeight(lambda s: 1.0 + s.t * s.t)
+        * null_space_fields.Manipulability()
+    ),
+    "a function": lambda: null_space_fields.FunctionCost(
+        lambda s: float(np.sin(s.t) * s.position("panda_hand") @ [1.0, 2.0, 3.0])
+    ),
+    # These have numbers for 7 joints: both robots have 7.
+    "target_posture": lambda: null_space_fields.TargetPosture(
+        configuration=np.linspace(-0.5, 0.5, 7)
+    ),
+    "constant": lambda: metrics.ConstantMetric(W),
+    "coordinates": lambda: metrics.CoordinatesMetric(np.tril(np.ones((7, 7)))),
+}
+
+
+def robots_for(which: str) -> tuple[Robot, Robot]:
+    """Return two robots that a part fits, with other shapes if it can be."""
+    if which in {"target_posture", "constant", "coordinates"}:
+        return load("panda"), load("iiwa14")
+    return load("panda"), with_fingers()
+
+
+def test_every_member_is_in_two_threads() -> None:
+    assert set(members()) <= set(OF_ANY_ROBOT)
+
+
+@pytest.mark.parametrize("which", OF_ANY_ROBOT)
+def test_two_threads_share_a_part(which: str, request: pytest.FixtureRequest) -> None:
+    """Each has a state of another robot; together they find what each finds alone."""
+    robots = robots_for(which)
+    rng = np.random.default_rng(17)
+    visits = {
+        robot: [
+            (0.1 * k, robot.random_configuration(rng), rng.normal(size=robot.nv))
+            for k in range(15)
+        ]
+        for robot in robots
+    }
+
+    def visit(part: NullSpaceField | Metric, robot: Robot) -> list[list[Array]]:
+        state = RobotState(robot)
+        return [used(part, state.update(*where)) for where in visits[robot]]
+
+    expected = [visit(OF_ANY_ROBOT[which](), robot) for robot in robots]
+    shared, together = OF_ANY_ROBOT[which](), Barrier(2)
+
+    def at_once(robot: Robot) -> list[list[Array]]:
+        together.wait()
+        return visit(shared, robot)
+
+    interval = sys.getswitchinterval()
+    request.addfinalizer(lambda: sys.setswitchinterval(interval))
+    sys.setswitchinterval(1e-6)
+    with ThreadPoolExecutor(2) as pool:
+        found = list(pool.map(at_once, robots))
+    for one, other in zip(found, expected, strict=True):
+        for mine, wanted in zip(one, other, strict=True):
+            for actual, value in zip(mine, wanted, strict=True):
+                np.testing.assert_array_equal(actual, value)
+    if which not in {"rest", "uncontrolled", "identity", "constant", "coordinates"}:
+        first, second = (np.concatenate([x.ravel() for x in row[1]]) for row in found)
+        assert first.shape != second.shape or (first != second).any()
+
+
+def test_sums_are_values() -> None:
+    """They are in no family, since YAML has a list of fields instead."""
+    terms = [part for name in EXAMPLES for part in examples(name)]
+    field = FieldSum(
+        [term for term in terms if isinstance(term, NullSpaceField) and term.controls]
+    )
+    names = vars(null_space_fields) | vars(geometry) | vars(shapes) | vars(paths)
+    for twin in (pickle.loads(pickle.dumps(field)), eval(repr(field), {}, names)):
+        assert twin == field
+        assert hash(twin) == hash(field)
+    robot = load("panda")
+    state = robot.state(0.0, robot.home(), np.zeros(7))
+    assert placed(field, state, [BALL, BOX]) != field

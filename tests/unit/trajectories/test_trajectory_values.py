@@ -1,0 +1,646 @@
+"""Trajectories are values: equal, immutable, checked, placed where a robot starts."""
+
+import copy
+import dataclasses
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+from trajectory_cases import (
+    CIRCLE,
+    IDENTITY,
+    LISSAJOUS,
+    MEMBERS,
+    POINTS,
+    R1,
+    R2,
+    SPIN,
+    TIMES,
+    flat,
+    nodding,
+    pose,
+    swinging,
+)
+
+import hsp_control.trajectories as family
+from hsp_control.common.exceptions import (
+    ImmutableError,
+    ScheduleError,
+    ShapeError,
+    TrajectoryError,
+)
+from hsp_control.trajectories import (
+    Blend,
+    BlendOrientation,
+    CallableOrientation,
+    CallableTrajectory,
+    Circle,
+    ComposedPose,
+    Hold,
+    HoldOrientation,
+    HoldPose,
+    Line,
+    Lissajous,
+    MinimumJerk,
+    OrientationPath,
+    OrientationSample,
+    PiecewisePolynomial,
+    PoseSample,
+    Schedule,
+    ScrewInterpolation,
+    Spin,
+    Spline,
+    Stops,
+    TrajectorySample,
+    UniformLine,
+)
+
+Array = NDArray[np.float64]
+
+SCHEDULE = Schedule([(-np.inf, 1.0), (2.0, 4.0)], ramp=0.5)
+VALUES: dict[str, Any] = {
+    **{name: member for name, (member, _) in MEMBERS.items()},
+    "schedule": SCHEDULE,
+    "schedule without end": Schedule.always(),
+    "circle from the start": Circle(0.1, 2.0, origin="start", center=[0.1, 0, 0]),
+    "nested": ComposedPose(Blend(Circle(0.1, 2.0), 1.0), BlendOrientation(SPIN, 2)),
+}
+every_value = pytest.mark.parametrize("name", VALUES)
+
+
+def fields(value: Any) -> list[str]:
+    return [field.name for field in dataclasses.fields(value)]
+
+
+def arrays(value: Any) -> list[Array]:
+    """Return the arrays among the fields, those of parts inside included."""
+    found = []
+    for name in fields(value):
+        inner = getattr(value, name)
+        if dataclasses.is_dataclass(inner):
+            found += arrays(inner)
+        elif isinstance(inner, np.ndarray):
+            found.append(inner)
+    return found
+
+
+# --- one value, however it came about -------------------------------------------------
+
+
+@every_value
+def test_equal_parameters_make_one_value(name: str) -> None:
+    value = VALUES[name]
+    given = {field: getattr(value, field) for field in fields(value)}
+    again = type(value)(**given)
+    assert again is not value
+    assert again == value
+    assert hash(again) == hash(value)
+    assert len({again, value}) == 1
+    assert value != given
+    assert all(value != other for key, other in VALUES.items() if key != name)
+
+
+@every_value
+def test_a_changed_copy_differs(name: str) -> None:
+    value = VALUES[name]
+    changes: dict[str, Any] = {
+        "duration": 7.5, "point": [9.0], "velocity": [3, 2, 1], "radius": 9.5,
+        "rates": [3, 2, 9], "times": np.add(getattr(value, "times", 0.0), 1.0),
+        "function": len, "rotation": [0.1, 0.2, 0.3], "intervals": [(7, 9)],
+        "position": Hold([0, 0, 9]) if type(value) is ComposedPose else [0, 0, 9],
+    }  # fmt: skip
+    changed = [name for name in fields(value) if name in changes]
+    assert changed
+    for field in changed:
+        if field == "velocity" and type(value) is CallableTrajectory:
+            continue
+        other = dataclasses.replace(value, **{field: changes[field]})
+        assert other != value
+        assert getattr(value, field) is VALUES[name].__getattribute__(field)
+
+
+@every_value
+def test_copies_are_the_value_itself(name: str) -> None:
+    value = VALUES[name]
+    assert copy.copy(value) is value
+    assert copy.deepcopy(value) is value
+    assert copy.deepcopy([value])[0] is value
+
+
+@every_value
+def test_a_pickled_value_is_equal_and_moves_alike(name: str) -> None:
+    value = VALUES[name]
+    if name in MEMBERS:
+        value.sample(0.7)  # whatever it keeps is not part of the value
+    again = pickle.loads(pickle.dumps(value))
+    assert again == value
+    assert hash(again) == hash(value)
+    assert repr(again) == repr(value)
+    assert not any(array.flags.writeable for array in arrays(again))
+    with pytest.raises(ImmutableError):
+        setattr(again, fields(again)[0], None)
+    for t in (-0.5, 0.7, 3.0) if name in MEMBERS else ():
+        for a, b in zip(flat(value.sample(t)), flat(again.sample(t)), strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+@every_value
+def test_repr_makes_an_equal_value(name: str) -> None:
+    value = VALUES[name]
+    written = repr(value)
+    if "<function" in written:
+        assert written.startswith(f"{type(value).__name__}(function=")
+        return
+    again = eval(written, {"__builtins__": {}}, vars(family))
+    assert again == value
+    assert hash(again) == hash(value)
+    assert "origin" not in written or value.origin == "start"  # no defaults
+
+
+def test_repr_is_the_call() -> None:
+    assert repr(Circle(0.1, 2)) == "Circle(radius=0.1, angular_rate=2.0)"
+    assert repr(Hold(np.ones(2))) == "Hold(point=[1.0, 1.0])"
+    assert repr(ComposedPose(Hold([1, 2, 3]))) == (
+        "ComposedPose(position=Hold(point=[1.0, 2.0, 3.0]))"
+    )
+    assert repr(SCHEDULE) == "Schedule(intervals=((None, 1.0), (2.0, 4.0)), ramp=0.5)"
+
+
+@every_value
+def test_values_never_change(name: str) -> None:
+    value = VALUES[name]
+    kind = type(value).__name__
+    for field in [*fields(value), "no_such_attribute"]:
+        with pytest.raises(ImmutableError, match=rf"^{kind}\.{field} cannot be assig"):
+            setattr(value, field, 1.0)
+        with pytest.raises(ImmutableError, match=rf"^{kind}\.{field} cannot be delet"):
+            delattr(value, field)
+    for array in arrays(value):
+        assert array.dtype == np.float64
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+
+
+def read_only(points: Array) -> Array:
+    points = points.copy()
+    points.setflags(write=False)
+    return points
+
+
+FORMS: dict[str, Callable[[Array], Any]] = {
+    "list": lambda x: x.tolist(),
+    "tuple of lists": lambda x: tuple(x.tolist()),
+    "tuples": lambda x: tuple(map(tuple, x)) if x.ndim > 1 else tuple(x),
+    "list of arrays": list,
+    "float32": lambda x: x.astype(np.float32),
+    "integers": lambda x: x.astype(int),
+    "integers of Python": lambda x: x.astype(int).tolist(),
+    "Fortran order": np.asfortranarray,
+    "strided": lambda x: np.repeat(x, 3, axis=0)[::3],
+    "backwards": lambda x: x[::-1].copy()[::-1],
+    "read-only": read_only,
+    "masked": np.ma.array,
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_all_forms_of_an_array_are_one_value(form: str) -> None:
+    points, times = np.array([[1.0, 2.0], [3.0, 5.0], [4.0, 0.0]]), np.arange(3.0)
+    given = FORMS[form]
+    for kind in (MinimumJerk, Stops, Spline):
+        value, plain = kind(given(points), given(times)), kind(points, times)
+        assert value == plain
+        assert hash(value) == hash(plain)
+        assert repr(value) == repr(plain)
+    assert Hold(given(times)) == Hold([0, 1, 2])
+    assert HoldOrientation(given(IDENTITY)) == HoldOrientation(IDENTITY)
+    assert OrientationPath(
+        given(np.stack([IDENTITY, IDENTITY[[1, 2, 0]]])), [0, 1]
+    ) == OrientationPath([IDENTITY, IDENTITY[[1, 2, 0]]], [0, 1])
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    plain = Circle(2, 3, [1, 1], phase=1)
+    for number in (np.float32, np.int64, np.uint8, np.array, float):
+        value = Circle(number(2), number(3), [number(1), number(1)], phase=number(1))
+        assert value == plain
+        assert type(value.radius) is float
+
+
+def test_the_sign_of_zero_is_no_difference() -> None:
+    one, other = Hold([0.0, 1.0]), Hold([-0.0, 1.0])
+    assert one == other
+    assert hash(one) == hash(other)
+    line, back = UniformLine([1], [0.0]), UniformLine([1], [-0.0])
+    assert (line == back) is (hash(line) == hash(back)) is True
+
+
+def test_a_default_is_the_same_value_as_when_it_is_given() -> None:
+    given = BlendOrientation(SPIN, 1.0, start_angular_velocity=[0, 0, 0], start_time=0)
+    default = BlendOrientation(SPIN, 1.0)
+    assert given == default
+    assert hash(given) == hash(default)
+    assert repr(given) == repr(default)
+    assert not np.asarray(default.start_angular_velocity).flags.writeable
+
+
+# --- wrong arguments ------------------------------------------------------------------
+
+NUMBER = ["fast", np.nan, -np.inf, None, True, [1.0], {}, 1j]
+POSITIVE = [*NUMBER, 0, -1.0, 0.0, np.float32(-2)]
+OPTIONAL_VECTOR = [
+    1.0, [], "here", ["here"], [np.nan, 0, 0], [0, 0, np.inf], [[1.0, 2.0, 3.0]],
+    [True, False, True], [None, 1, 2], {"x": 1}, [1j, 0, 0], b"123", np.zeros((0, 3)),
+]  # fmt: skip
+VECTOR = [*OPTIONAL_VECTOR, None]
+OPTIONAL_VECTOR3 = [*OPTIONAL_VECTOR, [1.0], [1.0, 2.0], [1.0, 2.0, 3.0, 4.0]]
+VECTOR3 = [*OPTIONAL_VECTOR3, None]
+OPTIONAL_MATRIX = [1.0, [], [[]], "rows", [1.0, 2.0], [[1], [2, 3]], [[np.nan, 1]]]
+MATRIX = [*OPTIONAL_MATRIX, None]
+OPTIONAL_ROTATION = [
+    "up", 1.0, [1.0], [0.0, 0.0], 2.0 * IDENTITY, np.diag([1.0, 1.0, -1.0]),
+    [1, 1, 1, 1], [[1, 0], [0, 1]], np.eye(4), [np.nan, 0, 0], [IDENTITY],
+    [[1], [0, 1]], {"rpy": 0},
+]  # fmt: skip
+ROTATION = [*OPTIONAL_ROTATION, None]
+CHILD = [None, 1.0, "circle", {}, {"type": "spyn"}, SCHEDULE, Circle]
+FUNCTION = [None, 1.0, "f"]
+ORIGIN = ["here", None, 1, "World"]
+# For each class: arguments that are right, and for each field all that is wrong.
+WRONG: dict[type, tuple[dict[str, Any], dict[str, list[Any]]]] = {
+    Hold: ({"point": [1, 2, 3]}, {"point": OPTIONAL_VECTOR}),
+    Line: (
+        {"end": [1, 2, 3], "duration": 1, "start": [0, 0, 0]},
+        {"end": VECTOR, "duration": POSITIVE, "start": OPTIONAL_VECTOR,
+         "start_time": NUMBER},
+    ),
+    UniformLine: (
+        {"velocity": [1, 2, 3], "start": [0, 0, 0]},
+        {"velocity": VECTOR, "start": OPTIONAL_VECTOR},
+    ),
+    Circle: (
+        {"radius": 1, "angular_rate": 2, "center": [0, 0, 0]},
+        {"radius": POSITIVE, "angular_rate": NUMBER, "center": OPTIONAL_VECTOR,
+         "phase": NUMBER, "normal": [*OPTIONAL_VECTOR3, [0, 0, 0]],
+         "toward": OPTIONAL_VECTOR3, "axes": OPTIONAL_MATRIX},
+    ),
+    Lissajous: (
+        {"amplitudes": [1, 1, 1], "rates": [1, 2, 3], "center": [0, 0, 0]},
+        {"amplitudes": VECTOR, "rates": VECTOR, "phases": OPTIONAL_VECTOR,
+         "center": OPTIONAL_VECTOR},
+    ),
+    MinimumJerk: (
+        {"waypoints": POINTS, "times": TIMES}, {"waypoints": MATRIX, "times": VECTOR}
+    ),
+    Stops: (
+        {"waypoints": POINTS, "times": TIMES}, {"waypoints": MATRIX, "times": VECTOR}
+    ),
+    Spline: (
+        {"waypoints": POINTS, "times": TIMES},
+        {"waypoints": MATRIX, "times": VECTOR, "degree": [4, None, "5", [5], -3]},
+    ),
+    PiecewisePolynomial: (
+        {"times": [0, 1], "coefficients": [[[1, 2, 3], [4, 5, 6]]]},
+        {"times": VECTOR, "coefficients": [*MATRIX, [[1.0]], [[[1], [2, 3]]]],
+         "end": OPTIONAL_VECTOR},
+    ),
+    CallableTrajectory: (
+        {"function": swinging, "dimension": 3},
+        {"function": FUNCTION, "dimension": [0, -1, 2.5, "3", None, True, [3]],
+         "velocity": FUNCTION[1:], "acceleration": FUNCTION[1:], "step": POSITIVE},
+    ),
+    Blend: (
+        {"trajectory": LISSAJOUS, "duration": 1, "start": [0, 0, 0]},
+        {"trajectory": [*CHILD, SPIN], "duration": POSITIVE, "start": OPTIONAL_VECTOR,
+         "start_velocity": OPTIONAL_VECTOR, "start_time": NUMBER},
+    ),
+    HoldOrientation: ({}, {"rotation": OPTIONAL_ROTATION}),
+    Spin: (
+        {"axis": [1, 0, 0], "rate": 1},
+        {"axis": [*VECTOR3, [0, 0, 0]], "rate": NUMBER, "rotation": OPTIONAL_ROTATION},
+    ),
+    OrientationPath: (
+        {"rotations": [R1, R2], "times": [0, 1]},
+        {"rotations": [1.0, "up", [1.0], IDENTITY[0], None, [IDENTITY, [0, 0, 0]],
+                       [[1, 2], [3, 4]], [IDENTITY, 2 * IDENTITY],
+                       [[0, 0, np.nan]] * 2],
+         "times": VECTOR},
+    ),
+    CallableOrientation: (
+        {"function": nodding}, {"function": FUNCTION, "step": POSITIVE}
+    ),
+    BlendOrientation: (
+        {"trajectory": SPIN, "duration": 1},
+        {"trajectory": [*CHILD, CIRCLE], "duration": POSITIVE,
+         "rotation": OPTIONAL_ROTATION, "start_angular_velocity": VECTOR3,
+         "start_time": NUMBER},
+    ),
+    HoldPose: ({}, {"position": OPTIONAL_VECTOR3, "rotation": OPTIONAL_ROTATION}),
+    ComposedPose: (
+        {}, {"position": [*CHILD, SPIN, CIRCLE], "orientation": [*CHILD, CIRCLE]}
+    ),
+    ScrewInterpolation: (
+        {"position": [1, 2, 3], "rotation": R1, "duration": 1},
+        {"position": VECTOR3, "rotation": ROTATION, "duration": POSITIVE,
+         "start_time": NUMBER, "start_position": OPTIONAL_VECTOR3,
+         "start_rotation": OPTIONAL_ROTATION},
+    ),
+}  # fmt: skip
+ONE_BY_ONE = [(kind, field) for kind, (_, wrong) in WRONG.items() for field in wrong]
+
+
+@pytest.mark.parametrize(
+    ("kind", "field"), ONE_BY_ONE, ids=[f"{k.__name__}.{f}" for k, f in ONE_BY_ONE]
+)
+def test_a_wrong_value_is_one_error_with_class_and_field(
+    kind: type, field: str
+) -> None:
+    right, wrong = WRONG[kind]
+    kind(**right)
+    for value in wrong[field]:
+        with pytest.raises(TrajectoryError) as caught:
+            kind(**{**right, field: value})
+        message = str(caught.value)
+        assert type(caught.value) is TrajectoryError
+        assert message.startswith(f"{kind.__name__}: {field}"), message
+        assert "\n" not in message
+        assert "validat" not in message, message  # no words of pydantic
+        assert "function-" not in message, message
+        assert caught.value.__suppress_context__
+
+
+def test_every_field_of_every_member_is_given_wrong() -> None:
+    members = {type(member) for member, _ in MEMBERS.values()}
+    assert set(WRONG) == members
+    for kind, (_, wrong) in WRONG.items():
+        assert set(wrong) == {*fields(kind)} - {"origin"}
+        if "origin" in fields(kind):
+            for value in ORIGIN:
+                with pytest.raises(TrajectoryError, match=f"^{kind.__name__}: origin"):
+                    kind(**{**WRONG[kind][0], "origin": value})
+
+
+CALLS: dict[str, Callable[[], Any]] = {
+    r"^Circle: missing keys 'radius', 'angular_rate'": lambda: Circle(),  # type: ignore
+    r"^Circle: missing key 'angular_rate'": lambda: Circle(1.0),  # type: ignore
+    r"^Circle: radios: .* did you mean 'radius'": (
+        lambda: Circle(radios=1, angular_rate=2)  # type: ignore
+    ),
+    r"^Circle: takes 3 positional arguments \(radius, angular_rate, center\)": (
+        lambda: Circle(1, 2, [0, 0], 0.5)  # type: ignore
+    ),
+    r"^Hold: takes 1 positional argument \(point\)": (
+        lambda: Hold([0, 0], "start")  # type: ignore
+    ),
+    r"^Circle: radius: .* multiple values": (
+        lambda: Circle(1, 2, radius=3)  # type: ignore
+    ),
+    r"^Blend: trajectory.radius: -1 is negative; must be greater than 0": (
+        lambda: Blend({"type": "circle", "radius": -1, "angular_rate": 1}, 1)  # type: ignore
+    ),
+}
+
+
+@pytest.mark.parametrize("message", CALLS)
+def test_a_wrong_call_is_one_error(message: str) -> None:
+    with pytest.raises(TrajectoryError, match=message):
+        CALLS[message]()
+
+
+SCHEDULES: dict[str, dict[str, Any]] = {
+    r"^Schedule: intervals\.0\.0: .* not a finite": {"intervals": [(np.nan, 1)]},
+    r"^Schedule: intervals\.0\.0: \.inf is not": {"intervals": [(np.inf, 1)]},
+    r"^Schedule: intervals\.0\.1: -\.inf is not": {"intervals": [(0, -np.inf)]},
+    r"^Schedule: intervals\.0: \[1\] has 1 entry, needs 2": {"intervals": [[1]]},
+    r"^Schedule: intervals\.1: .* has 3 entries, needs 2": {
+        "intervals": [(0, 1), (2, 3, 4)]
+    },
+    r"^Schedule: intervals\.0\.1: 'end' is text; expected a num": {
+        "intervals": [(0, "end")]
+    },
+    r"^Schedule: intervals\.0: 1": {"intervals": [1, 2]},
+    r"^Schedule: intervals: 'always'": {"intervals": "always"},
+    r"^Schedule: intervals: \[\]": {"intervals": []},
+    r"^Schedule: ramp: -1 is negative; must be at least 0": {
+        "intervals": [(0, 1)], "ramp": -1
+    },
+    r"^Schedule: ramp: nothing given": {"intervals": [(0, 1)], "ramp": None},
+    r"^Schedule: the interval from 1 to 1 s is empty": {"intervals": [(1, 1)]},
+    r"^Schedule: .* overlaps the previous one, which ends at 2 s": {
+        "intervals": [(0, 2), (1, 3)]
+    },
+    r"^Schedule: .* is shorter than its ramps, 0.6 s": {"intervals": [(0, 0.5)]},
+    r"^Schedule: missing key 'intervals'": {"ramp": 1},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("message", SCHEDULES)
+def test_a_wrong_schedule_is_one_error(message: str) -> None:
+    with pytest.raises(ScheduleError, match=message):
+        Schedule(**SCHEDULES[message])
+
+
+def test_no_start_and_no_end_have_two_notations() -> None:
+    endless = Schedule([(None, 1), (2, None)])
+    for pairs in ([(-np.inf, 1), (2, np.inf)], np.array([[-np.inf, 1], [2, np.inf]])):
+        assert Schedule(pairs) == endless
+    assert endless.intervals == ((None, 1.0), (2.0, None))
+    assert endless.windows == ((-np.inf, 1.0), (2.0, np.inf))
+    assert Schedule.always().constant
+    assert not endless.constant
+
+
+# --- where the robot starts -----------------------------------------------------------
+
+START = np.array([0.3, -0.2, 0.5])
+PLACED = [kind for kind in WRONG if getattr(kind, "points", ())]
+every_placed = pytest.mark.parametrize("kind", PLACED, ids=lambda kind: kind.__name__)
+
+
+def assert_relative(trajectory: Any, sample: Any) -> None:
+    assert trajectory.relative
+    for use in (trajectory.sample, lambda t: trajectory.sample(t, sample)):
+        with pytest.raises(TrajectoryError, match="the robot starts, which only a"):
+            use(0.0)
+    with pytest.raises(TrajectoryError, match="the robot starts, which only a"):
+        trajectory.follow(sample)(0.0)
+
+
+@every_placed
+def test_an_omitted_point_is_where_the_robot_starts(kind: Any) -> None:
+    given = WRONG[kind][0]
+    optional = [
+        field.name
+        for field in dataclasses.fields(kind)
+        if field.name in kind.points and field.default is None
+    ]
+    for name in optional:
+        trajectory = kind(**{key: each for key, each in given.items() if key != name})
+        assert_relative(trajectory, TrajectorySample.allocate(3))
+        anchored = trajectory.anchored(START)
+        assert anchored == kind(**{**given, name: START})
+        assert not anchored.relative
+        with pytest.raises(TrajectoryError, match=f"{name} is missing: nothing starts"):
+            trajectory.anchored(None)
+
+
+@every_placed
+def test_points_are_counted_from_the_start(kind: Any) -> None:
+    given = WRONG[kind][0]
+    trajectory = kind(**given, origin="start")
+    assert_relative(trajectory, TrajectorySample.allocate(3))
+    assert trajectory.dimension == 3
+    anchored = trajectory.anchored(START.tolist())
+    moved = {name: START + given[name] for name in kind.points}
+    assert anchored == kind(**{**given, **moved})
+    assert anchored.origin == "world"
+    with pytest.raises(TrajectoryError, match=r"^origin: start is not available here"):
+        trajectory.anchored(None)
+    with pytest.raises(TrajectoryError, match=r"has 3 coordinates \[.*; needs 2"):
+        trajectory.anchored([1, 2])
+    if kind is Blend:  # only its own start is moved
+        return
+    for t in (0.0, 0.4, 1.3):
+        here, there = kind(**given).sample(t), anchored.sample(t)
+        np.testing.assert_allclose(there.position, here.position + START, atol=1e-14)
+        np.testing.assert_allclose(there.velocity, here.velocity, atol=1e-13)
+        np.testing.assert_allclose(there.acceleration, here.acceleration, atol=1e-12)
+
+
+@every_placed
+def test_points_in_the_world_stay(kind: Any) -> None:
+    trajectory = kind(**WRONG[kind][0])
+    assert not trajectory.relative
+    assert trajectory.anchored(START) is trajectory
+    assert trajectory.anchored(None) is trajectory
+    with pytest.raises(TrajectoryError, match="has 3 coordinates"):
+        trajectory.anchored([1, 2, 3, 4])
+
+
+def test_a_blend_begins_and_ends_about_the_start() -> None:
+    blend = Blend(Circle(0.1, 2.0), 1.5)
+    assert_relative(blend, TrajectorySample.allocate(3))
+    anchored = blend.anchored(START)
+    assert anchored == Blend(Circle(0.1, 2.0, START), 1.5, start=START)
+    np.testing.assert_array_equal(anchored.sample(0.0).position, START)
+    fixed = Blend(Circle(0.1, 2.0), 1.5, start=[0, 0, 0])
+    assert fixed.relative
+    assert fixed.anchored(START) == Blend(Circle(0.1, 2, START), 1.5, start=[0, 0, 0])
+    with pytest.raises(TrajectoryError, match="nothing starts here"):
+        fixed.anchored(None)
+
+
+@pytest.mark.parametrize(
+    "trajectory",
+    [
+        CallableTrajectory(swinging, 3, origin="start"),
+        PiecewisePolynomial([0, 1], [[[1, 2, 3]]], origin="start"),
+    ],
+)
+def test_what_has_no_points_cannot_be_counted_from_the_start(trajectory: Any) -> None:
+    assert_relative(trajectory, TrajectorySample.allocate(3))
+    with pytest.raises(TrajectoryError, match="origin: start cannot move a"):
+        trajectory.anchored(START)
+
+
+def test_a_circle_is_level_about_the_start() -> None:
+    circle = Circle(0.1, 2.0).anchored(START)
+    assert circle.center is not None
+    np.testing.assert_array_equal(circle.center, START)
+    for t in (0.0, 0.3, 2.0):
+        x, x_dot, _ = circle.sample(t)
+        assert x[2] == START[2]
+        assert x_dot[2] == 0.0
+        arm = x - START
+        assert np.linalg.norm(arm) == pytest.approx(0.1)
+        np.testing.assert_allclose(x_dot, np.cross([0, 0, 2.0], arm), atol=1e-15)
+    np.testing.assert_allclose(circle.sample(0.0).position, [0.4, -0.2, 0.5])
+    flat_circle = Circle(0.1, 2.0).anchored([1.0, 2.0])
+    np.testing.assert_allclose(flat_circle.sample(0.0).position, [1.1, 2.0])
+    with pytest.raises(
+        TrajectoryError, match=r"^Circle: a circle in dimension 4 needs"
+    ):
+        Circle(0.1, 2.0).anchored([0, 0, 0, 0])
+
+
+@pytest.mark.parametrize(
+    "trajectory",
+    [HoldOrientation(), Spin([0, 1, 0], 2.0), BlendOrientation(SPIN, 1.5)],
+    ids=lambda each: type(each).__name__,
+)
+def test_an_omitted_rotation_is_that_of_the_start(trajectory: Any) -> None:
+    assert_relative(trajectory, OrientationSample.allocate())
+    anchored = trajectory.anchored(R2)
+    assert anchored == dataclasses.replace(trajectory, rotation=R2)
+    np.testing.assert_allclose(anchored.sample(0.0).rotation, R2, atol=1e-14)
+    assert anchored.anchored(R1) == anchored
+    angles = [0.1, 0.2, 0.3]
+    np.testing.assert_allclose(
+        trajectory.anchored(angles).sample(0.0).rotation,
+        pin.rpy.rpyToMatrix(*angles),
+        atol=1e-15,
+    )
+
+
+def test_a_blend_may_lead_into_an_orientation_of_the_start() -> None:
+    blend = BlendOrientation(Spin([0, 0, 1], 1.0), 1.5, rotation=R1)
+    assert_relative(blend, OrientationSample.allocate())
+    expected = BlendOrientation(Spin([0, 0, 1], 1.0, rotation=R2), 1.5, rotation=R1)
+    assert blend.anchored(R2) == expected
+
+
+POSES: dict[str, tuple[Any, Callable[[pin.SE3], Any]]] = {
+    "hold": (HoldPose(), lambda M: HoldPose(M.translation, M.rotation)),
+    "hold a rotation": (
+        HoldPose(rotation=R1), lambda M: HoldPose(M.translation, R1)
+    ),
+    "composed": (
+        ComposedPose(),
+        lambda M: ComposedPose(Hold(M.translation), HoldOrientation(M.rotation)),
+    ),
+    "composed of one": (
+        ComposedPose(LISSAJOUS),
+        lambda M: ComposedPose(LISSAJOUS, HoldOrientation(M.rotation)),
+    ),
+    "screw": (
+        ScrewInterpolation(POINTS[0], R1, 2.0, start_time=1.0),
+        lambda M: ScrewInterpolation(
+            POINTS[0], R1, 2.0, start_time=1.0,
+            start_position=M.translation, start_rotation=M.rotation,
+        ),
+    ),
+    "screw from a place": (
+        ScrewInterpolation(POINTS[0], R1, 2.0, start_position=POINTS[1]),
+        lambda M: ScrewInterpolation(
+            POINTS[0], R1, 2.0, start_position=POINTS[1], start_rotation=M.rotation
+        ),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", POSES)
+def test_poses_start_where_the_robot_starts(name: str) -> None:
+    trajectory, expected = POSES[name]
+    assert trajectory.relative
+    with pytest.raises(TrajectoryError, match="the robot starts, which only a"):
+        trajectory.sample(0.0)
+    with pytest.raises(TrajectoryError, match="the robot starts, which only a"):
+        trajectory.follow(PoseSample.allocate())(0.0)
+    start = pose(9)
+    anchored = trajectory.anchored(start)
+    assert anchored == expected(start)
+    assert not anchored.relative
+    assert anchored.anchored(pose(3)) == anchored
+    anchored.sample(0.0)
+
+
+def test_a_follower_checks_the_memory_it_writes() -> None:
+    for trajectory in (CIRCLE, Hold([1, 2]), Blend(CIRCLE, 1.0, start=[0, 0])):
+        with pytest.raises(
+            ShapeError, match=r"has dimension 3; this .* has dimension 2"
+        ):
+            trajectory.follow(TrajectorySample.allocate(3))
