@@ -13,9 +13,11 @@ import pinocchio as pin
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.geometry import Scene
 from hsp_control.geometry.shapes import Sphere
+from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import FieldSample, ObstacleClearance
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.metrics import IdentityMetric, MetricSample
 from hsp_control.null_space.metrics.metric import IDENTITY
 from hsp_control.trajectories import Blend, ComposedPose, HoldOrientation, PoseSample
 
@@ -57,7 +59,8 @@ class Case:
         """Build the robot, trajectory, ball, gains and field of all controllers."""
         self.robot = robot = hsp.Robot.load("panda")
         self.q0 = robot.home()
-        start = robot.state(0.0, self.q0, np.zeros(robot.nv)).frame(FRAME)
+        state = robot.state(0.0, self.q0, np.zeros(robot.nv))
+        start = state.frame(FRAME)
         circle = hsp.Circle(
             0.1, 2.0, start.position + CENTER, phase=np.pi, normal=[0.0, 0.0, 1.0]
         )
@@ -74,10 +77,8 @@ class Case:
         self.field: hsp.NullSpaceField = posture
         if self.obstacle:
             self.field = posture + self.clearance_weight * self.clearance
-        self._metric = hsp.IdentityMetric().evaluate(
-            robot.state(0.0, self.q0, np.zeros(robot.nv)),
-            MetricSample.allocate(robot.nv),
-        )
+        self._placed = self.field.placed(Start(state, Scene()))
+        self._metric = IdentityMetric().evaluate(state, MetricSample.allocate(robot.nv))
         self._sample = FieldSample.allocate(robot.nv)
         self._state = hsp.RobotState(robot)
         self._pose = PoseSample.allocate()
@@ -184,4 +185,4 @@ class Case:
         }
 
     def _evaluate(self, state: hsp.RobotState) -> FieldSample:
-        return self.field.evaluate(state, self._metric, IDENTITY, self._sample)
+        return self._placed.evaluate(state, self._metric, IDENTITY, self._sample)

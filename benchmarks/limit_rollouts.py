@@ -19,7 +19,9 @@ from rich.progress import track
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array, Indices
+from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.control.actuation import Status
+from hsp_control.robot.integrators import Rk4
 
 T = TypeVar("T")
 PERIOD = 1e-3  # [s]
@@ -64,7 +66,7 @@ def panda() -> hsp.Robot:
     return hsp.Robot.load("panda")
 
 
-def draw(seed: int) -> tuple[hsp.Controller, hsp.Limits, Array]:
+def draw(seed: int) -> tuple[hsp.Controller, RobotLimits, Array]:
     """Return a random controller whose limits become active, its limits and a start.
 
     Limits: 70 to 100 % of the arm's efforts, 20 to 50 % of its speeds, 1000 N·m/s, its
@@ -75,8 +77,14 @@ def draw(seed: int) -> tuple[hsp.Controller, hsp.Limits, Array]:
     robot, rng = panda(), np.random.default_rng(seed)
     lower, upper = robot.position_limits()
     q0 = 0.5 * (lower + upper) + 0.35 * (upper - lower) * rng.uniform(-1.0, 1.0, 7)
-    own = hsp.Limits()
-    limits = hsp.Limits(effort=own.effort * rng.uniform(0.7, 1.0), effort_rate=1000.0, velocity=own.velocity * rng.uniform(0.2, 0.5), null_space_speed=2.0 if seed % 2 else None, static_effort=1.0 if seed % 2 else None)
+    own = own_limits(robot)
+    limits = hsp.Limits(
+        effort=own.effort * rng.uniform(0.7, 1.0),
+        effort_rate=1000.0,
+        velocity=own.velocity * rng.uniform(0.2, 0.5),
+        null_space_speed=2.0 if seed % 2 else None,
+        static_effort=1.0 if seed % 2 else None,
+    )
     start = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp")
     away = rng.uniform(0.0, 0.5) * rng.normal(size=3)
     center, rate = start + away, rng.uniform(1.0, 6.0)
@@ -84,7 +92,9 @@ def draw(seed: int) -> tuple[hsp.Controller, hsp.Limits, Array]:
     gains = hsp.Gains(natural_frequency=rng.uniform(5.0, 12.0))
     task = hsp.FramePosition("panda_tcp", path, gains=gains)
     field = hsp.JointCentering()
-    return hsp.Controller(robot, [task], field, limits=limits), limits, q0
+    controller = hsp.Controller(robot, [task], field, limits=limits)
+    assert controller.limits is not None
+    return controller, controller.limits, q0
 
 
 def roll_out(seed: int) -> Arm:
@@ -96,7 +106,7 @@ def roll_out(seed: int) -> Arm:
         duration=0.8,
         control_period=PERIOD,
         log_period=PERIOD,
-        integrator=hsp.Rk4(PERIOD),
+        integrator=Rk4(PERIOD),
     )
     excess = beyond(rollout, limits)
     status = rollout["status"]
@@ -115,7 +125,7 @@ def roll_out(seed: int) -> Arm:
     )
 
 
-def beyond(rollout: hsp.Rollout, limits: hsp.Limits) -> tuple[Array, ...]:
+def beyond(rollout: hsp.Rollout, limits: RobotLimits) -> tuple[Array, ...]:
     """Return by how much each limit is exceeded, step by step and joint by joint."""
     q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
     return (
@@ -126,7 +136,7 @@ def beyond(rollout: hsp.Rollout, limits: hsp.Limits) -> tuple[Array, ...]:
     )
 
 
-def limit_ratios(rollout: hsp.Rollout, limits: hsp.Limits) -> tuple[Array, ...]:
+def limit_ratios(rollout: hsp.Rollout, limits: RobotLimits) -> tuple[Array, ...]:
     """Return the ratio of each value to its limit; positions count from mid-range."""
     q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
     middle, half = 0.5 * (limits.upper + limits.lower), limits.upper - limits.lower
@@ -143,9 +153,9 @@ def step_time(controller: hsp.Controller, rollout: hsp.Rollout, rows: Indices) -
     rows, times = rows[rows > 0][:40], []
     for k in rows:
         controller.applied(rollout["tau"][k - 1], PERIOD)
-        state = controller.robot.state(rollout.t[k], rollout["q"][k], rollout["v"][k])
+        step = rollout.t[k], rollout["q"][k], rollout["v"][k]
         before = process_time()
-        controller.compute(state)
+        controller.compute(*step)
         times.append(process_time() - before)
     return float(np.median(times)) if times else float("nan")
 

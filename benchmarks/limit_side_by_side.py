@@ -17,7 +17,10 @@ from timing import ratios, spread, step_times
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.config import Experiment
+from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.actuation import Status
+from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation.plants import RigidBodyPlant
 from hsp_control.visualization.palette import INK, SERIES
 from hsp_control.visualization.plots import new_figure, styled
 
@@ -51,10 +54,10 @@ class Run(NamedTuple):
 
 def this_law(experiment: Experiment) -> Compute:
     """Return the configuration's controller, with the applied effort fed back."""
-    controller, state = experiment.controller, hsp.RobotState(experiment.robot)
+    controller = experiment.controller
 
     def compute(t: float, q: Array, v: Array) -> Array:
-        tau = controller.compute(state.update(t, q, v)).tau
+        tau = controller.compute(t, q, v).tau
         controller.applied(tau, PERIOD)
         return tau
 
@@ -67,7 +70,7 @@ def clipped(experiment: Experiment, limits: Array) -> Compute:
     return lambda t, q, v: np.clip(law(t, q, v), -limits, limits)
 
 
-def tsid_of(experiment: Experiment, limits: hsp.Limits, weight: float) -> Compute:
+def tsid_of(experiment: Experiment, limits: RobotLimits, weight: float) -> Compute:
     """Return TSID: hand and posture tasks; bounds of efforts, positions and speeds.
 
     The posture task has Kp = K_N α and Kv = K_N + α for each joint, for the field
@@ -85,17 +88,15 @@ def tsid_of(experiment: Experiment, limits: hsp.Limits, weight: float) -> Comput
 
     hand = tsid.TaskSE3Equality("hand", peer, task.frame)
     hand.useLocalFrame(False)
-    hand.setKp(task.Kp[0, 0] * np.ones(6))
-    hand.setKd(task.Kv[0, 0] * np.ones(6))
+    feedback = controller.feedback(task.name)
+    hand.setKp(feedback.Kp[0, 0] * np.ones(6))
+    hand.setKd(feedback.Kv[0, 0] * np.ones(6))
     hand.setMask(np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     problem.addMotionTask(hand, 1.0, 1, 0.0)
 
     # g is linear in q: compute its slope and its zero from two values.
-    still = hsp.RobotState(robot)
-
     def flow(q: Array) -> Array:
-        controller.compute(still.update(0.0, q, np.zeros(nv)))
-        return np.array(controller.field_sample.g)
+        return controller.compute(0.0, q, np.zeros(nv)).field.g
 
     step = 1e-3
     rates = -(flow(q0 + step) - flow(q0)) / step
@@ -149,7 +150,7 @@ def close_loop(experiment: Experiment, compute: Compute) -> Run:
     robot, (task,) = experiment.robot, experiment.controller.tasks
     assert isinstance(task, hsp.FramePosition)
     reference = experiment.controller  # computes g for the measurement
-    plant, integrator = hsp.RigidBodyPlant(robot), hsp.Rk4(PERIOD)
+    plant, integrator = RigidBodyPlant(robot), Rk4(PERIOD)
     q, v, tau = experiment.q0.copy(), experiment.v0.copy(), np.zeros(robot.nv)
     state, rows, end = hsp.RobotState(robot), [], ""
 
@@ -165,9 +166,8 @@ def close_loop(experiment: Experiment, compute: Compute) -> Run:
             break
         frame = state.update(t, q, v).frame(task.frame)
         error = np.linalg.norm(task.trajectory.sample(t).position - frame.position)
-        reference.compute(state)
         J = frame.jacobian[:3]
-        e_N = reference.field_sample.g - v
+        e_N = reference.compute(t, q, v).field.g - v
         e_N = e_N - np.linalg.pinv(J) @ (J @ e_N)
         rows.append((t, q, v, tau.copy(), error, np.linalg.norm(e_N)))
         q, v = integrator.advance(robot, accelerate, t, t + PERIOD, q, v)
@@ -177,7 +177,7 @@ def close_loop(experiment: Experiment, compute: Compute) -> Run:
     return Run(*(np.array(column) for column in zip(*rows, strict=True)), end)
 
 
-def runs_of(name: str) -> tuple[dict[str, Run], hsp.Limits]:
+def runs_of(name: str) -> tuple[dict[str, Run], RobotLimits]:
     """Return the runs of a configuration by controller, and its limits."""
     load = lambda *changes: hsp.load_experiment(f"limits/{name}", *changes)  # noqa: E731
     limits = load().controller.limits
@@ -202,7 +202,7 @@ def runs_of(name: str) -> tuple[dict[str, Run], hsp.Limits]:
     }, limits
 
 
-def row(name: str, label: str, run: Run, limits: hsp.Limits) -> str:
+def row(name: str, label: str, run: Run, limits: RobotLimits) -> str:
     """Return a line of the table."""
     rate = np.abs(np.diff(run.tau, axis=0)).max() / PERIOD
     margin = np.minimum(run.q - limits.lower, limits.upper - run.q).min()
@@ -227,18 +227,16 @@ HEADER = (
 )
 
 
-def cost(name: str, run: Run, limits: hsp.Limits) -> str:
+def cost(name: str, run: Run, limits: RobotLimits) -> str:
     """Return rows of step times beside TSID's, without and with active limits."""
     experiment = hsp.load_experiment(f"limits/{name}")
-    controller, state = experiment.controller, hsp.RobotState(experiment.robot)
+    controller = experiment.controller
 
     def law(t: float, q: Array, v: Array) -> Array:
-        return controller.compute(state.update(t, q, v)).tau
+        return controller.compute(t, q, v).tau
 
     steps = list(zip(run.t, run.q, run.v, strict=True))
-    active = [
-        controller.compute(state.update(*step)).status != Status.EXACT for step in steps
-    ]
+    active = [controller.compute(*step).status != Status.EXACT for step in steps]
     peer = tsid_of(hsp.load_experiment(f"limits/{name}", "limits=null"), limits, 1e-3)
     lines = ""
     for label, wanted in (("none", False), ("some", True)):
@@ -256,7 +254,7 @@ COST = (
 )
 
 
-def figure(found: dict[str, tuple[dict[str, Run], hsp.Limits]]) -> Figure:
+def figure(found: dict[str, tuple[dict[str, Run], RobotLimits]]) -> Figure:
     """Draw limited quantities, tracking error and null-space error."""
     drawn = new_figure(10.0, 7.2)
     axes = drawn.subplots(3, 2, sharex="col")

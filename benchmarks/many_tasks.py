@@ -8,7 +8,9 @@ import pinocchio as pin
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.trajectories import ComposedPose, HoldOrientation, PoseSample
+from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation.plants import RigidBodyPlant
+from hsp_control.trajectories import Blend, ComposedPose, HoldOrientation, PoseSample
 
 FREQUENCY, NULL_SPACE_GAIN, POSTURE_RATE = 10.0, 10.0, 1.0
 PERIOD, STEP = 1e-3, 2.5e-4  # [s]
@@ -43,7 +45,7 @@ class Poses:
             )
             self.trajectories.append(
                 ComposedPose(
-                    hsp.Blend(circle, 1.0, start=start.position),
+                    Blend(circle, 1.0, start=start.position),
                     HoldOrientation(start.rotation),
                 )
             )
@@ -59,10 +61,9 @@ class Poses:
         controller = hsp.Controller(
             self.robot, tasks, posture, null_space_gain=NULL_SPACE_GAIN
         )
-        state = hsp.RobotState(self.robot)
 
         def compute(t: float, q: Array, v: Array) -> Array:
-            return controller.compute(state.update(t, q, v)).tau
+            return controller.compute(t, q, v).tau
 
         return compute
 
@@ -131,7 +132,7 @@ class Poses:
         self, compute: Callable[[float, Array, Array], Array], duration: float
     ) -> tuple[float, list[tuple[float, Array, Array]]]:
         """Run in closed loop; return the rms error [m] of the last half, and states."""
-        plant, integrator = hsp.RigidBodyPlant(self.robot), hsp.Rk4(STEP)
+        plant, integrator = RigidBodyPlant(self.robot), Rk4(STEP)
         q, v, tau = self.q0.copy(), np.zeros(self.robot.nv), np.zeros(self.robot.nv)
         state, states, squares = hsp.RobotState(self.robot), [], []
 

@@ -24,9 +24,13 @@ from imperfect_plants import SETTLED, configuration
 from marked_sections import DOCS, replace_section
 from rich.progress import track
 
-from hsp_control import ContinuousPlant, IntegratedPlant, SampledPlant, load_experiment
+from hsp_control import load_experiment
 from hsp_control.control.compensation import Command
-from hsp_control.robot import RobotState
+from hsp_control.simulation.plants import (
+    ContinuousPlant,
+    IntegratedPlant,
+    SampledPlant,
+)
 
 PROCESSES = 3
 CSV = DOCS / "robustness.csv"
@@ -201,7 +205,7 @@ def measured(config: dict[str, Any]) -> tuple[float, float, float]:
     if isinstance(plant, ContinuousPlant):
         plant = IntegratedPlant(plant, made.integrator)
     assert isinstance(plant, SampledPlant)
-    command, state = Command(made.controller, made.compensation), RobotState(made.robot)
+    command = Command(made.controller, made.compensation)
     q, v, last = made.q0, made.v0, np.zeros(made.robot.nv)
     plant.reset(0.0, q, v)
     sums, efforts, rows = np.zeros(2), 0.0, 0
@@ -213,7 +217,7 @@ def measured(config: dict[str, Any]) -> tuple[float, float, float]:
         if k > settled:
             efforts += float(np.mean(((tau - last) / period) ** 2)) / (steps - settled)
         if k > settled and k % max(1, round(0.005 / period)) == 0:
-            output = made.controller.compute(state.update(t, q, v))
+            output = made.controller.compute(t, q, v)
             e, e_N = output.task.error, output.null_space_error
             sums += 1e6 * (e @ e), e_N @ e_N
             rows += 1

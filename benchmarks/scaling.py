@@ -12,7 +12,7 @@ import argparse
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +32,7 @@ from hsp_control.null_space.fields import (
     TargetPosture,
     Transmission,
 )
-from hsp_control.trajectories import TrajectorySample
+from hsp_control.trajectories import ComposedPose, HoldOrientation, TrajectorySample
 from hsp_control.visualization.plots import new_figure, styled
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -49,13 +49,9 @@ class Law:
 
     controller: hsp.Controller
 
-    def __post_init__(self) -> None:
-        """Allocate the state of all steps."""
-        self.state = hsp.RobotState(self.controller.robot)
-
     def __call__(self, t: float, q: Array, v: Array) -> Array:
         """Return the effort."""
-        return self.controller.compute(self.state.update(t, q, v)).tau
+        return self.controller.compute(t, q, v).tau
 
 
 # ------------------------------------------------------------------------- the series
@@ -84,7 +80,7 @@ def fields() -> Iterator[Point]:
         TargetPosture(robot.home()),
         Manipulability(HAND),
         InverseCondition(HAND),
-        Transmission(HAND, [0.0, 0.0, 1.0]),
+        Transmission(HAND, direction=[0.0, 0.0, 1.0]),
     ]
     for n in range(len(available) + 1):
         field: hsp.NullSpaceField = Rest()
@@ -121,19 +117,19 @@ def levels() -> Iterator[Point]:
     frames = [f"link{40 - 6 * k}" for k in range(5)]
     paths = circles(robot, frames)
     positions = [
-        hsp.FramePosition(frame, path, gains=GAINS)
-        for frame, path in zip(frames, paths, strict=True)
+        hsp.FramePosition(frame, path, gains=GAINS, priority=k + 1)
+        for k, (frame, path) in enumerate(zip(frames, paths, strict=True))
     ]
     away = hsp.Hold(np.asarray(paths[0].center) + 0.3)
     conflicting = hsp.FramePosition(frames[0], away, gains=GAINS, name="conflicting")
     posture = TargetPosture(bent(robot))
 
-    def law(stack: list[list[hsp.Task]]) -> Law:
-        return Law(hsp.Controller(robot, stack, posture, singularity_threshold=1e-3))
+    def law(tasks: list[hsp.FramePosition]) -> Law:
+        return Law(hsp.Controller(robot, tasks, posture, singularity_threshold=1e-3))
 
     for n in range(1, 6):
-        upper: list[list[hsp.Task]] = [[task] for task in positions[:n]]
-        conflict = [*upper[:-1], [*upper[-1], conflicting]]
+        upper = positions[:n]
+        conflict = [*upper, replace(conflicting, priority=n)]
         yield n, robot, {"this law": law(upper), "in conflict": law(conflict)}
 
 
@@ -265,9 +261,9 @@ def tsid_positions(
 def panda_pose(robot: hsp.Robot, field: hsp.NullSpaceField) -> hsp.Controller:
     """Return this law for a pose of the hand and a field."""
     frame = robot.state(0.0, robot.home(), np.zeros(robot.nv)).frame(HAND)
-    pose = hsp.ComposedPose(
+    pose = ComposedPose(
         hsp.Circle(0.05, 2.0, frame.position, normal=[0.0, 0.0, 1.0]),
-        hsp.HoldOrientation(frame.rotation),
+        HoldOrientation(frame.rotation),
     )
     task = hsp.FramePose(HAND, pose, gains=GAINS)
     return hsp.Controller(robot, [task], field, null_space_gain=10.0)
@@ -325,8 +321,8 @@ TEXT = """\
 
 Written by `make bench` (`benchmarks/scaling.py`); do not edit.
 
-One `RobotState.update` and one `Controller.compute` [µs], medians over {rounds}
-interleaved rounds of {block} steps on one core, and the fitted t = a + b nᵖ, n ≥ 1.
+One `Controller.compute(t, q, v)` [µs], medians over {rounds} interleaved rounds of
+{block} steps on one core, and the fitted t = a + b nᵖ, n ≥ 1.
 Near a singularity a stack of 18 rows takes about 100 µs more (Jacobi's method). Ratios
 are valid for other machines, microseconds are not.
 

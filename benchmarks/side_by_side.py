@@ -31,6 +31,8 @@ from timing import Compute, State, ratios, spread, step_times
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.null_space.fields import Manipulability
+from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation.plants import RigidBodyPlant
 
 Make = Callable[[Case], Compute]
 
@@ -84,7 +86,6 @@ def peers() -> tuple[dict[str, Make], dict[str, tuple[str, Make]], dict[str, str
 def _this_law(
     case: Case, name: str = "centering", *, diagnoses: bool = False
 ) -> Compute:
-    robot = case.robot
     fields: dict[str, hsp.NullSpaceField] = {
         "centering": hsp.JointCentering(weights=2.0),
         "manipulability": Manipulability(FRAME),
@@ -141,7 +142,7 @@ class Run:
 def close_loop(case: Case, make: Make) -> Run:
     """Run a controller on the rigid-body plant, with its effort held each period."""
     run, rows = Run(), []
-    plant, integrator = hsp.RigidBodyPlant(case.robot), hsp.Rk4(STEP)
+    plant, integrator = RigidBodyPlant(case.robot), Rk4(STEP)
     q, v = case.q0.copy(), np.zeros(case.robot.nv)
     tau = np.zeros(case.robot.nv)
 

@@ -13,10 +13,12 @@ from scipy.optimize import nnls
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.constraints.contacts import SurfaceContact
 from hsp_control.geometry.shapes import Box
+from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import ContactPlant, RigidContact
 from hsp_control.simulation.plants.mujoco import ContactShape, Ground, MujocoPlant
-from hsp_control.trajectories import Blend
+from hsp_control.trajectories import Blend, HoldOrientation
 
 COM, HAND, TRUNK = "center_of_mass", "hand", "trunk"
 PERIOD = 1e-3  # how long an effort is held [s]
@@ -134,23 +136,33 @@ class Standing:
     def controller(
         self, *, limited: bool = True, threshold: float = 0.03
     ) -> hsp.Controller:
-        """Return this law; its posture field excludes the root, as TSID's task does."""
+        """Return this law; its posture field excludes the root, as TSID's task does.
+
+        All tasks are of one level, as in TSID.
+        """
         robot, body = self.robot, self.body
         weights = np.full(robot.nv, POSTURE_RATE)
         weights[list(robot.unactuated)] = 0.0
+        common: dict[str, Any] = {"gains": self.gains, "priority": 1}
+        upright = HoldOrientation(self.upright)
         tasks = [
-            hsp.CenterOfMass(self.com, gains=self.gains, name=COM),
-            hsp.FramePosition(body.hand, self.hand, gains=self.gains, name=HAND),
-            hsp.FrameOrientation(body.trunk, hsp.HoldOrientation(self.upright), gains=self.gains, name=TRUNK),
+            hsp.CenterOfMass(self.com, **common, name=COM),
+            hsp.FramePosition(body.hand, self.hand, **common, name=HAND),
+            hsp.FrameOrientation(body.trunk, upright, **common, name=TRUNK),
         ]
         return hsp.Controller(
             robot,
             tasks,
-            hsp.TargetPosture(self.q0, weights=weights),
+            hsp.TargetPosture(configuration=self.q0, weights=weights),
             null_space_gain=GAIN,
             singularity_threshold=threshold,
             contacts=[
-                hsp.SurfaceContact(name, corners=self.corners, friction=FRICTION, damping=CONTACT_DAMPING)
+                SurfaceContact(
+                    name,
+                    corners=self.corners,
+                    friction=FRICTION,
+                    damping=CONTACT_DAMPING,
+                )
                 for name in body.soles
             ],
             limits=hsp.Limits(velocity=None, position=None) if limited else None,
@@ -161,7 +173,7 @@ class Standing:
     def ideal(self) -> "Engine":
         """Return rigid contacts that hold any force, with a Runge-Kutta step."""
         soles = [RigidContact(name) for name in self.body.soles]
-        plant, integrator = ContactPlant(self.robot, soles), hsp.Rk4(PERIOD)
+        plant, integrator = ContactPlant(self.robot, soles), Rk4(PERIOD)
 
         def advance(t: float, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
             acceleration = partial(_acceleration, plant, tau)
@@ -195,7 +207,7 @@ class Standing:
     def measure(self, t: float, q: Array, v: Array) -> dict[str, float]:
         """Measure one instant, in the same way for every controller."""
         state = self._state.update(t, q, v)
-        output = self._reference.compute(state)
+        output = self._reference.compute(t, q, v)
         errors = {
             name: float(np.linalg.norm(output.task.error[rows]))
             for name, rows in self._reference.task_rows.items()

@@ -22,8 +22,7 @@ begin = process_time()
 import hsp_control as hsp
 imported = process_time()
 experiment = hsp.load_experiment(sys.argv[1])
-state = experiment.robot.state(0.0, experiment.q0, experiment.v0)
-experiment.controller.compute(state)
+experiment.controller.compute(0.0, experiment.q0, experiment.v0)
 done = process_time()
 print(imported - begin, done - imported, done)
 """

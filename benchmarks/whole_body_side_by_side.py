@@ -31,6 +31,7 @@ from timing import Compute, State, ratios, spread, step_times
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.law import Outcome
 
 ROOT = Path(__file__).resolve().parent.parent
 LAW = "this law"
@@ -59,11 +60,11 @@ def _tsid(peer: Any, weight: float) -> Callable[[Standing], Made]:
 
 def this_law(case: Standing) -> Made:
     """Return `hsp_control.Controller` as a user calls it."""
-    controller, state = case.controller(), hsp.RobotState(case.robot)
+    controller = case.controller()
     statuses: list[str] = []
 
     def compute(t: float, q: Array, v: Array) -> Array:
-        output = controller.compute(state.update(t, q, v))
+        output = controller.compute(t, q, v)
         statuses.append(f"{output.status}{' damped' if output.damped else ''}")
         return output.tau
 
@@ -154,8 +155,9 @@ def timing_table(times: dict[str, Array]) -> str:
 
 def parts_table(case: Standing, states: list[State]) -> str:
     """Return the table of the times of the parts of this law's step."""
-    controller, state = case.controller(), hsp.RobotState(case.robot)
-    controller.compute(state.update(*states[0]))
+    controller = case.controller()
+    controller.compute(*states[0])
+    state = controller.state
     active, actuation = controller.active_stack, controller._actuation
     support = active.support
     times: dict[str, list[int]] = {}
@@ -166,8 +168,8 @@ def parts_table(case: Standing, states: list[State]) -> str:
         times.setdefault(name, []).append(perf_counter_ns() - started)
         return result
 
-    def law() -> float:
-        return active.resolve(state, controller.metric, controller.field)
+    def law() -> Outcome:
+        return active.resolve(state.t)
 
     for t, q, v in states:
         timed("kinematics, one pass of Pinocchio", lambda: state.update(t, q, v))  # noqa: B023

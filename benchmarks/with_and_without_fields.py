@@ -160,14 +160,14 @@ def clearance_of(experiment: Experiment) -> Clearance | None:
 def step_ratio(experiment: Experiment, rollout: Rollout) -> float:
     """Return the time of a control step over that of the bare Pinocchio calls."""
     controller, robot = experiment.controller, experiment.robot
-    model, data, state = robot.model, robot.model.createData(), RobotState(robot)
+    model, data = robot.model, robot.model.createData()
     rows = np.linspace(0, len(rollout) - 1, STEPS).astype(int)
     states = [(float(rollout.t[k]), rollout.q[k], rollout.v[k]) for k in rows]
     a = np.zeros(robot.nv)
 
     def this_law() -> None:
         for t, q, v in states:
-            controller.compute(state.update(t, q, v))
+            controller.compute(t, q, v)
 
     def pinocchio() -> None:
         for _, q, v in states:

@@ -9,7 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import hsp_control as hsp
+from hsp_control.null_space import metrics
+from hsp_control.null_space.fields import FunctionField
+from hsp_control.robot.integrators import Dop853
 from hsp_control.simulation.log_series import chosen_rows
+from hsp_control.trajectories import ComposedPose, HoldOrientation
 from hsp_control.visualization.palette import DESIRED, INK, SERIES
 from hsp_control.visualization.plots import (
     new_figure,
@@ -117,14 +121,14 @@ def draw_sweep() -> None:
 def draw_propositions(left: Axes, middle: Axes) -> None:
     """Draw e and e_N of an iiwa that starts off its path, in three metrics."""
     robot = hsp.Robot.load("iiwa14")
-    metrics = {
-        "identity": hsp.IdentityMetric(),
-        "constant": hsp.ConstantMetric(np.linspace(1.0, 3.0, 7)),
-        "mass matrix": hsp.MassMatrixMetric(),
+    shown = {
+        "identity": metrics.IdentityMetric(),
+        "constant": metrics.ConstantMetric(np.linspace(1.0, 3.0, 7)),
+        "mass matrix": metrics.MassMatrixMetric(),
     }
     # Wide to narrow: the three lines lie on each other, that is the point.
-    for color, width, name in zip(SERIES, (7.0, 4.5, 2.0), metrics, strict=False):
-        rollout = moving_iiwa(robot, metrics[name])
+    for color, width, name in zip(SERIES, (7.0, 4.5, 2.0), shown, strict=False):
+        rollout = moving_iiwa(robot, shown[name])
         error = np.linalg.norm(rollout["task.hand.error"], axis=1)
         left.semilogy(rollout.t, error, color=color, lw=width, label=name)
         norm = rollout["null_space_norm"]
@@ -145,17 +149,17 @@ def draw_propositions(left: Axes, middle: Axes) -> None:
         axes.legend()
 
 
-def moving_iiwa(robot: hsp.Robot, metric: hsp.Metric) -> hsp.Rollout:
+def moving_iiwa(robot: hsp.Robot, metric: metrics.Metric) -> hsp.Rollout:
     """Return a run with a pose task on a circle and a posture that swings."""
     state = robot.state(0.0, robot.home(), np.zeros(7))
     hand = state.frame("iiwa_link_ee")
-    circle = hsp.Circle(
-        hand.position - [0.05, 0.0, 0.0], 0.1, 2.0, normal=[0.0, 0.0, 1.0]
-    )
-    pose = hsp.ComposedPose(circle, hsp.HoldOrientation(hand.rotation))
+    circle = hsp.Circle(0.1, 2.0, hand.position - [0.05, 0.0, 0.0])
+    pose = ComposedPose(circle, HoldOrientation(hand.rotation))
     gains = hsp.Gains(natural_frequency=FREQUENCY)
     task = hsp.FramePose("iiwa_link_ee", pose, gains=gains, name="hand")
-    swing = hsp.FunctionField(lambda s: 0.8 * np.sin(1.5 * s.t + np.arange(7)) - robot.joint_positions(s.q))
+    swing = FunctionField(
+        lambda s: 0.8 * np.sin(1.5 * s.t + np.arange(7)) - robot.joint_positions(s.q)
+    )
     controller = hsp.Controller(
         robot, [task], swing, null_space_gain=GAIN, metric=metric
     )
@@ -166,7 +170,7 @@ def moving_iiwa(robot: hsp.Robot, metric: hsp.Metric) -> hsp.Rollout:
         start,
         0.3 * rng.standard_normal(7),
         duration=3.0,
-        integrator=hsp.Dop853(1e-10, 1e-10),
+        integrator=Dop853(1e-10, 1e-10),
     )
 
 
@@ -184,7 +188,7 @@ def draw_chaos(axes: Axes) -> None:
                     experiment.controller,
                     q0,
                     duration=10.0,
-                    integrator=hsp.Dop853(1e-12, 1e-12),
+                    integrator=Dop853(1e-12, 1e-12),
                 )
             )
         apart = np.abs(runs[0]["joint_positions"] - runs[1]["joint_positions"])

@@ -11,7 +11,7 @@ from hsp_control.common.arrays import Array
 def make(
     case: Case,
     field: hsp.NullSpaceField | None = None,
-    metric: hsp.Metric | None = None,
+    metric: hsp.metrics.Metric | None = None,
     *,
     diagnoses: bool = False,
 ) -> Callable[[float, Array, Array], Array]:
@@ -33,13 +33,12 @@ def make(
         metric=metric,
         limits=hsp.Limits(),
     )
-    state = hsp.RobotState(robot)
 
     def compute(t: float, q: Array, v: Array) -> Array:
-        return controller.compute(state.update(t, q, v)).tau
+        return controller.compute(t, q, v).tau
 
     def compute_and_diagnose(t: float, q: Array, v: Array) -> Array:
-        tau = controller.compute(state.update(t, q, v)).tau
+        tau = controller.compute(t, q, v).tau
         controller.diagnose()
         return tau
 

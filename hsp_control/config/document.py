@@ -137,7 +137,7 @@ class Document:
             ConfigError: If the key path leads nowhere.
         """
         try:
-            path = assign(self._data, current_keys(keys, origin), value)
+            path = assign(self._data, current_keys(keys, origin, self._data), value)
         except ValueError as error:
             raise located(origin, str(error)) from None
         for inside in [key for key in self._origins if key[: len(path)] == path]:

@@ -183,11 +183,10 @@ def build(document: Document) -> Experiment:
     folder = Path(document.name).resolve().parent
     robot, scenario = build_robot(document, scenario, folder)
     q0 = build_start(document, scenario.start, robot)
-    if scenario.start.ground is not None:
-        with document.at("start", "ground"):
+    with document.at():
+        if scenario.start.ground is not None:
             contacts = scenario.contacts.values()
             q0 = put_on_ground(scenario.start.ground, contacts, robot, q0)
-    with document.at():
         scene = located_scene(scenario.scene, folder, document.access)
         scenario = scenario.model_copy(update={"scene": scene})
         fields, null_space = scenario.null_space.fields, scenario.null_space

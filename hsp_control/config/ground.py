@@ -28,11 +28,9 @@ def put_on_ground(
     """
     contacts = list(contacts)
     if not (robot.unactuated and contacts):
-        raise ContactError(
-            f"{robot.name} has no contact to put on the ground"
-            if robot.unactuated
-            else f"{robot.name} has no free-flyer root to put on the ground"
-        )
+        lacks = "contact" if robot.unactuated else "free-flyer root"
+        with within("start", "ground"):
+            raise ContactError(f"{robot.name} has no {lacks} to put on the ground")
     state = robot.state(0.0, q, np.zeros(robot.nv))
     lowest = np.inf
     for contact in contacts:

@@ -41,6 +41,11 @@ RENAMED = (
 )
 """All keys that have a new name; of two that fit, the first counts."""
 
+UNUSED = (
+    Renamed(("tasks", "*", "gains"), (), "angular_momentum"),  # it is of first order
+)
+"""Keys that had no effect, and are gone."""
+
 _NESTED = dict, list
 
 
@@ -53,7 +58,7 @@ def rename_keys(
     origins: dict[KeyPath, Any],
     location: Callable[[KeyPath], str],
 ) -> None:
-    """Give renamed keys their new names, and warn about each of them.
+    """Give renamed keys their new names, remove unused ones, and warn about each.
 
     Args:
         data: The configuration; changed in place.
@@ -64,9 +69,14 @@ def rename_keys(
     Raises:
         ConfigError: If the old and the new key are both given.
     """
+    for pattern, _, kind in UNUSED:
+        for path in list(_matches(data, pattern)):
+            if _get(data, (*path[:-1], "type")) == kind:
+                _warn(location(path), f"{written(path)} has no effect; remove it")
+                del _get(data, path[:-1])[path[-1]]
     for old_pattern, new_pattern, kind in RENAMED:
         for old in list(_matches(data, old_pattern)):
-            if kind is not None and _get(data, old[:-1]).get("type") != kind:
+            if kind is not None and _get(data, (*old[:-1], "type")) != kind:
                 continue
             new = _new_path(old_pattern, new_pattern, old)
             holders = [_get(data, new[:k]) for k in range(len(new))]
@@ -79,34 +89,41 @@ def rename_keys(
                 holder is None or isinstance(holder, _NESTED) for holder in holders
             ):
                 continue  # the new place cannot exist: the schema reports what is wrong
-            _warn(location(old), old, new)
+            _warn(location(old), f"{written(old)} is now {written(new)}")
             _move(data, old, new)
             for path in [path for path in origins if path[: len(old)] == old]:
                 origins[(*new, *path[len(old) :])] = origins.pop(path)
 
 
-def current_keys(keys: Sequence[str], where: str) -> list[str]:
+def current_keys(
+    keys: Sequence[str], where: str, data: dict[str, Any] | None = None
+) -> list[str]:
     """Return the parts of a key path with their new names; warn if one is renamed.
 
     Args:
         keys: The parts, as text: those of ``--set`` or ``--over``.
         where: The file and line, or the option, for the warning.
+        data: The configuration; without it, a key whose new name depends on a type
+            keeps its old name.
     """
     current: KeyPath = tuple(keys)
     for old_pattern, new_pattern, kind in RENAMED:
-        if kind is not None:
-            continue  # the type is not known here
         old = current[: len(old_pattern)]
-        if _fits(old, old_pattern):
-            new = _new_path(old_pattern, new_pattern, old)
-            _warn(where, old, new)
-            current = (*new, *current[len(old) :])
+        if not _fits(old, old_pattern):
+            continue
+        if kind is not None:
+            if data is None:
+                break
+            if _get(data, (*old[:-1], "type")) != kind:
+                continue
+        new = _new_path(old_pattern, new_pattern, old)
+        _warn(where, f"{written(old)} is now {written(new)}")
+        current = (*new, *current[len(old) :])
     return [str(part) for part in current]
 
 
-def _warn(where: str, old: KeyPath, new: KeyPath) -> None:
-    message = f"{where}: {written(old)} is now {written(new)}"
-    warnings.warn(message, RenamedKeyWarning, stacklevel=4)
+def _warn(where: str, message: str) -> None:
+    warnings.warn(f"{where}: {message}", RenamedKeyWarning, stacklevel=4)
 
 
 def _fits(path: KeyPath, pattern: KeyPath) -> bool:
@@ -137,8 +154,8 @@ def _matches(value: Any, pattern: KeyPath, path: KeyPath = ()) -> Iterator[KeyPa
 def _get(data: Any, path: KeyPath) -> Any:
     """Return the value at a key path, None if there is none."""
     for part in path:
-        if isinstance(data, list) and isinstance(part, int):
-            data = data[part] if part < len(data) else None
+        if isinstance(data, list) and str(part).isdecimal():
+            data = data[int(part)] if int(part) < len(data) else None
         else:
             data = data.get(part) if isinstance(data, dict) else None
     return data

@@ -5,9 +5,11 @@ same name. Units are SI: metres, radians, seconds.
 """
 
 from collections.abc import Sequence
+from copy import deepcopy
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
+from pydantic.json_schema import GenerateJsonSchema
 
 from hsp_control.config.models.base import Model
 from hsp_control.config.models.compensation import CompensationModel
@@ -20,7 +22,9 @@ from hsp_control.config.models.view import ViewModel
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.changes import Change
+from hsp_control.declaration import Part
 from hsp_control.declaration.named import BY_NAME
+from hsp_control.declaration.plain_data import plain_data
 from hsp_control.declaration.quantities import Name
 from hsp_control.geometry.scene import Scene
 from hsp_control.tasks import Task
@@ -69,10 +73,30 @@ class Scenario(Model):
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a configuration, for editors."""
-    schema = Scenario.model_json_schema()
+    schema = Scenario.model_json_schema(schema_generator=_Generator)
     for model in schema["$defs"].values():
         if "const" in (kind := model.get("properties", {}).get("type", {})):
             kind.setdefault("description", f"{kind['const']}: {model['description']}")
+    _name_added_tasks(schema["$defs"])
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "hsp_control configuration"
     return schema
+
+
+class _Generator(GenerateJsonSchema):
+    """Pydantic's generator, with the defaults as YAML would give them."""
+
+    def encode_default(self, dft: Any) -> Any:
+        """Return a default as plain data."""
+        return plain_data(dft, defaults=not isinstance(dft, Part))
+
+
+def _name_added_tasks(definitions: dict[str, Any]) -> None:
+    """Let a task have a name where no key of a mapping is its name: in a change."""
+    name = {"type": "string", "description": Task.documentation["name"]}
+    for option in definitions["AddTask"]["properties"]["task"]["oneOf"]:
+        task = option["$ref"].removeprefix("#/$defs/")
+        added = deepcopy(definitions[task])
+        added["properties"]["name"] = name
+        definitions[f"Added{task}"] = added
+        option["$ref"] = f"#/$defs/Added{task}"

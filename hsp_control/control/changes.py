@@ -3,13 +3,14 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, replace
-from typing import Annotated, Self
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
 from pydantic import AfterValidator
 
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.constraints.limits import Limits
 from hsp_control.control.composition import check_tasks, checked_gain
 from hsp_control.control.evolution import ABSENT
 from hsp_control.control.setup import (
@@ -18,11 +19,20 @@ from hsp_control.control.setup import (
     planned_task,
     planned_terms,
 )
-from hsp_control.declaration import Part, within
+from hsp_control.declaration import AnyOf, Part, within
 from hsp_control.declaration.quantities import Flag, Gain, NonNegative, Number
+from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.tasks import Gains, Task
+from hsp_control.trajectories import (
+    Crossfade,
+    OrientationTrajectory,
+    PoseTrajectory,
+    Trajectory,
+    crossfade,
+)
+from hsp_control.trajectories.crossfade import AnyReference
 
 
 class Change(Part, ABC, family="changes", error=ControllerError):
@@ -39,6 +49,11 @@ class Change(Part, ABC, family="changes", error=ControllerError):
     ramp: NonNegative = 0.3
     """How long it takes [s]; 0 is a jump."""
 
+    @property
+    def end(self) -> float:
+        """When it is complete [s]."""
+        return self.at + self.ramp
+
     @abstractmethod
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with this change, after all earlier ones.
@@ -47,8 +62,13 @@ class Change(Part, ABC, family="changes", error=ControllerError):
             ControllerError: If it names something that does not exist then.
         """
 
-    def placed(self, start: Start) -> Self:
-        """Return the change with its parts placed; see `Task.placed`."""
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change with its parts placed; see `Task.placed`.
+
+        Args:
+            start: Where the robot is when the change is made.
+            setup: The setup with all earlier changes.
+        """
         return self
 
 
@@ -59,7 +79,7 @@ class AddTask(Change, type="add_task"):
     """The task; what is relative in it counts from where the robot is when the change
     is made."""
 
-    def placed(self, start: Start) -> Self:
+    def placed(self, start: Start, setup: Setup) -> Self:
         """Return the change with its task placed."""
         with within("task"):
             return replace(self, task=self.task.placed(start))
@@ -68,10 +88,9 @@ class AddTask(Change, type="add_task"):
         """Return the setup with the task; see `Change.apply`."""
         there = [each.task for each in setup.tasks if each.presence.target == 1.0]
         check_tasks([*there, self.task], setup.start.state.robot)
-        key = 1 + max((each.key for each in setup.tasks), default=-1)
         presence = ABSENT.then(self.at, self.ramp, 1.0)
-        added = planned_task(key, self.task, presence)
-        return replace(setup, tasks=(*setup.tasks, added))
+        added = planned_task(setup.count, self.task, presence)
+        return replace(setup, tasks=(*setup.tasks, added), count=setup.count + 1)
 
 
 class RemoveTask(Change, type="remove_task"):
@@ -112,13 +131,43 @@ class ChangeGains(Change, type="gains"):
         return setup.with_task(k, gains=planned.gains.then(self.at, self.ramp, target))
 
 
+class ChangeReference(Change, type="reference"):
+    """The trajectory of a task changes to another one; C² if both are."""
+
+    task: str
+    """Name of the task."""
+    trajectory: Annotated[
+        Trajectory | OrientationTrajectory | PoseTrajectory,
+        AnyOf(PoseTrajectory, Trajectory, OrientationTrajectory),
+    ]
+    """The new trajectory, in the task's unit; what is relative in it counts from where
+    the robot is when the change is made."""
+
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change with its trajectory in the world."""
+        task = setup.tasks[setup.find_task(self.task)].task
+        followed = task.following(self.trajectory).placed(start).followed
+        assert followed is not None
+        return replace(self, trajectory=followed)
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the trajectory; see `Change.apply`."""
+        k = setup.find_task(self.task)
+        task = setup.tasks[k].task
+        assert task.followed is not None
+        changed = crossfade(
+            task.followed, self.trajectory, start_time=self.at, duration=self.ramp
+        )
+        return setup.with_task(k, task=task.following(changed))
+
+
 class ChangeField(Change, type="field"):
     """The null-space field changes to another one; Proposition 2 holds throughout."""
 
     fields: Annotated[Sequence[NullSpaceField], AfterValidator(tuple)]
     """The new fields; their sum is used. Without fields, self-motion comes to rest."""
 
-    def placed(self, start: Start) -> Self:
+    def placed(self, start: Start, setup: Setup) -> Self:
         """Return the change with its fields placed."""
         placed = []
         for k, field in enumerate(self.fields):
@@ -207,6 +256,73 @@ class ChangeContact(Change, type="contact"):
         return replace(setup, contacts=tuple(contacts))
 
 
+class MoveObstacle(Change, type="obstacle"):
+    """An obstacle leaves its trajectory for another one; C² if both are."""
+
+    obstacle: str
+    """Name of the obstacle in the scene."""
+    center: Trajectory
+    """The new trajectory of its frame's origin in the world [m]."""
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the obstacle wherever it counts; see `Change.apply`."""
+        scene = setup.start.scene
+        with within("obstacle"):
+            old = scene[self.obstacle]
+        center = Crossfade(
+            old.center, self.center, start_time=self.at, duration=self.ramp
+        )
+        new = replace(old, center=center)
+        moved = Scene([new if each == old else each for each in scene.values()])
+        terms = tuple(
+            replace(each, field=_exchanged(each.field, old, new))
+            for each in setup.terms
+        )
+        distances = tuple(
+            (_exchanged(each, old, new), count)
+            for each, count in setup.limits.distances
+        )
+        return replace(
+            setup,
+            start=setup.start._replace(scene=moved),
+            terms=terms,
+            limits=replace(setup.limits, distances=distances),
+        )
+
+
+Holder = TypeVar("Holder", bound=Part)
+
+
+def _exchanged(part: Holder, old: Obstacle, new: Obstacle) -> Holder:
+    """Return a part in which one obstacle is replaced by another one."""
+    changes: dict[str, Any] = {}
+    for name, value in part.all_fields().items():
+        if value == old:
+            changes[name] = new
+        elif isinstance(value, tuple) and old in value:
+            changes[name] = tuple(new if each == old else each for each in value)
+    return replace(part, **changes) if changes else part  # type: ignore[type-var]
+
+
+class ChangeLimits(Change, type="limits"):
+    """The limits change to other ones; each number goes there smoothly."""
+
+    limits: Limits
+    """The new limits."""
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the limits; see `Change.apply`.
+
+        Raises:
+            LimitError: If they do not fit the robot.
+        """
+        robot = setup.start.state.robot
+        with within("limits"):
+            numbers = self.limits.placed(setup.start)
+            limits = setup.limits.then(self.at, self.ramp, numbers, robot)
+        return replace(setup, limits=limits)
+
+
 class Changes:
     """Makes changes that begin at one time: what `Controller.at` returns.
 
@@ -237,6 +353,11 @@ class Changes:
         """Change the gains of a task; see `ChangeGains`."""
         return self._do(ChangeGains(task, gains, at=self._at, ramp=self._ramp))
 
+    def reference(self, task: str, trajectory: AnyReference) -> Self:
+        """Change the trajectory of a task; see `ChangeReference`."""
+        at, ramp = self._at, self._ramp
+        return self._do(ChangeReference(task, trajectory, at=at, ramp=ramp))
+
     def field(self, *fields: NullSpaceField) -> Self:
         """Change to another field, or to the sum of several; see `ChangeField`."""
         return self._do(ChangeField(fields, at=self._at, ramp=self._ramp))
@@ -248,6 +369,14 @@ class Changes:
     def null_space_gain(self, gain: Gain) -> Self:
         """Change the null-space gain; see `ChangeNullSpaceGain`."""
         return self._do(ChangeNullSpaceGain(gain, at=self._at, ramp=self._ramp))
+
+    def obstacle(self, obstacle: str, center: Trajectory) -> Self:
+        """Move an obstacle on another trajectory; see `MoveObstacle`."""
+        return self._do(MoveObstacle(obstacle, center, at=self._at, ramp=self._ramp))
+
+    def limits(self, limits: Limits) -> Self:
+        """Change the limits; see `ChangeLimits`."""
+        return self._do(ChangeLimits(limits, at=self._at, ramp=self._ramp))
 
     def contact(self, contact: str, *, bears: bool) -> Self:
         """Lift a contact, or set it down; see `ChangeContact`."""

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError, ControllerError, GainError
 from hsp_control.constraints.contacts import Contact
+from hsp_control.declaration import within
 from hsp_control.null_space.metrics import Metric, MetricSample
 from hsp_control.null_space.metrics.metric import VARYING
 from hsp_control.robot import Robot
@@ -19,6 +20,21 @@ Base = Literal["flying", "driven"]
 """What else than contacts acts on a free-flyer root: nothing, or an outside device."""
 
 
+def check_kind(what: str, value: object, kind: type) -> None:
+    """Check that an argument is of the right kind.
+
+    Raises:
+        ControllerError: Contains the value.
+    """
+    if isinstance(value, kind):
+        return
+    if kind is Task and isinstance(value, list | tuple):
+        raise ControllerError(
+            "tasks contains lists; write the level as priority=1, 2, ... of each task"
+        )
+    raise ControllerError(f"{what} {value!r}, which is not a {kind.__name__}")
+
+
 def check_tasks(tasks: Sequence[Task], robot: Robot) -> None:
     """Check that there are tasks, that their names differ, and that no level is large.
 
@@ -27,9 +43,6 @@ def check_tasks(tasks: Sequence[Task], robot: Robot) -> None:
     """
     if not tasks:
         raise ControllerError("a controller needs at least one task")
-    for each in tasks:
-        if not isinstance(each, Task):
-            raise ControllerError(f"tasks contains {each!r}, which is not a task")
     names = [task.name for task in tasks]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
@@ -99,10 +112,11 @@ def check_support(robot: Robot, contacts: Sequence[Contact], base: Base | None) 
         raise ContactError(f"base is {base!r}; needs 'flying', 'driven' or None")
     if not robot.unactuated:
         if contacts or base is not None:
-            raise ContactError(
-                f"{robot.name} has no free-flyer root: contacts and base are only for "
-                "robots with a floating base"
-            )
+            with within("contacts" if contacts else "base"):
+                raise ContactError(
+                    f"{robot.name} has no free-flyer root: contacts and base are only "
+                    "for robots with a floating base"
+                )
         return
     if not contacts and base is None:
         raise ContactError(
@@ -111,7 +125,10 @@ def check_support(robot: Robot, contacts: Sequence[Contact], base: Base | None) 
             "moves it)"
         )
     if contacts and base == "driven":
-        raise ContactError("base='driven' needs no contacts, but contacts are given")
+        with within("base"):
+            raise ContactError(
+                "base='driven' needs no contacts, but contacts are given"
+            )
     names = [contact.name for contact in contacts]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from threading import Lock
 from typing import Any, overload
 
@@ -18,6 +18,7 @@ from hsp_control.control.actuation import Actuation
 from hsp_control.control.changes import Change, Changes
 from hsp_control.control.composition import (
     Base,
+    check_kind,
     check_support,
     check_tasks,
     checked_gain,
@@ -26,6 +27,7 @@ from hsp_control.control.composition import (
 from hsp_control.control.evolution import PRESENT, Evolution
 from hsp_control.control.output import ControlOutput, Diagnostics
 from hsp_control.control.planned_contact import PlannedContact
+from hsp_control.control.planned_limits import PlannedLimits
 from hsp_control.control.read_only import read_only
 from hsp_control.control.setup import (
     PlannedTerm,
@@ -44,6 +46,7 @@ from hsp_control.null_space.metrics import IdentityMetric, Metric
 from hsp_control.null_space.metrics.metric import CONSTANT
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
+from hsp_control.tasks.gains import as_gain
 from hsp_control.tasks.task import Feedback
 
 AccelerationModifier = Callable[
@@ -67,8 +70,8 @@ class Controller:
     the effort rate is limited (see `applied`).
 
     The parts are values and do not change; `at` makes changes while the controller
-    runs. What they leave relative (trajectories without a centre, ``target="start"``) refers
-    to ``start``, or else to the first state for which an effort is computed. A
+    runs. What they leave relative (a circle without a centre, ``target="start"``)
+    refers to ``start``, or else to the first state for which an effort is computed. A
     controller can be copied and pickled at any time; several threads may share it.
     """
 
@@ -129,18 +132,25 @@ class Controller:
         self._declared_limits = limits
         self._declared_contacts = tuple(contacts)
         self._declared_metric = IdentityMetric() if metric is None else metric
+        for task in self._declared_tasks:
+            check_kind("tasks contains", task, Task)
+        for contact in self._declared_contacts:
+            check_kind("contacts contains", contact, Contact)
+        check_kind("field is", self._declared_field, NullSpaceField)
+        check_kind("metric is", self._declared_metric, Metric)
+        if limits is not None:
+            check_kind("limits is", limits, Limits)
         self._base = base
         self._scene = scene if isinstance(scene, Scene) else Scene(scene)
         self._threshold = float(singularity_threshold)
-        self._changes: tuple[Change, ...] = ()
+        self._changes = tuple(changes)
         self._given_start = None
         if start is not None:
             self._given_start = robot.check_configuration(start).copy()
         check_support(robot, self._declared_contacts, base)
-        self._declared_gain = np.array(null_space_gain, dtype=float)
+        with within("null_space", "gain"):
+            self._declared_gain = as_gain(null_space_gain, "null_space_gain")
         self._allocate()
-        for change in changes:
-            self.change(change)
 
     def _allocate(self) -> None:
         """Set up what a copy has of its own, and compose the parts."""
@@ -150,6 +160,7 @@ class Controller:
         self._modified, self._mixed = np.zeros((2, robot.nv))
         self._gain = np.zeros((robot.nv, robot.nv))
         self._feedback: dict[int, Feedback] = {}
+        self._by_key: dict[int, Task] = {}
         self._stacks: dict[tuple[int, ...], ActiveStack] = {}
         self._field: NullSpaceField = Rest()
         self._now, self._begun = -np.inf, False
@@ -164,9 +175,10 @@ class Controller:
         robot = self._robot
         tasks = []
         for task in self._declared_tasks:
-            with within("tasks", getattr(task, "name", repr(task))):
+            with within("tasks", task.name):
                 tasks.append(task.placed(start))
-        check_tasks(tasks, robot)
+        with within("tasks"):
+            check_tasks(tasks, robot)
         with within("null_space", "metric"):
             metric = self._declared_metric.placed(start)
         with within("null_space", "gain"):
@@ -183,8 +195,9 @@ class Controller:
         if self._declared_limits is not None:
             with within("limits"):
                 limits = self._declared_limits.placed(start)
+        planned = PlannedLimits.of(limits, robot)
         self._actuation = Actuation(
-            robot, limits, () if self._base == "driven" else robot.unactuated
+            robot, planned, () if self._base == "driven" else robot.unactuated
         )
         self._start = start
         self._settled = Setup(
@@ -194,10 +207,19 @@ class Controller:
             tuple(fields),
             Evolution(gain),
             tuple(contacts),
+            planned,
+            len(tasks),
         )
-        self._open = [_placed(change, start) for change in self._changes]
+        # In order of time: a change may refer to what an earlier one has made.
+        order = sorted(range(len(self._changes)), key=lambda k: self._changes[k].at)
+        setup, placed = self._settled, []
+        for k in order:
+            with within("changes", k):
+                placed.append(self._changes[k].placed(start, setup))
+                setup = placed[-1].apply(setup)
         self._stacks.clear()
-        self._install(_applied(self._open, self._settled))
+        self._install(setup)
+        self._open = tuple(placed)
 
     def _install(self, setup: Setup) -> None:
         """Let the steps follow a setup; what stays the same is not compiled again."""
@@ -205,21 +227,43 @@ class Controller:
         field = setup.field
         if field != self._field:
             self._field = field
+        known = {id(task): self._feedback[key] for key, task in self._by_key.items()}
+        by_key = {each.key: each.task for each in setup.tasks}
+        if any(self._by_key.get(key, task) is not task for key, task in by_key.items()):
+            self._stacks.clear()
         self._feedback = {
-            each.key: self._feedback.get(each.key) or each.task.feedback()
-            for each in setup.tasks
+            key: known.get(id(task)) or self._feedback_of(key, task)
+            for key, task in by_key.items()
         }
+        self._by_key = by_key
+        self._written: set[int] = set()
+        self._fading = [each for each in setup.tasks if not each.always]
         self._levels = levels_of(setup.tasks, self._robot)
         self._steady = setup.steady and setup.end == -np.inf
         self._active: ActiveStack | None = None
-        self._write_gains(self._now)
+        self._actuation.plan(setup.limits, self._latest)
+        self._write_gains(self._latest)
+
+    def _feedback_of(self, key: int, task: Task) -> Feedback:
+        """Return the feedback of a task that is new, or follows a new trajectory."""
+        old = self._by_key.get(key)
+        if old is not None and old.name == task.name and old.rows == task.rows:
+            return self._feedback[key]
+        return task.feedback()
 
     def _write_gains(self, t: float) -> None:
         """Write the gains of a time; every step reads these arrays."""
         for each in self._setup.tasks:
-            feedback = self._feedback[each.key]
-            feedback.Kp[:], feedback.Kv[:] = each.gains.at(t)
+            if not (each.gains.constant and each.key in self._written):
+                feedback = self._feedback[each.key]
+                feedback.Kp[:], feedback.Kv[:] = each.gains.at(t)
+        self._written = set(self._by_key)
         self._gain[:] = self._setup.gain.at(t)
+
+    @property
+    def _latest(self) -> float:
+        """The latest time of a step [s]; -inf before the first one."""
+        return max(self._now, self._state.t) if self._begun else -np.inf
 
     def _begin(self, state: RobotState) -> None:
         """Place what is relative at the first state, unless a start was given."""
@@ -355,6 +399,7 @@ class Controller:
         with self._lock:
             self._actuation.forget()
             self._now, self._begun = -np.inf, False
+            self._active = None  # the next step places what is relative
             for feedback in self._feedback.values():
                 feedback.offset[:] = 0.0
             if self._changes:
@@ -376,11 +421,12 @@ class Controller:
         if not self._begun:
             self._begin(self._state)
         self._now = max(self._now, t)
-        if self._setup.end > -np.inf:
-            if self._now > self._setup.end + _MEMORY:
-                self._settle()
+        if self._open:
+            if self._now > self._open[0].end + _MEMORY:
+                self._settle(self._now - _MEMORY)
             self._write_gains(t)
-        weights = {each.key: each.weight(t) for each in self._setup.tasks}
+            self._actuation.update_limits(t)
+        weights = {each.key: each.weight(t) for each in self._fading}
         coming = sorted(
             (key for key, w in weights.items() if 0.0 < w < 1.0),
             key=lambda key: -weights[key],
@@ -401,11 +447,12 @@ class Controller:
             a = mixed
         return a, outcome
 
-    def _settle(self) -> None:
-        """Forget the changes that are complete."""
-        self._settled = self._setup.settled(self._setup.end)
-        self._open = []
-        self._install(self._settled)
+    def _settle(self, t: float) -> None:
+        """Forget the changes that were complete at a time, and all changes before."""
+        done = list(takewhile(lambda each: each.end <= t, self._open))
+        self._settled = _applied(done, self._settled).settled(t)
+        self._open = self._open[len(done) :]
+        self._install(_applied(self._open, self._settled))
 
     def _stack_without(self, t: float, off: Set[int]) -> ActiveStack:
         """Return the stack of the contacts that are active now, without some tasks."""
@@ -447,19 +494,21 @@ class Controller:
             HspControlError: If its parts do not fit the robot.
         """
         with self._lock:
-            start = self._start
+            start, now = self._start, self._latest
             if self._begun:
-                change = replace(change, at=max(change.at, self._now))
+                change = replace(change, at=max(change.at, now))
                 state = self._state
                 here = self._robot.state(state.t, state.q, state.v)
                 start = Start(here, self._scene)
-            placed = _placed(change, start)
-            self._install(_applied([*self._open, placed], self._settled))
-            self._open.append(placed)
-            made = (*self._changes, placed if self._begun else change)
-            self._changes = tuple(sorted(made, key=lambda each: each.at))
+            earlier = [each for each in self._open if each.at <= change.at]
+            placed = change.placed(start, _applied(earlier, self._settled))
+            opened = _in_order((*self._open, placed))
+            self._install(_applied(opened, self._settled))
+            self._open = opened
+            made = placed if self._begun else change
+            self._changes = (*self._changes, made)
             if self._begun:  # compile now, not in a step
-                self._stack_without(self._now, set()).prepare()
+                self._stack_without(now, set()).prepare()
 
     # -- what it is made of -----------------------------------------------------------
 
@@ -476,7 +525,7 @@ class Controller:
     @read_only("use at(t).add(task) and at(t).remove(name)")
     def levels(self) -> tuple[tuple[Task, ...], ...]:
         """The tasks that count now or fade, by level, the highest priority first."""
-        now = self._now
+        now = self._latest
         levels = [
             tuple(each.task for each in level if each.presence.at(now) > 0.0)
             for level in self._levels
@@ -498,7 +547,7 @@ class Controller:
         """The joint-space metric."""
         return self._setup.metric
 
-    @read_only("use at(t).limits(...)")
+    @read_only()
     def limits(self) -> RobotLimits | None:
         """The limits, as numbers of this robot."""
         return self._actuation.limits
@@ -513,15 +562,15 @@ class Controller:
         """What else than contacts acts on a floating base."""
         return self._base
 
-    @read_only()
+    @read_only("use at(t).obstacle(name, center)")
     def scene(self) -> Scene:
         """The obstacles that fields and limits name."""
-        return self._scene
+        return self._setup.start.scene
 
     @read_only("use at(t)")
     def changes(self) -> tuple[Change, ...]:
         """All changes that were made, in order of their times."""
-        return self._changes
+        return tuple(sorted(self._changes, key=lambda each: each.at))
 
     @read_only("call compute")
     def state(self) -> RobotState:
@@ -650,7 +699,7 @@ class Controller:
             "begun": self._begun,
             "start": self._start,
             "settled": self._settled,
-            "open": list(self._open),
+            "open": self._open,
             "now": self._now,
             "at": (state.t, state.q.copy(), state.v.copy()),
             "offsets": {k: each.offset.copy() for k, each in self._feedback.items()},
@@ -686,14 +735,13 @@ _DECLARED = (
 """The attributes from which all others are made."""
 
 
-def _placed(change: Change, start: Start) -> Change:
-    with within("changes", type(change).yaml_type or type(change).__name__):
-        return change.placed(start)
+def _in_order(changes: Iterable[Change]) -> tuple[Change, ...]:
+    """Return changes in order of time; those of one time in their order."""
+    return tuple(sorted(changes, key=lambda change: change.at))
 
 
-def _applied(changes: Sequence[Change], setup: Setup) -> Setup:
+def _applied(changes: Iterable[Change], setup: Setup) -> Setup:
     """Return the setup with changes, in order of time."""
-    for change in sorted(changes, key=lambda each: each.at):
-        with within("changes", type(change).yaml_type or type(change).__name__):
-            setup = change.apply(setup)
+    for change in _in_order(changes):
+        setup = change.apply(setup)
     return setup

@@ -90,6 +90,8 @@ class Evolution(Generic[Value]):
         x: Value = self.initial
         x_dot: Value = 0.0 * x
         for each in self.transitions:
+            if each.start > t:
+                break
             s, s_dot = each.share(t)
             if s == 1.0:
                 x, x_dot = each.target, 0.0 * each.target

@@ -12,6 +12,7 @@ from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.control.composition import priority_of
 from hsp_control.control.evolution import ABSENT, PRESENT, Evolution, EvolvingWeight
 from hsp_control.control.planned_contact import PlannedContact
+from hsp_control.control.planned_limits import PlannedLimits
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import FieldSum, NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
@@ -83,6 +84,8 @@ class Setup:
         terms: The terms of the field; their sum is the field.
         gain: K_N, shape (nv, nv) [1/s].
         contacts: The contacts.
+        limits: The limits.
+        count: How many tasks there have ever been; the next one has this key.
     """
 
     start: Start
@@ -91,6 +94,8 @@ class Setup:
     terms: tuple[PlannedTerm, ...]
     gain: Evolution[Array]
     contacts: tuple[PlannedContact, ...]
+    limits: PlannedLimits
+    count: int
 
     @property
     def field(self) -> NullSpaceField:
@@ -110,7 +115,7 @@ class Setup:
             *(term.presence for term in self.terms),
             *(contact.presence for contact in self.contacts),
         ]
-        return max(each.end for each in evolutions)
+        return max(self.limits.end, *(each.end for each in evolutions))
 
     @property
     def steady(self) -> bool:
@@ -164,6 +169,8 @@ class Setup:
             tuple(each for each in terms if each.presence != ABSENT),
             self.gain.settled(t),
             tuple(contacts),
+            self.limits.settled(t),
+            self.count,
         )
 
 

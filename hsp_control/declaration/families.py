@@ -8,6 +8,7 @@ from pydantic_core import CoreSchema, SchemaValidator, core_schema
 
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.declaration.plain import joined
+from hsp_control.declaration.quantities import plain
 
 if TYPE_CHECKING:
     from hsp_control.declaration.part import Part
@@ -117,7 +118,7 @@ class AnyOf:
         if self._validator is None or members != self._checked:
             self._checked = members
             self._validator = SchemaValidator(_union(members))
-        return self._validator.validate_python(value)
+        return self._validator.validate_python(plain(value))
 
     def core_schema(self) -> CoreSchema:
         """Return pydantic's schema."""
@@ -149,10 +150,14 @@ def _described(name: str, member: "type[Part]", handler: GetJsonSchemaHandler) -
     reference = handler(definition)
     if full_name in _UNDER_WAY or _is_known(reference, handler):
         return reference
-    schema = {**member.__pydantic_core_schema__, "ref": full_name}
+    schema: Any = member.__pydantic_core_schema__
+    others: list[CoreSchema] = []
+    if schema["type"] == "definitions":
+        schema, others = schema["schema"], schema["definitions"]
+    own = cast(CoreSchema, {**schema, "ref": full_name})
     _UNDER_WAY.add(full_name)
     try:
-        handler(core_schema.definitions_schema(definition, [cast(CoreSchema, schema)]))
+        handler(core_schema.definitions_schema(definition, [own, *others]))
     finally:
         _UNDER_WAY.discard(full_name)
     described = handler.resolve_ref_schema(reference)

@@ -75,7 +75,8 @@ def findings(
     if expected.discriminator is not None:
         choices = tagged(expected.options, expected.discriminator)
         for tag, inner in below.items():
-            found += findings(document, shape(choices.get(tag, Any)), inner, path)
+            chosen = shape(choices.get(tag, Any))._replace(tag=expected.discriminator)
+            found += findings(document, chosen, inner, path)
         return found
     if len(expected.options) == 1:
         for key, inner in below.items():
@@ -95,7 +96,7 @@ def findings(
 def _here(path: KeyPath, expected: Shape, error: ErrorDetails) -> Finding:
     """Return the finding for an error of the value at ``path`` itself."""
     kind, value = error["type"], error["input"]
-    if kind.endswith(("_type", "_parsing", "_from_float")):
+    if kind.endswith(("_type", "_parsing", "_from_float")) or _not_a_list(error):
         kind = "mismatch"
     if kind in ("extra_forbidden", "missing"):  # its key is not known
         kind = "other"
@@ -107,6 +108,12 @@ def _here(path: KeyPath, expected: Shape, error: ErrorDetails) -> Finding:
         elif kind == "union_tag_not_found" and (misspelt := nearest(tag, unknown)):
             path, kind, value = (*path, misspelt), "misspelt_tag", misspelt
     return Finding(path, kind, value, expected, error)
+
+
+def _not_a_list(error: ErrorDetails) -> bool:
+    if error["type"] == "is_instance_of":
+        return bool(error["ctx"]["class"] == "Sequence")
+    return error["type"] == "sequence_str"
 
 
 def _at_key(

@@ -1,5 +1,6 @@
 """One error for the wrong arguments of a part, in the words of the package."""
 
+import dataclasses
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -8,7 +9,7 @@ from pydantic import ValidationError
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.declaration.findings import Finding, findings
 from hsp_control.declaration.keys import KeyPath, written
-from hsp_control.declaration.schema import fields, shape
+from hsp_control.declaration.schema import shape
 from hsp_control.declaration.wording import explained
 
 if TYPE_CHECKING:
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
 
 def argument_error(cls: "type[Part]", error: ValidationError) -> HspControlError:
     """Return the part's own error for what pydantic found wrong with its arguments."""
-    names = [name for name, field in fields(cls).items() if not field.kw_only]
+    fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+    names = [field.name for field in fields if not field.kw_only]
     pending = []
     for each in error.errors(include_url=False):
         path = each["loc"]

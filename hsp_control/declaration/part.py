@@ -19,6 +19,7 @@ from pydantic_core import CoreSchema
 
 from hsp_control.common.exceptions import HspControlError, ImmutableError
 from hsp_control.declaration.docstrings import attribute_docstrings
+from hsp_control.declaration.equality import same
 from hsp_control.declaration.families import Family
 from hsp_control.declaration.mistakes import argument_error
 from hsp_control.declaration.plain_data import plain_data
@@ -98,7 +99,10 @@ class Part:
         if family is not None:
             cls.family = Family(family, cls)
         cls.yaml_type = type
-        cls.documentation = {**cls.documentation, **attribute_docstrings(cls)}
+        inherited: dict[str, str] = {}
+        for base in reversed(cls.__mro__[1:]):
+            inherited |= vars(base).get("documentation", {})
+        cls.documentation = inherited | attribute_docstrings(cls)
         if "__post_init__" in vars(cls):
             cls.__post_init__ = _completed(cls.__post_init__)  # type: ignore[assignment,method-assign]
         hidden = _hide_properties(cls)
@@ -135,12 +139,14 @@ class Part:
         """Add the docstrings of the fields to a JSON schema of the part, in place."""
         if cls.yaml_key is not None:
             schema.get("properties", {}).pop(cls.yaml_key, None)
-            required = schema.get("required", [])
-            schema["required"] = [name for name in required if name != cls.yaml_key]
+            if cls.yaml_key in schema.get("required", []):
+                schema["required"].remove(cls.yaml_key)
         for name, about in schema.get("properties", {}).items():
             about.pop("title", None)
             if "oneOf" in about:  # a part; its default would need its type
                 about.pop("default", None)
+            if about.get("type") == "object" and about.get("default") == []:
+                about["default"] = {}  # no parts, by name
             if name in cls.documentation:
                 about["description"] = cls.documentation[name]
 
@@ -180,7 +186,7 @@ class Part:
         if not isinstance(other, Part) or type(self) is not type(other):
             return NotImplemented
         return all(
-            _same(getattr(self, f.name), getattr(other, f.name))
+            same(getattr(self, f.name), getattr(other, f.name))
             for f in value_fields(self)
         )
 
@@ -287,23 +293,7 @@ def _is_default(part: Part, field: "Field[Any]") -> bool:
         return False
     else:
         default = field.default
-    return _same(getattr(part, field.name), default)
-
-
-def _same(a: Any, b: Any) -> bool:
-    """Return whether two values of a field are equal; arrays entry by entry."""
-    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
-        if a is None or b is None:
-            return a is b
-        try:
-            return bool(np.array_equal(a, b))
-        except (TypeError, ValueError):
-            return False
-    if isinstance(a, tuple | list) and type(a) is type(b):
-        return len(a) == len(b) and all(map(_same, a, b))
-    if isinstance(a, dict) and isinstance(b, dict):
-        return a.keys() == b.keys() and all(_same(a[key], b[key]) for key in a)
-    return bool(a == b)
+    return same(getattr(part, field.name), default)
 
 
 def _hashable(value: Any) -> Any:

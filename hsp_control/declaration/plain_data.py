@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_origin
 
 import numpy as np
 from pydantic import BaseModel
 
 from hsp_control.common.exceptions import ConfigError
+from hsp_control.declaration import schema
+from hsp_control.declaration.equality import same
 from hsp_control.declaration.located import within
 
 if TYPE_CHECKING:
@@ -37,26 +39,11 @@ def plain_data(value: Any, *, defaults: bool = False) -> Any:
     if isinstance(value, BaseModel):
         return _of_model(value, defaults)
     if isinstance(value, Mapping):
-        return {key: _inside(key, each, defaults) for key, each in value.items()}
+        return {key: _entry(key, each, defaults) for key, each in value.items()}
     if isinstance(value, list | tuple):
         return [_inside(k, each, defaults) for k, each in enumerate(value)]
     what = getattr(value, "__qualname__", None) or f"a {type(value).__name__}"
     raise ConfigError(f"YAML cannot say {what}: it is Python, not data")
-
-
-def named(parts: Any, *, defaults: bool = False) -> dict[str, Any]:
-    """Return parts as a mapping by name, whose entries do not repeat it.
-
-    Raises:
-        ConfigError: If YAML cannot say a part.
-    """
-    found = {}
-    for each in parts:
-        with within(each.name):
-            data = plain_data(each, defaults=defaults)
-        data.pop("name", None)
-        found[each.name] = data
-    return found
 
 
 def _of_part(part: "Part", defaults: bool) -> dict[str, Any]:
@@ -70,6 +57,8 @@ def _of_part(part: "Part", defaults: bool) -> dict[str, Any]:
         data["type"] = part.yaml_type
     fields = part.all_fields() if defaults else part.changed_fields()
     for name, value in fields.items():
+        if isinstance(value, tuple) and _is_mapping(part, name):
+            value = {getattr(each, each.yaml_key): each for each in value}
         data[name] = _inside(name, value, defaults)
     return data
 
@@ -78,11 +67,23 @@ def _of_model(model: BaseModel, defaults: bool) -> dict[str, Any]:
     data = {}
     for name, field in type(model).model_fields.items():
         value = getattr(model, name)
-        is_default = not field.is_required() and value == field.get_default(
-            call_default_factory=True
-        )
-        if defaults or not is_default:
+        default = field.get_default(call_default_factory=True)
+        if defaults or field.is_required() or not same(value, default):
             data[name] = _inside(name, value, defaults)
+    return data
+
+
+def _is_mapping(part: "Part", field: str) -> bool:
+    """Return whether YAML gives the parts that a field holds as a mapping by name."""
+    (option, *_) = schema.field_shape(schema.fields(type(part))[field]).options
+    return get_origin(option) is dict
+
+
+def _entry(key: Any, value: Any, defaults: bool) -> Any:
+    """Return an entry of a mapping; a part does not repeat the name that its key is."""
+    data = _inside(key, value, defaults)
+    if (name := getattr(value, "yaml_key", None)) is not None:
+        data.pop(name, None)
     return data
 
 

@@ -38,7 +38,18 @@ _PLAIN = BeforeValidator(plain)
 Number = Annotated[float, Strict(), Field(allow_inf_nan=False), _PLAIN]
 Positive = Annotated[float, Strict(), Field(gt=0.0, allow_inf_nan=False), _PLAIN]
 NonNegative = Annotated[float, Strict(), Field(ge=0.0, allow_inf_nan=False), _PLAIN]
+Share = Annotated[float, Strict(), Field(ge=0.0, lt=1.0, allow_inf_nan=False), _PLAIN]
+"""0 ≤ x < 1."""
+Fraction = Annotated[
+    float, Strict(), Field(gt=0.0, le=1.0, allow_inf_nan=False), _PLAIN
+]
+"""0 < x ≤ 1."""
+ProperFraction = Annotated[
+    float, Strict(), Field(gt=0.0, lt=1.0, allow_inf_nan=False), _PLAIN
+]
+"""0 < x < 1."""
 Count = Annotated[int, Strict(), Field(ge=0), _PLAIN]
+PositiveCount = Annotated[int, Strict(), Field(ge=1), _PLAIN]
 Flag = Annotated[bool, Strict()]
 Name = Annotated[
     str,
@@ -54,6 +65,16 @@ FileName = Annotated[
 """The path of a file, stored as text."""
 Names = Annotated[Sequence[str], AfterValidator(tuple)]
 """Names, stored as a tuple."""
+
+
+def _distinct_axes(letters: str) -> str:
+    if not letters or len(set(letters)) < len(letters) or set(letters) - set("xyz"):
+        raise ValueError(f"{letters!r} must be distinct letters of x, y and z")
+    return letters
+
+
+Axes = Annotated[str, AfterValidator(_distinct_axes)]
+"""World axes by their letters, such as ``xz``."""
 
 
 class ArrayField:

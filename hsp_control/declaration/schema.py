@@ -25,10 +25,12 @@ class Shape(NamedTuple):
     Attributes:
         options: The types; ``Any`` for a type whose inside is not known.
         metadata: Pydantic's constraints beside the type: bounds, discriminators.
+        tag: The key whose value chose this type among others, if one did.
     """
 
     options: tuple[Any, ...]
     metadata: tuple[Any, ...] = ()
+    tag: str | None = None
 
     @property
     def discriminator(self) -> str | None:
@@ -111,7 +113,9 @@ def keys(expected: Shape, *, required: bool = False) -> list[str]:
     found: dict[str, FieldInfo] = {}
     for option in expected.options:
         found |= fields(option)
-    return [key for key, info in found.items() if info.is_required() or not required]
+    names = [key for key, info in found.items() if info.is_required() or not required]
+    of_part = expected.tag is not None and expected.tag not in found
+    return [str(expected.tag), *names] if of_part else names
 
 
 def tagged(options: Iterable[Any], discriminator: str) -> dict[Any, Any]:

@@ -130,9 +130,13 @@ def _words(expected: Shape, *, many: bool = False) -> list[str]:
     """Return the types in plain words; an empty list if a type has no plain word."""
     found: list[str] = []
     for option in expected.options:
+        inner = shape(option)
         choices = [shown(choice) for choice in literals([option])]
-        words = choices or [_word(option, expected.bounds(), many=many)]
-        if not all(words):
+        if inner.options != (option,):  # an alias, or ``Annotated``
+            words = _words(inner, many=many)
+        else:
+            words = choices or [_word(option, expected.bounds(), many=many)]
+        if not (words and all(words)):
             return []
         found += [word for word in words if word not in found]
     return found

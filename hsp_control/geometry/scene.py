@@ -12,6 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SceneError, TrajectoryError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import Part
+from hsp_control.declaration.named import is_plain, with_name
 from hsp_control.declaration.quantities import ArrayField, Name
 from hsp_control.geometry.shapes import Shape
 from hsp_control.trajectories import (
@@ -39,6 +40,11 @@ def _in_space(center: Trajectory) -> Trajectory:
     return center
 
 
+def _or_world_axes(orientation: Any) -> Any:
+    """Return the world's axes for None, which logs of version 0.1 contain."""
+    return HoldOrientation((0.0, 0.0, 0.0)) if orientation is None else orientation
+
+
 def _from_world_axes(orientation: OrientationTrajectory) -> OrientationTrajectory:
     return orientation.anchored(np.eye(3))
 
@@ -54,9 +60,11 @@ class Obstacle(Part, error=SceneError):
     """Its shape, centred on its own frame [-]."""
     center: Annotated[Trajectory, AfterValidator(_in_space)]
     """Trajectory of its frame's origin in the world, of dimension 3 [m]."""
-    orientation: Annotated[OrientationTrajectory, AfterValidator(_from_world_axes)] = (
-        HoldOrientation((0.0, 0.0, 0.0))
-    )
+    orientation: Annotated[
+        OrientationTrajectory,
+        BeforeValidator(_or_world_axes),
+        AfterValidator(_from_world_axes),
+    ] = HoldOrientation((0.0, 0.0, 0.0))
     """Trajectory of its frame's orientation, body to world [-]; along the world's axes
     by default. One without a rotation begins along them."""
 
@@ -84,13 +92,13 @@ def _keyed(obstacles: Any) -> Any:
 
     Raises:
         SceneError: If two have the same name.
+        ConfigError: If data give a name beside the key.
     """
     if isinstance(obstacles, Mapping):
-        return {
-            key: {"name": key, **each} if isinstance(each, dict) else each
-            for key, each in obstacles.items()
-        }
+        return {key: with_name(key, each) for key, each in obstacles.items()}
     if isinstance(obstacles, str) or not isinstance(obstacles, Iterable):
+        return obstacles
+    if obstacles and is_plain(obstacles):
         return obstacles
     keyed: dict[Any, Any] = {}
     for each in obstacles:

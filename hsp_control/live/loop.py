@@ -105,6 +105,7 @@ def run_loop(
         loop_log = LoopLog(log, log_period, effort_source, scene, dict(meta or {}))
         loop_log.warm_up(reader, limiter)
         effort_source.restart()
+        effort_source.controller.compute(start_time, first.q, first.v)  # begins there
         safe_stop.begin()
         end = np.inf if duration is None else start_time + duration - 0.5 * period
         loop = _Loop(effort_source, hardware, reader, limiter, safe_stop, loop_log, end)

@@ -25,8 +25,9 @@ class OperatorRequests:
         """Request that a change is made between two periods, for example a new task.
 
         ``requests.call(lambda: controller.at(t).gains(...))``. If it raises, the
-        robot is stopped. The loop waits until it returns: build what it needs, and
-        compute once with it, before the call.
+        robot is stopped. The loop waits until it returns: a change of the controller
+        takes a few milliseconds. With a type of task or field that was never used it
+        takes longer, because kernels are compiled: compute once with it before.
         """
         self._changes.append(change)
 

@@ -310,7 +310,7 @@ class RobotState:
         self._centroidal: CentroidalMotion | None = None
         self._mass_matrix_rate: Array = np.zeros((robot.nv, robot.nv))
         self._displaced: RobotState | None = None
-        self._made: dict[int, tuple[object, Any]] = {}
+        self._made: dict[tuple[int, str], tuple[object, Any]] = {}
 
     def update(self, t: float, q: Array, v: Array) -> Self:
         """Move to time t [s], configuration q (nq,) and velocity v (nv,), in place.
@@ -432,18 +432,21 @@ class RobotState:
             )
         return self._world
 
-    def made(self, part: object, make: Callable[[], Made]) -> Made:
+    def made(self, part: object, what: str, make: Callable[[], Made]) -> Made:
         """Return what ``make`` returned for a part and this state; it is called once.
+
+        ``what`` tells apart what a class and its subclasses keep.
 
         Parts are values and have no memory. What they compute with at a state, such as
         buffers and compiled calls, is kept here, so that one part may serve many
         states, in many threads.
         """
-        found = self._made.get(id(part))
+        key = id(part), what
+        found = self._made.get(key)
         if found is None:
             if len(self._made) >= _MADE_LIMIT:
                 self._made.clear()
-            self._made[id(part)] = found = part, make()  # keeps the part, and its id
+            self._made[key] = found = part, make()  # keeps the part, and its id
         made: Made = found[1]
         return made
 

@@ -5,7 +5,8 @@ Other entries may be missing, and a user may add entries.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import accumulate
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -27,6 +28,20 @@ _NORM_TOLERANCE = 1e-6
 """Tolerance of a quaternion's norm."""
 _MAX_LENGTH = 1e4
 """Largest length in the parameters of an obstacle [m]."""
+
+_POSITION, _ORIENTATION = ("position", "m", "m/s"), ("orientation", "rad", "rad/s")
+_OLD_TASKS: dict[str, tuple[tuple[tuple[Any, ...], ...], tuple[str, ...]]] = {
+    "FramePosition": (((*_POSITION, None),), ("position",)),
+    "FrameOrientation": (((*_ORIENTATION, 3),), ("orientation",)),
+    "FramePose": (((*_POSITION, 3), (*_ORIENTATION, 3)), ("position", "orientation")),
+    "RelativePose": (((*_POSITION, 3), (*_ORIENTATION, 3)), ()),
+    "Pointing": ((("tan of half the angle", "-", "1/s", 2),), ("direction",)),
+    "JointPosture": ((("joints", "rad or m", "rad/s or m/s", None),), ()),
+    "CenterOfMass": (((*_POSITION, None),), ()),
+    "AngularMomentum": ((("angular momentum", "m²/s", "m²/s²", 3),), ()),
+}
+"""What version 0.1 did not log: the parts of a task's error, each with its size (None:
+all rows), and what can be drawn; by class."""
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=100_000)]
@@ -51,12 +66,33 @@ class _Robot(_Model):
     joint_coordinates: str | None = None
 
 
+_ErrorPart = Annotated[tuple[str, str, str, Count], Field(strict=False)]
+"""Name, unit, unit of the rate, number of components; JSON has it as a list."""
+
+
 class _Task(_Model):
     type: str = ""
     rows: Annotated[int, Field(ge=0)] | None = None
     level: Annotated[int, Field(ge=0)] | None = None
+    error: Annotated[list[_ErrorPart], Field(min_length=1)] | None = None
+    drawn: list[Literal["position", "orientation", "direction"]] = []
     axes: Annotated[str, Field(pattern="^[xyz]{1,3}$")] | None = None
     frame: str | None = None
+
+    @property
+    def error_width(self) -> int | None:
+        """Number of rows of the error; None if that is not known."""
+        return self.rows if self.error is None else sum(n for *_, n in self.error)
+
+    @property
+    def drawn_columns(self) -> dict[str, slice]:
+        """The columns of the reference that can be drawn, by what they are."""
+        return drawn_columns(self.drawn, self.axes)
+
+    @property
+    def reference_width(self) -> int | None:
+        """How many numbers the reference has; None if that is not known."""
+        return max((part.stop for part in self.drawn_columns.values()), default=None)
 
 
 class _Obstacle(_Model):
@@ -85,15 +121,44 @@ class _Meta(_Model):
 
 
 def renamed_entries(meta: dict[str, Any]) -> dict[str, Any]:
-    """Return the meta data of a log with the entry names of this version.
+    """Return the meta data of a log with the entries of this version.
 
-    Logs of version 0.1 have ``robot.freedoms`` instead of ``robot.dofs``.
+    Logs of version 0.1 have ``robot.freedoms`` instead of ``robot.dofs``, and the class
+    of a task instead of ``error`` and ``drawn``.
     """
-    robot = meta.get("robot")
-    if not isinstance(robot, dict) or "freedoms" not in robot or "dofs" in robot:
-        return meta
-    entries = {"dofs" if name == "freedoms" else name: robot[name] for name in robot}
-    return {**meta, "robot": entries}
+    robot, tasks = meta.get("robot"), meta.get("tasks")
+    if isinstance(robot, dict) and "freedoms" in robot and "dofs" not in robot:
+        names = {"freedoms": "dofs"}
+        robot = {names.get(name, name): entry for name, entry in robot.items()}
+        meta = {**meta, "robot": robot}
+    if isinstance(tasks, dict) and tasks:
+        tasks = {name: _renamed_task(task) for name, task in tasks.items()}
+        meta = {**meta, "tasks": tasks}
+    return meta
+
+
+def _renamed_task(task: Any) -> Any:
+    """Return the meta data of a task with the entries of this version."""
+    if not isinstance(task, dict) or "error" in task:
+        return task
+    error, drawn = _OLD_TASKS.get(str(task.get("type")), ((), ()))
+    parts = [[*part, size or task.get("rows")] for *part, size in error]
+    if not parts or None in parts[0]:
+        return task
+    return {**task, "error": parts, "drawn": list(drawn)}
+
+
+def drawn_columns(drawn: Sequence[str], axes: str | None) -> dict[str, slice]:
+    """Return the columns of a task's reference that can be drawn, by what they are.
+
+    Args:
+        drawn: What they are, in order; see `Task.drawn`.
+        axes: The world axes of a position; None: all three.
+    """
+    position = 3 if axes is None else len(axes)
+    widths = {"position": position, "orientation": 4, "direction": 3}
+    ends = list(accumulate((widths[part] for part in drawn), initial=0))
+    return {part: slice(*ends[k : k + 2]) for k, part in enumerate(drawn)}
 
 
 def find_fault(meta: dict[str, Any], columns: dict[str, Array]) -> str:
@@ -167,9 +232,9 @@ def _fault_of_shapes(meta: _Meta, columns: dict[str, Array]) -> str:
     }
     for name, task in meta.tasks.items():
         for part in ("error", "error_rate"):
-            wanted[f"task.{name}.{part}"] = (task.rows,)
+            wanted[f"task.{name}.{part}"] = (task.error_width,)
         for part in ("reference", "actual"):
-            wanted[f"task.{name}.{part}"] = (_reference_width(task),)
+            wanted[f"task.{name}.{part}"] = (task.reference_width,)
     for obstacle in meta.obstacles:
         wanted[f"obstacle.{obstacle}"] = (3,)
         wanted[f"obstacle.{obstacle}.quaternion"] = (4,)
@@ -216,8 +281,11 @@ def _fault_of_meta(meta: _Meta, columns: dict[str, Array]) -> str:
         if f"obstacle.{name}" not in columns:
             return f"the log lacks the column 'obstacle.{name}'"
     for name, task in meta.tasks.items():
-        if task.type == "FramePosition" and task.axes is None:
-            return f"its entry 'meta' lacks 'tasks.{name}.axes'"
+        if task.rows not in {None, task.error_width}:
+            return (
+                f"its task {name!r} has {task.rows} rows; the parts of its error have "
+                f"{task.error_width}"
+            )
     return ""
 
 
@@ -241,10 +309,10 @@ def _quaternions(meta: _Meta, columns: dict[str, Array]) -> Iterator[tuple[str, 
         if name.startswith("obstacle.") and name.endswith(".quaternion"):
             yield name, column
     for name, task in meta.tasks.items():
-        for part in ("reference", "actual"):
-            key = f"task.{name}.{part}"
-            if key in columns and _reference_width(task) in (4, 7):
-                yield key, columns[key][:, -4:]
+        where = task.drawn_columns.get("orientation")
+        for key in (f"task.{name}.reference", f"task.{name}.actual"):
+            if where is not None and key in columns:
+                yield key, columns[key][:, where]
 
 
 def _lengths_are_drawable(value: Any) -> bool:
@@ -259,11 +327,3 @@ def _lengths_are_drawable(value: Any) -> bool:
 def _is_positive_definite(matrix: Array) -> bool:
     symmetric = bool(np.allclose(matrix, matrix.T))
     return symmetric and bool(np.linalg.eigvalsh(matrix)[0] > 0.0)
-
-
-def _reference_width(task: _Task) -> int | None:
-    """Return how many numbers a task's reference has; None if that is not known."""
-    known = {"FramePose": 7, "FrameOrientation": 4}
-    if task.type == "FramePosition" and task.axes is not None:
-        return len(task.axes)
-    return known.get(task.type)

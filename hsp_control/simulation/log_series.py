@@ -8,13 +8,15 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_meta import drawn_columns
 
 
 class ErrorPart(NamedTuple):
     """The components of a task's error that have the same unit.
 
     Attributes:
-        label: The task's name, and the name of the part if there are several.
+        label: The task's name, and the name of the part if there are several, or if it
+            has no unit.
         unit: The components' unit.
         task: The task's index among the tasks.
         norm: The components' Euclidean norm at every row, shape (N,).
@@ -26,14 +28,21 @@ class ErrorPart(NamedTuple):
     norm: Array
 
 
-_PARTS = {
-    "FramePosition": (("", "m", slice(None)),),
-    "FrameOrientation": (("", "rad", slice(None)),),
-    "FramePose": (("position", "m", slice(3)), ("orientation", "rad", slice(3, 6))),
-    "Pointing": (("tan of half the angle", "–", slice(None)),),
-    "JointPosture": (("", None, slice(None)),),
-}
-"""The error's parts by type of task: name, unit (None: the joints'), components."""
+class TaskPath(NamedTuple):
+    """The path of a point that a task controls.
+
+    Attributes:
+        name: The task's name.
+        desired: The desired position [m], shape (N, 3); the actual one along world axes
+            that the task does not track.
+        actual: The actual position [m], shape (N, 3).
+        axes: The world axes that the task tracks, such as ``"xy"``.
+    """
+
+    name: str
+    desired: Array
+    actual: Array
+    axes: str
 
 
 def task_names(rollout: Rollout) -> list[str]:
@@ -41,23 +50,53 @@ def task_names(rollout: Rollout) -> list[str]:
     return list(rollout.meta.get("tasks", {}))
 
 
-def task_type(rollout: Rollout, name: str) -> str:
-    """Return the name of a task's class, "" if it is not in the log."""
-    return str(rollout.meta.get("tasks", {}).get(name, {}).get("type", ""))
-
-
 def task_errors(rollout: Rollout) -> list[ErrorPart]:
     """Return the norms of all tasks' errors, with metres and radians separate."""
-    parts = []
+    found = []
     for index, name in enumerate(task_names(rollout)):
-        error = rollout[f"task.{name}.error"]
-        unit_in_log = column_unit(rollout, f"task.{name}.error")
-        all_rows = (("", unit_in_log, slice(None)),)
-        for part, unit, rows in _PARTS.get(task_type(rollout, name), all_rows):
-            norm = np.linalg.norm(error[:, rows], axis=1)
-            label = f"{name} {part}".strip()
-            parts.append(ErrorPart(label, unit or position_unit(rollout), index, norm))
-    return parts
+        error, first = rollout[f"task.{name}.error"], 0
+        whole = ("", column_unit(rollout, f"task.{name}.error"), "", error.shape[1])
+        parts = rollout.meta["tasks"][name].get("error") or [whole]
+        for part, declared, _, size in parts:
+            unit = {"-": "–", "rad or m": position_unit(rollout)}.get(
+                declared, declared
+            )
+            label = f"{name} {part}" if len(parts) > 1 or unit == "–" else name
+            norm = np.linalg.norm(error[:, first : first + size], axis=1)
+            found.append(ErrorPart(label.strip(), unit, index, norm))
+            first += size
+    return found
+
+
+def drawn_parts(rollout: Rollout, name: str) -> dict[str, slice]:
+    """Return the columns of a task's reference that can be drawn, by what they are.
+
+    They are ``position`` [m], ``orientation``, a quaternion (x, y, z, w), and
+    ``direction``, a unit vector.
+    """
+    about = rollout.meta["tasks"][name]
+    return drawn_columns(about.get("drawn", ()), about.get("axes"))
+
+
+def task_path(rollout: Rollout, name: str) -> TaskPath | None:
+    """Return the path of the point that a task controls, if it controls one.
+
+    Along axes that the task does not track, the point is found in the skeleton.
+    """
+    where = drawn_parts(rollout, name).get("position")
+    if where is None:
+        return None
+    actual = rollout[f"task.{name}.actual"][:, where]
+    axes = rollout.meta["tasks"][name].get("axes") or "xyz"
+    tracked, skeleton = ["xyz".index(axis) for axis in axes], rollout["skeleton"]
+    path = np.zeros((len(actual), 3))
+    path[:, tracked] = actual
+    for point in range(skeleton.shape[1]):
+        if np.array_equal(skeleton[:, point, tracked], actual):
+            path = skeleton[:, point].copy()
+    desired = path.copy()
+    desired[:, tracked] = rollout[f"task.{name}.reference"][:, where]
+    return TaskPath(name, desired, path, axes)
 
 
 def joint_names(rollout: Rollout) -> list[str]:

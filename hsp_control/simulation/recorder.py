@@ -19,10 +19,11 @@ from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.shapes import shape_to_log
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.metrics import ConstantMetric, Metric
+from hsp_control.null_space.metrics import FixedMetric, Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.log_file import MAX_SIZE
 from hsp_control.simulation.rollout import FORMAT, Rollout, complete_columns
+from hsp_control.tasks import Task
 
 _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
@@ -47,6 +48,8 @@ class Recorder:
         self._capacity = rows
         self._columns: dict[str, Array] = {}
         self._descriptions: dict[str, dict[str, str]] = {}
+        self._logged: dict[str, Task] = {}
+        self._levels: dict[str, int] = {}
         robot = controller.robot
         nv, units = robot.nv, dict.fromkeys(robot.units)
         self._joint_unit = joint_unit = " or ".join(units)
@@ -96,11 +99,23 @@ class Recorder:
             self._descriptions[name] = {"unit": unit, "meaning": meaning}
 
     def _add_task_columns(self) -> None:
-        """Add the columns of all tasks; tasks may be added during the run."""
+        """Add the columns of all tasks; the tasks may change during the run.
+
+        A task that is removed keeps its columns and its place in the meta data.
+        """
         self._tasks, column = self._controller.tasks, self._add_column
+        self._log_names: dict[str, str] = {}
         probe = _probe(self._controller.robot)
-        for task in self._tasks:
-            m, prefix = task.rows, f"task.{task.name}"
+        levels = [
+            (level, task)
+            for level, tasks in enumerate(self._controller.levels)
+            for task in tasks
+        ]
+        for level, task in levels:
+            name = self._log_name(task)
+            self._log_names[task.name] = name
+            self._logged[name], self._levels[name] = task, level
+            m, prefix = task.rows, f"task.{name}"
             width = len(task.measure(probe)[0])
             parts = task.error_parts
             unit = " and ".join(dict.fromkeys(part.unit for part in parts))
@@ -110,6 +125,19 @@ class Recorder:
             column(f"{prefix}.error_rate", (m,), rate_unit, "error rate e'")
             column(f"{prefix}.reference", (width,), unit, "desired value")
             column(f"{prefix}.actual", (width,), unit, "actual value")
+
+    def _log_name(self, task: Task) -> str:
+        """Return the task's name in the log.
+
+        A number is added if another task was logged by this name, whose columns do not
+        fit.
+        """
+        name, k = task.name, 2
+        while name in self._logged and _task_meta(self._logged[name]) != _task_meta(
+            task
+        ):
+            name, k = f"{task.name}_{k}", k + 1
+        return name
 
     def _add_term_columns(self) -> None:
         """Add the columns of the field's terms; the field may change during the run."""
@@ -158,15 +186,17 @@ class Recorder:
         columns["v"][i] = state.v
         columns["tau"][i] = tau
         columns["joint_positions"][i] = robot.joint_positions(state.q)
-        for task in self._tasks:
+        for name, task in self._logged.items():
             reference, actual = task.measure(state)
-            columns[f"task.{task.name}.reference"][i] = reference
-            columns[f"task.{task.name}.actual"][i] = actual
+            columns[f"task.{name}.reference"][i] = reference
+            columns[f"task.{name}.actual"][i] = actual
         for k, (frame, joint) in enumerate(self._points):
             columns["skeleton"][i, k] = (
                 state.position(frame) if frame else state.data.oMi[joint].translation
             )
+        moved = self._controller.scene
         for obstacle in self._scene.values():
+            obstacle = moved[obstacle.name] if obstacle.name in moved else obstacle
             placement = pin.SE3ToXYZQUAT(obstacle.placement(state.t))
             columns[f"obstacle.{obstacle.name}"][i] = placement[:3]
             columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
@@ -182,9 +212,10 @@ class Recorder:
     def _record_law(self, state: RobotState, output: ControlOutput) -> None:
         i, columns, controller = self._rows, self._columns, self._controller
         columns["acceleration"][i] = output.acceleration
-        for name, rows in controller.task_rows.items():  # of the active tasks
-            columns[f"task.{name}.error"][i] = output.task.error[rows]
-            columns[f"task.{name}.error_rate"][i] = output.task.error_rate[rows]
+        for task, rows in controller.task_rows.items():  # of the active tasks
+            prefix = f"task.{self._log_names[task]}"
+            columns[f"{prefix}.error"][i] = output.task.error[rows]
+            columns[f"{prefix}.error_rate"][i] = output.task.error_rate[rows]
         diagnostics = controller.diagnose()
         columns["field.g"][i] = output.field.g
         columns["field.value"][i] = diagnostics.field_value
@@ -271,16 +302,8 @@ class Recorder:
                 "joint_coordinates": robot.source.joint_coordinates,
             },
             "tasks": {
-                task.name: {
-                    "type": type(task).__name__,
-                    "rows": task.rows,
-                    "level": level,
-                    "error": [list(part) for part in task.error_parts],
-                    "axes": getattr(task, "axes", None),
-                    "frame": getattr(task, "frame", None),
-                }
-                for level, tasks in enumerate(controller.levels)
-                for task in tasks
+                name: {**_task_meta(task), "level": self._levels[name]}
+                for name, task in self._logged.items()
             },
             "field": controller.field.name,
             "controls_null_space": controller.field.controls,
@@ -319,6 +342,17 @@ def _terms(controller: Controller) -> dict[str, NullSpaceField]:
     }
 
 
+def _task_meta(task: Task) -> dict[str, Any]:
+    return {
+        "type": type(task).__name__,
+        "rows": task.rows,
+        "error": [list(part) for part in task.error_parts],
+        "drawn": list(task.drawn),
+        "axes": getattr(task, "axes", None),
+        "frame": getattr(task, "frame", None),
+    }
+
+
 def _obstacle_meta(obstacle: Obstacle) -> dict[str, Any]:
     radius = obstacle.shape.bounding_radius
     return {
@@ -329,7 +363,7 @@ def _obstacle_meta(obstacle: Obstacle) -> dict[str, Any]:
 
 
 def _constant_matrix(metric: Metric) -> list[list[float]] | None:
-    if isinstance(metric, ConstantMetric):
+    if isinstance(metric, FixedMetric):
         return [[float(x) for x in row] for row in metric.W]
     return None
 

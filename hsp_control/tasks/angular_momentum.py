@@ -1,7 +1,7 @@
 """The task of the angular momentum about the centre of mass."""
 
 from dataclasses import replace
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.placing import place_point
 from hsp_control.tasks.task import ErrorPart, Feedback, Task, TaskSample
 from hsp_control.trajectories import Hold, Trajectory
+from hsp_control.trajectories.crossfade import AnyReference
 
 
 class AngularMomentum(Task, type="angular_momentum"):
@@ -43,6 +44,16 @@ class AngularMomentum(Task, type="angular_momentum"):
     def feedback(self) -> Feedback:
         """Return new arrays of feedback: Kp = K and Kv = 1, for e' + K e = 0."""
         return Feedback(self.rate * np.eye(3), np.eye(3), np.zeros(3))
+
+    @property
+    def followed(self) -> Trajectory:
+        """The trajectory of a placed task."""
+        return self.trajectory
+
+    def following(self, trajectory: AnyReference) -> Self:
+        """Return the task with another trajectory."""
+        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
+        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory about zero; see `Task.placed`."""

@@ -2,11 +2,12 @@
 
 from dataclasses import KW_ONLY, replace
 from functools import partial
-from typing import Self
+from typing import Any, Self
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
+from hsp_control.declaration.quantities import Axes
 from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.axes import axis_indices, track_axes
@@ -14,6 +15,7 @@ from hsp_control.tasks.frame_task import TrackingTask
 from hsp_control.tasks.placing import place_point
 from hsp_control.tasks.task import ErrorPart, Feedback, TaskSample
 from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
+from hsp_control.trajectories.crossfade import AnyReference
 
 
 class CenterOfMass(TrackingTask, type="center_of_mass"):
@@ -25,12 +27,8 @@ class CenterOfMass(TrackingTask, type="center_of_mass"):
     trajectory: Trajectory = Hold()
     """c_d(t), the trajectory of the centre of mass [m]; held by default."""
     _: KW_ONLY
-    axes: str = "xyz"
-    """World axes that are tracked, in the order of the trajectory, such as ``xy``."""
-
-    def __post_init__(self) -> None:
-        """Check the axes."""
-        axis_indices(self.axes)
+    axes: Axes = "xyz"
+    """World axes that are tracked, in the trajectory's order, such as ``xy`` [-]."""
 
     @property
     def error_parts(self) -> tuple[ErrorPart, ...]:
@@ -40,6 +38,16 @@ class CenterOfMass(TrackingTask, type="center_of_mass"):
     def keeps_balance(self, robot: Robot) -> bool:
         """Return True: see `Task.keeps_balance`."""
         return True
+
+    @property
+    def followed(self) -> Trajectory:
+        """The trajectory of a placed task."""
+        return self.trajectory
+
+    def following(self, trajectory: AnyReference) -> Self:
+        """Return the task with another trajectory."""
+        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
+        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the world; see `Task.placed`."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
 from hsp_control.tasks.placing import place_orientation
 from hsp_control.tasks.task import (
+    Drawn,
     ErrorPart,
     Feedback,
     TaskSample,
@@ -38,6 +39,7 @@ from hsp_control.trajectories import (
     OrientationSample,
     OrientationTrajectory,
 )
+from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.following import Follower
 
 ORIENTATION_SCRATCH = 12
@@ -53,6 +55,8 @@ class FrameOrientation(FrameTask, TrackingTask, type="frame_orientation"):
     frame's Jacobian in world axes.
     """
 
+    drawn: ClassVar[tuple[Drawn, ...]] = ("orientation",)
+
     trajectory: OrientationTrajectory = HoldOrientation()
     """R_d(t), world ← frame [rad]; held as at the start by default."""
 
@@ -63,6 +67,16 @@ class FrameOrientation(FrameTask, TrackingTask, type="frame_orientation"):
 
     def _default_name(self) -> str:
         return f"{super()._default_name()}_orientation"
+
+    @property
+    def followed(self) -> OrientationTrajectory:
+        """The trajectory of a placed task."""
+        return self.trajectory
+
+    def following(self, trajectory: AnyReference) -> Self:
+        """Return the task with another trajectory."""
+        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
+        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the world; see `Task.placed`."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 import pinocchio as pin
@@ -23,6 +23,7 @@ from hsp_control.tasks.frame_orientation import (
 from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
 from hsp_control.tasks.placing import place_pose
 from hsp_control.tasks.task import (
+    Drawn,
     ErrorPart,
     Feedback,
     TaskSample,
@@ -35,6 +36,7 @@ from hsp_control.trajectories import (
     PoseTrajectory,
     Trajectory,
 )
+from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.following import Follower
 
 PoseOrPoint = Annotated[PoseTrajectory | Trajectory, AnyOf(PoseTrajectory, Trajectory)]
@@ -55,6 +57,8 @@ class FramePose(FrameTask, TrackingTask, type="frame_pose"):
     (docs/law.md).
     """
 
+    drawn: ClassVar[tuple[Drawn, ...]] = ("position", "orientation")
+
     trajectory: PoseOrPoint = ComposedPose()
     """The desired pose, world ← frame, or the trajectory of its origin, with the
     orientation of the start [m, rad]; held at the start by default."""
@@ -66,9 +70,24 @@ class FramePose(FrameTask, TrackingTask, type="frame_pose"):
 
     @property
     def pose(self) -> PoseTrajectory:
-        """The trajectory of a placed task."""
-        assert isinstance(self.trajectory, PoseTrajectory), "the task is not placed"
+        """The trajectory of a placed task.
+
+        Raises:
+            TaskError: If the task is not placed.
+        """
+        if not isinstance(self.trajectory, PoseTrajectory):
+            raise self._not_placed("orientation")
         return self.trajectory
+
+    @property
+    def followed(self) -> PoseTrajectory:
+        """The trajectory of a placed task."""
+        return self.pose
+
+    def following(self, trajectory: AnyReference) -> Self:
+        """Return the task with another trajectory."""
+        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
+        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the world; see `Task.placed`."""

@@ -2,18 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import KW_ONLY, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.native import bind
+from hsp_control.declaration.quantities import Axes
 from hsp_control.geometry.start import Start
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.axes import axis_indices, track_axes
 from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
 from hsp_control.tasks.placing import place_point
-from hsp_control.tasks.task import ErrorPart, Feedback, TaskSample
+from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, TaskSample
 from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
+from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.following import Follower
 
 
@@ -24,20 +26,28 @@ class FramePosition(FrameTask, TrackingTask, type="frame_position"):
     a_x = x_d'' + Kv e' + Kp e + offset.
     """
 
+    drawn: ClassVar[tuple[Drawn, ...]] = ("position",)
+
     trajectory: Trajectory = Hold()
     """x_d(t), the trajectory of the origin [m]; held at the start by default."""
     _: KW_ONLY
-    axes: str = "xyz"
-    """World axes that are tracked, in the order of the trajectory, such as ``xy``."""
+    axes: Axes = "xyz"
+    """World axes that are tracked, in the trajectory's order, such as ``xy`` [-]."""
 
     @property
     def error_parts(self) -> tuple[ErrorPart, ...]:
         """The position along the tracked axes."""
         return (ErrorPart("position", "m", "m/s", len(self.axes)),)
 
-    def __post_init__(self) -> None:
-        """Check the axes."""
-        axis_indices(self.axes)
+    @property
+    def followed(self) -> Trajectory:
+        """The trajectory of a placed task."""
+        return self.trajectory
+
+    def following(self, trajectory: AnyReference) -> Self:
+        """Return the task with another trajectory."""
+        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
+        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the world; see `Task.placed`."""

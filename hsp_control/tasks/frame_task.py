@@ -37,12 +37,17 @@ class FrameTask(SecondOrderTask):
     """
 
     frame: str | None = None
-    """Name of the frame; the robot's end effector by default."""
+    """Name of the frame [-]; the robot's end effector by default."""
 
     @property
     def frame_name(self) -> str:
-        """Name of the frame of a placed task."""
-        assert self.frame is not None, f"task {self.name!r} is not placed"
+        """Name of the frame of a placed task.
+
+        Raises:
+            TaskError: If the task is not placed.
+        """
+        if self.frame is None:
+            raise self._not_placed("frame")
         return self.frame
 
     def _default_name(self) -> str:

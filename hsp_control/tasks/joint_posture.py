@@ -2,7 +2,7 @@
 
 from dataclasses import KW_ONLY, replace
 from math import atan2, cos, sin
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -24,7 +24,8 @@ from hsp_control.tasks.task import (
     TaskSample,
     add_feedback,
 )
-from hsp_control.trajectories import Trajectory, TrajectorySample
+from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
+from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.following import stay
 
 
@@ -40,8 +41,8 @@ class JointPosture(SecondOrderTask, type="joint_posture"):
     numbers [rad or m]."""
     _: KW_ONLY
     joints: Names | None = None
-    """Names of the joints, in the order of the rows; all with one degree of freedom by
-    default."""
+    """Names of the joints, in the order of the rows [-]; all with one degree of freedom
+    by default."""
     displacement: Trajectory | None = None
     """Motion of the joints about the reference, one number for each of the joints [rad
     or m]; none by default."""
@@ -53,6 +54,18 @@ class JointPosture(SecondOrderTask, type="joint_posture"):
 
     def _default_name(self) -> str:
         return "posture"
+
+    @property
+    def followed(self) -> Trajectory:
+        """The displacement of a placed task."""
+        if self.displacement is None:
+            return Hold(np.zeros(len(self._joints)))
+        return self.displacement
+
+    def following(self, trajectory: AnyReference) -> Self:
+        """Return the task with another displacement."""
+        changes: dict[str, Any] = {"displacement": trajectory}  # checked there
+        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its configuration and its joints; see `Task.placed`.
@@ -96,7 +109,7 @@ class JointPosture(SecondOrderTask, type="joint_posture"):
             _joint_posture,
             state.q,
             state.v,
-            np.asarray(self.reference),
+            self._configuration(robot),
             joints,
             sample,
             feedback,
@@ -120,7 +133,7 @@ class JointPosture(SecondOrderTask, type="joint_posture"):
         """
         robot = state.robot
         indices = self._indices(robot)
-        desired = np.asarray(self.reference)
+        desired = self._configuration(robot)
         if self.displacement is not None:
             moved = np.zeros(robot.nv)
             moved[indices] = self.displacement.sample(state.t).position
@@ -152,8 +165,15 @@ class JointPosture(SecondOrderTask, type="joint_posture"):
 
     @property
     def _joints(self) -> tuple[str, ...]:
-        assert self.joints is not None, f"task {self.name!r} is not placed"
+        if self.joints is None:
+            raise self._not_placed("joints")
         return tuple(self.joints)
+
+    def _configuration(self, robot: Robot) -> Array:
+        """Return the reference, shape (nq,)."""
+        if np.shape(self.reference) != (robot.nq,):
+            raise self._not_placed("reference")
+        return np.asarray(self.reference)
 
 
 @kernel

@@ -4,9 +4,10 @@ from collections.abc import Callable
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
 from math import sqrt
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
@@ -19,12 +20,13 @@ from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.frame_task import FrameTask, frame_of
 from hsp_control.tasks.placing import place_orientation
-from hsp_control.tasks.task import ErrorPart, Feedback, TaskSample, add_feedback
+from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, TaskSample, add_feedback
 from hsp_control.trajectories import (
     HoldOrientation,
     OrientationSample,
     OrientationTrajectory,
 )
+from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.following import Follower
 
 ANTIPODE_MARGIN = 0.02
@@ -45,6 +47,8 @@ class Pointing(FrameTask, type="pointing"):
     to the axis.
     """
 
+    drawn: ClassVar[tuple[Drawn, ...]] = ("direction",)
+
     direction: Vector3 | None = None
     """The desired direction in the world, of any length but zero [-]."""
     _: KW_ONLY
@@ -52,7 +56,8 @@ class Pointing(FrameTask, type="pointing"):
     """The pointing axis in the frame, of any length but zero [-]."""
     trajectory: OrientationTrajectory | None = None
     """Instead of `direction`, one that moves: an orientation, world ← desired frame,
-    whose third axis is the desired direction [rad]."""
+    whose third axis is the desired direction [rad]. What is omitted is such that the
+    axis points along it at the start."""
 
     def __post_init__(self) -> None:
         """Check axis and direction."""
@@ -66,10 +71,20 @@ class Pointing(FrameTask, type="pointing"):
     @property
     def error_parts(self) -> tuple[ErrorPart, ...]:
         """The stereographic coordinates."""
-        return (ErrorPart("direction", "-", "1/s", 2),)
+        return (ErrorPart("tan of half the angle", "-", "1/s", 2),)
 
     def _default_name(self) -> str:
         return f"{super()._default_name()}_pointing"
+
+    @property
+    def followed(self) -> OrientationTrajectory:
+        """The trajectory of a placed task, whose third axis is the direction."""
+        return self._desired
+
+    def following(self, trajectory: AnyReference) -> Self:
+        """Return the task with another trajectory."""
+        changes: dict[str, Any] = {"direction": None, "trajectory": trajectory}
+        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task for the robot; see `Task.placed`."""
@@ -77,7 +92,7 @@ class Pointing(FrameTask, type="pointing"):
         frame = frame_of(self.frame, robot)
         trajectory = self.trajectory
         if trajectory is not None:
-            here = start.state.frame(frame).rotation
+            here = start.state.frame(frame).rotation @ self._turn
             trajectory = place_orientation(trajectory, here, None)
         return replace(self, frame=frame, trajectory=trajectory).checked(robot)
 
@@ -93,6 +108,12 @@ class Pointing(FrameTask, type="pointing"):
         """The axis, of length 1."""
         axis = np.asarray(self.axis, dtype=float)
         return np.asarray(axis / np.linalg.norm(axis))
+
+    @property
+    def _turn(self) -> Array:
+        """The shortest rotation of the frame that makes the axis its third one."""
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), self._axis)
+        return np.array(turn.toRotationMatrix())
 
     @cached_property
     def _normals(self) -> Array:

@@ -1,7 +1,7 @@
 """The task of a frame's pose relative to another frame, as for two hands on a part."""
 
 from dataclasses import KW_ONLY, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pinocchio as pin
@@ -22,6 +22,7 @@ from hsp_control.tasks.frame_task import TrackingTask, frame_of
 from hsp_control.tasks.placing import place_pose
 from hsp_control.tasks.task import ErrorPart, Feedback, TaskSample, default_name
 from hsp_control.trajectories import ComposedPose, PoseSample, PoseTrajectory
+from hsp_control.trajectories.crossfade import AnyReference
 
 
 class RelativePose(TrackingTask, type="relative_pose"):
@@ -32,13 +33,13 @@ class RelativePose(TrackingTask, type="relative_pose"):
     """
 
     frame: str | None = None
-    """Name of the frame that is controlled; the robot's end effector by default."""
+    """Name of the frame that is controlled [-]; the robot's end effector by default."""
     trajectory: PoseOrPoint = ComposedPose()
     """The desired pose, reference ← frame, or the trajectory of its origin, with the
     relative orientation of the start [m, rad]; held at the start by default."""
     _: KW_ONLY
     reference: str
-    """Name of the frame that the pose is relative to."""
+    """Name of the frame that the pose is relative to [-]."""
 
     @property
     def error_parts(self) -> tuple[ErrorPart, ...]:
@@ -50,15 +51,35 @@ class RelativePose(TrackingTask, type="relative_pose"):
 
     @property
     def frame_name(self) -> str:
-        """Name of the frame of a placed task."""
-        assert self.frame is not None, f"task {self.name!r} is not placed"
+        """Name of the frame of a placed task.
+
+        Raises:
+            TaskError: If the task is not placed.
+        """
+        if self.frame is None:
+            raise self._not_placed("frame")
         return self.frame
 
     @property
     def pose(self) -> PoseTrajectory:
-        """The trajectory of a placed task."""
-        assert isinstance(self.trajectory, PoseTrajectory), "the task is not placed"
+        """The trajectory of a placed task.
+
+        Raises:
+            TaskError: If the task is not placed.
+        """
+        if not isinstance(self.trajectory, PoseTrajectory):
+            raise self._not_placed("orientation")
         return self.trajectory
+
+    @property
+    def followed(self) -> PoseTrajectory:
+        """The trajectory of a placed task."""
+        return self.pose
+
+    def following(self, trajectory: AnyReference) -> Self:
+        """Return the task with another trajectory."""
+        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
+        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the reference; see `Task.placed`.

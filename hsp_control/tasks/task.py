@@ -2,22 +2,24 @@
 
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import KW_ONLY
 from functools import partial
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import Part, within
+from hsp_control.declaration.quantities import PositiveCount
 from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
 from hsp_control.trajectories import Schedule
+from hsp_control.trajectories.crossfade import AnyReference
 
 
 class TaskSample(NamedTuple):
@@ -76,6 +78,10 @@ class Feedback(NamedTuple):
     offset: Array
 
 
+Drawn = Literal["position", "orientation", "direction"]
+"""What can be drawn in the world; see `Task`."""
+
+
 class ErrorPart(NamedTuple):
     """Some consecutive components of a task's error that share a unit.
 
@@ -117,20 +123,24 @@ class Task(Part, ABC, family="tasks", error=TaskError):
 
     Attributes:
         order: Order of the error equation.
+        drawn: What `measure` returns, in this order, if it can be drawn in the world:
+            ``position`` [m], along `axes` if the task has those, ``orientation`` as a
+            quaternion (x, y, z, w), ``direction`` as a unit vector.
     """
 
     order: ClassVar[Literal[1, 2]] = 2
+    drawn: ClassVar[tuple[Drawn, ...]] = ()
     yaml_key: ClassVar[str | None] = "name"
 
     _: KW_ONLY
-    priority: Annotated[int, Field(ge=1)] | None = None
+    priority: PositiveCount | None = None
     """Priority [-]; 1 is the highest, and tasks of the same priority form one level. By
     default 1; on a floating base 1 for what keeps the balance (centre of mass, angular
     momentum, the trunk) and 2 for all else."""
     schedule: Schedule | None = None
-    """When the task is active; always by default."""
+    """When the task is active [-]; always by default."""
     name: str = ""
-    """The task's name in the log; by default that of its frame, or its type."""
+    """The task's name in the log [-]; by default that of its frame, or its type."""
 
     def _complete(self) -> None:
         if not self.name:
@@ -197,6 +207,26 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         self.feedback()
         return self
 
+    def _not_placed(self, what: str) -> TaskError:
+        """Return the error of a task that is used before it is placed."""
+        return TaskError(
+            f"task {self.name!r}: a controller would look up its {what}; outside of "
+            "one, call `placed` first"
+        )
+
+    @property
+    def followed(self) -> AnyReference | None:
+        """The trajectory that a placed task follows; None if it has none."""
+        return None
+
+    def following(self, trajectory: AnyReference) -> Self:
+        """Return the task with another trajectory.
+
+        Raises:
+            TaskError: If it follows none.
+        """
+        raise TaskError(f"task {self.name!r} follows no trajectory")
+
     def keeps_balance(self, robot: Robot) -> bool:
         """Whether a floating base needs the task to stand; see `priority`."""
         return False
@@ -242,18 +272,17 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         Returns:
             ``out``, or the new sample.
         """
-        if type(self).compile is Task.compile:
-            raise TypeError(f"{type(self).__name__} implements no evaluate")
         out, feedback = self.given(state, out, feedback)
+        compile_ = self._compiled_by()
 
         def make() -> tuple[Feedback, TaskSample, StepPlan]:
             own, sample = (
                 self.feedback(),
                 TaskSample.allocate(self.rows, state.robot.nv),
             )
-            return own, sample, self.compile(state, own, sample)
+            return own, sample, compile_(self, state, own, sample)
 
-        own, sample, plan = state.made(self, make)
+        own, sample, plan = state.made(self, "evaluate", make)
         for array, value in zip(own, feedback, strict=True):
             array[:] = value
         for follow in plan.follow:
@@ -263,6 +292,21 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         for array, value in zip(out, sample, strict=True):
             array[:] = value
         return out
+
+    @classmethod
+    def _compiled_by(cls) -> Callable[..., StepPlan]:
+        """Return the `compile` that does what this class's `evaluate` does.
+
+        Not that of a subclass that overrides `evaluate` and calls this one.
+
+        Raises:
+            TypeError: If there is none.
+        """
+        for each in cls.__mro__:
+            own = vars(each).get("compile", Task.compile)
+            if own is not Task.compile:
+                return own  # type: ignore[no-any-return]
+        raise TypeError(f"{cls.__name__} implements no evaluate")
 
     def given(
         self, state: RobotState, out: TaskSample | None, feedback: Feedback | None
@@ -285,7 +329,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """Return (reference, actual) for logs and plots, two arrays of one shape (k,).
 
         Choose coordinates that are easy to read, for example a quaternion; k need not
-        be m.
+        be m. `drawn` says what they are.
         """
 
 
@@ -294,7 +338,7 @@ class SecondOrderTask(Task):
 
     _: KW_ONLY
     gains: Gains = Gains(natural_frequency=10.0)
-    """Feedback gains of the rows; critically damped at 10 rad/s by default."""
+    """Kp and Kv of the rows [1/s², 1/s]; critically damped at 10 rad/s by default."""
 
     def feedback(self) -> Feedback:
         """Return new arrays of feedback; see `Task.feedback`."""

@@ -11,6 +11,11 @@ from hsp_control.trajectories.callable_trajectory import (
     CallableTrajectory as CallableTrajectory,
 )
 from hsp_control.trajectories.circle import Circle as Circle
+from hsp_control.trajectories.crossfade import Crossfade as Crossfade
+from hsp_control.trajectories.crossfade import (
+    CrossfadeOrientation as CrossfadeOrientation,
+)
+from hsp_control.trajectories.crossfade import crossfade as crossfade
 from hsp_control.trajectories.hold import Hold as Hold
 from hsp_control.trajectories.hold_orientation import HoldOrientation as HoldOrientation
 from hsp_control.trajectories.hold_pose import HoldPose as HoldPose

@@ -34,7 +34,7 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
     """R(t) = R_d(t) exp(y(t)), y a quintic with y = y' = y'' = 0 at t0 + T.
 
     y, y' and y'' at t0 are such that the body starts at R0 with angular velocity ω0 and
-    zero angular acceleration. The motion is C² from t0 on, equals R_d from t0 + T on,
+    angular acceleration ω0'. The motion is C² from t0 on, equals R_d from t0 + T on,
     and rests at R0 before t0. It needs the logarithm at t0 only. It is therefore smooth
     for any R_d, whereas exp(s log(R0ᵀ R_d)) jumps where R_d passes an angle of π from
     R0.
@@ -50,6 +50,8 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
     orientation in which the robot starts by default."""
     start_angular_velocity: Vector3 = (0.0, 0.0, 0.0)
     """ω0 in the world frame, shape (3,) [rad/s]."""
+    start_angular_acceleration: Vector3 = (0.0, 0.0, 0.0)
+    """ω0' in the world frame, shape (3,) [rad/s²]."""
     start_time: Number = 0.0
     """t0 [s]."""
 
@@ -76,7 +78,7 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
         return QUINTIC @ np.stack([y, T * y_dot, T * T * y_ddot, rest, rest, rest])
 
     def _start_offset(self) -> tuple[Array, Array, Array]:
-        """Return y, y' and y'' at t0, with which ω = ω_d + R w = ω0 and ω' = 0.
+        """Return y, y' and y'' at t0, with which ω = ω_d + R w = ω0 and ω' = ω0'.
 
         w = Jexp(y) y' is the angular velocity relative to R_d, in the body frame.
         """
@@ -88,7 +90,8 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
         J_log, J_exp_dot = np.empty((3, 3)), np.empty((3, 3))
         jlog3(y, J_log)
         w = R.T @ (omega - omega_d)
-        w_dot = R.T @ (-omega_d_dot - np.cross(omega, R @ w))
+        omega_dot = np.asarray(self.start_angular_acceleration)
+        w_dot = R.T @ (omega_dot - omega_d_dot - np.cross(omega, R @ w))
         y_dot = J_log @ w
         jexp3_dot(y, y_dot, J_exp_dot)
         return y, y_dot, J_log @ (w_dot - J_exp_dot @ y_dot)

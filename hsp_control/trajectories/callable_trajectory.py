@@ -1,13 +1,11 @@
 """Any Python function of time as a trajectory."""
 
 from collections.abc import Callable
-from typing import Annotated
 
 from numpy.typing import ArrayLike
-from pydantic import Field
 
 from hsp_control.common.arrays import Array
-from hsp_control.declaration.quantities import Count, Positive
+from hsp_control.declaration.quantities import Positive, PositiveCount
 from hsp_control.trajectories import checks, time_derivatives
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
@@ -25,7 +23,7 @@ class CallableTrajectory(Trajectory):
 
     function: PointFunction
     """f, time [s] to a point of shape (n,)."""
-    dimension: Annotated[Count, Field(gt=0)]
+    dimension: PositiveCount
     """The number n of coordinates [-]."""
     velocity: PointFunction | None = None
     """f', time [s] to shape (n,), if known."""

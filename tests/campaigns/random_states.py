@@ -82,21 +82,10 @@ def bundled(name: str, seed: int, steps: int) -> Iterator[Tally]:
 def configured(config: str, seed: int, steps: int) -> Iterator[Tally]:
     """Drive the robot of a bundled configuration by its own controller, limited."""
     experiment = hsp.load_experiment(config)
-    own = experiment.controller
-    robot = own.robot
-    limits = own.limits or hsp.Limits(position=None, velocity=None)
-    controller = hsp.Controller(
-        robot,
-        own.levels,
-        own.field,
-        null_space_gain=own.null_space_gain,
-        metric=own.metric,
-        limits=limits,
-        contacts=own.contacts,
-        base=experiment.scenario.base,
-        schedules=own.schedules,
-    )
-    yield from _drive(robot, seed, steps, lambda _: controller)
+    if experiment.scenario.limits is None:
+        limits = "limits={position: none, velocity: none}"
+        experiment = hsp.load_experiment(config, limits)
+    yield from _drive(experiment.robot, seed, steps, lambda _: experiment.controller)
 
 
 def _drive(
@@ -215,17 +204,18 @@ def drawn_controller(robot: hsp.Robot, rng: np.random.Generator) -> hsp.Controll
         _tasks(robot, rng),
         _field(robot, rng),
         null_space_gain=10.0 ** rng.uniform(-1.0, 2.0),
-        metric=hsp.MassMatrixMetric() if rng.random() < 0.3 else None,
+        metric=hsp.metrics.MassMatrixMetric() if rng.random() < 0.3 else None,
         singularity_threshold=10.0 ** rng.uniform(-4.0, -1.0),
         limits=_limits(robot, rng) if rng.random() < 0.25 else None,
+        start=robot.home(),
     )
 
 
-def _trajectory(center: Array, rng: np.random.Generator) -> hsp.Lissajous:
+def _trajectory(center: Array, rng: np.random.Generator) -> hsp.trajectories.Lissajous:
     """Return a path about a point: near, far, or out of reach; slow or fast."""
     n, far = len(center), 10.0 ** rng.uniform(-3.0, 1.0)
     middle = center + far * rng.uniform(-1.0, 1.0, n)
-    return hsp.Lissajous(
+    return hsp.trajectories.Lissajous(
         10.0 ** rng.uniform(-3.0, 0.5) * rng.uniform(-1.0, 1.0, n),
         10.0 ** rng.uniform(-1.0, 2.0) * rng.uniform(-1.0, 1.0, n),
         rng.uniform(-np.pi, np.pi, n),
@@ -237,64 +227,70 @@ def _gains(rng: np.random.Generator) -> hsp.Gains:
     return hsp.Gains(natural_frequency=10.0 ** rng.uniform(-0.5, 2.0))
 
 
-def _tasks(robot: hsp.Robot, rng: np.random.Generator) -> list[list[hsp.Task]]:
+def _tasks(robot: hsp.Robot, rng: np.random.Generator) -> list[hsp.Task]:
     frame = robot.end_effector
     home = robot.state(0.0, robot.home(), np.zeros(robot.nv))
     here = home.position(frame)
     if robot.nv < 6:
         axes = str(rng.choice(["xy", "x", "y"]))
         path = _trajectory(here[["xyz".index(axis) for axis in axes]], rng)
-        levels: list[list[hsp.Task]] = [
-            [hsp.FramePosition(frame, path, gains=_gains(rng), axes=axes)]
+        tasks: list[hsp.Task] = [
+            hsp.FramePosition(frame, path, gains=_gains(rng), axes=axes)
         ]
         if rng.random() < 0.4:
-            levels.append([_posture(robot, rng)])
-        return levels
+            tasks.append(_posture(robot, rng))
+        return tasks
     path = _trajectory(here, rng)
-    turning = hsp.Spin(
+    turning = hsp.trajectories.Spin(
         rng.standard_normal(3), 10.0 ** rng.uniform(-1.0, 1.5), rotation=np.eye(3)
     )
     position = hsp.FramePosition(frame, path, gains=_gains(rng))
     match rng.integers(5):
         case 0:
-            return [[position]]
+            return [position]
         case 1:
-            pose = hsp.ComposedPose(path, turning)
-            return [[hsp.FramePose(frame, pose, gains=_gains(rng))]]
+            pose = hsp.trajectories.ComposedPose(path, turning)
+            return [hsp.FramePose(frame, pose, gains=_gains(rng))]
         case 2:
-            orientation = hsp.FrameOrientation(frame, turning, gains=_gains(rng))
-            return [[position], [orientation]]
+            orientation = hsp.FrameOrientation(
+                frame, turning, gains=_gains(rng), priority=2
+            )
+            return [position, orientation]
         case 3:
-            return [[position], [_posture(robot, rng)]]
+            return [position, _posture(robot, rng)]
         case _:
             half = robot.model.njoints // 2
             other = next(f.name for f in robot.model.frames if f.parentJoint == half)
-            elbow = hsp.FramePosition(other, _trajectory(home.position(other), rng), gains=_gains(rng), name="elbow")  # fmt: skip
-            return [[position], [elbow]]
+            path = _trajectory(home.position(other), rng)
+            elbow = hsp.FramePosition(
+                other, path, gains=_gains(rng), priority=2, name="elbow"
+            )
+            return [position, elbow]
 
 
 def _posture(robot: hsp.Robot, rng: np.random.Generator) -> hsp.Task:
-    return hsp.JointPosture(drawn_configurations(robot, rng, 1)[0], gains=_gains(rng))
+    posture = drawn_configurations(robot, rng, 1)[0]
+    return hsp.JointPosture(posture, gains=_gains(rng), priority=2)
 
 
 def _field(robot: hsp.Robot, rng: np.random.Generator) -> hsp.NullSpaceField | None:
     frame = robot.end_effector
     limited = np.isfinite(robot.position_limits()[0]).all()
     choices: list[Callable[[], hsp.NullSpaceField]] = [
-        lambda: hsp.TargetPosture(drawn_configurations(robot, rng, 1)[0]),
-        lambda: hsp.PointDistance([frame], _ball(rng)),
+        lambda: hsp.TargetPosture(configuration=drawn_configurations(robot, rng, 1)[0]),
+        lambda: hsp.fields.PointDistance([frame], _ball(rng)),
         lambda: _clearances(robot)[rng.integers(len(_clearances(robot)))],
     ]
     if limited:
         choices += [
             lambda: hsp.JointCentering(),
-            lambda: hsp.LimitBarrier(),
+            lambda: hsp.fields.LimitBarrier(),
             lambda: hsp.Manipulability(frame),
         ]
     else:
         choices += [
             lambda: hsp.Manipulability(frame, axes="xy"),
-            lambda: hsp.EqualJointAngles(list(robot.joint_names)),
+            lambda: hsp.fields.EqualJointAngles(list(robot.joint_names)),
         ]
     count = int(rng.choice([0, 1, 1, 2]))
     total: hsp.NullSpaceField | None = None
@@ -322,6 +318,13 @@ def _ball(rng: np.random.Generator) -> hsp.Obstacle:
 
 def _limits(robot: hsp.Robot, rng: np.random.Generator) -> hsp.Limits:
     own = OWN_EFFORTS.get(robot.name)
-    effort = np.array(own) if own is not None else hsp.Limits().effort
     bounded = bool(rng.random() < 0.3)  # a programme of many rows
-    return hsp.Limits(effort=effort * 10.0 ** rng.uniform(-1.5, 0.0), effort_rate=1000.0 if rng.random() < 0.4 else None, velocity="robot" if bounded else None, acceleration=20.0 if rng.random() < 0.2 else None, position="robot" if bounded and own is None else None, bandwidth=10.0 ** rng.uniform(0.0, 2.0))
+    scale = 10.0 ** rng.uniform(-1.5, 0.0)
+    return hsp.Limits(
+        effort=hsp.limits.Scaled(scale) if own is None else scale * np.array(own),
+        effort_rate=1000.0 if rng.random() < 0.4 else None,
+        velocity="robot" if bounded else None,
+        acceleration=20.0 if rng.random() < 0.2 else None,
+        position="robot" if bounded and own is None else None,
+        bandwidth=10.0 ** rng.uniform(0.0, 2.0),
+    )

@@ -60,7 +60,7 @@ def soak(seconds: float, log_channels: int, show: object = None) -> Soak:
     """Run the loop for a simulated time [s], read memory so many times."""
     experiment = hsp.load_experiment(CONFIG)
     controller, robot = experiment.controller, experiment.robot
-    plant = IntegratedPlant(hsp.RigidBodyPlant(robot), Rk4(PERIOD))
+    plant = IntegratedPlant(hsp.plants.RigidBodyPlant(robot), Rk4(PERIOD))
     state = RobotState(robot)
     plant.reset(0.0, experiment.q0, experiment.v0)
     q, v = experiment.q0.copy(), experiment.v0.copy()

@@ -15,7 +15,7 @@ from places import ROOT
 from hsp_control import RobotState, Rollout, load_experiment
 from hsp_control.common.resources import bundled_configs
 from hsp_control.config import Experiment
-from hsp_control.null_space.fields import WeightedSum
+from hsp_control.null_space.fields import FieldSum
 
 CONFIGURATIONS = [name for name in bundled_configs() if "/" not in name]
 COARSE = (
@@ -52,8 +52,8 @@ def limit_margin(experiment: Experiment, rollout: Rollout) -> float:
 def minimum_distance(experiment: Experiment, rollout: Rollout) -> float:
     """Return the least distance that the configuration's first field watches [m]."""
     field = experiment.controller.field
-    if isinstance(field, WeightedSum):
-        field = field.terms[0][1]
+    if isinstance(field, FieldSum):
+        field = field.terms[0]
     state = RobotState(experiment.robot)
     rows = zip(rollout.t, rollout.q, rollout.v, strict=True)
     return min(field.minimum_distance(state.update(*row)) for row in rows)
@@ -176,6 +176,15 @@ def test_a_configuration_runs_as_it_is_written(name: str) -> None:
     rollout = load_experiment(name, "simulation.duration=0.1").run()
     assert rollout.status == "completed"
     assert errors(rollout).max() < 1e-4
+
+
+def test_an_obstacle_s_orientation_may_be_null() -> None:
+    """It is so in the configurations that logs of version 0.1 contain."""
+    null = "scene.obstacles.disk.orientation=null"
+    experiment, plain = (
+        load_experiment("paper/4_moving_obstacle", *some) for some in ([null], [])
+    )
+    assert experiment.scenario.scene == plain.scenario.scene
 
 
 def test_the_page_shows_every_configuration() -> None:

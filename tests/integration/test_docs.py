@@ -20,6 +20,7 @@ from hsp_control.config.models.live import LiveModel
 from hsp_control.config.models.view import ShowModel
 from hsp_control.live import EffortInterface, StopSettings, Tolerance, run_loop
 from hsp_control.live.simulated_robot import WATCHDOG
+from hsp_control.null_space.fields.weight import sample_weight
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -44,7 +45,7 @@ def test_the_readme_s_python_runs(
     space: dict = {}
     exec(compile(snippet, "README.md", "exec"), space)
     rollout = space["rollout"]
-    assert np.isfinite(space["tau"]).all()
+    assert np.isfinite(space["output"].tau).all()
     assert (tmp_path / "out" / "elbow.npz").is_file()
     assert "completed" in capsys.readouterr().out
     # It does what the README claims: the law's exponential on the user's own cost.
@@ -213,7 +214,9 @@ def test_the_live_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     space: dict = {}
     exec(compile(example, "live.md", "exec"), space)
     assert space["report"].ended == "completed"
-    assert space["controller"].field is space["calm"]
+    fields, state = space["controller"].field.terms, space["controller"].state
+    weights = {each.name: sample_weight(each.weight, state)[0] for each in fields}
+    assert weights == {"obstacle_clearance": 0.0, "target_posture": 0.0, "calm": 1.0}
     assert space["run"].status == "completed"
 
     module = SimpleNamespace(

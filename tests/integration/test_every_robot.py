@@ -23,7 +23,6 @@ from hsp_control import (
     Hold,
     JointCentering,
     NullSpaceField,
-    Rk4,
     Robot,
     TargetPosture,
     Task,
@@ -34,6 +33,7 @@ from hsp_control.cli.robot_table import FLOATING, LOAD_OPTIONS
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.resources import bundled_robots
 from hsp_control.robot.description.sources import example_robots
+from hsp_control.robot.integrators import Rk4
 from hsp_control.trajectories import HoldPose
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -164,10 +164,17 @@ def hold_and_centre(robot: Robot, kind: str) -> float:
     if kind == "position":
         letters = "".join("xyz"[i] for i in rows)
         target = Hold(goal.translation[rows])
-        task = FramePosition(robot.end_effector, target, gains=gains, axes=letters, name="hand")
+        task = FramePosition(
+            robot.end_effector, target, gains=gains, axes=letters, name="hand"
+        )
     else:
-        task = FramePose(robot.end_effector, HoldPose(goal.translation, goal.rotation), gains=gains, name="hand")
-    pull: NullSpaceField = TargetPosture(robot.integrate(q0, off(0.5)))
+        task = FramePose(
+            robot.end_effector,
+            HoldPose(goal.translation, goal.rotation),
+            gains=gains,
+            name="hand",
+        )
+    pull: NullSpaceField = TargetPosture(configuration=robot.integrate(q0, off(0.5)))
     if np.isfinite(robot.position_limits()[0]).any() and (high - low < 6.28).any():
         pull = pull + JointCentering(weights=reach**2)
     controller = Controller(robot, [task], pull, null_space_gain=FREQUENCY)

@@ -13,22 +13,20 @@ from hsp_control import (
     FramePosition,
     Gains,
     Hold,
-    IdentityMetric,
     JointPosture,
     Limits,
-    MassMatrixMetric,
-    MinimumDistance,
     Obstacle,
     ObstacleClearance,
-    Push,
-    RigidBodyPlant,
-    Rk4,
     Robot,
     Sphere,
     TargetPosture,
     simulate,
 )
+from hsp_control.constraints.limits import ObstacleDistance
+from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric
+from hsp_control.robot.integrators import Rk4
 from hsp_control.robot.matrix_view import matrix_view
+from hsp_control.simulation.plants import Push, RigidBodyPlant
 
 Array = NDArray[np.float64]
 MASS, LEVER, INERTIA, LENGTH = 2.0, 0.2, 0.1, 0.4
@@ -104,8 +102,12 @@ def gains() -> Gains:
 
 def controlled(robot: Robot, task: str, metric: Any) -> Controller:
     tasks = {
-        "position": lambda: FramePosition("tip", Hold([0.1]), gains=gains(), axes="x", name="it"),
-        "center of mass": lambda: CenterOfMass(Hold([0.05]), gains=gains(), axes="x", name="it"),
+        "position": lambda: FramePosition(
+            "tip", Hold([0.1]), gains=gains(), axes="x", name="it"
+        ),
+        "center of mass": lambda: CenterOfMass(
+            Hold([0.05]), gains=gains(), axes="x", name="it"
+        ),
         "posture": lambda: JointPosture([0.2], gains=gains(), name="it"),
     }
     field = TargetPosture([0.0])
@@ -129,7 +131,7 @@ def test_the_error_equation_in_closed_loop(
 def test_within_limits_beside_a_ball_and_pushed(robot: Robot) -> None:
     ball = Obstacle("ball", Sphere(0.1), Hold([0.3, 0.0, 0.1]))
     clearance = ObstacleClearance([ball])
-    limits = Limits(distances=[MinimumDistance(clearance.proximity, 0.02)])
+    limits = Limits(distances=[ObstacleDistance(0.02, obstacles=[ball])])
     task = FramePosition("tip", Hold([0.39]), gains=gains(), axes="x", name="it")
     controller = Controller(
         robot, [task], clearance, null_space_gain=5.0, limits=limits

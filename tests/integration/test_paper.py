@@ -16,17 +16,16 @@ from planar_arm import A, PlanarSimulation, simulate_paper
 
 from hsp_control import (
     Controller,
-    EqualJointAngles,
     FramePosition,
     Gains,
-    IdentityMetric,
     Robot,
     Rollout,
     load_experiment,
 )
 from hsp_control.common.resources import bundled_configs
 from hsp_control.config import Experiment
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.fields import EqualJointAngles
+from hsp_control.null_space.metrics import IdentityMetric, MetricSample
 from hsp_control.trajectories import Circle
 
 pytestmark = pytest.mark.filterwarnings("error")

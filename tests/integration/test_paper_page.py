@@ -13,6 +13,7 @@ from places import ROOT
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.config import Experiment
+from hsp_control.declaration.plain_data import plain_data
 from hsp_control.simulation.log_series import joint_positions
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -186,7 +187,7 @@ def test_pictures_show_runs_of_today(number: int, runs: dict[int, Rollout]) -> N
     run = runs[number]
     # Through the schema of today, which may have more to say than that of then.
     then = load_experiment(json.loads(said["configuration"])).scenario
-    assert then.model_dump(mode="json") == run.config
+    assert plain_data(then, defaults=True) == run.config
     drawn = json.loads(said["frames"])
     today = json.loads(drawing.provenance(run, PAPER[number].times)["frames"])
     assert drawn["t"] == today["t"]

@@ -16,24 +16,15 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from hsp_control import (
-    ConstantMetric,
     Controller,
-    Dop853,
-    EqualJointAngles,
     FramePose,
     FramePosition,
-    FunctionField,
     Gains,
     Hold,
-    IdentityMetric,
     JointCentering,
-    MassMatrixMetric,
-    Metric,
     NullSpaceField,
     Obstacle,
-    PointDistance,
     Pointing,
-    Rk4,
     Robot,
     RobotState,
     Rollout,
@@ -42,6 +33,14 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.geometry.shapes import Sphere
+from hsp_control.null_space.fields import EqualJointAngles, FunctionField, PointDistance
+from hsp_control.null_space.metrics import (
+    ConstantMetric,
+    IdentityMetric,
+    MassMatrixMetric,
+    Metric,
+)
+from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.trajectories import (
     Circle,
     ComposedPose,
@@ -197,7 +196,12 @@ TASKS: dict[str, TaskCase] = {
     "planar position": TaskCase(
         "planar3r",
         lambda robot, start: [
-            FramePosition("tip", Circle(0.9, 2.0, [1.0, 1.0], phase=0.4), gains=Gains(natural_frequency=8.0), axes="xy")
+            FramePosition(
+                "tip",
+                Circle(0.9, 2.0, [1.0, 1.0], phase=0.4),
+                gains=Gains(natural_frequency=8.0),
+                axes="xy",
+            )
         ],
         lambda start: {
             "tip": lambda t, here: (
@@ -212,7 +216,11 @@ TASKS: dict[str, TaskCase] = {
     "iiwa14 position": TaskCase(
         "iiwa14",
         lambda robot, start: [
-            FramePosition("iiwa_link_ee", circle_about(start.translation, OFF), gains=Gains(natural_frequency=6.0))
+            FramePosition(
+                "iiwa_link_ee",
+                circle_about(start.translation, OFF),
+                gains=Gains(natural_frequency=6.0),
+            )
         ],
         lambda start: {
             "iiwa_link_ee": lambda t, here: (
@@ -225,7 +233,11 @@ TASKS: dict[str, TaskCase] = {
     "iiwa14 pose": TaskCase(
         "iiwa14",
         lambda robot, start: [
-            FramePose("iiwa_link_ee", ComposedPose(circle_about(start.translation, OFF), spin(start)), gains=Gains(natural_frequency=5.0))
+            FramePose(
+                "iiwa_link_ee",
+                ComposedPose(circle_about(start.translation, OFF), spin(start)),
+                gains=Gains(natural_frequency=5.0),
+            )
         ],
         lambda start: {
             "iiwa_link_ee": lambda t, here: np.concatenate(
@@ -240,8 +252,17 @@ TASKS: dict[str, TaskCase] = {
     "panda position and pointing": TaskCase(
         "panda",
         lambda robot, start: [
-            FramePosition("panda_tcp", circle_about(start.translation, OFF), gains=Gains(natural_frequency=5.0)),
-            Pointing("panda_tcp", axis=[0.0, 0.0, 1.0], trajectory=HoldOrientation(LEANT @ start.rotation), gains=Gains(natural_frequency=5.0)),
+            FramePosition(
+                "panda_tcp",
+                circle_about(start.translation, OFF),
+                gains=Gains(natural_frequency=5.0),
+            ),
+            Pointing(
+                "panda_tcp",
+                axis=[0.0, 0.0, 1.0],
+                trajectory=HoldOrientation(LEANT @ start.rotation),
+                gains=Gains(natural_frequency=5.0),
+            ),
         ],
         lambda start: {
             "panda_tcp": lambda t, here: (
@@ -266,7 +287,7 @@ def tracked(which: str) -> tuple[Controller, Rollout]:
     robot = load(case.robot)
     q0 = home(case.robot)
     start = plain(case.robot).placement(q0, FRAMES[case.robot])
-    field = TargetPosture(robot.integrate(q0, np.full(robot.nv, 0.2)))
+    field = TargetPosture(configuration=robot.integrate(q0, np.full(robot.nv, 0.2)))
     metric = METRICS[case.metric][0](robot.nv)
     controller = Controller(robot, case.build(robot, start), field, metric=metric)
     v0 = 0.3 * np.sin(2.0 + np.arange(robot.nv))
@@ -359,7 +380,7 @@ def moving(robot: Robot, name: str) -> NullSpaceField:
     """Return a field that moves in time: an obstacle, and a vector field with ∂g/∂t."""
     lookout = Lissajous([0.2, 0.3, 0.1], [3.0, 2.0, 4.0], center=[0.7, 0.9, 1.1])
     ball = Obstacle("ball", Sphere(0.1), lookout)
-    posture = TargetPosture(home(name), weights=2.0)
+    posture = TargetPosture(configuration=home(name), weights=2.0)
     frame = FRAMES[name]
 
     def wave(state: RobotState) -> Array:
@@ -493,7 +514,11 @@ def test_the_law_integrates_in_fourth_order(metric: str) -> None:
     run = Run("panda", metric, "scalar")
     robot, q0 = load("panda"), home("panda")
     start = plain("panda").placement(q0, "panda_tcp")
-    task = FramePosition("panda_tcp", circle_about(start.translation, OFF), gains=Gains(natural_frequency=7))
+    task = FramePosition(
+        "panda_tcp",
+        circle_about(start.translation, OFF),
+        gains=Gains(natural_frequency=7),
+    )
     field = moving(robot, "panda")
     controller = Controller(
         robot, [task], field, null_space_gain=6.0, metric=METRICS[metric][0](7)
@@ -571,10 +596,19 @@ def centering_and_posture(angles: Array) -> float:
 HELD: dict[str, Held] = {
     "planar3r": Held(
         "planar3r",
-        lambda robot, start: FramePosition("tip", Hold(start.translation[:2]), gains=Gains(natural_frequency=10), axes="xy"),
+        lambda robot, start: FramePosition(
+            "tip",
+            Hold(start.translation[:2]),
+            gains=Gains(natural_frequency=10),
+            axes="xy",
+        ),
         lambda robot: (
             EqualJointAngles(["joint2", "joint3"], weight=5.0)
-            + PointDistance(["link2", "link3"], Obstacle("ball", Sphere(0.1), Hold([0.3, 1.3, 0.0])), weight=0.5)
+            + PointDistance(
+                ["link2", "link3"],
+                Obstacle("ball", Sphere(0.1), Hold([0.3, 1.3, 0.0])),
+                weight=0.5,
+            )
         ),
         planar_cost,
         tip_by_hand,
@@ -583,9 +617,11 @@ HELD: dict[str, Held] = {
     ),
     "panda position": Held(
         "panda",
-        lambda robot, start: FramePosition("panda_tcp", Hold(start.translation), gains=Gains(natural_frequency=10)),
+        lambda robot, start: FramePosition(
+            "panda_tcp", Hold(start.translation), gains=Gains(natural_frequency=10)
+        ),
         lambda robot: (
-            2.0 * JointCentering() + 3.0 * TargetPosture(posture())
+            2.0 * JointCentering() + 3.0 * TargetPosture(configuration=posture())
         ),
         centering_and_posture,
         lambda q: plain("panda").placement(q, "panda_tcp").translation,
@@ -594,9 +630,13 @@ HELD: dict[str, Held] = {
     ),
     "panda pose": Held(
         "panda",
-        lambda robot, start: FramePose("panda_tcp", HoldPose(start.translation, start.rotation), gains=Gains(natural_frequency=10)),
+        lambda robot, start: FramePose(
+            "panda_tcp",
+            HoldPose(start.translation, start.rotation),
+            gains=Gains(natural_frequency=10),
+        ),
         lambda robot: (
-            2.0 * JointCentering() + 3.0 * TargetPosture(posture())
+            2.0 * JointCentering() + 3.0 * TargetPosture(configuration=posture())
         ),
         centering_and_posture,
         lambda q: (

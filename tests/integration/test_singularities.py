@@ -24,7 +24,6 @@ from hsp_control import (
     FramePosition,
     Gains,
     Hold,
-    Rk4,
     Robot,
     RobotState,
     Rollout,
@@ -33,11 +32,11 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.common.exceptions import SimulationError
+from hsp_control.robot.integrators import Rk4
 from hsp_control.trajectories import (
     CallableOrientation,
     CallableTrajectory,
     ComposedPose,
-    HoldPose,
     MinimumJerk,
 )
 
@@ -76,6 +75,7 @@ class Passage:
     """A motion into a singularity and out of it again.
 
     Attributes:
+        robot: The robot.
         task: The task, which leads there and back.
         start: Where it starts, shape (nq,).
         duration: How long it takes, with time to recover [s].
@@ -84,6 +84,7 @@ class Passage:
         step: Of the integrator [s].
     """
 
+    robot: Robot
     task: Task
     start: Array
     duration: float
@@ -93,18 +94,17 @@ class Passage:
 
     def controller(self, threshold: float) -> Controller:
         """Return a controller that draws the joints to where they started."""
-        robot = self.task.robot
         return Controller(
-            robot,
+            self.robot,
             [self.task],
-            TargetPosture(self.start),
+            TargetPosture(configuration=self.start),
             null_space_gain=FREQUENCY,
             singularity_threshold=threshold,
         )
 
     def run(self, threshold: float, control_period: float | None = None) -> Rollout:
         """Return the motion; it starts with a speed of its own."""
-        v0 = 0.05 * np.sin(1.0 + np.arange(self.task.robot.nv))
+        v0 = 0.05 * np.sin(1.0 + np.arange(self.robot.nv))
         return simulate(
             self.controller(threshold),
             self.start,
@@ -123,8 +123,10 @@ def stretched_planar_arm() -> Passage:
     here = robot.state(0.0, q0, np.zeros(3)).position("tip")[:2].copy()
     away = 3.4 * here / np.linalg.norm(here)
     path = MinimumJerk([here, away, away, here], [0.0, 1.5, 2.0, 3.5])
-    task = FramePosition("tip", path, gains=Gains(natural_frequency=FREQUENCY), axes="xy")
-    return Passage(task, q0, 5.0, 0.1, effort=1.5e3)
+    task = FramePosition(
+        "tip", path, gains=Gains(natural_frequency=FREQUENCY), axes="xy"
+    )
+    return Passage(robot, task, q0, 5.0, 0.1, effort=1.5e3)
 
 
 def panda_out_of_reach(threshold: float) -> Passage:
@@ -137,7 +139,7 @@ def panda_out_of_reach(threshold: float) -> Passage:
     path = MinimumJerk([here, away, away, here], [0.0, 1.5, 2.0, 3.5])
     task = FramePosition("panda_tcp", path, gains=Gains(natural_frequency=FREQUENCY))
     effort = 2e3 if threshold < 0.1 else 2e2
-    return Passage(task, q0, 5.0, threshold, effort)
+    return Passage(robot, task, q0, 5.0, threshold, effort)
 
 
 def driven(
@@ -161,7 +163,7 @@ def driven(
         CallableOrientation(lambda t: hand(t).rotation.copy()),
     )
     task = FramePose(frame, path, gains=Gains(natural_frequency=FREQUENCY))
-    return Passage(task, singular + span, 5.0, DEFAULT, effort=80.0, step=0.0025)
+    return Passage(robot, task, singular + span, 5.0, DEFAULT, effort=80.0, step=0.0025)
 
 
 PASSAGES: dict[str, Callable[[], Passage]] = {
@@ -251,7 +253,7 @@ def test_effort_is_bounded_in_the_singularity(which: str) -> None:
     assert tightest > 0.02  # so the bound means something
     assert np.isfinite(rollout.tau).all()
     assert np.abs(rollout.tau).max() < passage.effort
-    assert robot is passage.task.robot
+    assert robot is passage.robot
 
 
 @every_passage
@@ -326,7 +328,7 @@ def test_a_target_out_of_reach_is_pointed_at(threshold: float) -> None:
     controller = Controller(
         robot,
         [task],
-        TargetPosture(robot.home()),
+        TargetPosture(configuration=robot.home()),
         singularity_threshold=threshold,
     )
     rollout = simulate(
@@ -376,27 +378,32 @@ def random_start(robot: Robot, rng: np.random.Generator) -> Array:
 
 
 class Target:
-    """A task whose target is set anew for every start."""
+    """A task whose target rests, and is set anew for every start."""
 
     def __init__(self, robot: Robot, kind: str) -> None:
         frame, gains = robot.end_effector, Gains(natural_frequency=FREQUENCY)
-        self.robot, self.kind = robot, kind
+        self.frame = frame
+        self.position, self.rotation = np.zeros(3), np.eye(3)
+        axes = [] if kind == "pose" else ["xyz".index(axis) for axis in kind]
+        still = np.zeros(len(axes) or 3)
+        position = CallableTrajectory(
+            lambda t: self.position[axes or slice(None)],
+            len(still),
+            velocity=lambda t: still,
+            acceleration=lambda t: still,
+        )
         self.task: Task
         if kind == "pose":
-            self.task = FramePose(frame, HoldPose(np.zeros(3), np.eye(3)), gains=gains)
+            pose = ComposedPose(position, CallableOrientation(lambda t: self.rotation))
+            self.task = FramePose(frame, pose, gains=gains)
         else:
-            self.task = FramePosition(frame, Hold(np.zeros(len(kind))), gains=gains, axes=kind)
+            self.task = FramePosition(frame, position, gains=gains, axes=kind)
 
     def move(self, state: RobotState, away: Array, turn: Array) -> None:
         """Put the target ``away`` [m] and turned by ``turn`` [rad] from the frame."""
-        here = state.frame(self.task.frame)
-        if self.kind == "pose":
-            self.task.trajectory = HoldPose(
-                here.position + away, here.rotation @ pin.exp3(turn)
-            )
-        else:
-            axes = ["xyz".index(axis) for axis in self.kind]
-            self.task.trajectory = Hold((here.position + away)[axes])
+        here = state.frame(self.frame)
+        self.position = here.position + away
+        self.rotation = here.rotation @ pin.exp3(turn)
 
 
 def loaded(name: str) -> Robot:
@@ -411,7 +418,7 @@ def test_random_starts(name: str) -> None:
     robot = loaded(name)
     rng = np.random.default_rng(sum(map(ord, name)))
     target = Target(robot, ROBOTS[name])
-    field = TargetPosture(robot.random_configuration(rng))
+    field = TargetPosture(configuration=robot.random_configuration(rng))
     controller = Controller(robot, [target.task], field, null_space_gain=FREQUENCY)
     state = RobotState(robot)
     singular = 0
@@ -446,7 +453,7 @@ def test_rollouts_from_singular_starts(name: str) -> None:
     robot = loaded(name)
     rng = np.random.default_rng(5)
     target = Target(robot, ROBOTS[name])
-    field = TargetPosture(robot.home())
+    field = TargetPosture(configuration=robot.home())
     controller = Controller(robot, [target.task], field, null_space_gain=FREQUENCY)
     state, runs = RobotState(robot), 0
     while runs < 12:

@@ -14,7 +14,7 @@ from campaigns.mutate_urdf import ARM, EXTERNAL, LAUGHS
 from campaigns.mutate_yaml import TAGS
 from campaigns.urdf_case import DAE, OBJ, STL
 
-from hsp_control import HspControlError, Mesh, Robot, load_experiment
+from hsp_control import HspControlError, Robot, load_experiment
 from hsp_control.cli import main
 from hsp_control.common.exceptions import (
     AccessError,
@@ -24,6 +24,7 @@ from hsp_control.common.exceptions import (
     SceneError,
     SimulationError,
 )
+from hsp_control.geometry.shapes import Mesh
 from hsp_control.robot.description.access import ANYWHERE, only_within
 from hsp_control.robot.description.urdf_checks import MAX_DOFS, MAX_LINKS
 from hsp_control.robot.description.xml_files import (
@@ -417,7 +418,8 @@ CONTRADICTIONS: dict[str, tuple[Callable[[Rollout], None], str]] = {
         "its column 'skeleton' has rows without numbers",
     ),
     "no axes": (
-        lambda run: run.meta["tasks"]["tip"].pop("axes"), "lacks 'tasks.tip.axes'"
+        lambda run: run.meta["tasks"]["tip"].pop("axes"),
+        r"'task.tip.reference' has rows of shape \(2,\); the entry 'meta' needs \(3,\)",
     ),
     "shape": (
         lambda run: run.meta["obstacles"]["disk"].update(parameters={}),

@@ -10,10 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from oracles import slope
 
-from hsp_control import (
-    Cost,
-    Robot,
-)
+from hsp_control import Cost, Robot
 from hsp_control.common.resources import bundled_robots
 from hsp_control.geometry import LinkShape
 from hsp_control.null_space.fields.barrier import barrier

@@ -6,17 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hsp_control import (
-    Controller,
-    Dop853,
-    FramePosition,
-    Gains,
-    Obstacle,
-    PointDistance,
-    Robot,
-    TargetPosture,
-)
+from hsp_control import Controller, FramePosition, Gains, Obstacle, Robot, TargetPosture
 from hsp_control.geometry.shapes import Sphere
+from hsp_control.null_space.fields import PointDistance
+from hsp_control.robot.integrators import Dop853
 from hsp_control.trajectories import Circle, Lissajous
 
 Array = NDArray[np.float64]
@@ -78,5 +71,9 @@ def planar_start() -> Array:
 def panda_controller() -> Controller:
     robot = load("panda")
     x = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
-    task = FramePosition("panda_tcp", Lissajous([0.1, 0.1, 0.05], [3.0, 4.0, 5.0], center=x), gains=Gains(natural_frequency=10.0))
+    task = FramePosition(
+        "panda_tcp",
+        Lissajous([0.1, 0.1, 0.05], [3.0, 4.0, 5.0], center=x),
+        gains=Gains(natural_frequency=10.0),
+    )
     return Controller(robot, [task], TargetPosture(robot.home() + 0.2))

@@ -1,4 +1,4 @@
-"""A Panda's controllers and states, and copies of what a controller returns."""
+"""A Panda's controllers and states, and all that a controller returns."""
 
 from collections.abc import Callable
 from functools import cache
@@ -10,15 +10,17 @@ from numpy.typing import NDArray
 
 from hsp_control import (
     Circle,
-    ConstantMetric,
     ControlOutput,
     FrameOrientation,
     FramePosition,
     Gains,
+    Robot,
+)
+from hsp_control.null_space.metrics import (
+    CoordinatesMetric,
     IdentityMetric,
     MassMatrixMetric,
     Metric,
-    Robot,
 )
 from hsp_control.trajectories import (
     HoldOrientation,
@@ -48,11 +50,11 @@ def circle() -> Circle:
     return Circle(0.1, 2.0, CENTER, normal=[0.0, 1.0, 1.0])
 
 
-def track(robot: Robot | None = None, **options: Any) -> FramePosition:
+def track(**options: Any) -> FramePosition:
     return FramePosition(TCP, circle(), gains=GAINS, **options)
 
 
-def hold_orientation(robot: Robot | None = None) -> FrameOrientation:
+def hold_orientation() -> FrameOrientation:
     return FrameOrientation(TCP, HoldOrientation(np.eye(3)), gains=GAINS)
 
 
@@ -68,15 +70,15 @@ def states(count: int, seed: int = 0) -> list[tuple[float, Array, Array]]:
     ]
 
 
-def copied(out: ControlOutput) -> dict[str, Any]:
-    """Return copies: the arrays are the controller's own."""
+def contents(out: ControlOutput) -> dict[str, Any]:
+    """Return all that an output contains, by name."""
     return {
-        "tau": out.tau.copy(),
-        "acceleration": out.acceleration.copy(),
-        "null_space_error": out.null_space_error.copy(),
+        "tau": out.tau,
+        "acceleration": out.acceleration,
+        "null_space_error": out.null_space_error,
         "damped": out.damped,
-        **{f"task.{k}": v.copy() for k, v in out.task._asdict().items()},
-        **{f"field.{k}": v.copy() for k, v in out.field._asdict().items()},
+        **{f"task.{k}": v for k, v in out.task._asdict().items()},
+        **{f"field.{k}": v for k, v in out.field._asdict().items()},
     }
 
 

@@ -19,21 +19,21 @@ from hsp_control import (
     Gains,
     Hold,
     JointPosture,
-    MassMatrixMetric,
     Obstacle,
     Pointing,
     Robot,
     Rollout,
-    Scene,
     TargetPosture,
     Task,
     load_experiment,
     simulate,
 )
 from hsp_control.common.resources import bundled_configs
+from hsp_control.geometry import Scene
 from hsp_control.geometry.shapes import (
     Sphere,
 )
+from hsp_control.null_space.metrics import MassMatrixMetric
 from hsp_control.trajectories import (
     Circle as Round,
 )
@@ -81,17 +81,21 @@ class Arm:
 @cache
 def spatial() -> dict[str, Rollout]:
     arm = Arm()
-    robot, tcp = arm.robot, arm.tcp
+    tcp = arm.tcp
     tilted = FramePosition(tcp, arm.circle([1.0, 0.0, 1.0]), gains=GAINS)
     center = Lissajous([0.0, 0.1, 0.1], [0, 2, 3], [0, 0, 0], [0.3, -0.3, 0.5])
     spin = Spin([0.0, 0.0, 1.0], 0.3, rotation=arm.rotation)
     pose = FramePose(tcp, ComposedPose(arm.circle([1.0, 0.0, 0.0]), spin), gains=GAINS)
     aside = Spin([0, 0, 1], 1.0, rotation=arm.rotation @ pin.utils.rotate("x", 0.4))
-    xz = FramePosition(tcp, Hold(arm.position[[0, 2]]), gains=GAINS, axes="xz", name="xz")
+    xz = FramePosition(
+        tcp, Hold(arm.position[[0, 2]]), gains=GAINS, axes="xz", name="xz"
+    )
     pointing = Pointing(tcp, axis=[0, 0, 1], trajectory=aside, gains=GAINS)
     joints = ["panda_joint1", "panda_joint2"]
     posture = JointPosture(arm.q0 + 0.1, gains=GAINS, joints=joints)
-    turned = FrameOrientation("panda_link5", HoldOrientation(np.eye(3)), gains=GAINS, name="turn")
+    turned = FrameOrientation(
+        "panda_link5", HoldOrientation(np.eye(3)), gains=GAINS, name="turn"
+    )
     return {
         "space": arm.run(
             tilted,

@@ -42,23 +42,18 @@ from field_oracles import (
 from numpy.typing import NDArray
 
 from hsp_control import (
-    ConstantMetric,
-    EqualJointAngles,
-    IdentityMetric,
     JointCentering,
-    MassMatrixMetric,
-    Metric,
     NullSpaceField,
     Obstacle,
     Rest,
     Robot,
     RobotState,
-    Scene,
     TargetPosture,
-    Uncontrolled,
 )
+from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import (
+    EqualJointAngles,
     FieldSample,
     FieldSum,
     InverseCondition,
@@ -67,8 +62,15 @@ from hsp_control.null_space.fields import (
     Ramp,
     StateWeight,
     Transmission,
+    Uncontrolled,
 )
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.metrics import (
+    ConstantMetric,
+    IdentityMetric,
+    MassMatrixMetric,
+    Metric,
+    MetricSample,
+)
 
 Array = NDArray[np.float64]
 

@@ -14,17 +14,9 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from hsp_control import (
-    Cost,
-    FunctionCost,
-    FunctionField,
-    Obstacle,
-    PointDistance,
-    Robot,
-    RobotState,
-    VectorField,
-)
+from hsp_control import Cost, FunctionCost, Obstacle, Robot, RobotState
 from hsp_control.geometry.shapes import Sphere
+from hsp_control.null_space.fields import FunctionField, PointDistance, VectorField
 from hsp_control.trajectories import Lissajous
 
 Array = NDArray[np.float64]

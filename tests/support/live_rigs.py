@@ -12,11 +12,9 @@ from hsp_control import (
     Controller,
     FramePosition,
     Gains,
-    IntegratedPlant,
     Limits,
-    RigidBodyPlant,
+    NullSpaceField,
     Robot,
-    SemiImplicitEuler,
     TargetPosture,
 )
 from hsp_control.live import (
@@ -25,6 +23,8 @@ from hsp_control.live import (
     Measurement,
     SimulatedRobot,
 )
+from hsp_control.robot.integrators import SemiImplicitEuler
+from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 
 Array = NDArray[np.float64]
 PERIOD = 0.001
@@ -39,14 +39,18 @@ def start() -> Array:
     return panda().home().copy()
 
 
-def law(limits: Limits | None = None) -> Controller:
+def law(
+    field: NullSpaceField | None = None,
+    gains: Gains = Gains(natural_frequency=10.0),  # noqa: B008 (a value)
+    limits: Limits | None = None,
+) -> Controller:
     """Return a controller that draws a circle and swings the elbow."""
     tip = panda().state(0.0, start(), np.zeros(7)).position("panda_tcp")
     path = Circle(0.1, 3.0, tip + np.array([0.0, 0.0, 0.1]), normal=[1.0, 0.0, 0.0])
-    task = FramePosition("panda_tcp", path, gains=Gains(natural_frequency=10.0), name="tip")
+    task = FramePosition("panda_tcp", path, gains=gains, name="tip")
     q = start()
     q[0] += 0.5
-    field = TargetPosture(q)
+    field = TargetPosture(q) if field is None else field
     return Controller(panda(), [task], field, null_space_gain=10.0, limits=limits)
 
 

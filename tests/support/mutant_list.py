@@ -32,6 +32,7 @@ LAW, CONTROL = PACKAGE + "law/", PACKAGE + "control/"
 ACTUATION, COMPENSATION = CONTROL + "actuation/", CONTROL + "compensation/"
 SIMULATION, LIVE = PACKAGE + "simulation/", PACKAGE + "live/"
 PLANTS = SIMULATION + "plants/"
+DECLARATION = PACKAGE + "declaration/"
 CONFIG, CLI = PACKAGE + "config/", PACKAGE + "cli/"
 
 UNIT = "tests/unit/"
@@ -161,15 +162,15 @@ MUTANTS = (
     Mutant(
         "angular momentum: the error grows",
         TASKS + "angular_momentum.py",
-        "out.error_rate[:] = -self.rate * out.error",
-        "out.error_rate[:] = self.rate * out.error",
+        "out.error_rate[:] = -(feedback.Kp @ out.error)",
+        "out.error_rate[:] = feedback.Kp @ out.error",
         EVERY_TASK + "angular_momentum",
     ),
     Mutant(
         "gains: Kv is not ramped",
-        TASKS + "gain_ramp.py",
-        "w * self._to[1]",
-        "w * self._from[1]",
+        CONTROL + "controller.py",
+        "feedback.Kp[:], feedback.Kv[:] = each.gains.at(t)",
+        "feedback.Kp[:] = each.gains.at(t)[0]",
         UNIT + "tasks/test_gains.py",
     ),
     # ------------------------------------------------------------------ null space
@@ -245,14 +246,14 @@ MUTANTS = (
     ),
     Mutant(
         "inverse condition: gradient's second term",
-        FIELDS + "conditioning.py",
+        FIELDS + "inverse_condition.py",
         "inner = J[i, j] / size - Z[i, j] / stretch",
         "inner = J[i, j] / size + Z[i, j] / stretch",
         EVERY_FIELD + "inverse_condition",
     ),
     Mutant(
         "inverse condition: rate without that of f",
-        FIELDS + "conditioning.py",
+        FIELDS + "inverse_condition.py",
         "2.0 * (phi_dot * inner + phi * inner_dot)",
         "2.0 * phi * inner_dot",
         EVERY_FIELD + "inverse_condition",
@@ -308,9 +309,9 @@ MUTANTS = (
     ),
     Mutant(
         "metric of coordinates: A Aᵀ for AᵀA",
-        METRICS + "constant.py",
-        "return cls(matrix.T @ matrix)",
-        "return cls(matrix @ matrix.T)",
+        METRICS + "coordinates.py",
+        "return np.asarray(A.T @ A)",
+        "return np.asarray(A @ A.T)",
         ON_ROBOTS + "coordinates_metric",
     ),
     # ----------------------------------------------------------------- constraints
@@ -596,6 +597,13 @@ MUTANTS = (
     Mutant(
         "configuration: unknown keys accepted",
         CONFIG + "models/base.py",
+        'extra="forbid"',
+        'extra="ignore"',
+        UNIT + "config/test_experiment.py -k every_mistake",
+    ),
+    Mutant(
+        "parts: unknown keys accepted",
+        DECLARATION + "part.py",
         'extra="forbid"',
         'extra="ignore"',
         UNIT + "config/test_experiment.py -k every_mistake",

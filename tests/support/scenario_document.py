@@ -1,8 +1,10 @@
 """A small schema and a good text for it, to read documents by."""
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 import pytest
+import yaml
 from pydantic import (
     BaseModel,
     ConfigDict,
@@ -121,3 +123,32 @@ def message(text: str, *overrides: str, model: type[BaseModel] = Scenario) -> st
     with pytest.raises(ConfigError) as caught:
         read(text, *overrides, model=model)
     return str(caught.value)
+
+
+def line_of(text: str, path: str) -> int:
+    """Return the line of a key path in a YAML text, or of its nearest ancestor."""
+    node, line = yaml.compose(text), 1
+    for part in path.split(".") if path else []:
+        if isinstance(node, yaml.MappingNode):
+            entries = {key.value: (key, value) for key, value in node.value}
+        elif isinstance(node, yaml.SequenceNode):
+            entries = {str(k): (each, each) for k, each in enumerate(node.value)}
+        else:
+            break
+        if part not in entries:
+            break
+        place, node = entries[part]
+        line = place.start_mark.line + 1
+    return line
+
+
+def check_place(error: Exception, file: Path) -> str:
+    """Check that an error has one line with the right place; return the key path."""
+    where, _, rest = str(error).removeprefix(f"{file}:").partition(": ")
+    path, colon, _ = rest.partition(": ")
+    if not colon or " " in path:
+        path = ""
+    assert str(error).startswith(f"{file}:{line_of(file.read_text(), path)}: "), error
+    assert where.isdecimal()
+    assert "\n" not in str(error), error
+    return path

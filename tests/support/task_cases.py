@@ -8,7 +8,7 @@ error is rounding.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -22,12 +22,15 @@ from hsp_control import (
     FramePosition,
     Gains,
     JointPosture,
+    NullSpaceField,
     Pointing,
-    RelativePose,
     Robot,
     Task,
 )
 from hsp_control.declaration.quantities import Matrix
+from hsp_control.geometry import Scene
+from hsp_control.geometry.start import Start
+from hsp_control.tasks import RelativePose
 from hsp_control.trajectories import (
     ComposedPose,
     HoldOrientation,
@@ -37,6 +40,7 @@ from hsp_control.trajectories import (
 )
 
 Array = NDArray[np.float64]
+Kind = TypeVar("Kind", bound=Task | NullSpaceField)
 
 TIME = 0.7  # [s], when all is looked at
 GAINS = Gains(25.0, 10.0)
@@ -57,6 +61,12 @@ def load(name: str, root: Any = None) -> Robot:
     if name not in BUNDLED:
         pytest.importorskip("example_robot_data")
     return Robot.load(name, root=root)
+
+
+def placed(part: Kind, robot: Robot) -> Kind:
+    """Return a task or field for a robot that starts at rest at home."""
+    at_rest = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+    return part.placed(Start(at_rest, Scene()))
 
 
 def panda() -> Robot:
@@ -168,11 +178,17 @@ class Family:
     stride = 0.03  # of differences in the error, as a part of the motion's time scale
     rows: int
 
-    def build(
+    def make(
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
         """Return the task whose error at (TIME, q) has the size ``error``."""
         raise NotImplementedError
+
+    def build(
+        self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
+    ) -> Task:
+        """Return the same, placed."""
+        return placed(self.make(robot, motion, error, gains, seed), robot)
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         """Return x(s), whose rate at s = 0 is J v."""
@@ -198,12 +214,14 @@ class Position(Family):
     def rows(self) -> int:  # type: ignore[override]
         return len(self.axes)
 
-    def build(
+    def make(
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
         target = self.coordinates(None, motion)(0.0)
         target = target + error * unit(np.random.default_rng(seed), self.rows)
-        return FramePosition(self.frame, wobble(target), gains=gains, axes=self.axes, name="here")
+        return FramePosition(
+            self.frame, wobble(target), gains=gains, axes=self.axes, name="here"
+        )
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         indices = ["xyz".index(axis) for axis in self.axes]
@@ -231,7 +249,7 @@ class Orientation(Family):
         R = self.placement(motion, 0.0).rotation
         return Tumble(R @ pin.exp3(-error * unit(rng, 3)))
 
-    def build(
+    def make(
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
         reference = self.reference(motion, error, np.random.default_rng(seed))
@@ -252,7 +270,7 @@ class Orientation(Family):
 class Pose(Orientation):
     rows = 6
 
-    def build(
+    def make(
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
         rng = np.random.default_rng(seed)
@@ -291,11 +309,13 @@ class Seen(Pose):
         seen_from = motion.placement(s, self.reference_frame)
         return seen_from.actInv(motion.placement(s, self.frame))
 
-    def build(
+    def make(
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
-        pose = super().build(robot, motion, error, gains, seed)
-        return RelativePose(self.frame, pose.trajectory, reference=self.reference_frame, gains=gains)
+        pose = super().make(robot, motion, error, gains, seed)
+        return RelativePose(
+            self.frame, pose.trajectory, reference=self.reference_frame, gains=gains
+        )
 
 
 @dataclass(frozen=True)
@@ -308,7 +328,7 @@ class Mass(Family):
     def rows(self) -> int:  # type: ignore[override]
         return len(self.axes)
 
-    def build(
+    def make(
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
         target = self.coordinates(None, motion)(0.0)
@@ -339,7 +359,7 @@ class Direction(Family):
     largest = 2.5
     stride = 0.01  # the coordinates end at pi
 
-    def build(
+    def make(
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
         rng = np.random.default_rng(seed)
@@ -372,7 +392,8 @@ class Direction(Family):
     def check_measure(
         self, task: Any, motion: Motion, reference: Array, actual: Array, e: Array
     ) -> None:
-        m = motion.placement(0.0, self.frame).rotation @ task.axis
+        axis = np.array(self.axis) / np.linalg.norm(self.axis)
+        m = motion.placement(0.0, self.frame).rotation @ axis
         np.testing.assert_allclose(actual, m, rtol=0, atol=1e-14)
         assert np.linalg.norm(reference) == pytest.approx(1.0, abs=1e-14)
         R_d = task.trajectory.sample(TIME).rotation
@@ -405,7 +426,7 @@ class Posture(Family):
     moves: bool
     rows: int = field(default=0)
 
-    def build(
+    def make(
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
         names = single_joints(robot) if self.joints is None else self.joints
@@ -418,7 +439,9 @@ class Posture(Family):
         if moved is not None:
             shift[indices] -= moved.sample(TIME).position
         reference = pin.integrate(robot.model, motion.q, shift)
-        return JointPosture(reference, gains=gains, displacement=moved, joints=self.joints)
+        return JointPosture(
+            reference, gains=gains, displacement=moved, joints=self.joints
+        )
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
         model = motion.robot.model

@@ -197,7 +197,7 @@ def test_the_loop_moves_as_the_simulation_does(loop: ControlLoop) -> None:
         duration=0.05,
         control_period=0.001,
         log_period=0.001,
-        integrator=hsp.SemiImplicitEuler(0.001),
+        integrator=hsp.integrators.SemiImplicitEuler(0.001),
     )
     for row in range(50):
         np.testing.assert_allclose(loop.q, rollout.q[row], rtol=0, atol=1e-14)

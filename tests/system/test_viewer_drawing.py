@@ -10,7 +10,8 @@ import pinocchio as pin
 import pytest
 from clips import Clip
 
-from hsp_control import Obstacle, Robot, Rollout, Scene, load_experiment
+from hsp_control import Obstacle, Robot, Rollout, load_experiment
+from hsp_control.geometry import Scene
 from hsp_control.geometry.shapes import (
     Box,
     Capsule,
@@ -267,7 +268,7 @@ def test_a_pose_task_shows_its_axes(recorder: Recorder) -> None:
                     "trajectory": {
                         "type": "screw",
                         "position": [0.5, 0.1, 0.5],
-                        "rpy": [3.0, 0.2, 0.0],
+                        "rotation": [3.0, 0.2, 0.0],
                         "duration": 0.1,
                     },
                 },

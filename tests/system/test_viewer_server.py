@@ -21,8 +21,9 @@ import numpy as np
 import pytest
 from pages import Page
 
-from hsp_control import Robot, Rollout, Scene, load_experiment
+from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.common.exceptions import ViewerError
+from hsp_control.geometry import Scene
 from hsp_control.visualization.viewer import (
     Recorder,
     Viewer,
@@ -128,6 +129,7 @@ def test_closing_leaves_nothing(arm: Robot) -> None:
 
 PARENT = """
 import os, sys, time
+from hsp_control.geometry import Scene
 from hsp_control.visualization.viewer.server import Server
 server = Server()
 if sys.argv[1] == "fork" and os.fork() == 0:

@@ -5,10 +5,25 @@ from typing import Annotated
 
 from pydantic import AfterValidator
 
+from hsp_control.common.exceptions import FieldError
 from hsp_control.config.models.base import Model
+from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Gain, Positive
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.metrics import IdentityMetric, Metric
+
+
+def _summable(fields: Sequence[NullSpaceField]) -> tuple[NullSpaceField, ...]:
+    """Return the fields in a tuple.
+
+    Raises:
+        FieldError: If one of several cannot be part of a sum.
+    """
+    for k, field in enumerate(fields):
+        if len(fields) > 1 and not field.controls:
+            with within(k):
+                raise FieldError(f"{field.name!r} cannot be combined with other fields")
+    return tuple(fields)
 
 
 class NullSpaceModel(Model):
@@ -19,7 +34,7 @@ class NullSpaceModel(Model):
     number, nv numbers, or a matrix."""
     metric: Metric = IdentityMetric()
     """The joint-space metric W [-]."""
-    fields: Annotated[Sequence[NullSpaceField], AfterValidator(tuple)] = ()
+    fields: Annotated[Sequence[NullSpaceField], AfterValidator(_summable)] = ()
     """Fields [rad/s or m/s]; their sum is used. Without fields, self-motion comes to
     rest."""
     singularity_threshold: Positive = 0.03

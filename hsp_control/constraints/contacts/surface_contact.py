@@ -57,7 +57,8 @@ class SurfaceContact(Contact, type="surface"):
     def __post_init__(self) -> None:
         """Check that the sole is given in one way."""
         sizes = [self.length is not None, self.width is not None]
-        if self.corners is not None and (any(sizes) or self.center is not None):
+        moved = self.center is not None and np.any(self.center)
+        if self.corners is not None and (any(sizes) or moved):
             raise ContactError(
                 "give either length and width (and center) of the sole, or its "
                 "corners; not both"

@@ -25,14 +25,14 @@ class MotionLimits(NamedTuple):
         upper: Upper position limit, shape (nv,) [rad or m].
         velocity: Maximum speed, shape (nv,) [rad/s or m/s].
         acceleration: Maximum acceleration, shape (nv,) [rad/s² or m/s²].
-        bandwidth: α of the barriers [1/s].
+        bandwidth: α of the barriers, shape (1,) [1/s].
     """
 
     lower: Array
     upper: Array
     velocity: Array
     acceleration: Array
-    bandwidth: float
+    bandwidth: Array
 
 
 class Bounds(NamedTuple):
@@ -75,7 +75,8 @@ def acceleration_bounds(
         a_lower: Written: lower bound on the acceleration, shape (nv,).
         a_upper: Written: upper bound on the acceleration, shape (nv,).
     """
-    lower, upper, velocity, acceleration, bandwidth = limits
+    lower, upper, velocity, acceleration, alpha = limits
+    bandwidth = alpha[0]
     for i in range(v.shape[0]):
         low, high = -np.inf, np.inf
         if where[i] >= 0:

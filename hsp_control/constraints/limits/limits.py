@@ -5,7 +5,7 @@ from dataclasses import KW_ONLY
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LimitError
@@ -17,7 +17,14 @@ from hsp_control.constraints.limits.position_range import PositionRange
 from hsp_control.constraints.limits.robot_limits import RobotLimits
 from hsp_control.constraints.limits.static_effort import StaticEffort
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.quantities import NonNegative, Positive, read_only
+from hsp_control.declaration.quantities import (
+    Fraction,
+    NonNegative,
+    Positive,
+    ProperFraction,
+    Share,
+    read_only,
+)
 from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot
@@ -71,20 +78,20 @@ class Limits(Part, error=LimitError):
     position_margin: NonNegative = 0.005
     """Margin inside the position limits [rad or m]. With efforts held for a period, a
     barrier may be crossed by the error of the acceleration over α²."""
-    velocity_margin: Annotated[NonNegative, Field(lt=1.0)] = 0.02
+    velocity_margin: Share = 0.02
     """Margin inside the speed limits, as a fraction of the limit [-]."""
     distances: Annotated[Sequence[MinimumDistance], AfterValidator(tuple)] = ()
     """Minimum distances [m]."""
     bandwidth: Positive = 10.0
     """Bandwidth α of the barriers [1/s]. Motors can follow 5 to 20: faster barriers act
     so late that they need more than the effort rate permits."""
-    static_effort: Annotated[Positive, Field(le=1.0)] | None = None
+    static_effort: Fraction | None = None
     """Fraction of the effort limit that gravity may use [-], so that an arm stays where
     its motors can hold it; for motors that carry no contact. Unlimited by default."""
     null_space_speed: Positives | None = None
     """How fast the null space may leave the field, where limits bind, before the tasks
     deviate [rad/s or m/s], one number or nv. Unlimited by default."""
-    null_space_weight: Annotated[Positive, Field(lt=1.0)] | None = None
+    null_space_weight: ProperFraction | None = None
     """Cost of null-space deviation relative to the first task, where limits bind [-];
     1e-6 by default, 1e-8 if tasks have priorities. With 1e-3, a robot that cannot reach
     its target comes to rest; 1e-3 of the null-space deviation then appears in the
@@ -130,7 +137,7 @@ class Limits(Part, error=LimitError):
                 read_only(upper - self.position_margin),
                 read_only((1.0 - self.velocity_margin) * velocity),
                 self._numbers("acceleration", robot),
-                self.bandwidth,
+                read_only([self.bandwidth]),
             ),
             distances=tuple(distances),
             static_effort=None if share is None else StaticEffort(effort, share),

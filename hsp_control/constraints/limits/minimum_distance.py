@@ -68,8 +68,8 @@ class MinimumDistance(Part, ABC, family="distances", error=LimitError):
         """
         proximity = self.clearance.proximity(state)
         d = proximity.measure(state).copy()
-        ahead = proximity.measure(state.ahead(_STEP)).copy()
-        behind = proximity.measure(state.ahead(-_STEP)).copy()
+        ahead = self._distances(state.ahead(_STEP))
+        behind = self._distances(state.ahead(-_STEP))
         rate = (ahead - behind) / (2.0 * _STEP)
         drift = (ahead - 2.0 * d + behind) / _STEP**2
         h = d - self.minimum
@@ -81,6 +81,9 @@ class MinimumDistance(Part, ABC, family="distances", error=LimitError):
             A[row] = proximity.gradient(state, slopes)
         b = -drift - 2.0 * bandwidth * rate - bandwidth**2 * h
         return A, b[near]
+
+    def _distances(self, state: RobotState) -> Array:
+        return self.clearance.proximity(state).measure(state).copy()
 
     def check_start(self, state: RobotState) -> None:
         """Check that no pair starts closer than the minimum distance.

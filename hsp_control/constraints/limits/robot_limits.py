@@ -69,7 +69,7 @@ class RobotLimits:
     @property
     def bandwidth(self) -> float:
         """α of the barriers [1/s]."""
-        return self.motion.bandwidth
+        return float(self.motion.bandwidth[0])
 
     def check_start(self, q: Array, v: Array) -> None:
         """Check that a start is within the limits; distances are those at t = 0.

@@ -51,7 +51,7 @@ class StaticEffort:
             A, shape (k, nv), and b, shape (k,).
         """
         robot, model = state.robot, state.robot.model
-        data = state.made(self, model.createData)
+        data = state.made(self, "data", model.createData)
         slope = pin.computeGeneralizedGravityDerivatives(model, data, state.q)
 
         def gravity(dt: float) -> Array:

@@ -22,13 +22,13 @@ Contacts and floating bases, and Limits.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.common.native import bind
-from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import (
     EFFORT,
     MOTION,
@@ -41,6 +41,7 @@ from hsp_control.control.actuation.qp import Rows, solve, stacked
 from hsp_control.control.actuation.status import EXACT, Status
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.planned_contact import PlannedContact
+from hsp_control.control.planned_limits import PlannedLimits
 from hsp_control.law import Resolution
 from hsp_control.robot import Robot, RobotState
 
@@ -77,23 +78,22 @@ class Actuation:
     `applied`.
 
     Attributes:
-        limits: The limits, if any.
+        limits: The limits in force, if any.
         base: Indices of the degrees of freedom without a motor.
     """
 
     def __init__(
-        self, robot: Robot, limits: RobotLimits | None, base: Sequence[int] = ()
+        self, robot: Robot, planned: PlannedLimits, base: Sequence[int] = ()
     ) -> None:
         """Allocate.
 
         Args:
             robot: The robot.
-            limits: Its limits; None for none.
+            planned: Its limits.
             base: Indices of the degrees of freedom without a motor.
         """
         nv = robot.nv
         self._robot = robot
-        self.limits = limits
         self.base: Indices = np.array(base, dtype=np.int64)
         self._floating = bool(self.base.size)
         self._motors: Indices = np.setdiff1d(np.arange(nv), self.base)
@@ -103,11 +103,40 @@ class Actuation:
         self._tau_lower, self._tau_upper = np.full(nv, -np.inf), np.full(nv, np.inf)
         self._no_forces = np.zeros(0)
         self._no_support = Support((), robot, self._weight)
-        self._check = IdentityCache(self._compile_check)
-        self._only_box_limits = not self._floating and (
-            limits is None or not (limits.distances or limits.static_effort)
-        )
+        self.plan(planned, -np.inf)
         self.forget()
+
+    def plan(self, planned: PlannedLimits, t: float) -> None:
+        """Keep other limits from now on; t is the present time [s]."""
+        self._planned = planned
+        self.limits = planned.at(t, self._robot)
+        self._check = IdentityCache(self._compile_check)  # it reads their arrays
+        self._slacks = planned.slacks(t)
+        self._only_box_limits = not (
+            self._floating
+            or planned.distances
+            or any(each.static_effort for each in planned.sets if each is not None)
+        )
+
+    def update_limits(self, t: float) -> None:
+        """Compute the limits in force at time t [s], if they change."""
+        if self._planned.numbers.constant:
+            return
+        now, memory = self._planned.at(t, self._robot), self.limits
+        assert now is not None
+        assert memory is not None
+        for name in ("effort", "effort_rate", "velocity", "lower", "upper"):
+            np.copyto(getattr(memory, name), getattr(now, name))
+        for old, new in zip(memory.motion, now.motion, strict=True):
+            np.copyto(old, new)
+        self.limits = replace(
+            memory,
+            static_effort=now.static_effort,
+            null_space_speed=now.null_space_speed,
+        )
+        self._slacks = self._planned.slacks(t)
+        if not np.isfinite(now.effort_rate).any():
+            self.forget()
 
     def support(self, contacts: Sequence[PlannedContact]) -> Support:
         """Return the forces that these contacts can exert; with no contacts, none."""
@@ -221,9 +250,15 @@ class Actuation:
         found: dict[str, Rows] = {}
         if limits is None:
             return found
-        if limits.distances:
-            parts = [each.rows(state, limits.bandwidth) for each in limits.distances]
+        if self._slacks:
+            parts = [each.rows(state, limits.bandwidth) for each, _ in self._slacks]
+            slack = [
+                s
+                for (_, lower), (_, s) in zip(parts, self._slacks, strict=True)
+                for _ in lower
+            ]
             A, lower = (np.concatenate(each) for each in zip(*parts, strict=True))
+            lower = lower - np.array(slack)
             found["distances"] = Rows(A, lower, np.full(len(lower), np.inf))
         if limits.static_effort is not None:
             A, lower = limits.static_effort.rows(

@@ -155,7 +155,7 @@ class Clearance(Cost):
             arguments = proximity.distances, self.influence, slopes, curvatures
             return _Work(proximity, slopes, curvatures, bind(barrier, *arguments))
 
-        return state.made(self, make)
+        return state.made(self, "proximity", make)
 
 
 class _Work(NamedTuple):

@@ -77,4 +77,4 @@ class CompiledCost(Cost):
             gradient, rate = np.zeros((2, state.robot.nv))
             return _Own(gradient, rate, self._compile(state, gradient, rate))
 
-        return state.made(self, make)
+        return state.made(self, "derivatives", make)

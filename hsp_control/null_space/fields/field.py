@@ -101,6 +101,13 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
         """
         return self
 
+    def _not_placed(self, what: str) -> FieldError:
+        """Return the error of a field that is used before it is placed."""
+        return FieldError(
+            f"field {self.name!r}: a controller would look up its {what}; outside of "
+            "one, call `placed` first"
+        )
+
     def __init_subclass__(cls, **arguments: Any) -> None:
         """Reset `compile` if a subclass overrides `evaluate` only.
 
@@ -198,11 +205,12 @@ class FieldSum(NullSpaceField):
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> FieldSample:
         """Write the weighted sums of g and g'; see `NullSpaceField.evaluate`."""
-        sample = FieldSample.allocate(state.robot.nv)
+        own = state.made(self, "sum", lambda: _Adding.allocate(state.robot.nv))
         for k, term in enumerate(self.terms):
-            term.evaluate(state, metric, form, sample)
-            weights = np.array(sample_weight(term.weight, state))
-            bind(_add, k == 0, weights, *sample, *out)()
+            term.evaluate(state, metric, form, own.sample)
+            own.weights[:] = sample_weight(term.weight, state)
+            own.start() if k == 0 else own.add()
+        out.g[:], out.g_dot[:] = own.total
         return out
 
     def compile(
@@ -254,6 +262,33 @@ class FieldSum(NullSpaceField):
             sample_weight(term.weight, state)[0] * term.value(state)
             for term in self.terms
         )
+
+
+class _Adding(NamedTuple):
+    """What a sum computes with at one state.
+
+    Attributes:
+        sample: The sample of a term.
+        weights: Its w and w', shape (2,).
+        total: The sum.
+        start: Begins the sum with the sample.
+        add: Adds the sample to the sum.
+    """
+
+    sample: FieldSample
+    weights: Array
+    total: FieldSample
+    start: Callable[[], object]
+    add: Callable[[], object]
+
+    @classmethod
+    def allocate(cls, nv: int) -> "_Adding":
+        sample, total = FieldSample.allocate(nv), FieldSample.allocate(nv)
+        weights = np.zeros(2)
+        start, add = (
+            bind(_add, first, weights, *sample, *total) for first in (True, False)
+        )
+        return cls(sample, weights, total, start, add)
 
 
 def terms_of(field: NullSpaceField) -> tuple[NullSpaceField, ...]:

@@ -18,10 +18,9 @@ because J' is known exactly.
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import KW_ONLY, replace
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
@@ -29,22 +28,12 @@ from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import CallSequence
 from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Axes
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
 from hsp_control.robot import Robot, RobotState
 
 Rows = Literal["position", "orientation", "pose"]
-
-
-def _axes(letters: str) -> str:
-    """Return the letters of world axes.
-
-    Raises:
-        ValueError: If they are not distinct letters of "xyz", at least one.
-    """
-    if not letters or len(set(letters)) < len(letters) or set(letters) - set("xyz"):
-        raise ValueError(f"{letters!r} must be distinct letters of x, y and z")
-    return letters
 
 
 class JacobianTerms(NamedTuple):
@@ -73,7 +62,7 @@ class JacobianCost(CompiledCost):
     frame: str | None = None
     """Name of the frame [-]; the robot's end effector by default."""
     _: KW_ONLY
-    axes: Annotated[str, AfterValidator(_axes)] = "xyz"
+    axes: Axes = "xyz"
     """World axes of the position rows of the Jacobian, such as ``xy`` for a planar arm
     [-]; the rows are always in the order x, y, z."""
 

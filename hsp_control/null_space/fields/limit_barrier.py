@@ -1,16 +1,14 @@
 """The cost of joints near their limits, zero in the middle of the range."""
 
 from dataclasses import KW_ONLY
-from typing import Annotated, Self
-
-from pydantic import Field
+from typing import Self
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.declaration import within
-from hsp_control.declaration.quantities import Positive, Weights
+from hsp_control.declaration.quantities import Fraction, Weights
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.barrier import barrier_at
 from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
@@ -26,7 +24,7 @@ class LimitBarrier(CompiledCost, type="limit_barrier"):
     joints and a floating root do not count.
     """
 
-    zone: Annotated[Positive, Field(le=1.0)] = 0.3
+    zone: Fraction = 0.3
     """Width of the zone before a limit, as a fraction of half the range, at most 1
     [-]."""
     _: KW_ONLY

@@ -37,7 +37,8 @@ class ObstacleClearance(Clearance, type="obstacle_clearance"):
     def __post_init__(self) -> None:
         """Check that there is an obstacle."""
         if self.obstacles is not None and not self.obstacles:
-            raise FieldError("obstacles: needs at least one obstacle")
+            with within("obstacles"):
+                raise FieldError("needs at least one obstacle")
 
     def fitted(self, start: Start) -> Self:
         """Return the cost with its obstacles from the scene; see `Clearance.placed`."""
@@ -52,7 +53,10 @@ class ObstacleClearance(Clearance, type="obstacle_clearance"):
         return replace(self, obstacles=tuple(found))
 
     def _pairs(self, robot: Robot) -> Proximity:
-        obstacles = [o for o in self.obstacles or () if isinstance(o, Obstacle)]
+        given = dict.fromkeys(self.obstacles or ())  # the same one twice counts once
+        obstacles = [each for each in given if isinstance(each, Obstacle)]
+        if not obstacles or len(obstacles) < len(given):
+            raise self._not_placed("obstacles")
         rounded = [o for o in obstacles if o.shape.rounded]
         flat = [o for o in obstacles if not o.shape.rounded]
         flat_proxy: Proxy = "spheres" if self.proxy == "capsules" else self.proxy

@@ -50,8 +50,9 @@ class PointDistance(CompiledCost, type="point_distance"):
 
     @property
     def _placed_obstacle(self) -> Obstacle:
-        assert isinstance(self.obstacle, Obstacle), "the field is not placed"
-        return self.obstacle
+        if isinstance(self.obstacle, Obstacle):
+            return self.obstacle
+        raise self._not_placed("obstacle")
 
     def minimum_distance(self, state: RobotState) -> float:
         """Return the minimum distance from a frame to the obstacle's centre [m]."""

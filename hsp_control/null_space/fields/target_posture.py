@@ -75,6 +75,8 @@ class TargetPosture(CompiledCost, type="target_posture"):
 
     def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
         robot = state.robot
+        if self.configuration is None:
+            raise self._not_placed("posture")
         return bind(
             _posture,
             state.q,

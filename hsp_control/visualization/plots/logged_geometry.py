@@ -1,30 +1,11 @@
 """The geometry in a log: skeleton, paths of the tasks, and their extent."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.log_series import task_names, task_type
+from hsp_control.simulation.log_series import TaskPath, task_names, task_path
 from hsp_control.visualization.plots.obstacles import logged_obstacles
-
-
-class TaskPath(NamedTuple):
-    """The path of a point that a task controls.
-
-    Attributes:
-        name: The task's name.
-        desired: The desired position [m], shape (N, 3); the actual one along world axes
-            that the task does not track.
-        actual: The actual position [m], shape (N, 3).
-        axes: The world axes that the task tracks, such as ``"xy"``.
-    """
-
-    name: str
-    desired: Array
-    actual: Array
-    axes: str
 
 
 def parents(rollout: Rollout) -> list[int]:
@@ -34,7 +15,7 @@ def parents(rollout: Rollout) -> list[int]:
 
 def task_paths(rollout: Rollout) -> list[TaskPath]:
     """Return the paths of all tasks that control a point."""
-    paths = (_task_path(rollout, name) for name in task_names(rollout))
+    paths = (task_path(rollout, name) for name in task_names(rollout))
     return [path for path in paths if path is not None]
 
 
@@ -71,31 +52,3 @@ def center_points(rollout: Rollout) -> Array:
 def _robot_and_paths(rollout: Rollout) -> list[Array]:
     paths = task_paths(rollout)
     return [rollout["skeleton"].reshape(-1, 3), *(path.desired for path in paths)]
-
-
-def _task_path(rollout: Rollout, name: str) -> TaskPath | None:
-    reference = rollout[f"task.{name}.reference"]
-    actual = rollout[f"task.{name}.actual"]
-    if task_type(rollout, name) == "FramePose":
-        return TaskPath(name, reference[:, :3], actual[:, :3], "xyz")
-    if task_type(rollout, name) != "FramePosition":
-        return None
-    axes, path = _located(rollout, name, actual)
-    desired = path.copy()
-    desired[:, ["xyz".index(axis) for axis in axes]] = reference
-    return TaskPath(name, desired, path, axes)
-
-
-def _located(rollout: Rollout, name: str, actual: Array) -> tuple[str, Array]:
-    """Return the axes that a task tracks, and the path of its point.
-
-    The point is found in the skeleton, which also has the axes that are not tracked.
-    """
-    axes = str(rollout.meta["tasks"][name]["axes"])
-    skeleton, columns = rollout["skeleton"], ["xyz".index(axis) for axis in axes]
-    for point in reversed(range(skeleton.shape[1])):
-        if np.array_equal(skeleton[:, point, columns], actual):
-            return axes, skeleton[:, point]
-    path = np.zeros((len(actual), 3))
-    path[:, columns] = actual
-    return axes, path

@@ -26,9 +26,10 @@ def null_space_projector(controller: Controller, state: RobotState) -> Array:
     J stacks the Jacobians of all contacts and tasks that are active at the state's
     time, and J# = W⁻¹Jᵀ(J W⁻¹Jᵀ)⁻¹. Where J loses rank, J# is the pseudo-inverse.
     """
-    J = controller.stack(state).jacobian
+    own = controller.state.update(state.t, state.q, state.v)  # of the same robot object
+    J = controller.stack(own).jacobian
     nv = controller.robot.nv
-    metric = controller.metric.evaluate(state, MetricSample.allocate(nv))
+    metric = controller.metric.evaluate(own, MetricSample.allocate(nv))
     # With W = L Lᵀ, P = L⁻ᵀ (I - B⁺B) Lᵀ for B = J L⁻ᵀ.
     B = np.linalg.solve(metric.L, J.T).T
     projector = np.eye(nv) - np.linalg.pinv(B, rcond=1e-9) @ B

@@ -8,6 +8,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_series import drawn_parts, task_names
 from hsp_control.visualization.viewer.interpolation import (
     interpolate_column,
     interpolate_configuration,
@@ -101,11 +102,11 @@ def _orientations(rollout: Rollout) -> Iterator[tuple[str, slice]]:
     for name in rollout.columns:
         if name.endswith(".quaternion"):
             yield name, slice(0, 4)
-    for task, about in rollout.meta.get("tasks", {}).items():
-        where = {"FramePose": slice(3, 7), "FrameOrientation": slice(0, 4)}
-        if about.get("type") in where:
-            yield f"task.{task}.reference", where[about["type"]]
-            yield f"task.{task}.actual", where[about["type"]]
+    for task in task_names(rollout):
+        where = drawn_parts(rollout, task).get("orientation")
+        if where is not None:
+            yield f"task.{task}.reference", where
+            yield f"task.{task}.actual", where
 
 
 def drawn_times(times: Array, finest: float, coarsest: float) -> Array:

@@ -21,16 +21,13 @@ from places import ROOT
 
 from hsp_control import (
     Circle,
-    ConstantMetric,
     Controller,
     FrameOrientation,
     FramePose,
     FramePosition,
     Gains,
-    IdentityMetric,
     JointPosture,
     Limits,
-    MassMatrixMetric,
     Obstacle,
     Pointing,
     Robot,
@@ -38,9 +35,10 @@ from hsp_control import (
 )
 from hsp_control.common import kernels, native
 from hsp_control.control.actuation import Status
-from hsp_control.geometry import Proximity, link_shapes
+from hsp_control.geometry import Proximity, Scene, link_shapes
 from hsp_control.geometry.coal_distances import CoalDistances
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
+from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import (
     EqualJointAngles,
     FieldSample,
@@ -57,7 +55,12 @@ from hsp_control.null_space.fields import (
     TargetPosture,
     Transmission,
 )
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.metrics import (
+    ConstantMetric,
+    IdentityMetric,
+    MassMatrixMetric,
+    MetricSample,
+)
 from hsp_control.tasks import Task, TaskSample
 from hsp_control.trajectories import (
     Blend,
@@ -90,21 +93,31 @@ def obstacle(shape: Shape) -> Obstacle:
     return Obstacle("it", shape, path, SPIN)
 
 
+def start_of(robot: Robot) -> Start:
+    return Start(robot.state(0.0, robot.home(), np.zeros(robot.nv)), Scene())
+
+
 def tasks(robot: Robot, frame: str) -> dict[str, Task]:
     blended = Blend(CIRCLE, 2.0, start=[0.4, 0.1, 0.5])
     path = OrientationPath([np.eye(3), TURNED], [0.0, 2.0])
     turning = BlendOrientation(SPIN, 2.0, rotation=TURNED)
     motion = Spline(np.eye(3, 7)[:, : len(robot.single_dof_joints)], [0.0, 0.5, 1.0])
     all_joints = motion.dimension == len(robot.single_dof_joints)
-    return {
+    made: dict[str, Task] = {
         "position": FramePosition(frame, blended, gains=GAINS),
-        "axes": FramePosition(frame, Lissajous([1, 1], [1, 2], center=[0, 0]), gains=GAINS, axes="zx"),
+        "axes": FramePosition(
+            frame, Lissajous([1, 1], [1, 2], center=[0, 0]), gains=GAINS, axes="zx"
+        ),
         "orientation": FrameOrientation(frame, path, gains=GAINS),
         "pose": FramePose(frame, ComposedPose(CIRCLE, turning), gains=GAINS),
         "held pose": FramePose(frame, HoldPose([0.4, 0, 0.5], TURNED), gains=GAINS),
         "pointing": Pointing(frame, axis=[0.0, 0.6, 0.8], trajectory=SPIN, gains=GAINS),
-        "posture": JointPosture(robot.home(), gains=GAINS, displacement=motion if all_joints else None),
+        "posture": JointPosture(
+            robot.home(), gains=GAINS, displacement=motion if all_joints else None
+        ),
     }
+    start = start_of(robot)
+    return {name: task.placed(start) for name, task in made.items()}
 
 
 def fields(robot: Robot, frame: str) -> dict[str, NullSpaceField]:
@@ -119,13 +132,14 @@ def fields(robot: Robot, frame: str) -> dict[str, NullSpaceField]:
         "root": Manipulability(frame, rows="pose", length=0.5),
         "log": Manipulability(frame, form="log", metric=2.0 * np.eye(robot.nv)),
         "condition": InverseCondition(frame),
-        "velocity": Transmission(frame, [0.0, 0.6, 0.8]),
-        "force": Transmission(frame, [0.0, 0.6, 0.8], kind="force"),
+        "velocity": Transmission(frame, direction=[0.0, 0.6, 0.8]),
+        "force": Transmission(frame, direction=[0.0, 0.6, 0.8], kind="force"),
         "point": PointDistance([frame], ball),
         "sum": JointCentering()
         + Ramp(initial=0.0, final=1.0, start=0.0, duration=2.0) * Manipulability(frame),
     }
-    return made
+    start = start_of(robot)
+    return {name: field.placed(start) for name, field in made.items()}
 
 
 def clearances(robot: Robot) -> dict[str, NullSpaceField]:
@@ -133,7 +147,9 @@ def clearances(robot: Robot) -> dict[str, NullSpaceField]:
         name: ObstacleClearance([obstacle(shape)], influence=0.8)
         for name, shape in SHAPES.items()
     }
-    return made | {"self": SelfClearance(influence=0.5)}
+    made["self"] = SelfClearance(influence=0.5)
+    start = start_of(robot)
+    return {name: field.placed(start) for name, field in made.items()}
 
 
 METRICS = {
@@ -359,11 +375,11 @@ def test_no_allocation_in_a_task(name: str, chain: Robot) -> None:
     robot = chain
     task = tasks(robot, f"link{JOINTS}")[name]
     state = robot.state(0.1, robot.home() + 0.1, np.full(JOINTS, 0.1))
-    out = TaskSample.allocate(task.rows, JOINTS)
+    out, feedback = TaskSample.allocate(task.rows, JOINTS), task.feedback()
 
     def step() -> None:
         state.stamp_array[0] += 1  # the frame anew, too
-        task.evaluate(state, out)
+        task.evaluate(state, out, feedback)
 
     peak, left = allocated(step, 2000)
     assert peak < VECTOR, name
@@ -377,12 +393,14 @@ def test_no_allocation_in_a_task(name: str, chain: Robot) -> None:
 def test_no_allocation_in_a_field(name: str, chain: Robot) -> None:
     robot = chain
     frame = f"link{JOINTS}"
+    field: NullSpaceField
     if name in SHAPES:
-        field: NullSpaceField = ObstacleClearance([obstacle(SHAPES[name])], influence=9.0)
+        field = ObstacleClearance([obstacle(SHAPES[name])], influence=9.0)
     elif name == "self":
         field = SelfClearance(influence=0.5)
     else:
         field = fields(robot, frame)[name]
+    field = field.placed(start_of(robot))
     state = robot.state(0.1, robot.home() + 0.1, np.full(JOINTS, 0.1))
     metric, out = MetricSample.allocate(JOINTS), FieldSample.allocate(JOINTS)
 
@@ -401,14 +419,15 @@ def test_a_step_allocates_what_pinocchio_returns_and_nothing_else(
 ) -> None:
     """Pinocchio hands out a copy of its Jacobians' rates, and of the effort."""
     name, q, v = f"link{JOINTS}", chain.home() + 0.1, np.full(JOINTS, 1e-3)
-    state = chain.state(0.1, q, v)
-    frame = state.frame(name)
+    frame = chain.state(0.1, q, v).frame(name)
     here = HoldPose(frame.position, frame.rotation)
     pose = FramePose(name, here, gains=GAINS)
     clearance = ObstacleClearance([obstacle(Sphere(0.1))], influence=9.0)
     field = JointCentering() + 0.1 * clearance
     controller = Controller(chain, [pose], field, limits=Limits())
-    assert controller.compute(state).status == Status.EXACT
+    state = controller.state
+    out = controller.compute(0.1, q, v)
+    assert out.status == Status.EXACT
 
     peak, left = allocated(lambda: state.update(0.1, q, v), 500)
     assert 6 * VECTOR <= peak < 7 * VECTOR
@@ -416,7 +435,7 @@ def test_a_step_allocates_what_pinocchio_returns_and_nothing_else(
 
     def compute() -> None:
         state.stamp_array[0] += 1
-        controller.compute(state)
+        controller.compute(state, out=out)
 
     peak, left = allocated(compute, 500)
     assert VECTOR <= peak < 2 * VECTOR

@@ -18,15 +18,11 @@ from numpy.typing import NDArray
 from places import ROOT
 
 from hsp_control import (
-    ConstantMetric,
     Controller,
     FrameOrientation,
     FramePosition,
     Gains,
     Hold,
-    IdentityMetric,
-    MassMatrixMetric,
-    Metric,
     Robot,
     TargetPosture,
 )
@@ -44,6 +40,12 @@ from hsp_control.common.linalg import (
     solve_rows_transposed,
 )
 from hsp_control.law import law
+from hsp_control.null_space.metrics import (
+    CoordinatesMetric,
+    IdentityMetric,
+    MassMatrixMetric,
+    Metric,
+)
 from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY, raise_covector
 from hsp_control.robot import kinematics, robot
 from hsp_control.tasks import TaskSample

@@ -1,22 +1,32 @@
 """Keys of version 0.1 still load, with one warning; errors keep their lines."""
 
 import json
+import re
 import warnings
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ConfigError
-from hsp_control.config import json_schema, renamed
+from hsp_control.config import renamed
 from hsp_control.config.document import Document
-from hsp_control.config.renamed import RenamedKeyWarning
+from hsp_control.config.renamed import Renamed, RenamedKeyWarning
 from hsp_control.config.scenario import Scenario
+from hsp_control.config.validation import validate
+from hsp_control.declaration.schema import entry, shape
 from hsp_control.sweeps.factor import factors
 from hsp_control.sweeps.plan import document
+from hsp_control.trajectories import (
+    ComposedPose,
+    Hold,
+    HoldOrientation,
+    OrientationPath,
+)
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -146,19 +156,203 @@ def test_an_old_key_in_the_file_of_a_sweep() -> None:
     }
 
 
+# -- keys of trajectories and distances -----------------------------------------------
+
+TURNED = """\
+robot: {name: panda}
+scene:
+  obstacles:
+    board:
+      shape: {type: box, size: [0.1, 0.1, 0.1]}
+      center: {type: hold, point: [1, 1, 1]}
+      orientation:
+        type: spin
+        rpy: [0, 0, 1]
+        axis: [0, 0, 1]
+        rate: 2
+tasks:
+  hand:
+    type: frame_orientation
+    trajectory:
+      type: path
+      rpy: [[0, 0, 1], [0, 0, 2]]
+      times: [0, 1]
+  still: {type: frame_orientation, trajectory: {type: hold, rpy: [0, 1, 0]}}
+  pose:
+    type: frame_pose
+    trajectory:
+      type: composed
+      position: {type: hold}
+      orientation: {type: path, rpy: [[0, 0, 3], [0, 0, 4]], times: [0, 1]}
+  screw:
+    type: frame_pose
+    trajectory: {type: screw, position: [1, 0, 1], rpy: [3, 0, 0], duration: 2}
+limits:
+  distances:
+  - {type: obstacles, least: 0.03}
+  - {type: self}
+"""
+NOW = {
+    "scene.obstacles.board.orientation.rpy": (9, "rotation"),
+    "tasks.hand.trajectory.rpy": (17, "rotations"),
+    "tasks.still.trajectory.rpy": (19, "rotation"),
+    "tasks.pose.trajectory.orientation.rpy": (25, "rotations"),
+    "tasks.screw.trajectory.rpy": (28, "rotation"),
+    "limits.distances.0.least": (31, "minimum"),
+}
+"""The line of each old key, and its new name."""
+
+
+def test_each_old_key_warns_at_its_line() -> None:
+    with pytest.warns(FutureWarning) as caught:
+        Document.parse(TURNED, "mine.yaml")
+    told = {str(each.message) for each in caught}
+    assert told == {
+        f"mine.yaml:{line}: {old} is now {old.rpartition('.')[0]}.{new}"
+        for old, (line, new) in NOW.items()
+    }
+    assert len(caught) == len(told)
+
+
+def test_old_keys_mean_what_the_new_ones_do() -> None:
+    new = TURNED.replace("rpy: [[", "rotations: [[").replace("rpy", "rotation")
+    new = new.replace("least", "minimum")
+    current = validate(Document.parse(new, "mine.yaml"), Scenario)
+    assert validate(read(TURNED), Scenario) == current
+    assert current.tasks["hand"].trajectory == OrientationPath(
+        [[0, 0, 1], [0, 0, 2]], [0, 1]
+    )
+    assert current.limits.distances[0].minimum == 0.03
+
+
+@pytest.mark.parametrize("old", NOW)
+def test_an_error_below_an_old_key_keeps_its_line(old: str) -> None:
+    line = NOW[old][0] - 1
+    lines = TURNED.splitlines()
+    value = "[[a" if "[[" in lines[line] else "[a" if "rpy" in lines[line] else "a"
+    key = old.rpartition(".")[2]
+    lines[line] = re.sub(rf"({key}: )\[*[-0-9.]+", rf"\1{value}", lines[line])
+    new = f"{old.rpartition('.')[0]}.{NOW[old][1]}"
+    with pytest.raises(ConfigError) as caught:
+        validate(read("\n".join(lines)), Scenario)
+    inside = ".0" * value.count("[")
+    assert str(caught.value) == (
+        f"mine.yaml:{line + 1}: {new}{inside}: 'a' is text; expected a number"
+    )
+
+
+@pytest.mark.parametrize("old", NOW)
+def test_an_override_of_an_old_key_is_that_of_the_new_one(old: str) -> None:
+    found, new = read(TURNED), f"{old.rpartition('.')[0]}.{NOW[old][1]}"
+    with pytest.warns(FutureWarning) as caught:
+        found.override(f"{old}=7")
+    assert [str(each.message) for each in caught] == [
+        f"--set {old}=7: {old} is now {new}"
+    ]
+    path = tuple(int(key) if key.isdecimal() else key for key in new.split("."))
+    assert found.location(path) == f"--set {old}=7"
+    value: Any = found.to_dict()
+    for key in path:
+        value = value[key]
+    assert value == 7
+
+
+def test_the_old_name_in_a_sweep_is_resolved_where_the_type_is_known() -> None:
+    old = "tasks.hand.trajectory.rpy"
+    (factor,) = factors({old: [[[0, 0, 5], [0, 0, 6]]]})
+    assert factor.name == old  # `rotation` or `rotations`: the type says which
+    found = read(TURNED)
+    with pytest.warns(FutureWarning, match=r"rpy is now .*rotations$"):
+        found.assign(list(factor.keys), [[0, 0, 5], [0, 0, 6]], factor.origin)
+    task = validate(found, Scenario).tasks["hand"]
+    assert task.trajectory.rotations[0, 2] == 5
+
+
 def test_every_new_key_exists() -> None:
-    for new in renamed.RENAMED.values():
-        assert new[0] in Scenario.model_fields
+    for each in renamed.RENAMED:
+        holders = shape(Scenario).options
+        for key in each.new[:-1]:
+            inner = (entry(holder, 0 if key == "*" else key) for holder in holders)
+            holders = tuple(o for found in inner if found for o in found.options)
+        of_type = [
+            holder
+            for holder in holders
+            if each.type in (None, getattr(holder, "yaml_type", None))
+        ]
+        assert any(entry(holder, each.new[-1]) for holder in of_type), each
+
+
+# -- what logs of version 0.1 contain -------------------------------------------------
+
+LOGGED = """\
+robot: {name: solo12, root: null, locked: null}
+scene:
+  obstacles:
+    ball:
+      shape: {type: sphere, radius: 0.1}
+      center: {origin: world, type: hold, point: [0, 0, 1]}
+      orientation: null
+contacts:
+  sole: {friction: 0.7, schedule: null, type: surface, frame: FL_FOOT, length: null,
+         width: null, center: [0, 0, 0], corners: [[0, 0, 0], [0, 1, 0], [1, 0, 0]]}
+tasks:
+  spin:
+    priority: 1
+    schedule: null
+    gains: {kp: null, kv: null, natural_frequency: 10.0, damping_ratio: null}
+    type: angular_momentum
+    rate: 10.0
+    trajectory: {origin: world, type: hold, point: [0, 0, 0]}
+  trunk:
+    priority: 1
+    gains: {kp: null, kv: null, natural_frequency: 10.0, damping_ratio: null}
+    blend: null
+    type: frame_pose
+    frame: base_link
+    trajectory:
+      type: composed
+      position: {origin: world, type: hold, point: null}
+      orientation: {type: hold, rpy: null}
+limits: null
+null_space:
+  metric: {type: identity}
+  fields:
+  - {type: target_posture, weight: 1.0, target: start, weights: 1.0}
+"""
+
+
+def test_what_a_log_of_version_0_1_contains() -> None:
+    with pytest.warns(FutureWarning) as caught:
+        found = Document.parse(LOGGED, "old.npz")
+    assert sorted(str(each.message) for each in caught) == [
+        "old.npz:15: tasks.spin.gains has no effect; remove it",
+        "old.npz:28: tasks.trunk.trajectory.orientation.rpy is now "
+        "tasks.trunk.trajectory.orientation.rotation",
+    ]
+    scenario = validate(found, Scenario)
+    ball = scenario.scene["ball"]
+    np.testing.assert_array_equal(ball.orientation.sample(0.0).rotation, np.eye(3))
+    assert scenario.contacts["sole"].points.shape == (3, 3)
+    assert scenario.tasks["spin"].priority == 1
+    assert scenario.tasks["trunk"].trajectory == ComposedPose(Hold(), HoldOrientation())
+
+
+@pytest.mark.parametrize("robot", ["panda", "solo12"])
+def test_gains_of_another_task_are_not_removed(robot: str) -> None:
+    task = {"type": "center_of_mass", "gains": {"kp": 1, "kv": 2}}
+    data = {"robot": {"name": robot}, "tasks": {"a": task}}
+    assert Document(data, {}, "data").to_dict() == data
 
 
 # -- tables with nested keys ----------------------------------------------------------
 
-NESTED: dict[tuple[str | int, ...], tuple[str | int, ...]] = {
-    ("limits", "margin"): ("limits", "position_margin"),
-    ("frequency",): ("simulation", "control", "frequency"),
-    ("tasks", "*", "gain"): ("tasks", "*", "gains", "kp"),
-    ("fields", "*", "size"): ("fields", "*", "influence"),
-}
+NESTED = (
+    Renamed(("limits", "margin"), ("limits", "position_margin")),
+    Renamed(("frequency",), ("simulation", "control", "frequency")),
+    Renamed(("tasks", "*", "gain"), ("tasks", "*", "gains", "kp")),
+    Renamed(("fields", "*", "size"), ("fields", "*", "extent"), "box"),
+    Renamed(("fields", "*", "size"), ("fields", "*", "influence")),
+)
 
 
 @pytest.fixture
@@ -191,6 +385,15 @@ def nested(monkeypatch: pytest.MonkeyPatch) -> None:
         (
             {"fields": [{"size": 1}, {}, {"size": 2}]},
             {"fields": [{"influence": 1}, {}, {"influence": 2}]},
+        ),
+        (
+            {"fields": [{"size": 1, "type": "box"}, {"size": 2, "type": "ball"}]},
+            {
+                "fields": [
+                    {"extent": 1, "type": "box"},
+                    {"influence": 2, "type": "ball"},
+                ]
+            },
         ),
         (
             {"tasks": [], "fields": {}, "limits": 1},
@@ -232,18 +435,3 @@ def test_old_and_new_nested_keys_at_once() -> None:
         "mine.yaml:3: limits.margin: is now limits.position_margin, which is also "
         "given; remove one of them"
     )
-
-
-# -- the schema -----------------------------------------------------------------------
-
-
-def test_every_key_of_the_schema_has_a_description() -> None:
-    schema = json_schema()
-    models = {"Scenario": schema, **schema["$defs"]}
-    without = [
-        f"{name}.{key}"
-        for name, model in models.items()
-        for key, value in model.get("properties", {}).items()
-        if not value.get("description")
-    ]
-    assert without == []

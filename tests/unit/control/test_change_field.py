@@ -15,23 +15,24 @@ from hsp_control import (
     FramePosition,
     Gains,
     Hold,
-    IdentityMetric,
     JointCentering,
     Manipulability,
-    MassMatrixMetric,
-    Metric,
     NullSpaceField,
     Rest,
     Robot,
     TargetPosture,
-    Uncontrolled,
     simulate,
 )
 from hsp_control.common.exceptions import ControllerError, FieldError
 from hsp_control.null_space.differences import rate_along_flow
-from hsp_control.null_space.fields import FieldSample
+from hsp_control.null_space.fields import FieldSample, Uncontrolled
 from hsp_control.null_space.fields.crossfade import crossfade
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.metrics import (
+    IdentityMetric,
+    MassMatrixMetric,
+    Metric,
+    MetricSample,
+)
 from hsp_control.robot import RobotState
 from hsp_control.simulation.recorder import Recorder
 
@@ -153,7 +154,13 @@ def test_what_cannot_change_is_refused() -> None:
 
 def test_the_log_has_the_terms_of_both_and_of_tasks_that_come() -> None:
     law = controller(JointCentering())
-    other = FramePosition("panda_link4", Hold([0.3]), gains=Gains(natural_frequency=5.0), name="elbow", axes="x")
+    other = FramePosition(
+        "panda_link4",
+        Hold([0.3]),
+        gains=Gains(natural_frequency=5.0),
+        name="elbow",
+        axes="x",
+    )
 
     def change(recorder: Recorder) -> None:
         done = len(recorder.rows(0)["t"])

@@ -11,46 +11,49 @@ from scipy.linalg import expm
 from hsp_control import (
     CenterOfMass,
     Circle,
-    Command,
-    Compensation,
     Controller,
-    EffortRateClip,
     FrameOrientation,
     FramePose,
     FramePosition,
-    FrictionFeedForward,
     Gains,
     Hold,
-    HoldOrientation,
-    HoldPose,
-    ImperfectPlant,
-    IntegralAction,
-    IntegratedPlant,
     JointFriction,
     JointPosture,
     Limits,
-    MomentumObserver,
     Pointing,
-    Predictor,
-    RelativePose,
-    RigidBodyPlant,
-    Rk4,
     Robot,
     RobotState,
     Rollout,
-    StartUpRamp,
-    StickingPlant,
     Task,
-    VelocityFilter,
     load_experiment,
     simulate,
 )
 from hsp_control.common.exceptions import CompensationError, GainError, SimulationError
 from hsp_control.control.actuation.status import Status
+from hsp_control.control.compensation import (
+    Command,
+    Compensation,
+    EffortRateClip,
+    FrictionFeedForward,
+    IntegralAction,
+    MomentumObserver,
+    Predictor,
+    StartUpRamp,
+    VelocityFilter,
+)
 from hsp_control.null_space.fields import TargetPosture
+from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation.plants import (
+    ImperfectPlant,
+    IntegratedPlant,
+    RigidBodyPlant,
+    StickingPlant,
+)
 from hsp_control.simulation.plants.drives import EffortDelay
 from hsp_control.simulation.plants.model_changes import Payload, ScaledInertias, changed
 from hsp_control.simulation.plants.sensors import SensorDelay, VelocityNoise
+from hsp_control.tasks import RelativePose
+from hsp_control.trajectories import HoldOrientation, HoldPose
 
 Array = NDArray[np.float64]
 H = 1e-3
@@ -66,7 +69,9 @@ def circle(
     start = robot.state(0.0, robot.home(), np.zeros(robot.nv)).position("panda_tcp")
     center = start + np.array([away - 0.05, 0.0, 0.0])
     path = Circle(0.05, 2.0, center, axes=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    return FramePosition("panda_tcp", path, gains=Gains(natural_frequency=frequency), name="hand")
+    return FramePosition(
+        "panda_tcp", path, gains=Gains(natural_frequency=frequency), name="hand"
+    )
 
 
 def controller(robot: Robot = PANDA, away: float = 0.05, **options: Any) -> Controller:
@@ -286,8 +291,15 @@ def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
     from hsp_control.control.compensation.friction_feed_forward import desired_velocity
 
     robot, rng = PANDA, np.random.default_rng(2)
-    turned = FrameOrientation("panda_tcp", HoldOrientation(np.eye(3)), gains=Gains(natural_frequency=5.0))
-    again = FramePosition("panda_tcp", circle().trajectory, gains=Gains(natural_frequency=5.0), name="more")
+    turned = FrameOrientation(
+        "panda_tcp", HoldOrientation(np.eye(3)), gains=Gains(natural_frequency=5.0)
+    )
+    again = FramePosition(
+        "panda_tcp",
+        circle().trajectory,
+        gains=Gains(natural_frequency=5.0),
+        name="more",
+    )
     tasks: list[Any] = {
         1: [circle(), turned],
         2: [[circle()], [turned]],
@@ -430,7 +442,9 @@ def test_too_much_integral_action_is_lost_with_a_payload() -> None:
     """2 kg at the hand leave 0.3 of the feedback: as little as Ki/(Kv Kp) = 12/40."""
     loaded = RigidBodyPlant(changed(PANDA, [Payload("panda_tcp", 2.0)]))
     point = circle(away=0.0).trajectory.sample(0.0).position
-    hold = FramePosition("panda_tcp", Hold(point), gains=Gains(natural_frequency=20.0), name="hand")
+    hold = FramePosition(
+        "panda_tcp", Hold(point), gains=Gains(natural_frequency=20.0), name="hand"
+    )
     made = Controller(PANDA, [hold], 2.0 * TargetPosture(Q0))
     largest = {}
     for rate in (5.0, 12.0):
@@ -706,9 +720,7 @@ def test_two_guards_of_the_effort_rate_are_one_too_many() -> None:
     made = controller(limits=Limits(effort_rate=500.0))
     with pytest.raises(CompensationError, match=r"limits\.effort_rate keeps the rate"):
         Command(made, Compensation(effort_rate=EffortRateClip(500.0)))
-    Command(
-        controller(limits=Limits()), Compensation(effort_rate=EffortRateClip(5.0))
-    )
+    Command(controller(limits=Limits()), Compensation(effort_rate=EffortRateClip(5.0)))
 
 
 @pytest.mark.parametrize("name", ["momentum_observer", "predictor", "start_up_ramp"])

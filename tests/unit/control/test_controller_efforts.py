@@ -1,13 +1,16 @@
 """Check what the controller returns, without memory, near singularities too."""
 
+from copy import deepcopy
+
 import numpy as np
 import oracles
 import pinocchio as pin
+import pytest
 from controller_cases import (
     EXACT,
     METRICS,
     assert_same,
-    copied,
+    contents,
     hold_orientation,
     metrics,
     panda,
@@ -15,15 +18,14 @@ from controller_cases import (
     track,
 )
 
-from hsp_control import (
-    Controller,
+from hsp_control import Controller, Rest, TargetPosture
+from hsp_control.common.exceptions import ControllerError
+from hsp_control.null_space.fields import Uncontrolled
+from hsp_control.null_space.metrics import (
     IdentityMetric,
     MassMatrixMetric,
-    Rest,
-    TargetPosture,
-    Uncontrolled,
+    MetricSample,
 )
-from hsp_control.null_space.metrics import MetricSample
 
 # --- what it returns -----------------------------------------------------------------
 
@@ -90,14 +92,14 @@ def test_defaults_are_rest_the_identity_and_ten() -> None:
         panda(), [track()], Rest(), metric=IdentityMetric(), null_space_gain=10.0
     )
     state = panda().state(*states(1)[0])
-    assert_same(copied(plain.compute(state)), copied(said.compute(state)))
+    assert_same(contents(plain.compute(state)), contents(said.compute(state)))
     np.testing.assert_array_equal(plain.null_space_gain, 10.0 * np.eye(7))
 
 
 def test_gain_as_number_list_and_matrix() -> None:
     state = panda().state(*states(1)[0])
     outputs = [
-        copied(Controller(panda(), [track()], null_space_gain=gain).compute(state))
+        contents(Controller(panda(), [track()], null_space_gain=gain).compute(state))
         for gain in (6.0, 7 * [6.0], 6.0 * np.eye(7))
     ]
     assert_same(outputs[0], outputs[1])
@@ -140,7 +142,7 @@ def test_diagnosis(kind: str) -> None:
     )
     for t, q, v in states(3, seed=1):
         state = panda().state(t, q, v)
-        out = copied(controller.compute(state))
+        out = contents(controller.compute(state))
         diagnosis = controller.diagnose()
         W = metric.evaluate(state, MetricSample.allocate(7)).W
         J, e_N = out["task.jacobian"], out["null_space_error"]
@@ -157,11 +159,46 @@ def test_diagnosis(kind: str) -> None:
         np.testing.assert_allclose(
             diagnosis.null_space_norm, np.sqrt(e_N @ W @ e_N), rtol=1e-13
         )
-        assert diagnosis.field_value == field.value(state)
+        assert diagnosis.field_value == controller.field.value(state)
         # To look changes nothing.
         again = controller.diagnose()
         np.testing.assert_array_equal(again.singular_values, diagnosis.singular_values)
-        assert_same(copied(controller.compute(state)), out)
+        assert_same(contents(controller.compute(state)), out)
+
+
+def test_a_state_may_be_given_in_any_form() -> None:
+    """To the last bit; values that a float32 can hold, in that one, too."""
+    controller = Controller(panda(), [track()], TargetPosture("home"))
+    t, q, v = states(1)[0]
+    q, v = q.astype(np.float32).astype(float), v.astype(np.float32).astype(float)
+    expected = contents(controller.compute(panda().state(t, q, v)))
+    forms = [
+        (q, v),
+        (q.tolist(), tuple(v)),
+        (q.astype(np.float32), v.astype(np.float32)),
+        (np.repeat(q, 2)[::2], v[::-1][::-1]),
+    ]
+    for form in forms:
+        assert_same(contents(controller.compute(t, *form)), expected)
+    own = controller.state.update(t, q, v)
+    assert_same(contents(controller.compute(own)), expected)
+    assert controller.state is own
+    with pytest.raises(ControllerError, match="needs t, q and v, or a RobotState"):
+        controller.compute(t)  # type: ignore[call-overload]
+
+
+def test_an_output_belongs_to_the_caller() -> None:
+    """Later steps do not write into it, unless it is given to them."""
+    controller = Controller(panda(), [track(), hold_orientation()], TargetPosture())
+    first, second, third = states(3)
+    out = controller.compute(*first)
+    before = deepcopy(contents(out))
+    other = controller.compute(*second)
+    assert_same(contents(out), before)
+    expected = contents(controller.compute(*third))
+    assert controller.compute(*third, out=other) is other
+    assert_same(contents(other), expected)
+    assert_same(contents(out), before)
 
 
 # --- no memory -----------------------------------------------------------------------
@@ -176,18 +213,18 @@ def test_same_state_same_effort(kind: str) -> None:
     fresh = Controller(panda(), tasks, field, metric=METRICS[kind](7))
     somewhere, *others = states(6, seed=2)
     state = panda().state(*somewhere)
-    expected = copied(controller.compute(state))
-    assert_same(copied(controller.compute(state)), expected)
+    expected = contents(controller.compute(state))
+    assert_same(contents(controller.compute(state)), expected)
     for t, q, v in others:
         controller.compute(panda().state(t, q, v))
         controller.diagnose()
     upright = panda().state(0.0, np.zeros(7), np.ones(7))
     assert controller.compute(upright).damped
     controller.flow(0.7, others[0][1])
-    assert_same(copied(controller.compute(state)), expected)
+    assert_same(contents(controller.compute(state)), expected)
     # Another controller of the same tasks and field does not disturb, nor a new state.
-    assert_same(copied(fresh.compute(panda().state(*somewhere))), expected)
-    assert_same(copied(controller.compute(state)), expected)
+    assert_same(contents(fresh.compute(panda().state(*somewhere))), expected)
+    assert_same(contents(controller.compute(state)), expected)
 
 
 def test_states_take_turns() -> None:
@@ -195,10 +232,10 @@ def test_states_take_turns() -> None:
     field = TargetPosture(panda().home())
     controller = Controller(panda(), [track()], field, metric=MassMatrixMetric())
     first, second = (panda().state(*where) for where in states(2, seed=3))
-    a, b = copied(controller.compute(first)), copied(controller.compute(second))
+    a, b = contents(controller.compute(first)), contents(controller.compute(second))
     for _ in range(3):
-        assert_same(copied(controller.compute(first)), a)
-        assert_same(copied(controller.compute(second)), b)
+        assert_same(contents(controller.compute(first)), a)
+        assert_same(contents(controller.compute(second)), b)
     assert np.abs(a["tau"] - b["tau"]).max() > 1.0
 
 
@@ -221,7 +258,7 @@ def test_singular_posture_gives_a_bounded_effort(kind: str) -> None:
     v = 0.1 * np.ones(7)
     direction = np.random.default_rng(4).standard_normal(7)
     outputs = [
-        copied(controller.compute(panda().state(0.0, h * direction, v)))
+        contents(controller.compute(panda().state(0.0, h * direction, v)))
         for h in (0.0, 1e-9, 1e-6)
     ]
     for out in outputs:

@@ -1,6 +1,7 @@
 """Check what the controller refuses, and that NaN never comes out of it."""
 
 from collections.abc import Callable
+from dataclasses import KW_ONLY
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,7 +12,7 @@ from controller_cases import (
     TCP,
     assert_same,
     circle,
-    copied,
+    contents,
     hold_orientation,
     panda,
     states,
@@ -20,36 +21,42 @@ from controller_cases import (
 from numpy.typing import NDArray
 
 from hsp_control import (
-    ConstantMetric,
     Controller,
     FramePosition,
     FunctionCost,
-    FunctionField,
     HspControlError,
     JointPosture,
-    Metric,
+    Limits,
     NullSpaceField,
+    ObstacleClearance,
     Rest,
-    Robot,
     RobotState,
+    TargetPosture,
     Task,
-    Trajectory,
     simulate,
 )
 from hsp_control.common.exceptions import (
+    ContactError,
     ControllerError,
     FieldError,
+    FrameNotFoundError,
     GainError,
+    ImmutableError,
+    LimitError,
     MetricError,
     NonFiniteError,
+    SceneError,
+    ShapeError,
     TrajectoryError,
 )
-from hsp_control.null_space.fields import FieldSample
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.fields import FieldSample, FunctionField
+from hsp_control.null_space.metrics import ConstantMetric, Metric, MetricSample
 from hsp_control.null_space.metrics.metric import VARYING
 from hsp_control.tasks import TaskSample
+from hsp_control.tasks.task import Feedback
 from hsp_control.trajectories import (
     CallableTrajectory,
+    Trajectory,
     TrajectorySample,
 )
 
@@ -72,32 +79,68 @@ W1 = np.array([100.0, 1, 1, 1, 1, 1, 1])
 @pytest.mark.parametrize(
     ("tasks", "options", "error", "message"),
     [
-        (list, {}, ControllerError, "a controller needs at least one task"),
+        (list, {}, ControllerError, "^tasks: a controller needs at least one task$"),
         (
             lambda: [track(axes="xyz"), track(name=TCP)],
             {},
             ControllerError,
-            "two tasks are called 'panda_tcp'; give them distinct names",
+            "^tasks: two tasks are called 'panda_tcp'; give them distinct names$",
         ),
         (
-            lambda: [track(Robot.load("panda"))],
+            lambda: [FramePosition("panda_hnad", name="hand")],
             {},
-            ControllerError,
-            r"task 'panda_tcp' was built for another robot object \(panda\)",
+            FrameNotFoundError,
+            r"^tasks.hand.frame: no frame 'panda_hnad'; did you mean 'panda_hand'\?",
         ),
         (
             lambda: [track()],
-            {"field": lambda: Rest()},
-            ControllerError,
-            r"field 'rest' was built for another robot object \(panda\); build it with",
+            {"field": lambda: Rest() + TargetPosture([0.0, 1.0])},
+            ShapeError,
+            r"^null_space.fields.1.target: .* has shape \(2,\); panda needs \(7,\)$",
         ),
         (
             lambda: [track(), hold_orientation(), track(name="again")],
             {},
             ControllerError,
-            r"the tasks have 9 rows \(panda_tcp: 3, panda_tcp_orientation: 3, again: 3"
-            r"\); panda has only 7 degrees of freedom",
+            r"^tasks: the tasks have 9 rows \(panda_tcp: 3, panda_tcp_orientation: 3, "
+            r"again: 3\); panda has only 7 degrees of freedom$",
         ),
+        (
+            lambda: [track(name="one"), *[track(name=n, priority=4) for n in "abc"]],
+            {},
+            ControllerError,
+            r"^tasks: the tasks of priority 4 have 9 rows \(a: 3, b: 3, c: 3\); panda",
+        ),
+        (
+            lambda: [track(), [track(name="again")]],
+            {},
+            ControllerError,
+            "^tasks contains lists; write the level as priority=1, 2, ... of each task",
+        ),
+        (lambda: [TCP], {}, ControllerError, "contains 'panda_tcp', which is not a Ta"),
+        *(
+            (lambda: [track()], {what: wrong}, ControllerError, message)
+            for what, wrong, message in (
+                ("field", [Rest()], r"^field is \[Rest\(\)\], which is not a NullSp"),
+                ("metric", "identity", "^metric is 'identity', which is not a Metric"),
+                ("limits", {"effort": 1}, "^limits is .*, which is not a Limits"),
+                ("contacts", ["sole"], "^contacts contains 'sole', which is not a Con"),
+            )
+        ),
+        (
+            lambda: [track()],
+            {"limits": lambda: Limits(effort=[1.0, 2.0])},
+            LimitError,
+            "^limits.effort: has 2 numbers; needs one number or 7$",
+        ),
+        (
+            lambda: [track()],
+            {"field": lambda: ObstacleClearance(["ball"])},
+            SceneError,
+            r"^null_space.fields.0.obstacles.0: no obstacle 'ball' \(the scene has",
+        ),
+        (lambda: [track()], {"start": [0.0, 1.0]}, ShapeError, r"panda needs \(7,\)"),
+        (lambda: [track()], {"base": "flying"}, ContactError, "^base: panda has no fr"),
         (
             lambda: [track()],
             {"null_space_gain": 0.0},
@@ -120,7 +163,7 @@ W1 = np.array([100.0, 1, 1, 1, 1, 1, 1])
             lambda: [track()],
             {"null_space_gain": "fast"},
             GainError,
-            "null_space_gain is 'fast'; needs numbers, a list or a matrix",
+            "^null_space.gain: null_space_gain is 'fast'; needs numbers",
         ),
         (
             lambda: [track()],
@@ -153,7 +196,7 @@ W1 = np.array([100.0, 1, 1, 1, 1, 1, 1])
             lambda: [track()],
             {"metric": lambda: ConstantMetric(np.eye(3))},
             MetricError,
-            r"metric has shape \(3, 3\); the robot needs \(7, 7\)",
+            r"^null_space.metric.matrix: the metric has shape \(3, 3\); the robot",
         ),
         *(
             (
@@ -179,7 +222,8 @@ def test_refuses(
     with pytest.raises(error, match=message) as caught:
         Controller(panda(), tasks(), **made)
     assert isinstance(caught.value, HspControlError)
-    assert isinstance(caught.value, ValueError)
+    not_there = error is FrameNotFoundError
+    assert isinstance(caught.value, LookupError if not_there else ValueError)
 
 
 def test_a_gain_is_judged_in_its_metric() -> None:
@@ -196,9 +240,36 @@ def test_a_gain_is_judged_in_its_metric() -> None:
 
 
 def test_as_many_rows_as_freedoms_are_allowed() -> None:
-    posture = JointPosture(panda().home(), gains=GAINS)
+    (posture,) = Controller(panda(), [JointPosture(gains=GAINS)]).tasks
     assert posture.rows == 7
-    Controller(panda(), [posture])
+
+
+@pytest.mark.parametrize(
+    ("name", "instead"),
+    [
+        ("tasks", r"use at\(t\).add\(task\) and at\(t\).remove\(name\)"),
+        ("levels", r"use at\(t\).add\(task\) and at\(t\).remove\(name\)"),
+        ("field", r"use at\(t\).field\(...\)"),
+        ("null_space_gain", r"use at\(t\).null_space_gain\(...\)"),
+        ("contacts", r"use at\(t\).contact\(name, bears=...\)"),
+        ("changes", r"use at\(t\)"),
+        ("state", "call compute"),
+        *(
+            (name, "build another one")
+            for name in ("robot", "metric", "limits", "base", "scene")
+        ),
+    ],
+)
+def test_what_it_is_made_of_cannot_be_assigned(name: str, instead: str) -> None:
+    controller = Controller(panda(), [track()])
+    with pytest.raises(ImmutableError, match=f"^Controller.{name} cannot.*{instead}"):
+        setattr(controller, name, getattr(controller, name))
+
+
+def test_the_gain_in_force_is_a_copy() -> None:
+    controller = Controller(panda(), [track()], null_space_gain=3.0)
+    controller.null_space_gain[:] = 7.0
+    np.testing.assert_array_equal(controller.null_space_gain, 3.0 * np.eye(7))
 
 
 # --- NaN never comes out -------------------------------------------------------------
@@ -224,10 +295,8 @@ class Broken(Trajectory):
 class BrokenField(NullSpaceField):
     """A user's field written straight into the sample, unchecked."""
 
-    def __init__(self, where: str, value: float) -> None:
-        super().__init__(panda(), "mine")
-        self.where = where
-        self.broken = value
+    where: str
+    broken: float
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -255,20 +324,26 @@ class BrokenMetric(Metric):
 class BrokenTask(FramePosition):
     """A user's task whose arrays go wrong after half a second."""
 
+    _: KW_ONLY
     where: str
     broken: float
 
-    def evaluate(self, state: RobotState, out: TaskSample | None = None) -> TaskSample:
-        out = super().evaluate(state, out)
+    def evaluate(
+        self,
+        state: RobotState,
+        out: TaskSample | None = None,
+        feedback: Feedback | None = None,
+    ) -> TaskSample:
+        out = super().evaluate(state, out, feedback)
         if state.t > 0.5:
             getattr(out, self.where)[..., 1] = self.broken
         return out
 
 
 def broken_task(where: str, value: float) -> BrokenTask:
-    task = BrokenTask(panda(), TCP, circle(), GAINS, name="mine")
-    task.where, task.broken = where, value
-    return task
+    return BrokenTask(
+        TCP, circle(), gains=GAINS, name="mine", where=where, broken=value
+    )
 
 
 def late(wrong: Any, right: Any) -> Callable[..., Any]:
@@ -319,7 +394,9 @@ FAILURES: dict[str, tuple[Callable[[], Parts], type[Exception], str]] = {
     ),
     **{
         f"{value} in a field's {where}": (
-            lambda value=value, where=where: {"field": BrokenField(where, value)},
+            lambda value=value, where=where: {
+                "field": BrokenField(where=where, broken=value, name="mine")
+            },
             NonFiniteError,
             r"field 'mine' is not finite at t = 0\.75 s",
         )
@@ -333,7 +410,11 @@ FAILURES: dict[str, tuple[Callable[[], Parts], type[Exception], str]] = {
     ),
     "infinity from a field's rate": (
         lambda: {
-            "field": FunctionField(late(np.zeros(7), np.zeros(7)), rate_function=late(np.full(7, np.inf), np.zeros(7)), name="mine")
+            "field": FunctionField(
+                late(np.zeros(7), np.zeros(7)),
+                rate_function=late(np.full(7, np.inf), np.zeros(7)),
+                name="mine",
+            )
         },
         FieldError,
         r"field 'mine' returned g' = array\(.*inf.* at t = 0\.75 s",
@@ -350,7 +431,12 @@ FAILURES: dict[str, tuple[Callable[[], Parts], type[Exception], str]] = {
     ),
     "NaN from a cost's gradient": (
         lambda: {
-            "field": FunctionCost(late(1.0, 1.0), gradient_function=late(NAN, np.zeros(7)), rate_function=late(np.zeros(7), np.zeros(7)), name="mine")
+            "field": FunctionCost(
+                late(1.0, 1.0),
+                gradient_function=late(NAN, np.zeros(7)),
+                rate_function=late(np.zeros(7), np.zeros(7)),
+                name="mine",
+            )
         },
         FieldError,
         r"'mine'.*t = 0\.75 s",
@@ -371,13 +457,13 @@ def test_nan_of_a_user_is_an_error_and_never_an_effort(what: str) -> None:
     parts = {"tasks": [track()], "field": None, "metric": None} | make()
     controller = Controller(panda(), **parts)
     _, q, v = states(1)[0]
-    before = copied(controller.compute(panda().state(0.25, q, v)))
+    before = contents(controller.compute(panda().state(0.25, q, v)))
     with pytest.raises(error, match=message) as caught:
         controller.compute(panda().state(0.75, q, v))
     assert type(caught.value) is error
     assert isinstance(caught.value, HspControlError)
     # The failure leaves nothing behind: the controller goes on as if new.
-    assert_same(copied(controller.compute(panda().state(0.25, q, v))), before)
+    assert_same(contents(controller.compute(panda().state(0.25, q, v))), before)
 
 
 def test_user_mistake_in_a_simulation_names_the_time() -> None:

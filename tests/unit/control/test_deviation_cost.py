@@ -11,17 +11,12 @@ from numpy.typing import NDArray
 
 from hsp_control import (
     Circle,
-    ConstantMetric,
     Controller,
     FramePosition,
     Gains,
     Hold,
-    IdentityMetric,
     JointCentering,
     Limits,
-    MassMatrixMetric,
-    Metric,
-    Rk4,
     Robot,
     RobotState,
     Rollout,
@@ -35,6 +30,13 @@ from hsp_control.control.actuation.deviation_cost import (
     null_space_rows,
 )
 from hsp_control.control.actuation.qp import solve
+from hsp_control.null_space.metrics import (
+    ConstantMetric,
+    IdentityMetric,
+    MassMatrixMetric,
+    Metric,
+)
+from hsp_control.robot.integrators import Rk4
 
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
@@ -96,9 +98,7 @@ def test_the_projector_is_the_law_s(metric: str, seed: int) -> None:
     """P(g - v) is the law's own null-space error, to rounding."""
     robot, rng = panda(), np.random.default_rng(seed)
     state = robot.state(0.1, robot.random_configuration(rng), rng.standard_normal(7))
-    controller = Controller(
-        robot, [hand()], JointCentering(), metric=METRICS[metric]
-    )
+    controller = Controller(robot, [hand()], JointCentering(), metric=METRICS[metric])
     out = controller.compute(state)
     if out.damped:  # then e_N keeps a part of the direction that is being lost
         return
@@ -129,7 +129,12 @@ def limited(seed: int, **options: Any) -> tuple[Controller, Array]:
     """Return a weak arm that is asked for more than it can do, and a start."""
     robot, rng = panda(), np.random.default_rng(seed)
     own = Limits()
-    limits = Limits(effort=own.effort * rng.uniform(0.45, 0.6), velocity=None, position=None, **options)
+    limits = Limits(
+        effort=own.effort * rng.uniform(0.45, 0.6),
+        velocity=None,
+        position=None,
+        **options,
+    )
     path = Circle(0.2, rng.uniform(4.0, 6.0), [0.45, 0.0, 0.45], normal=[0, 0, 1])
     task = FramePosition("panda_tcp", path, gains=Gains(natural_frequency=10.0))
     field = JointCentering()
@@ -233,7 +238,9 @@ def test_an_arm_goes_where_it_can_be_held() -> None:
     robot = panda()
     q0 = robot.home()
     share = 0.35  # of 87 N·m at the shoulder, which takes 37 with the arm stretched
-    far = FramePosition("panda_tcp", Hold([0.7, 0.0, 0.4]), gains=Gains(natural_frequency=6.0))
+    far = FramePosition(
+        "panda_tcp", Hold([0.7, 0.0, 0.4]), gains=Gains(natural_frequency=6.0)
+    )
     used = {}
     for static in (None, share):
         limits = Limits(static_effort=static)

@@ -21,11 +21,8 @@ from numpy.typing import NDArray
 from hsp_control import (
     Circle,
     Controller,
-    Dop853,
     FramePosition,
-    FunctionField,
     Hold,
-    Metric,
     Robot,
     RobotState,
     TargetPosture,
@@ -34,8 +31,10 @@ from hsp_control import (
 from hsp_control.common.exceptions import (
     ControllerError,
 )
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.fields import FunctionField
+from hsp_control.null_space.metrics import Metric, MetricSample
 from hsp_control.null_space.metrics.metric import CONSTANT
+from hsp_control.robot.integrators import Dop853
 
 Array = NDArray[np.float64]
 

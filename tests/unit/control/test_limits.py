@@ -19,11 +19,8 @@ from hsp_control import (
     JointCentering,
     JointPosture,
     Limits,
-    Lissajous,
-    MinimumDistance,
     Obstacle,
     ObstacleClearance,
-    Rk4,
     Robot,
     RobotState,
     Rollout,
@@ -31,11 +28,14 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.common.exceptions import LimitError
+from hsp_control.constraints.limits import MinimumDistance
 from hsp_control.constraints.limits.acceleration_bounds import acceleration_bounds
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.actuation import _relax
 from hsp_control.control.actuation.deviation_cost import deviation_cost
 from hsp_control.control.actuation.qp import Rows, solve
+from hsp_control.robot.integrators import Rk4
+from hsp_control.trajectories import Lissajous
 
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
@@ -184,7 +184,12 @@ def test_null_space_gives_way_first_then_the_lower_task() -> None:
     """One effort limit that binds: what is left exact shows the order."""
     robot = panda()
     q, v = robot.home(), np.zeros(7)
-    posture = JointPosture(robot.integrate(q, np.full(7, 0.5)), gains=Gains(natural_frequency=10.0), joints=["panda_joint1", "panda_joint2"], name="posture")
+    posture = JointPosture(
+        robot.integrate(q, np.full(7, 0.5)),
+        gains=Gains(natural_frequency=10.0),
+        joints=["panda_joint1", "panda_joint2"],
+        name="posture",
+    )
     levels = [[hand()], [posture]]
     field = 20.0 * JointCentering()
     free = Controller(robot, levels, field)
@@ -244,11 +249,17 @@ def test_no_limit_is_violated(seed: int) -> None:
     lower, upper = robot.position_limits()
     q0 = 0.5 * (lower + upper) + 0.35 * (upper - lower) * rng.uniform(-1.0, 1.0, 7)
     own = Limits()
-    limits = Limits(effort=own.effort * rng.uniform(0.7, 1.0), effort_rate=1000.0, velocity=own.velocity * rng.uniform(0.2, 0.5))
+    limits = Limits(
+        effort=own.effort * rng.uniform(0.7, 1.0),
+        effort_rate=1000.0,
+        velocity=own.velocity * rng.uniform(0.2, 0.5),
+    )
     start = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp")
     center = start + rng.normal(0.0, 0.4, 3)
     path = Circle(0.2, rng.uniform(1, 6), center, normal=rng.normal(size=3))
-    task = FramePosition("panda_tcp", path, gains=Gains(natural_frequency=rng.uniform(5, 12)))
+    task = FramePosition(
+        "panda_tcp", path, gains=Gains(natural_frequency=rng.uniform(5, 12))
+    )
     controller = Controller(robot, [task], JointCentering(), limits=limits)
     rollout = run(controller, q0, 0.8)
     assert rollout.meta["status"] == "completed"
@@ -407,7 +418,9 @@ def swinging() -> Obstacle:
 def elbow(limits: Limits | None) -> Controller:
     robot = panda()
     here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp").copy()
-    task = FramePosition("panda_tcp", Hold(here), gains=Gains(natural_frequency=10.0), name="hand")
+    task = FramePosition(
+        "panda_tcp", Hold(here), gains=Gains(natural_frequency=10.0), name="hand"
+    )
     return Controller(
         robot, [task], JointCentering(), null_space_gain=6.0, limits=limits
     )

@@ -9,26 +9,13 @@ import numpy as np
 import pytest
 
 from hsp_control import (
-    Command,
-    Compensation,
     Controller,
     FramePosition,
     Gains,
     Hold,
-    ImperfectPlant,
-    IntegralAction,
-    IntegratedPlant,
     JointPosture,
-    MassMatrixMetric,
-    MomentumObserver,
-    Predictor,
     Rest,
-    RigidBodyPlant,
-    Rk4,
     Robot,
-    Uncontrolled,
-    VelocityFilter,
-    check_rate,
     load_experiment,
     simulate,
 )
@@ -38,9 +25,25 @@ from hsp_control.common.exceptions import (
     SimulationError,
     UnstableRateError,
 )
+from hsp_control.control.compensation import (
+    Command,
+    Compensation,
+    IntegralAction,
+    MomentumObserver,
+    Predictor,
+    VelocityFilter,
+    check_rate,
+)
 from hsp_control.control.compensation.linear_loop import LinearLoop, _coupled
 from hsp_control.control.compensation.rate_check import null_space_rates, rate_findings
-from hsp_control.null_space.fields import TargetPosture
+from hsp_control.null_space.fields import TargetPosture, Uncontrolled
+from hsp_control.null_space.metrics import MassMatrixMetric
+from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation.plants import (
+    ImperfectPlant,
+    IntegratedPlant,
+    RigidBodyPlant,
+)
 from hsp_control.simulation.plants.drives import EffortDelay
 from hsp_control.simulation.plants.model_changes import ScaledInertias, changed
 from hsp_control.simulation.plants.sensors import SensorDelay
@@ -379,7 +382,9 @@ def test_a_field_s_slope_is_taken_in_the_null_space_and_the_metric() -> None:
     for low, high in pairwise(got):
         assert 0.0 < low < high
     for field in (Rest(), Uncontrolled()):
-        hand = FramePosition("panda_tcp", Hold([0.4, 0.0, 0.5]), gains=Gains(natural_frequency=10.0))
+        hand = FramePosition(
+            "panda_tcp", Hold([0.4, 0.0, 0.5]), gains=Gains(natural_frequency=10.0)
+        )
         K, A = null_space_rates(Controller(PANDA, [hand], field), state)
         assert np.allclose(A, 0.0)
         assert len(K) == (4 if field.controls else 0)

@@ -1,6 +1,8 @@
 """Strict priorities: against an oracle of projectors, and along whole motions."""
 
+from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,22 +12,24 @@ from law_numbers import Numbers, numbers, resolve
 from numpy.typing import NDArray
 
 from hsp_control import (
-    ConstantMetric,
     Controller,
-    Dop853,
     FramePosition,
     Gains,
     Hold,
-    IdentityMetric,
     JointCentering,
     JointPosture,
-    MassMatrixMetric,
-    Metric,
     Robot,
     simulate,
 )
 from hsp_control.common.exceptions import ControllerError
+from hsp_control.null_space.metrics import (
+    ConstantMetric,
+    IdentityMetric,
+    MassMatrixMetric,
+    Metric,
+)
 from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY, VARYING
+from hsp_control.robot.integrators import Dop853
 from hsp_control.trajectories import Circle
 
 Array = NDArray[np.float64]
@@ -178,11 +182,15 @@ def conflicting(kind: str) -> Controller:
     robot = panda()
     circle = Circle(0.1, 1.5, [0.45, 0.0, 0.4], normal=[0.0, 0.0, 1.0])
     hand = FramePosition("panda_tcp", circle, gains=GAINS, name="hand")
-    rival = FramePosition("panda_tcp", Hold([0.6]), gains=GAINS, axes="x", name="rival")
-    wrist = JointPosture(robot.home(), gains=GAINS, joints=["panda_joint7"], name="wrist")
+    rival = FramePosition(
+        "panda_tcp", Hold([0.6]), gains=GAINS, axes="x", name="rival", priority=2
+    )
+    wrist = JointPosture(
+        robot.home(), gains=GAINS, joints=["panda_joint7"], name="wrist", priority=2
+    )
     return Controller(
         robot,
-        [[hand], [rival, wrist]],
+        [wrist, hand, rival],
         2.0 * JointCentering(),
         null_space_gain=4.0,
         metric=metric_of(kind),
@@ -218,12 +226,23 @@ def test_propositions_hold_per_level(kind: str) -> None:
     np.testing.assert_allclose(norm, norm[0] * np.exp(-4.0 * t), rtol=1e-6, atol=0)
 
 
-def test_levels_are_lists_or_tasks_not_both() -> None:
-    hand, rival = conflicting("identity").tasks[:2]
-    with pytest.raises(ControllerError, match="mixes tasks and lists"):
-        Controller(panda(), [hand, [rival]])
-    with pytest.raises(ControllerError, match="at every level"):
-        Controller(panda(), [[hand], []])
+def test_levels_are_the_tasks_of_one_priority() -> None:
+    """Numbers may be left out; within a level the order is the user's."""
+    controller = conflicting("identity")
+    names = [[task.name for task in level] for level in controller.levels]
+    assert names == [["hand"], ["wrist", "rival"]]
+    assert [task.name for task in controller.tasks] == ["hand", "wrist", "rival"]
+    assert [controller.priority_of(n) for n in ("hand", "wrist", "rival")] == [1, 2, 2]
+    hand, wrist, rival = controller.tasks
+    spread = [replace(rival, priority=70), replace(hand, priority=3), wrist]
+    levels = Controller(panda(), spread).levels
+    assert [task.name for (task,) in levels] == ["wrist", "hand", "rival"]
+
+
+def test_nested_lists_are_refused() -> None:
+    hand, *others = conflicting("identity").tasks
+    with pytest.raises(ControllerError, match="lists; write the level as priority="):
+        Controller(panda(), [hand, others])  # type: ignore[list-item]
 
 
 def test_propositions_hold_for_two_arms() -> None:
@@ -241,16 +260,14 @@ def test_propositions_hold_for_two_arms() -> None:
     state = robot.state(0.0, q, np.zeros(robot.nv))
     left, right = (state.position(f"{side}_gripper").copy() for side in SIDES)
     x_axis = np.array([1.0, 0.0, 0.0])
-    levels = [
-        [
-            FramePosition("left_gripper", Circle(0.08, 1.5, left, normal=x_axis), gains=GAINS)
-        ],
-        [
-            FramePosition("right_gripper", Hold(right + 0.05), gains=GAINS),
-            FramePosition("left_gripper", Hold([0.3]), gains=GAINS, axes="x", name="rival"),
-        ],
+    round_and_round = Circle(0.08, 1.5, left, normal=x_axis)
+    second: dict[str, Any] = {"gains": GAINS, "priority": 2}
+    tasks = [
+        FramePosition("left_gripper", round_and_round, gains=GAINS),
+        FramePosition("right_gripper", Hold(right + 0.05), **second),
+        FramePosition("left_gripper", Hold([0.3]), axes="x", name="rival", **second),
     ]
-    controller = Controller(robot, levels, JointCentering(), null_space_gain=4.0)
+    controller = Controller(robot, tasks, JointCentering(), null_space_gain=4.0)
     v0 = 0.2 * np.cos(np.arange(robot.nv))
     rollout = simulate(
         controller,

@@ -8,10 +8,7 @@ from hypothesis import strategies as st
 from law_numbers import Numbers, numbers, orthogonal, resolve
 from numpy.typing import NDArray
 
-from hsp_control import (
-    ConstantMetric,
-)
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.metrics import CoordinatesMetric, MetricSample
 from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY, VARYING
 
 Array = NDArray[np.float64]

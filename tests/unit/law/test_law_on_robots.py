@@ -14,27 +14,30 @@ from law_cases import load, pseudo_inverse
 from law_numbers import positive
 from numpy.typing import NDArray
 from oracles import slope
+from task_cases import placed
 
 from hsp_control import (
     Circle,
-    ConstantMetric,
     Controller,
     ControlOutput,
     FrameOrientation,
     FramePosition,
-    FunctionField,
     Gains,
-    IdentityMetric,
     JointPosture,
-    MassMatrixMetric,
-    Metric,
     NullSpaceField,
     Robot,
     RobotState,
     TargetPosture,
 )
-from hsp_control.null_space.fields import FieldSample
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.fields import FieldSample, FunctionField
+from hsp_control.null_space.metrics import (
+    ConstantMetric,
+    CoordinatesMetric,
+    IdentityMetric,
+    MassMatrixMetric,
+    Metric,
+    MetricSample,
+)
 from hsp_control.null_space.metrics.metric import VARYING
 from hsp_control.trajectories import HoldOrientation
 
@@ -272,7 +275,7 @@ def test_coordinates_metric_is_equation_13_in_those_coordinates(name: str) -> No
     )
     # A cost's field is raised with the metric: -∇_θ f in the other coordinates.
     robot = c.robot
-    cost = TargetPosture(c.posture, weights=2.0)
+    cost = placed(TargetPosture(configuration=c.posture, weights=2.0), robot)
     sample = metric.evaluate(state, MetricSample.allocate(nv))
     state = robot.state(0.3, robot.integrate(c.q, 0.3 * c.v), c.v)
     g = cost.evaluate(state, sample, metric.form, FieldSample.allocate(nv)).g
@@ -409,7 +412,7 @@ def test_metrics_differ() -> None:
 def test_a_task_that_takes_every_freedom_leaves_no_null_space() -> None:
     """J square: P = 0, e_N = 0, and the field changes nothing."""
     c = case("panda")
-    task = JointPosture(c.posture, gains=GAINS)
+    task = placed(JointPosture(c.posture, gains=GAINS), c.robot)
     state = c.robot.state(0.3, c.q, c.v)
     full = c._replace(tasks=[task])
     for kind in METRICS:

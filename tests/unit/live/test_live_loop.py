@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 import hsp_control as hsp
 from hsp_control import (
     FramePosition,
-    FunctionField,
     Gains,
     Hold,
     Limits,
@@ -34,6 +33,8 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.common.exceptions import HardwareError, HspControlError, LiveError
+from hsp_control.constraints.limits import PositionRange
+from hsp_control.control.changes import Changes
 from hsp_control.control.compensation import Command
 from hsp_control.live import (
     EffortInterface,
@@ -46,6 +47,7 @@ from hsp_control.live import (
     Tolerance,
     run_loop,
 )
+from hsp_control.null_space.fields import FunctionField
 
 Array = NDArray[np.float64]
 AT_REST = 0.02
@@ -83,7 +85,7 @@ def test_it_is_the_simulation_then_stops(tmp_path: Path) -> None:
         duration=0.4,
         control_period=PERIOD,
         log_period=0.01,
-        integrator=hsp.SemiImplicitEuler(PERIOD),
+        integrator=hsp.integrators.SemiImplicitEuler(PERIOD),
     )
     count = len(reference) - 1  # the last one is the safe stop's first
     assert run["live.phase"][count] == Phase.DAMPING
@@ -163,9 +165,7 @@ def test_what_is_sent_keeps_rate_and_effort(compensates: bool) -> None:
     most, rate = 60.0, 200.0
     interface = EffortInterface(compensates, rate, most)
     rig = Rig(watched(interface))
-    wild = law()
-    tip = wild.tasks[0]
-    tip.Kp[:] *= 30.0  # more than such a motor can do
+    wild = law(gains=Gains(30.0 * 100.0, 20.0))  # more than such a motor can do
     run_loop(wild, rig, duration=0.3, interface=interface)
     sent = np.array(rig.sent)
     # The first step is from what holds a robot at rest: g(q), or nothing.
@@ -320,8 +320,7 @@ def bad_field(t: float, what: Any) -> FunctionField:
 @pytest.mark.slow
 @pytest.mark.parametrize("what", [np.nan, ZeroDivisionError("by zero")])
 def test_a_law_that_fails_ends_in_the_safe_stop(what: Any, tmp_path: Path) -> None:
-    controller = law()
-    controller.field = bad_field(0.2, what)
+    controller = law(bad_field(0.2, what))
     rig, log = Rig(), tmp_path / "run.journal"
     report = run_loop(controller, rig, duration=5.0, log=log)
     assert report.ended == "fault"
@@ -386,7 +385,7 @@ def test_a_second_ctrl_c_leaves_it_to_the_robot() -> None:
 def test_what_a_change_raises_stops_it() -> None:
     requests, rig = OperatorRequests(), Rig()
     gains = Gains(natural_frequency=5.0)
-    requests.call(lambda: law().change_gains("tipp", gains, start=0.0, ramp=1.0))
+    requests.call(lambda: law().at(0.0).gains("tipp", gains))
     report = run_loop(law(), rig, requests=requests)
     assert "'tipp'" in report.reason
     assert_held(rig, report)
@@ -481,14 +480,20 @@ def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
     q = start()
     q[0] -= 0.5
     new = TargetPosture(q, name="other")
-    elbow = FramePosition("panda_link4", Hold([0.6]), gains=Gains(natural_frequency=5.0), name="elbow", axes="z")  # fmt: skip
+    gains = Gains(natural_frequency=5.0)
+    elbow = FramePosition(
+        "panda_link4", Hold([0.6]), gains=gains, name="elbow", axes="z"
+    )
+    stiffer = Gains(natural_frequency=15.0)
+
+    def at(t: float) -> Changes:
+        return controller.at(t).ramp(0.2)
+
     changes = {
-        0.1: lambda: controller.change_field(new, start=0.12, ramp=0.2),
-        0.2: lambda: controller.change_gains(
-            "tip", Gains(natural_frequency=15.0), start=0.22, ramp=0.2
-        ),
-        0.3: lambda: controller.add_task(elbow, start=0.32, ramp=0.2),
-        0.6: lambda: controller.remove_task("elbow", start=0.62, ramp=0.2),
+        0.1: lambda: at(0.12).field(new),
+        0.2: lambda: at(0.22).gains("tip", stiffer),
+        0.3: lambda: at(0.32).add(elbow),
+        0.6: lambda: at(0.62).remove("elbow"),
     }
     for_now = sorted(changes.items())
 
@@ -498,12 +503,13 @@ def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
 
     log = tmp_path / "run.journal"
     report = run_loop(
-        controller, rig, duration=1.0, requests=requests, on_period=on_period, log=log,
+        controller, rig, duration=2.0, requests=requests, on_period=on_period, log=log,
         log_period=PERIOD,
     )  # fmt: skip
     assert report.ended == "completed", report.reason
     assert_held(rig, report)
-    assert controller.field is new
+    assert controller.field.name == "other"  # complete, and the old one forgotten
+    assert [task.name for task in controller.tasks] == ["tip"]
     run = Rollout.load(log)
     ran = run["live.phase"] == Phase.RUNNING
     steps = np.abs(np.diff(run.tau[ran], axis=0)).max(axis=1)
@@ -512,6 +518,23 @@ def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
     assert np.isfinite(run["task.elbow.error"][(run.t > 0.4) & (run.t < 0.6), 0]).all()
     assert np.isnan(run["task.elbow.error"][run.t > 0.83]).all()
     assert np.isnan(run["field.other.g"][run.t < 0.09]).all()
+    assert list(run.meta["tasks"]) == ["tip", "elbow"]  # what has left is drawn too
+
+
+def test_a_task_of_another_form_is_logged_by_another_name() -> None:
+    controller = law()
+    elbow = FramePosition("panda_link4", Hold([0.6]), name="elbow", axes="z")
+    other = FramePosition("panda_link4", name="elbow", axes="xy")
+    controller.at(0.01).ramp(0.01).add(elbow)
+    controller.at(0.03).ramp(0.01).remove("elbow")
+    controller.at(0.05).ramp(0.01).add(other)
+    run = simulate(controller, start(), duration=0.08, control_period=PERIOD)
+    assert [about["axes"] for about in run.meta["tasks"].values()] == ["xyz", "z", "xy"]
+    for name, rows in (("elbow", [2, 3]), ("elbow_2", [6, 7, 8])):
+        error = run[f"task.{name}.error"]
+        measured = run[f"task.{name}.reference"] - run[f"task.{name}.actual"]
+        np.testing.assert_allclose(error[rows], measured[rows], atol=1e-15)
+        assert np.isnan(np.delete(error, rows, axis=0)).all()
 
 
 # --- what is refused -----------------------------------------------------------------
@@ -591,10 +614,15 @@ def test_a_robot_that_is_silent_or_unfit_is_not_started() -> None:
 
 def test_the_monitor_uses_the_limits_of_the_controller() -> None:
     q = start()
-    limits = Limits(position=(q - 0.05, q + 0.05))
-    controller = law()  # does not know of them, and swings by 0.5 rad
-    controller.limits = limits
-    report = run_loop(controller, Rig(), duration=5.0)
+    limits = Limits(position=PositionRange(q - 0.05, q + 0.05))
+    unaware = law()  # does not know of them, and swings by 0.5 rad
+
+    class Beyond(Command):
+        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
+            super().effort(t, q, v, period)
+            return unaware.compute(t, q, v).tau
+
+    report = run_loop(Beyond(law(limits=limits)), Rig(), duration=5.0)
     assert report.ended == "fault"
     assert "outside" in report.reason
     assert report.t < 3.0

@@ -8,13 +8,15 @@ from hypothesis import strategies as st
 from live_rigs import PERIOD, panda, start, watched
 from numpy.typing import NDArray
 
-from hsp_control import IntegratedPlant, RigidBodyPlant, Rk4, Robot
+from hsp_control import Robot
 from hsp_control.common.exceptions import LiveError
 from hsp_control.live import EffortInterface, Phase, SafeStop, StopSettings
 from hsp_control.live.dead_reckoning import DeadReckoning
 from hsp_control.live.deadlines import Deadlines
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.safe_stop import largest_scale
+from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 from hsp_control.simulation.plants.model_changes import ScaledInertias, changed
 
 Array = NDArray[np.float64]

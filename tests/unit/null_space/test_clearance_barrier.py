@@ -10,12 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import slope
 
-from hsp_control import (
-    Cost,
-    IdentityMetric,
-    Obstacle,
-    RobotState,
-)
+from hsp_control import Cost, Obstacle, RobotState
 from hsp_control.geometry import Proxy
 from hsp_control.geometry.shapes import (
     Sphere,
@@ -25,7 +20,7 @@ from hsp_control.null_space.fields import (
     ObstacleClearance,
 )
 from hsp_control.null_space.fields.barrier import CORE, barrier
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.metrics import IdentityMetric, MetricSample
 from hsp_control.trajectories import (
     Hold,
     UniformLine,

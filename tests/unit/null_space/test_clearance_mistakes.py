@@ -11,20 +11,14 @@ from clearance_cases import AIR, load, still
 from field_cases import placed
 from odd_robots import collision, odd_robot
 
-from hsp_control import (
-    NullSpaceField,
-    Obstacle,
-    Robot,
-    Scene,
-    load_experiment,
-)
+from hsp_control import NullSpaceField, Obstacle, Robot, load_experiment
 from hsp_control.common.exceptions import (
     FieldError,
     HspControlError,
     ModelError,
     SceneError,
 )
-from hsp_control.geometry import Proximity, link_shapes
+from hsp_control.geometry import Proximity, Scene, link_shapes
 from hsp_control.geometry.shapes import (
     Box,
     Capsule,

@@ -18,16 +18,7 @@ from numpy.typing import NDArray
 from odd_robots import FACES, OCTAHEDRON, write_stl
 from oracles import gradient, slope
 
-from hsp_control import (
-    Controller,
-    Cost,
-    Dop853,
-    FramePosition,
-    Gains,
-    Obstacle,
-    Rk4,
-    simulate,
-)
+from hsp_control import Controller, Cost, FramePosition, Gains, Obstacle, simulate
 from hsp_control.declaration.quantities import Vector
 from hsp_control.geometry import LinkShape, Proximity, link_shapes
 from hsp_control.geometry.shapes import (
@@ -43,6 +34,7 @@ from hsp_control.geometry.shapes import (
 from hsp_control.null_space.fields import (
     ObstacleClearance,
 )
+from hsp_control.robot import Dop853, Rk4
 from hsp_control.robot.integrators import Integrator
 from hsp_control.trajectories import (
     Hold,

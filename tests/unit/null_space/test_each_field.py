@@ -21,20 +21,11 @@ from field_oracles import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hsp_control import (
-    FunctionCost,
-    FunctionField,
-    IdentityMetric,
-    JointCentering,
-    MassMatrixMetric,
-    Rest,
-    RobotState,
-    TargetPosture,
-    Uncontrolled,
-)
+from hsp_control import FunctionCost, JointCentering, Rest, RobotState, TargetPosture
 from hsp_control.common.exceptions import FieldError
 from hsp_control.null_space.fields import (
     FieldSum,
+    FunctionField,
     InverseCondition,
     LimitBarrier,
     Manipulability,
@@ -42,9 +33,11 @@ from hsp_control.null_space.fields import (
     PointDistance,
     StateWeight,
     Transmission,
+    Uncontrolled,
     crossfade,
 )
 from hsp_control.null_space.fields.weight import Product, sample_weight
+from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric
 from hsp_control.trajectories import Hold
 
 pytestmark = pytest.mark.filterwarnings("error")

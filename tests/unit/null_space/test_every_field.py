@@ -16,11 +16,8 @@ from field_oracles import (
 )
 from numpy.typing import NDArray
 
-from hsp_control import (
-    IdentityMetric,
-    MassMatrixMetric,
-)
 from hsp_control.null_space import differences
+from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric
 
 pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]

@@ -10,22 +10,15 @@ from field_oracles import OBSTACLE, ValueOnly, load, target
 from numpy.typing import NDArray
 
 from hsp_control import (
-    EqualJointAngles,
     FunctionCost,
-    FunctionField,
     HspControlError,
-    IdentityMetric,
     JointCentering,
-    MassMatrixMetric,
-    Metric,
     NullSpaceField,
     Obstacle,
-    PointDistance,
     Rest,
     Robot,
     RobotState,
     TargetPosture,
-    Uncontrolled,
 )
 from hsp_control.common.exceptions import (
     FieldError,
@@ -36,15 +29,20 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import (
+    EqualJointAngles,
     FieldSample,
     FieldSum,
+    FunctionField,
     LimitBarrier,
     Manipulability,
     ObstacleClearance,
+    PointDistance,
     Ramp,
     StateWeight,
     Transmission,
+    Uncontrolled,
 )
+from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.trajectories import Hold
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -322,6 +320,27 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
         lambda: on("planar3r", Rest() + LimitBarrier()),
         FieldError,
         r"^1: no joint of planar3r has limits$",
+    ),
+    "posture, not placed": (
+        lambda: used(TargetPosture("home")),
+        FieldError,
+        r"^field 'target_posture': a controller would look up its posture; outside of "
+        r"one, call `placed` first$",
+    ),
+    "distance, not placed": (
+        lambda: used(PointDistance(["tip"], "ball")),
+        FieldError,
+        r"^field 'point_distance': a controller would look up its obstacle;",
+    ),
+    "clearance, not placed": (
+        lambda: used(ObstacleClearance()),
+        FieldError,
+        r"^field 'obstacle_clearance': a controller would look up its obstacles;",
+    ),
+    "clearance, one not placed": (
+        lambda: used(ObstacleClearance([OBSTACLE, "box"], name="mine")),
+        FieldError,
+        r"^field 'mine': a controller would look up its obstacles;",
     ),
     # evaluation
     "weight of the state, negative": (

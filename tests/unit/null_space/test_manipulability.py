@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from oracles import slope
 from places import THOROUGH
 
-from hsp_control import Robot, ToolFrame
+from hsp_control import Robot
 from hsp_control.common.exceptions import (
     FieldError,
     FrameNotFoundError,
@@ -37,6 +37,7 @@ from hsp_control.null_space.fields.jacobian_cost import (
     JacobianTerms,
     Rows,
 )
+from hsp_control.robot.description.loading import ToolFrame
 from hsp_control.robot.description.sources import example_robots
 
 pytestmark = pytest.mark.filterwarnings("error")

@@ -9,19 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from law_cases import load
 
-from hsp_control import (
-    ConstantMetric,
-    Cost,
-    IdentityMetric,
-    MassMatrixMetric,
-    RobotState,
-    Scene,
-    TargetPosture,
-)
+from hsp_control import Cost, RobotState, TargetPosture
 from hsp_control.common.exceptions import MetricError
+from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import FieldSample
-from hsp_control.null_space.metrics import CoordinatesMetric, MetricSample
+from hsp_control.null_space.metrics import (
+    ConstantMetric,
+    CoordinatesMetric,
+    IdentityMetric,
+    MassMatrixMetric,
+    MetricSample,
+)
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -9,9 +9,7 @@ from clearance_cases import agree, flowing, load, still, turned
 from numpy.typing import NDArray
 from oracles import gradient
 
-from hsp_control import (
-    Robot,
-)
+from hsp_control import Robot
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.null_space.fields import (
     SelfClearance,

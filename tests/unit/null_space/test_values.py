@@ -22,11 +22,11 @@ from field_cases import evaluate, placed
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from hsp_control import NullSpaceField, Obstacle, Robot, RobotState, Scene, geometry
+from hsp_control import NullSpaceField, Obstacle, Robot, RobotState, geometry
 from hsp_control import trajectories as paths
 from hsp_control.common.exceptions import ImmutableError
 from hsp_control.declaration import Part
-from hsp_control.geometry import shapes
+from hsp_control.geometry import Scene, shapes
 from hsp_control.geometry.start import Start
 from hsp_control.null_space import fields as null_space_fields
 from hsp_control.null_space import metrics

@@ -15,21 +15,14 @@ from numpy.typing import NDArray
 from oracles import gradient, slope
 
 from hsp_control import (
-    ConstantMetric,
     Controller,
     FramePosition,
-    FunctionField,
     Gains,
     Hold,
-    IdentityMetric,
     JointCentering,
-    MassMatrixMetric,
-    Metric,
     NullSpaceField,
     Obstacle,
-    PointDistance,
     Rest,
-    Rk4,
     Robot,
     RobotState,
     TargetPosture,
@@ -41,15 +34,24 @@ from hsp_control.null_space.fields import (
     ConstantWeight,
     FieldSample,
     FieldSum,
+    FunctionField,
     LimitBarrier,
     Manipulability,
     ObstacleClearance,
+    PointDistance,
     Ramp,
     StateWeight,
     Weight,
 )
 from hsp_control.null_space.fields.weight import Product, sample_weight
-from hsp_control.null_space.metrics import MetricSample
+from hsp_control.null_space.metrics import (
+    ConstantMetric,
+    IdentityMetric,
+    MassMatrixMetric,
+    Metric,
+    MetricSample,
+)
+from hsp_control.robot import Rk4
 from hsp_control.trajectories import Lissajous
 
 pytestmark = pytest.mark.filterwarnings("error")

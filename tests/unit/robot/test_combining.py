@@ -16,7 +16,6 @@ from hsp_control import (
     Gains,
     Hold,
     JointCentering,
-    Rk4,
     Robot,
     simulate,
 )
@@ -30,6 +29,7 @@ from hsp_control.common.resources import bundled_robots
 from hsp_control.geometry import link_shapes
 from hsp_control.robot.description.combining import Part, combine, placement
 from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.integrators import Rk4
 
 pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
@@ -255,9 +255,7 @@ def test_each_arm_moves_as_if_alone() -> None:
         start = single.state(0.0, q0[own], np.zeros(7)).position("panda_tcp")
         turned = place.rotation.T @ away
         apart = simulate(
-            Controller(
-                single, [task(single, "", start + turned)], JointCentering()
-            ),
+            Controller(single, [task(single, "", start + turned)], JointCentering()),
             q0[own],
             **options,  # type: ignore[arg-type]
         )

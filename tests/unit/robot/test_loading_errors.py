@@ -11,7 +11,7 @@ import yaml
 from places import ROOT
 from robot_texts import ARM, INERTIA, gripper, joint, link, robot_xml
 
-from hsp_control import HspControlError, Robot, ToolFrame
+from hsp_control import HspControlError, Robot
 from hsp_control.common.exceptions import (
     FrameNotFoundError,
     JointNotFoundError,
@@ -20,6 +20,7 @@ from hsp_control.common.exceptions import (
     RobotNotFoundError,
     ShapeError,
 )
+from hsp_control.robot.description.loading import ToolFrame
 
 
 @pytest.fixture

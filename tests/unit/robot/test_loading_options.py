@@ -17,11 +17,11 @@ from robot_texts import (
     robot_xml,
 )
 
-from hsp_control import Robot, ToolFrame
+from hsp_control import Robot
 from hsp_control.common.exceptions import (
     ModelError,
 )
-from hsp_control.robot.description.loading import end_effector_frame
+from hsp_control.robot.description.loading import ToolFrame, end_effector_frame
 
 
 @pytest.fixture

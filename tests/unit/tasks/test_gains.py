@@ -8,15 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hsp_control import (
-    Gains,
-    JointPosture,
-    Robot,
-)
-from hsp_control.common.exceptions import (
-    GainError,
-)
-from hsp_control.tasks.gain_ramp import GainRamp
+from hsp_control import Controller, Gains, JointPosture, Robot
+from hsp_control.common.exceptions import GainError
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -35,18 +28,20 @@ def test_gains_in_three_forms() -> None:
     np.testing.assert_array_equal(Kv, [[3.0, 0.5], [0.1, 4.0]])
 
 
-def test_a_ramp_leads_both_gains_to_the_new_ones() -> None:
+def test_a_change_leads_both_gains_to_the_new_ones() -> None:
     """Unchanged before it, the mean of both half-way, exactly the new ones after it."""
     robot = Robot.load("planar3r")
     old, new = Gains([4.0, 5.0, 6.0], 7.0), Gains(40.0, [10.0, 20.0, 30.0])
-    task = JointPosture(robot.neutral(), gains=old)
+    controller = Controller(robot, [JointPosture("home", gains=old)])
     first, last = old.matrices(3), new.matrices(3)
     half = [0.5 * (a + b) for a, b in zip(first, last, strict=True)]
-    ramp = GainRamp(task, new, start=1.0, ramp=0.5)
+    controller.at(1.0).ramp(0.5).gains("posture", new)
     for t, expected in ((0.0, first), (1.0, first), (1.25, half), (1.5, last)):
-        assert ramp.apply(t) is (t == 1.5)
-        np.testing.assert_allclose(task.Kp, expected[0], rtol=1e-14)
-        np.testing.assert_allclose(task.Kv, expected[1], rtol=1e-14)
+        controller.compute(t, robot.home(), np.zeros(3))
+        Kp, Kv, offset = controller.feedback("posture")
+        np.testing.assert_allclose(Kp, expected[0], rtol=1e-14)
+        np.testing.assert_allclose(Kv, expected[1], rtol=1e-14)
+        assert not offset.any()
 
 
 def test_matrices_are_copies() -> None:
@@ -75,36 +70,63 @@ def test_gains_from_frequency(frequency: float, ratio: float) -> None:
 
 
 def test_gains_from_frequency_defaults_and_lists() -> None:
-    assert repr(Gains(natural_frequency=3.0)) == "Gains(kp=9.0, kv=6.0)"
+    for kp, one in zip((9.0, 6.0), Gains(natural_frequency=3).matrices(1), strict=True):
+        np.testing.assert_array_equal(one, [[kp]])
     Kp, Kv = Gains(natural_frequency=[2.0, 3.0], damping_ratio=[1.0, 0.5]).matrices(2)
     np.testing.assert_array_equal(Kp, np.diag([4.0, 9.0]))
     np.testing.assert_array_equal(Kv, np.diag([4.0, 3.0]))
 
 
 GAIN_ERRORS: dict[str, tuple[Callable[[], Any], str]] = {
-    "negative": (lambda: Gains(-1.0, 1.0), r"^kp is -1.0; must be greater than 0$"),
-    "zero": (lambda: Gains(1.0, [1.0, 0.0]), r"^kv is \[1.0, 0.0\]; must be greater"),
+    "negative": (
+        lambda: Gains(-1.0, 1.0),
+        r"^Gains: kp: -1.0 is negative; must be greater than 0$",
+    ),
+    "zero": (
+        lambda: Gains(1.0, [1.0, 0.0]),
+        r"^Gains: kv.1: 0.0 is too small; must be greater than 0$",
+    ),
     "diagonal": (
         lambda: Gains([[1.0, 0.0], [0.0, -2.0]], 1.0),
-        r"^kp is \[\[1.0, 0.0\], \[0.0, -2.0\]\]; must be greater than 0$",
+        r"^Gains: kp is \[\[1.0, 0.0\], \[0.0, -2.0\]\]; must be greater than 0$",
     ),
-    "nan": (lambda: Gains(np.nan, 1.0), r"^kp is nan; needs finite numbers$"),
-    "infinite": (lambda: Gains(1.0, np.inf), r"^kv is inf; needs finite numbers$"),
+    "nan": (lambda: Gains(np.nan, 1.0), r"^Gains: kp: .nan is not a finite number$"),
+    "infinite": (lambda: Gains(1.0, np.inf), r"^Gains: kv: .inf is not a finite num"),
+    "infinite in a matrix": (
+        lambda: Gains([[1.0, np.inf], [0.0, 1.0]], 1.0),
+        r"^Gains: kp.0.1: .inf is not a finite number$",
+    ),
     "not square": (
         lambda: Gains(np.ones((2, 3)), 1.0),
-        r"^kp has shape \(2, 3\); a matrix gain must be square$",
+        r"^Gains: kp has shape \(2, 3\); a matrix gain must be square$",
     ),
     "three axes": (
         lambda: Gains(np.ones((1, 1, 1)), 1.0),
-        r"^kp has shape \(1, 1, 1\)",
+        r"^Gains: kp.0: \[\[1.0\]\] is a list; expected a number$",
     ),
-    "empty": (lambda: Gains([], 1.0), r"^kp is empty; needs numbers$"),
+    "empty": (lambda: Gains([], 1.0), r"^Gains: kp is empty; needs numbers$"),
     "words": (
         lambda: Gains("stiff", 1.0),
-        r"^kp is 'stiff'; needs numbers, a list or a matrix$",
+        r"^Gains: kp: 'stiff' is text; expected a number, a list of numbers or a mat",
     ),
-    "ragged": (lambda: Gains([[1.0], [1.0, 2.0]], 1.0), r"needs numbers, a list or a"),
-    "none": (lambda: Gains(None, 1.0), r"^kp is (nan|None); needs"),
+    "ragged": (
+        lambda: Gains([[1.0], [1.0, 2.0]], 1.0),
+        r"^Gains: kp: rows have different lengths \[1, 2\]; need the same$",
+    ),
+    "none": (lambda: Gains(None, 1.0), r"^Gains: give both kp and kv; one of them is"),
+    "nothing": (lambda: Gains(), r"^Gains: give either kp and kv, or natural_freq"),
+    "twice": (
+        lambda: Gains(1.0, 1.0, natural_frequency=1.0),
+        r"^Gains: give either kp and kv, or natural_frequency and damping_ratio$",
+    ),
+    "ratio alone": (
+        lambda: Gains(damping_ratio=1.0),
+        r"^Gains: give either kp and kv, or natural_frequency$",
+    ),
+    "another name": (
+        lambda: Gains(frequency=1.0),  # type: ignore[call-arg]
+        r"^Gains: frequency: unknown key 'frequency'",
+    ),
     "shape of kp": (
         lambda: Gains([1.0, 2.0], 1.0).matrices(3),
         r"^kp has shape \(2,\); needs a number, 3 numbers or a 3 × 3 matrix$",
@@ -119,19 +141,19 @@ GAIN_ERRORS: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "frequency": (
         lambda: Gains(natural_frequency=0.0),
-        r"^natural_frequency is 0.0; must be greater than 0$",
+        r"^Gains: natural_frequency: 0.0 is too small; must be greater than 0$",
     ),
     "ratio": (
         lambda: Gains(natural_frequency=1.0, damping_ratio=-1.0),
-        r"^damping_ratio is -1.0; must be greater than 0$",
+        r"^Gains: damping_ratio: -1.0 is negative; must be greater than 0$",
     ),
     "frequency matrix": (
         lambda: Gains(natural_frequency=np.eye(2) + 1.0),
-        r"^natural_frequency and damping_ratio must be numbers or lists$",
+        r"^Gains: natural_frequency and damping_ratio must be numbers or lists$",
     ),
     "lists of different length": (
         lambda: Gains(natural_frequency=[1.0, 2.0], damping_ratio=[1.0, 1.0, 1.0]),
-        r"^natural_frequency and damping_ratio: ",
+        r"^Gains: natural_frequency has 2 entries, damping_ratio 3$",
     ),
 }
 

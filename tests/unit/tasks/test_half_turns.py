@@ -136,7 +136,9 @@ def test_pointing_is_led_back_from_near_the_antipode(degrees: float) -> None:
     angle = np.radians(degrees)
     seen = np.array([np.sin(angle), 0.0, np.cos(angle)])
     wanted = HoldOrientation(frame_along(here) @ frame_along(seen).T)
-    task = Pointing("panda_tcp", axis=TOOL, trajectory=wanted, gains=Gains(natural_frequency=3.0))
+    task = Pointing(
+        "panda_tcp", axis=TOOL, trajectory=wanted, gains=Gains(natural_frequency=3.0)
+    )
     run = simulate(Controller(robot, [task]), q0, duration=8.0, log_period=0.1)
     n = run["task.panda_tcp_pointing.actual"] @ wanted.rotation
     angles = np.arctan2(np.hypot(n[:, 0], n[:, 1]), n[:, 2])

@@ -1,5 +1,7 @@
 """Check that what is drawn is what the log says, predictions of e_N among it."""
 
+from pathlib import Path
+
 import matplotlib as mpl
 import numpy as np
 import pinocchio as pin
@@ -21,7 +23,6 @@ from matplotlib.patches import Circle
 
 import hsp_control.visualization.plots as plots
 from hsp_control import (
-    ConstantMetric,
     Controller,
     FramePosition,
     Hold,
@@ -29,9 +30,9 @@ from hsp_control import (
     Rest,
     Robot,
     Rollout,
-    Scene,
     simulate,
 )
+from hsp_control.geometry import Scene
 from hsp_control.geometry.shapes import (
     Box,
     Capsule,
@@ -42,8 +43,10 @@ from hsp_control.geometry.shapes import (
     Shape,
     Sphere,
 )
+from hsp_control.null_space.metrics import CoordinatesMetric
 from hsp_control.simulation import log_series
 from hsp_control.simulation.decay import predicted_decay
+from hsp_control.tasks.task import ErrorPart
 from hsp_control.trajectories import (
     Circle as Round,
 )
@@ -57,6 +60,7 @@ from hsp_control.visualization.plots import (
     paths,
     views,
 )
+from hsp_control.visualization.viewer.targets import read_targets
 
 pytestmark = [pytest.mark.filterwarnings("error"), pytest.mark.slow]
 A = np.tril(np.ones((3, 3)))
@@ -173,6 +177,57 @@ def test_each_type_of_task_has_its_unit(logs: dict[str, Rollout]) -> None:
     told = changed(logs["posture"], robot=robot)
     assert log_series.task_errors(told)[0].unit == "rad"
     assert log_series.effort_unit(told) == "N·m"
+
+
+def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
+    class Tool(FramePosition):
+        @property
+        def error_parts(self) -> tuple[ErrorPart, ...]:
+            return (
+                ErrorPart("x and z", "mm", "mm/s", 2),
+                ErrorPart("y", "m", "m/s", 1),
+            )
+
+    arm = Arm()
+    tool = Tool(arm.tcp, arm.circle([1.0, 0.0, 0.0]), axes="xzy", gains=GAINS)
+    log = arm.run(tool)
+    parts = log_series.task_errors(log)
+    assert [(part.label, part.unit) for part in parts] == [
+        ("panda_tcp x and z", "mm"),
+        ("panda_tcp y", "m"),
+    ]
+    np.testing.assert_array_equal(
+        parts[1].norm, np.abs(log["task.panda_tcp.error"][:, 2])
+    )
+    (path,) = logged_geometry.task_paths(log)
+    desired = log["task.panda_tcp.reference"]
+    np.testing.assert_array_equal(path.desired[:, [0, 2, 1]], desired)
+    (target,) = read_targets(log)
+    np.testing.assert_array_equal(target.desired, path.desired)
+
+
+@pytest.mark.parametrize("name", ["pose", "several", "posture", "obstacle"])
+def test_an_old_log_has_the_class_instead_and_is_drawn_alike(
+    logs: dict[str, Rollout], name: str, tmp_path: Path
+) -> None:
+    """Version 0.1 logged neither the parts of the errors nor what is drawn."""
+    log = logs[name]
+    since = {"error", "drawn"}
+    tasks = {
+        task: {key: entry for key, entry in about.items() if key not in since}
+        for task, about in log.meta["tasks"].items()
+    }
+    old = Rollout.load(changed(log, tasks=tasks).save(tmp_path / "old.npz"))
+    assert old.meta["tasks"] == log.meta["tasks"]
+    unknown = {task: {**about, "type": "Own"} for task, about in tasks.items()}
+    bare = Rollout.load(changed(log, tasks=unknown).save(tmp_path / "bare.npz"))
+    assert not logged_geometry.task_paths(bare)
+    assert not read_targets(bare)
+    for part in log_series.task_errors(bare):  # a name, and all rows together
+        error = log[f"task.{log_series.task_names(log)[part.task]}.error"]
+        np.testing.assert_array_equal(part.norm, np.linalg.norm(error, axis=1))
+    for figure in both(bare):
+        figure.canvas.draw()
 
 
 def test_paths_are_the_logs_in_the_plane_of_the_robot(logs: dict[str, Rollout]) -> None:

@@ -8,7 +8,17 @@ import pinocchio as pin
 import pytest
 from clips import Clip
 
-from hsp_control import Experiment, Robot, Rollout, load_experiment
+from hsp_control import (
+    Circle,
+    Controller,
+    Experiment,
+    FramePosition,
+    Robot,
+    Rollout,
+    TargetPosture,
+    load_experiment,
+    simulate,
+)
 from hsp_control.geometry.shapes import (
     Box,
     Capsule,
@@ -159,6 +169,26 @@ def test_the_projector_is_the_laws_own(name: str) -> None:
         np.testing.assert_allclose(
             P @ (output.field.g - state.v), output.null_space_error, atol=1e-9
         )
+
+
+def test_the_robot_of_the_view_may_be_another_object(recorder: Recorder) -> None:
+    robot = Robot.load("panda")
+    task = FramePosition(trajectory=Circle(0.1, 2.0))  # relative to the run's start
+    controllers = [
+        Controller(robot, [task], TargetPosture(robot.home() + 0.1)) for _ in range(2)
+    ]
+    run = simulate(controllers[0], robot.home(), duration=0.1)
+    clips = []
+    for controller in controllers:
+        viewer = Viewer(Robot.load("panda"), transport=recorder)
+        viewer.play(run, controller=controller)
+        clips.append(Clip(recorder))
+    paths = clips[0].paths("/self_motion")
+    assert paths
+    assert clips[1].paths("/self_motion") == paths
+    for path in paths:
+        first, second = (clip.values(path, "scale") for clip in clips)
+        np.testing.assert_allclose(first, second, atol=1e-12)
 
 
 # -- distances ------------------------------------------------------------------------

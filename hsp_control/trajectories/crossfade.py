@@ -1,0 +1,225 @@
+"""A smooth change from one reference to another, both of which may move."""
+
+from dataclasses import KW_ONLY
+from functools import cached_property
+
+from numpy.typing import ArrayLike
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.kernels import kernel
+from hsp_control.declaration.quantities import NonNegative, Number
+from hsp_control.trajectories.blend_orientation import BlendOrientation
+from hsp_control.trajectories.orientation import (
+    OrientationSample,
+    OrientationTrajectory,
+)
+from hsp_control.trajectories.pose import ComposedPose, PoseTrajectory
+from hsp_control.trajectories.timing import smooth_step
+from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+
+AnyReference = Trajectory | OrientationTrajectory | PoseTrajectory
+
+
+class Crossfade(Trajectory, type="crossfade"):
+    """x(t) = (1 - s) x_0(t) + s x_1(t), with s the `smooth_step`; C² if both are."""
+
+    before: Trajectory
+    """x_0, until the change."""
+    after: Trajectory
+    """x_1, from the end of the change on."""
+    _: KW_ONLY
+    start_time: Number = 0.0
+    """Time at which the change begins [s]."""
+    duration: NonNegative = 0.3
+    """Duration of the change [s]; 0 is a jump."""
+
+    def __post_init__(self) -> None:
+        """Check that both have one dimension."""
+        if self.relative:
+            return
+        if self.before.dimension != self.after.dimension:
+            raise TrajectoryError(
+                f"before has dimension {self.before.dimension}, after has "
+                f"{self.after.dimension}; they must be the same"
+            )
+
+    @property
+    def relative(self) -> bool:
+        """Whether one of them depends on where the robot starts."""
+        return self.before.relative or self.after.relative
+
+    def anchored(self, start: ArrayLike | None) -> "Crossfade":
+        """Return both in the world; see `Trajectory.anchored`."""
+        return Crossfade(
+            self.before.anchored(start),
+            self.after.anchored(start),
+            start_time=self.start_time,
+            duration=self.duration,
+        )
+
+    @property
+    def dimension(self) -> int:
+        """The number n of coordinates."""
+        return self.after.dimension
+
+    def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
+        """Return the point at time t; see `Trajectory.sample`."""
+        out = self._output(out)
+        if t < self.start_time:
+            return self.before.sample(t, out)
+        self.after.sample(t, out)
+        if t < self.start_time + self.duration:
+            old = self.before.sample(t)
+            _mix(float(t), self.start_time, self.duration, *old, *out)
+        return out
+
+
+class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
+    """R_0(t) until the change, then a `BlendOrientation` into R_1(t); C² if both are.
+
+    The blend begins with orientation, angular velocity and angular acceleration of R_0.
+    """
+
+    before: OrientationTrajectory
+    """R_0, until the change."""
+    after: OrientationTrajectory
+    """R_1, from the end of the change on."""
+    _: KW_ONLY
+    start_time: Number = 0.0
+    """Time at which the change begins [s]."""
+    duration: NonNegative = 0.3
+    """Duration of the change [s]; 0 is a jump."""
+
+    @property
+    def relative(self) -> bool:
+        """Whether one of them depends on how the robot starts."""
+        return self.before.relative or self.after.relative
+
+    def anchored(self, start: ArrayLike) -> "CrossfadeOrientation":
+        """Return both with the start orientation; see `OrientationTrajectory`."""
+        return CrossfadeOrientation(
+            self.before.anchored(start),
+            self.after.anchored(start),
+            start_time=self.start_time,
+            duration=self.duration,
+        )
+
+    def sample(
+        self, t: float, out: OrientationSample | None = None
+    ) -> OrientationSample:
+        """Return the orientation at time t; see `OrientationTrajectory.sample`."""
+        out = self._output(out)
+        if t < self.start_time:
+            return self.before.sample(t, out)
+        return self._blend.sample(t, out)
+
+    @cached_property
+    def _blend(self) -> OrientationTrajectory:
+        if self.duration == 0.0:
+            return self.after
+        R, omega, omega_dot = self.before.sample(self.start_time)
+        return BlendOrientation(
+            self.after,
+            self.duration,
+            rotation=R,
+            start_angular_velocity=omega,
+            start_angular_acceleration=omega_dot,
+            start_time=self.start_time,
+        )
+
+
+class PositionOf(Trajectory):
+    """The origin of a pose trajectory."""
+
+    pose: PoseTrajectory
+    """The pose trajectory [m, rad]."""
+
+    @property
+    def dimension(self) -> int:
+        """Three."""
+        return 3
+
+    def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
+        """Return the origin at time t; see `Trajectory.sample`."""
+        out = self._output(out)
+        for own, other in zip(out, self.pose.sample(t).position, strict=True):
+            own[:] = other
+        return out
+
+
+class OrientationOf(OrientationTrajectory):
+    """The orientation of a pose trajectory."""
+
+    pose: PoseTrajectory
+    """The pose trajectory [m, rad]."""
+
+    def sample(
+        self, t: float, out: OrientationSample | None = None
+    ) -> OrientationSample:
+        """Return the orientation at time t; see `OrientationTrajectory.sample`."""
+        out = self._output(out)
+        for own, other in zip(out, self.pose.sample(t).orientation, strict=True):
+            own[:] = other
+        return out
+
+
+def crossfade(
+    before: AnyReference, after: AnyReference, *, start_time: float, duration: float
+) -> AnyReference:
+    """Return the smooth change from one reference to another of the same kind.
+
+    Args:
+        before: The reference until the change.
+        after: The reference from the end of the change on.
+        start_time: When the change begins [s].
+        duration: How long it takes [s].
+
+    Raises:
+        TrajectoryError: If they are of different kinds.
+    """
+    when = {"start_time": start_time, "duration": duration}
+    if isinstance(before, Trajectory) and isinstance(after, Trajectory):
+        return Crossfade(before, after, **when)
+    if isinstance(before, OrientationTrajectory) and isinstance(
+        after, OrientationTrajectory
+    ):
+        return CrossfadeOrientation(before, after, **when)
+    if isinstance(before, PoseTrajectory) and isinstance(after, PoseTrajectory):
+        old, new = _parts(before), _parts(after)
+        return ComposedPose(
+            Crossfade(old.position, new.position, **when),
+            CrossfadeOrientation(old.orientation, new.orientation, **when),
+        )
+    raise TrajectoryError(
+        f"{type(before).__name__} cannot change into {type(after).__name__}: one is a "
+        "point, an orientation or a pose, and the other is not"
+    )
+
+
+def _parts(pose: PoseTrajectory) -> ComposedPose:
+    if isinstance(pose, ComposedPose):
+        return pose
+    return ComposedPose(PositionOf(pose), OrientationOf(pose))
+
+
+@kernel
+def _mix(
+    t: float,
+    start_time: float,
+    duration: float,
+    old: Array,
+    old_dot: Array,
+    old_ddot: Array,
+    x: Array,
+    x_dot: Array,
+    x_ddot: Array,
+) -> None:
+    """Overwrite x_1 and its rates by those of (1 - s) x_0 + s x_1."""
+    s, s_dot, s_ddot = smooth_step(t, start_time, duration)
+    for i in range(x.size):
+        gap, gap_dot = x[i] - old[i], x_dot[i] - old_dot[i]
+        gap_ddot = x_ddot[i] - old_ddot[i]
+        x[i] = old[i] + s * gap
+        x_dot[i] = old_dot[i] + s_dot * gap + s * gap_dot
+        x_ddot[i] = old_ddot[i] + s_ddot * gap + 2.0 * s_dot * gap_dot + s * gap_ddot

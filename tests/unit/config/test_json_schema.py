@@ -1,0 +1,193 @@
+"""The JSON schema: complete texts, units, defaults that fit, one definition a part."""
+
+import json
+import re
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+import jsonschema
+import pytest
+
+from hsp_control.cli import main
+from hsp_control.config import json_schema
+from hsp_control.config.document import Document
+from hsp_control.config.scenario import Scenario
+from hsp_control.config.validation import validate
+from hsp_control.declaration.families import Family
+from hsp_control.declaration.part import Part
+
+SCHEMA = json_schema()
+DEFINITIONS: dict[str, Any] = {"Scenario": SCHEMA, **SCHEMA["$defs"]}
+PROPERTIES = [
+    (f"{name}.{key}", about)
+    for name, definition in DEFINITIONS.items()
+    for key, about in definition.get("properties", {}).items()
+]
+
+_SYMBOL = r"(?:rad|m|s|kg|N|Hz)[²³]?"
+_PRODUCT = rf"(?:1|{_SYMBOL}(?:·{_SYMBOL})*)(?:/{_SYMBOL})?"
+_WORDS = "control periods|periods|the task's unit(?: per s)?|unit quaternions"
+_ONE = rf"(?:-|{_PRODUCT}|{_WORDS})"
+UNIT = re.compile(rf"\[{_ONE}(?:(?:, or |, | or ){_ONE})*\]")
+"""Such as [m], [N·m·s/rad or N·s/m], [-]."""
+
+
+def numeric(about: Any) -> bool:
+    """Return whether a property may hold numbers itself, not inside another part."""
+    if not isinstance(about, dict):
+        return False
+    inner = [about.get(key) for key in ("items", "additionalProperties")]
+    for key in ("anyOf", "oneOf", "allOf", "prefixItems"):
+        inner += about.get(key, [])
+    inner += about.get("patternProperties", {}).values()
+    return about.get("type") in ("number", "integer") or any(map(numeric, inner))
+
+
+def keywords(schema: Any) -> Iterator[str]:
+    """Yield the keywords of a schema, those of what is inside included."""
+    if not isinstance(schema, dict):
+        return
+    for key, value in schema.items():
+        yield key
+        if key in ("properties", "patternProperties", "$defs"):
+            for each in value.values():
+                yield from keywords(each)
+        elif key in ("anyOf", "oneOf", "allOf", "prefixItems"):
+            for each in value:
+                yield from keywords(each)
+        elif key in ("items", "additionalProperties", "propertyNames"):
+            yield from keywords(value)
+
+
+def references(schema: Any) -> Iterator[str]:
+    """Yield the names of the definitions that a schema refers to."""
+    if isinstance(schema, dict):
+        if "$ref" in schema:
+            yield schema["$ref"].removeprefix("#/$defs/")
+        schema = list(schema.values())
+    if isinstance(schema, list):
+        for each in schema:
+            yield from references(each)
+
+
+def test_everything_has_a_description() -> None:
+    assert [name for name, each in DEFINITIONS.items() if "title" not in each] == []
+    texts = {name: each.get("description") for name, each in DEFINITIONS.items()}
+    texts |= {name: about.get("description") for name, about in PROPERTIES}
+    assert [name for name, text in texts.items() if not text] == []
+    assert [name for name, text in texts.items() if "TODO" in text] == []
+
+
+def test_every_number_has_a_unit() -> None:
+    without = [
+        f"{name}: {about['description']}"
+        for name, about in PROPERTIES
+        if numeric(about) and not UNIT.search(about["description"])
+    ]
+    assert without == []
+    assert sum(numeric(about) for _, about in PROPERTIES) > 200
+
+
+@pytest.mark.parametrize(
+    ("text", "has_one"),
+    [
+        ("Mass [kg].", True),
+        ("Friction [N·m·s/rad or N·s/m], one number or nv.", True),
+        ("A point [m, or the task's unit]; the start by default.", True),
+        ("Weight [-].", True),
+        ("Gravity, [0, 0, -9.81] by default.", False),
+        ("Mass in kg.", False),
+        ("Stiffness [-1/s²].", False),
+    ],
+)
+def test_what_a_unit_is(text: str, has_one: bool) -> None:
+    assert bool(UNIT.search(text)) is has_one
+
+
+STANDARD = """
+$defs $ref $schema additionalProperties anyOf const default description enum
+exclusiveMaximum exclusiveMinimum items maxItems maxLength maxProperties maximum
+minItems minLength minProperties minimum oneOf pattern patternProperties prefixItems
+properties propertyNames required title type
+"""
+
+
+def test_it_has_the_keywords_of_json_schema_only() -> None:
+    """Pydantic writes ``lt`` where it does not see through its own validators."""
+    known = {*STANDARD.split(), "discriminator"}  # the latter is OpenAPI's, for editors
+    assert set(keywords(SCHEMA)) <= known
+
+
+def test_defaults_fit_their_own_schema() -> None:
+    for name, about in PROPERTIES:
+        if "default" in about:
+            schema = {**about, "$defs": SCHEMA["$defs"]}
+            found = list(jsonschema.Draft202012Validator(schema).iter_errors(
+                about["default"]
+            ))  # fmt: skip
+            assert not found, (name, about["default"])
+
+
+def families() -> Iterator[Family]:
+    """Yield the families whose parts YAML can give."""
+    pending: list[type[Part]] = [Part]
+    while pending:
+        cls = pending.pop()
+        pending += cls.__subclasses__()
+        ours = cls.__module__.startswith("hsp_control.")
+        if ours and cls.family is not None and cls.family.base is cls:
+            yield cls.family
+
+
+def test_each_part_is_defined_once_and_used() -> None:
+    """So the schema grows with the number of parts, not with their combinations."""
+    definitions = SCHEMA["$defs"]
+    assert set(references(SCHEMA)) == set(definitions)
+    titles = Counter(
+        each["title"] for name, each in definitions.items() if "Added" not in name
+    )
+    assert set(titles.values()) == {1}
+    parts = {m.__name__ for family in families() for m in family.members.values()
+             if m.__module__.startswith("hsp_control.")}  # fmt: skip
+    assert len(parts) > 40
+    assert parts <= set(titles)
+    assert len(json.dumps(SCHEMA)) < 200_000
+
+
+# -- names ----------------------------------------------------------------------------
+
+TASK = {"type": "frame_position", "frame": "hand"}
+NAMED = {**TASK, "name": "elbow"}
+
+
+@pytest.mark.parametrize(
+    ("tasks", "added", "good"),
+    [
+        (TASK, TASK, True),
+        (TASK, NAMED, True),  # in a list of changes, no key is its name
+        (NAMED, NAMED, False),
+        (TASK, {**NAMED, "frme": "hand"}, False),
+    ],
+)
+def test_editor_and_program_agree_about_names(
+    tasks: dict[str, Any], added: dict[str, Any], good: bool
+) -> None:
+    data = {
+        "robot": {"name": "panda"},
+        "tasks": {"hand": tasks},
+        "changes": [{"type": "add_task", "at": 1, "task": added}],
+    }
+    assert jsonschema.Draft202012Validator(SCHEMA).is_valid(data) is good
+    try:
+        scenario = validate(Document(data, {}, "data"), Scenario)
+    except ValueError:
+        assert not good
+    else:
+        assert good
+        assert scenario.changes[0].task.name == added.get("name", "hand")
+
+
+def test_the_command_prints_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out) == SCHEMA

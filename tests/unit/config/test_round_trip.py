@@ -1,0 +1,171 @@
+"""A configuration as plain data says the same: logs keep it like this."""
+
+import json
+from typing import Any
+
+import jsonschema
+import pytest
+import yaml
+
+from hsp_control import FunctionCost, Gains, Sphere, load_experiment
+from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.resources import bundled_configs
+from hsp_control.config import json_schema
+from hsp_control.config.document import Document
+from hsp_control.config.models.null_space import NullSpaceModel
+from hsp_control.config.scenario import Scenario
+from hsp_control.config.validation import validate
+from hsp_control.declaration.plain_data import plain_data
+from hsp_control.geometry import Obstacle
+from hsp_control.geometry.scene import Scene
+from hsp_control.tasks import FramePosition
+from hsp_control.trajectories import Hold
+
+SCHEMA = jsonschema.Draft202012Validator(json_schema())
+
+EVERYTHING: dict[str, Any] = {
+    "robot": {"name": "panda", "tool_frames": {"pen": {"parent": "panda_hand"}}},
+    "start": {"joints": {"panda_joint4": -2.0}},
+    "scene": {
+        "obstacles": {
+            "ball": {
+                "shape": {"type": "sphere", "radius": 0.1},
+                "center": {"type": "hold", "point": [1, 1, 1]},
+                "orientation": {"type": "spin", "axis": [0, 0, 1], "rate": 1},
+            },
+        }
+    },
+    "tasks": {
+        "hand": {
+            "type": "frame_pose",
+            "trajectory": {"type": "composed", "position": {"type": "hold"}},
+            "gains": {"kp": [1, 1, 1, 2, 2, 2], "kv": 2},
+            "schedule": {"intervals": [[0, None]], "ramp": 0.1},
+        },
+        "posture": {"type": "joint_posture", "reference": "home", "priority": 2},
+    },
+    "limits": {
+        "effort": {"scale": {"panda_joint1": 0.5}},
+        "velocity": "none",
+        "acceleration": [None, 1, 1, 1, 1, 1, 1],
+        "position": {"lower": -3, "upper": [3, 3, 3, None, 3, 3, 3]},
+        "distances": [{"type": "obstacles", "obstacles": ["ball"]}, {"type": "self"}],
+    },
+    "null_space": {
+        "gain": [[2, 1], [0, 2]],
+        "metric": {"type": "constant", "matrix": [1, 2]},
+        "fields": [
+            {"type": "joint_centering", "weight": {"final": 1, "duration": 2}},
+            {"type": "target_posture", "target": "start"},
+        ],
+    },
+    "changes": [
+        {"type": "add_task", "at": 1, "task": {"type": "pointing", "name": "eye",
+                                               "direction": [0, 0, 1]}},
+        {"type": "gains", "at": 2, "task": "hand", "gains": {"kp": 1, "kv": 1}},
+        {"type": "field", "at": 3, "fields": [{"type": "manipulability"}]},
+        {"type": "weight", "at": 4, "field": "manipulability", "weight": 2},
+        {"type": "null_space_gain", "at": 5, "gain": 3},
+        {"type": "remove_task", "at": 6, "task": "hand"},
+        {"type": "contact", "at": 7, "contact": "sole", "bears": False},
+    ],
+    "plant": {"type": "mujoco", "contacts": {
+        "panda_hand": {"shape": {"type": "sphere", "radius": 0.01}}}},
+    "compensation": {"predictor": {}},
+    "simulation": {"control_period": 0.001},
+}  # fmt: skip
+
+
+def scenarios() -> dict[str, Scenario]:
+    """Return the bundled configurations, and one with a little of everything."""
+    found = {
+        name: validate(Document.read(file), Scenario)
+        for name, file in bundled_configs().items()
+    }
+    everything = validate(Document(EVERYTHING, {}, "everything"), Scenario)
+    return {**found, "everything": everything}
+
+
+SCENARIOS = scenarios()
+
+
+@pytest.mark.parametrize("defaults", [False, True])
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_configuration_equals_what_it_becomes_as_data(
+    name: str, defaults: bool
+) -> None:
+    scenario = SCENARIOS[name]
+    data = plain_data(scenario, defaults=defaults)
+    assert validate(Document(data, {}, name), Scenario) == scenario
+    # JSON and YAML change nothing either.
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+    again = Document.parse(yaml.safe_dump(data), name)
+    assert validate(again, Scenario) == scenario
+    assert not list(SCHEMA.iter_errors(data))
+
+
+@pytest.mark.parametrize("name", bundled_configs())
+def test_without_defaults_nothing_is_added(name: str) -> None:
+    """Only what the file says: other keys would be defaults."""
+
+    def within(inner: Any, outer: Any) -> bool:
+        if isinstance(inner, dict):
+            return all(k in outer and within(v, outer[k]) for k, v in inner.items())
+        return not isinstance(inner, list) or (
+            len(inner) == len(outer) and all(map(within, inner, outer))
+        )
+
+    written = Document.read(bundled_configs()[name]).to_dict()
+    assert within(plain_data(SCENARIOS[name]), written)
+
+
+def test_with_defaults_no_key_is_missing() -> None:
+    data = plain_data(SCENARIOS["everything"], defaults=True)
+    assert set(data) == set(Scenario.model_fields)
+    assert data["scene"]["obstacles"]["ball"]["center"]["origin"] == "world"
+    assert data["tasks"]["hand"]["blend"] is None
+    least = Document({"robot": {}, "tasks": EVERYTHING["tasks"]}, {}, "least")
+    empty = validate(least, Scenario)
+    assert plain_data(empty, defaults=True)["scene"] == {"obstacles": {}}
+    assert plain_data(empty, defaults=True)["contacts"] == {}
+
+
+def test_a_name_stands_once() -> None:
+    """As the key of a mapping, and inside only where there is no key."""
+    data = plain_data(SCENARIOS["everything"], defaults=True)
+    assert "name" not in data["tasks"]["hand"]
+    assert "name" not in data["scene"]["obstacles"]["ball"]
+    assert data["changes"][0]["task"]["name"] == "eye"
+    scene = Scene([Obstacle("ball", Sphere(0.1), Hold([0, 0, 1]))])
+    assert scene.to_dict() == {
+        "obstacles": {
+            "ball": {
+                "shape": {"type": "sphere", "radius": 0.1},
+                "center": {"type": "hold", "point": [0, 0, 1]},
+            }
+        }
+    }
+
+
+def test_a_part_says_what_yaml_would_say() -> None:
+    task = FramePosition("tip", name="hand", gains=Gains(1, [2, 2, 2]))
+    assert task.to_dict() == {
+        "type": "frame_position",
+        "frame": "tip",
+        "name": "hand",
+        "gains": {"kp": 1.0, "kv": [2.0, 2.0, 2.0]},
+    }
+
+
+def test_what_only_python_can_say_is_named() -> None:
+    cost = FunctionCost(lambda q, t: 0.0)
+    model = NullSpaceModel(fields=[cost])
+    with pytest.raises(ConfigError, match=r"^fields\.0: YAML has no name for Function"):
+        plain_data(model)
+
+
+def test_a_log_keeps_the_configuration() -> None:
+    short = "simulation.duration=0.02"
+    experiment = load_experiment("paper/4_moving_obstacle", short)
+    config = json.loads(json.dumps(experiment.run().config))
+    assert validate(Document(config, {}, "log"), Scenario) == experiment.scenario

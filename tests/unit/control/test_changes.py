@@ -1,0 +1,362 @@
+"""Changes while running: one time line, smooth however they overlap."""
+
+import copy
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from places import THOROUGH
+
+import hsp_control as hsp
+from hsp_control.control.changes import Change
+
+Array = NDArray[np.float64]
+
+ROBOTS = ["planar3r", "iiwa14", "panda"]
+SPAN = 3.0
+"""The changes begin within this time [s]."""
+
+
+class Line:
+    """A controller whose changes are drawn at random, along a motion that is given."""
+
+    def __init__(self, name: str, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.robot = hsp.Robot.load(name)
+        away = 0.2 * np.ones(self.robot.nv)
+        self.center = self.robot.integrate(self.robot.home(), away)
+        self.swing = 0.1 * self.rng.standard_normal(self.robot.nv)
+        self.frame = self.robot.end_effector
+        self.there = ["hand"]
+        self.terms = ["joint_centering"]
+        self.made = 0
+
+    def controller(self, changes: tuple[Change, ...] = ()) -> hsp.Controller:
+        axes = "xz" if self.robot.nv == 3 else "xyz"
+        hand = hsp.FramePosition(self.frame, axes=axes, name="hand")
+        field = hsp.TargetPosture("home", name="joint_centering")
+        start = self.center
+        return hsp.Controller(self.robot, [hand], field, start=start, changes=changes)
+
+    def motion(self, t: float) -> tuple[Array, Array]:
+        q = self.robot.integrate(self.center, self.swing * np.sin(3.0 * t))
+        return q, 3.0 * self.swing * np.cos(3.0 * t)
+
+    def efforts(self, controller: hsp.Controller, times: Array) -> Array:
+        return np.array([controller.compute(t, *self.motion(t)).tau for t in times])
+
+    def draw(self, number: int) -> tuple[Change, ...]:
+        """Return changes in order of time, so that each is possible."""
+        times = np.sort(self.rng.uniform(0.0, SPAN, number))
+        return tuple(self._change(float(t)) for t in times)
+
+    def _change(self, t: float) -> Change:
+        rng, when = self.rng, {"at": t, "ramp": float(self.rng.uniform(0.1, 0.5))}
+        kinds = ["gains", "weight", "field", "gain", "add"]
+        if len(self.there) > 1:
+            kinds += ["remove", "remove"]
+        match rng.choice(kinds):
+            case "gains":
+                gains = hsp.Gains(natural_frequency=float(rng.uniform(2.0, 15.0)))
+                name = str(rng.choice(self.there))
+                return hsp.changes.ChangeGains(name, gains, **when)
+            case "weight":
+                name = str(rng.choice(self.terms))
+                weight = float(rng.uniform(0.0, 3.0))
+                return hsp.changes.ChangeWeight(name, weight, **when)
+            case "field":
+                self.made += 1
+                self.terms = [f"first_{self.made}", f"second_{self.made}"]
+                posture = 0.3 * rng.standard_normal(self.robot.nv)
+                fields = [
+                    hsp.TargetPosture(posture, name=self.terms[0]),
+                    hsp.TargetPosture("home", name=self.terms[1], weight=0.5),
+                ]
+                return hsp.changes.ChangeField(fields, **when)
+            case "gain":
+                gain = float(rng.uniform(2.0, 20.0))
+                return hsp.changes.ChangeNullSpaceGain(gain, **when)
+            case "remove":
+                name = str(rng.choice(self.there[1:]))
+                self.there.remove(name)
+                return hsp.changes.RemoveTask(name, **when)
+            case _:
+                joint = str(rng.choice(list(self.robot.joints)))
+                self.made += 1
+                # Now and then a name is used again.
+                name = f"joint_{self.made % 3}"
+                if name in self.there:
+                    return self._change(t)
+                self.there.append(name)
+                task = hsp.JointPosture(
+                    "home", joints=[joint], priority=2 + self.made % 2, name=name
+                )
+                return hsp.changes.AddTask(task, **when)
+
+
+quick = settings(
+    max_examples=5 if THOROUGH else 1, deadline=None, derandomize=not THOROUGH
+)
+seeds = st.integers(0, 2**32 - 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROBOTS)
+@given(seeds)
+@quick
+def test_efforts_stay_continuous_through_a_hundred_changes(
+    name: str, seed: int
+) -> None:
+    """Where a change begins or ends, efforts change no more than anywhere else."""
+    line = Line(name, seed)
+    changes = line.draw(100)
+    edges = np.array([[each.at, each.end] for each in changes]).ravel()
+    between = line.rng.uniform(0.0, SPAN, 60)
+    gap, millisecond = 1e-5, 1e-3
+    halves = [*((t, gap) for t in edges), *((t, millisecond) for t in between)]
+    halves.sort()
+    times = np.array([(t, t + width) for t, width in halves])
+    tau = line.efforts(line.controller(changes), times.ravel()).reshape(
+        len(times), 2, -1
+    )
+    steps = np.abs(tau[:, 1] - tau[:, 0]).max(axis=1)
+    widths = np.diff(times, axis=1)[:, 0]
+    smooth = steps[widths > 0.5 * millisecond].max()
+    assert steps[widths < 0.5 * millisecond].max() < 0.1 * smooth
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROBOTS)
+@given(seeds)
+@quick
+def test_in_the_end_it_is_as_if_built_that_way(name: str, seed: int) -> None:
+    line = Line(name, seed)
+    changed = line.controller(line.draw(100))
+    line.efforts(changed, np.array([0.0, 1.0, SPAN + 1.0, SPAN + 3.0]))
+    tasks = []
+    for task in changed.tasks:
+        Kp, Kv, _ = changed.feedback(task.name)
+        tasks.append(replace(task, gains=hsp.Gains(Kp, Kv)))  # type: ignore[call-arg]
+    built = hsp.Controller(
+        line.robot,
+        tasks,
+        changed.field,
+        null_space_gain=changed.null_space_gain,
+    )
+    assert sorted(task.name for task in tasks) == sorted(line.there)
+    times = np.linspace(SPAN + 3.0, SPAN + 4.0, 7)
+    np.testing.assert_array_equal(
+        line.efforts(changed, times), line.efforts(built, times)
+    )
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@given(seeds)
+@quick
+def test_the_order_of_the_calls_does_not_count(name: str, seed: int) -> None:
+    line = Line(name, seed)
+    changes = line.draw(15)
+    shuffled = tuple(changes[k] for k in line.rng.permutation(len(changes)))
+    times = np.linspace(0.0, SPAN + 0.6, 40)
+    np.testing.assert_array_equal(
+        line.efforts(line.controller(changes), times),
+        line.efforts(line.controller(shuffled), times),
+    )
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@given(seeds)
+@quick
+def test_a_change_made_in_time_is_the_same_as_one_made_before(
+    name: str, seed: int
+) -> None:
+    line = Line(name, seed)
+    changes = line.draw(15)
+    times = np.arange(0.0, SPAN + 0.6, 5e-2)
+    before = line.efforts(line.controller(changes), times)
+    controller, waiting = line.controller(), list(changes)
+    tau = []
+    for t in times:
+        while waiting and waiting[0].at < t + 5e-2:
+            controller.change(waiting.pop(0))
+        tau.append(controller.compute(t, *line.motion(t)).tau)
+    np.testing.assert_allclose(tau, before, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, "pickle"])
+@given(seeds)
+@quick
+def test_copies_made_at_any_time_compute_the_same(duplicate: Any, seed: int) -> None:
+    line = Line("panda", seed)
+    controller = line.controller(line.draw(20))
+    for t in line.rng.uniform(0.0, SPAN, 3).cumsum():
+        controller.compute(t, *line.motion(t))
+        if duplicate == "pickle":
+            twin = pickle.loads(pickle.dumps(controller))
+        else:
+            twin = duplicate(controller)
+        for later in (t, t + 0.01, t + 0.3):
+            np.testing.assert_array_equal(
+                controller.compute(later, *line.motion(later)).tau,
+                twin.compute(later, *line.motion(later)).tau,
+            )
+
+
+# -- the cases of the trial ---------------------------------------------------------
+
+
+@pytest.fixture
+def panda() -> "Trial":
+    return Trial()
+
+
+class Trial:
+    """The Panda at home, with a hand that has to go 3 cm."""
+
+    def __init__(self, **options: Any) -> None:
+        self.robot = hsp.Robot.load("panda")
+        self.q, self.v = self.robot.home(), np.zeros(7)
+        point = self.robot.state(0.0, self.q, self.v).position("panda_tcp")
+        hand = hsp.FramePosition("panda_tcp", hsp.Hold(point + 0.02), name="hand")
+        self.controller = hsp.Controller(self.robot, [hand], **options)
+
+    def largest_step(self, act: Callable[[int], object], duration: float) -> float:
+        """Return the largest step of effort in a millisecond [N·m]."""
+        tau = []
+        for k in range(round(duration * 1000)):
+            act(k)
+            tau.append(self.controller.compute(k * 1e-3, self.q, self.v).tau)
+        return float(np.abs(np.diff(tau, axis=0)).max())
+
+
+def gains(frequency: float) -> hsp.Gains:
+    return hsp.Gains(natural_frequency=frequency)
+
+
+TURNED = hsp.FrameOrientation(
+    "panda_tcp", hsp.trajectories.HoldOrientation([3.0, 0.4, 0.1]), name="turned"
+)
+
+
+def test_a_change_of_gains_that_ends_before_an_older_one(panda: Trial) -> None:
+    def act(k: int) -> None:
+        if k == 1:
+            panda.controller.at(0.2).ramp(1.0).gains("hand", gains(20.0))
+        if k == 600:
+            panda.controller.at(0.6).ramp(0.3).gains("hand", gains(5.0))
+
+    assert panda.largest_step(act, 1.3) < 0.2
+    Kp = panda.controller.feedback("hand").Kp
+    np.testing.assert_allclose(Kp, 25.0 * np.eye(3), atol=1e-12)
+
+
+def test_changes_of_gains_that_are_made_in_reverse(panda: Trial) -> None:
+    panda.controller.at(0.6).ramp(0.3).gains("hand", gains(5.0))
+    panda.controller.at(0.2).ramp(1.0).gains("hand", gains(20.0))
+    assert panda.largest_step(lambda k: None, 1.3) < 0.2
+    Kp = panda.controller.feedback("hand").Kp
+    np.testing.assert_allclose(Kp, 25.0 * np.eye(3), atol=1e-12)
+
+
+def test_a_task_that_is_removed_while_it_fades_in(panda: Trial) -> None:
+    def act(k: int) -> None:
+        if k == 500:
+            panda.controller.at(0.5).ramp(0.5).add(TURNED)
+        if k == 700:
+            panda.controller.at(0.7).ramp(0.5).remove("turned")
+
+    assert panda.largest_step(act, 1.5) < 0.3
+    assert [task.name for task in panda.controller.tasks] == ["hand"]
+
+
+def test_the_removal_of_a_scheduled_task_does_not_switch_it_on() -> None:
+    schedule = hsp.trajectories.Schedule([(2.0, 5.0)], ramp=0.3)
+    both, one = Trial(), Trial()
+    both.controller.at(0.0).ramp(0.0).add(replace(TURNED, schedule=schedule))
+    both.controller.at(3.0).ramp(0.3).remove("turned")
+    for t in np.linspace(0.0, 1.9, 6):
+        np.testing.assert_array_equal(
+            both.controller.compute(t, both.q, both.v).tau,
+            one.controller.compute(t, one.q, one.v).tau,
+        )
+    assert both.largest_step(lambda k: None, 3.6) < 0.4
+
+
+def test_a_start_in_the_past_begins_now_with_the_whole_ramp(panda: Trial) -> None:
+    def act(k: int) -> None:
+        if k == 500:
+            panda.controller.at(0.1).ramp(0.3).gains("hand", gains(20.0))
+
+    assert panda.largest_step(act, 0.9) < 0.3
+    assert panda.controller.changes[0].at == pytest.approx(0.499)
+
+
+def test_a_name_can_be_used_again(panda: Trial) -> None:
+    act = panda.controller.at
+    act(0.1).ramp(0.2).add(TURNED)
+    act(0.4).ramp(0.2).remove("turned")
+    act(0.5).ramp(0.2).add(replace(TURNED, gains=gains(3.0)))
+    assert panda.largest_step(lambda k: None, 1.0) < 0.6
+    Kp = panda.controller.feedback("turned").Kp
+    np.testing.assert_allclose(Kp, 9.0 * np.eye(3), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda c: c.at(1).remove("hnad"), r"no task 'hnad'; did you mean 'hand'\?"),
+        (lambda c: c.at(1).add(c.tasks[0]), "two tasks are called 'hand'"),
+        (lambda c: c.at(1).gains("hand", hsp.Gains([1, 2], 1)), "kp has shape"),
+        (lambda c: c.at(1).weight("rets", 2), r"no field 'rets'; did you mean 'rest'"),
+        (lambda c: c.at(1).weight("rest", -2), r"weight: -2 is negative"),
+        (lambda c: c.at(1).ramp(-1).remove("hand"), "ramp: -1 is negative"),
+        (lambda c: c.at(1).contact("foot", bears=True), "no contact 'foot'"),
+        (lambda c: c.at(1).null_space_gain(-1), "gain: "),
+        (
+            lambda c: c.at(1).field(hsp.fields.Uncontrolled()),
+            "uncontrolled null space cannot be blended",
+        ),
+    ],
+)
+def test_impossible_changes(
+    make: Callable[[hsp.Controller], object], message: str, panda: Trial
+) -> None:
+    """Each is refused when it is made, and nothing of it stays."""
+    with pytest.raises(hsp.HspControlError, match=message):
+        make(panda.controller)
+    assert panda.controller.changes == ()
+    panda.largest_step(lambda k: None, 0.01)
+
+
+def test_a_removal_of_what_is_gone_by_then_is_refused(panda: Trial) -> None:
+    panda.controller.at(1.0).add(TURNED)
+    with pytest.raises(hsp.errors.ControllerError, match="no task 'turned'"):
+        panda.controller.at(0.5).gains("turned", gains(3.0))
+
+
+def test_a_contact_that_is_lifted_equals_one_whose_schedule_ends() -> None:
+    robot = hsp.Robot.load("solo12")
+    feet = [name for name in robot.frame_names if name.endswith("_FOOT")]
+    trunk = hsp.FramePose("base_link", name="trunk")
+
+    def standing(**lifted: Any) -> hsp.Controller:
+        contacts = [hsp.contacts.PointContact(foot) for foot in feet]
+        contacts[0] = replace(contacts[0], **lifted)
+        return hsp.Controller(robot, [trunk], contacts=contacts, start=robot.home())
+
+    changed = standing()
+    changed.at(0.5).ramp(0.4).contact(feet[0], bears=False)
+    scheduled = standing(schedule=hsp.trajectories.Schedule([(None, 0.9)], ramp=0.4))
+    for t in np.linspace(0.0, 1.2, 13):
+        np.testing.assert_allclose(
+            changed.compute(t, robot.home(), np.zeros(robot.nv)).forces,
+            scheduled.compute(t, robot.home(), np.zeros(robot.nv)).forces,
+            rtol=1e-9,
+            atol=1e-9,
+        )

@@ -1,0 +1,139 @@
+"""Priorities that the user does not give: on a floating base, balance comes first."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from task_cases import load, panda, placed
+
+from hsp_control import (
+    CenterOfMass,
+    Controller,
+    FrameOrientation,
+    FramePose,
+    FramePosition,
+    JointPosture,
+    Pointing,
+    Robot,
+    Task,
+)
+from hsp_control.control.composition import priority_of
+from hsp_control.tasks import AngularMomentum, RelativePose
+
+UP = (0.0, 0.0, 1.0)
+
+
+@pytest.fixture(scope="module")
+def quadruped() -> Robot:
+    pytest.importorskip("example_robot_data")
+    return Robot.load("solo12")
+
+
+def every_task(trunk: str, foot: str) -> dict[str, tuple[Task, bool]]:
+    """Return tasks, and whether the balance needs them."""
+    made: dict[str, tuple[Task, bool]] = {
+        "mass": (CenterOfMass(), True),
+        "mass on an axis": (CenterOfMass(axes="x"), True),
+        "momentum": (AngularMomentum(), True),
+        "posture": (JointPosture(), False),
+        "one joint": (JointPosture(joints=["FL_KFE"]), False),
+        "foot from trunk": (RelativePose(foot, reference=trunk), False),
+        "trunk from foot": (RelativePose(trunk, reference=foot), False),
+    }
+    for name, frame, needed in (("trunk", trunk, True), ("foot", foot, False)):
+        for kind in (FramePose, FramePosition, FrameOrientation):
+            made[f"{kind.__name__} of the {name}"] = kind(frame), needed
+        made[f"pointing of the {name}"] = Pointing(frame, UP), needed
+    return made
+
+
+CASES = every_task("base_link", "FL_FOOT")
+
+
+@pytest.mark.parametrize("which", CASES)
+def test_on_a_floating_base_balance_comes_first(which: str, quadruped: Robot) -> None:
+    task, needed = CASES[which]
+    task = placed(task, quadruped)
+    assert task.keeps_balance(quadruped) is needed
+    assert priority_of(task, quadruped) == (1 if needed else 2)
+
+
+@pytest.mark.parametrize("which", CASES)
+@pytest.mark.parametrize("priority", [1, 2, 7])
+def test_a_given_priority_counts(which: str, priority: int, quadruped: Robot) -> None:
+    task = replace(CASES[which][0], priority=priority)
+    assert priority_of(placed(task, quadruped), quadruped) == priority
+
+
+@pytest.mark.parametrize(
+    ("name", "root"), [("panda", None), ("ur5", "planar"), ("tiago_no_hand", None)]
+)
+def test_without_a_floating_base_all_tasks_have_the_first(name: str, root: Any) -> None:
+    """Motors move a base that rolls, and nothing falls."""
+    robot = load(name, root)
+    links = (robot.end_effector, robot.frame_names[-1])
+    tasks: list[Task] = [
+        CenterOfMass(),
+        AngularMomentum(),
+        JointPosture(),
+        *(FramePosition(frame) for frame in links),
+        *(Pointing(frame, UP) for frame in links),
+    ]
+    for task in tasks:
+        assert priority_of(placed(task, robot), robot) == 1
+    given = placed(FramePosition(priority=3), robot)
+    assert priority_of(given, robot) == 3
+
+
+def test_any_frame_that_is_fixed_to_the_base_is_the_trunk() -> None:
+    pytest.importorskip("example_robot_data")
+    talos = Robot.load("talos")
+    assert talos.unactuated
+    fixed = {
+        frame.name
+        for frame in talos.model.frames
+        if frame.parentJoint == 1 and frame.name in talos.frame_names
+    }
+    assert len(fixed) > 1
+    for frame in talos.frame_names:
+        if frame == "universe":
+            continue
+        needed = frame in fixed
+        assert FramePosition(frame).keeps_balance(talos) is needed
+
+
+def test_a_controller_s_levels(quadruped: Robot) -> None:
+    tasks = [
+        JointPosture(joints=["FL_KFE", "FR_KFE"], priority=5),
+        FramePosition("FL_FOOT"),
+        FrameOrientation("base_link"),
+        FramePosition("FR_FOOT", priority=1),
+        CenterOfMass(),
+    ]
+    controller = Controller(quadruped, tasks, base="driven")
+    names = [[task.name for task in level] for level in controller.levels]
+    assert names == [
+        ["base_link_orientation", "FR_FOOT", "center_of_mass"],
+        ["FL_FOOT"],
+        ["posture"],
+    ]
+    for name, priority in (("FR_FOOT", 1), ("FL_FOOT", 2), ("posture", 5)):
+        assert controller.priority_of(name) == priority
+    # The placed tasks say what the user said, and no more.
+    given = {task.name: task.priority for task in controller.tasks}
+    assert given == {task.name: task.priority for task in tasks}
+
+
+def test_a_priority_may_be_given_on_a_fixed_base() -> None:
+    first, second = FramePosition(axes="x"), FrameOrientation(priority=2)
+    controller = Controller(panda(), [second, first])
+    assert [level[0].name for level in controller.levels] == [
+        "end_effector",
+        "end_effector_orientation",
+    ]
+    q, v = panda().home(), np.zeros(7)
+    together = Controller(panda(), [first, replace(second, priority=1)])
+    np.testing.assert_allclose(
+        controller.compute(0.0, q, v).tau, together.compute(0.0, q, v).tau, rtol=1e-12
+    )

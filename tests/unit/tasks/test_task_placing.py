@@ -1,0 +1,497 @@
+"""Placing: what a task leaves to the robot and its start becomes numbers and names."""
+
+import copy
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+from task_cases import load, panda, planar, single_joints
+
+from hsp_control import (
+    CenterOfMass,
+    Circle,
+    Controller,
+    FrameOrientation,
+    FramePose,
+    FramePosition,
+    Gains,
+    Hold,
+    HspControlError,
+    JointPosture,
+    Line,
+    Pointing,
+    Robot,
+    RobotState,
+    Task,
+)
+from hsp_control.common.exceptions import (
+    FrameNotFoundError,
+    GainError,
+    JointNotFoundError,
+    ShapeError,
+    TaskError,
+    TrajectoryError,
+)
+from hsp_control.geometry import Scene
+from hsp_control.geometry.start import Start
+from hsp_control.tasks import AngularMomentum, RelativePose
+from hsp_control.tasks.task import TaskSample
+from hsp_control.trajectories import (
+    Blend,
+    BlendOrientation,
+    ComposedPose,
+    HoldOrientation,
+    HoldPose,
+    OrientationPath,
+    ScrewInterpolation,
+    Spin,
+    UniformLine,
+)
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+TCP = "panda_tcp"
+POINT = np.array([0.4, 0.1, 0.5])
+TURNED = pin.exp3(np.array([0.3, -0.5, 0.4]))
+
+
+def state(robot: Robot | None = None, seed: int = 4) -> RobotState:
+    """Return a state in motion, away from home."""
+    robot, rng = panda() if robot is None else robot, np.random.default_rng(seed)
+    q = robot.random_configuration(rng)
+    return robot.state(0.0, q, rng.standard_normal(robot.nv))
+
+
+def place(task: Any, at: RobotState | None = None) -> Any:
+    return task.placed(Start(state() if at is None else at, Scene()))
+
+
+def pose_of(at: RobotState, frame: str) -> pin.SE3:
+    kinematics = at.frame(frame)
+    return pin.SE3(kinematics.rotation.copy(), kinematics.position.copy())
+
+
+def seen(at: RobotState, frame: str, reference: str) -> pin.SE3:
+    return pose_of(at, reference).actInv(pose_of(at, frame))
+
+
+TASKS: dict[str, Task] = {
+    "momentum": AngularMomentum(),
+    "momentum, relative": AngularMomentum(Circle(0.1, 2.0)),
+    "mass": CenterOfMass(),
+    "mass on axes": CenterOfMass(Circle(0.1, 2.0), axes="zx", blend=1.0),
+    "orientation": FrameOrientation(),
+    "orientation, blended": FrameOrientation(TCP, Spin([0, 0, 1], 0.5), blend=1.0),
+    "pose": FramePose(),
+    "pose of a point": FramePose(TCP, Circle(0.1, 2.0), blend=1.5),
+    "pose of a screw": FramePose(trajectory=ScrewInterpolation(POINT, TURNED, 1.0)),
+    "pose in the world": FramePose("panda_hand", HoldPose(POINT, TURNED)),
+    "position": FramePosition(),
+    "position on axes": FramePosition(axes="y", trajectory=Line([0.3], 2.0)),
+    "position in the world": FramePosition("panda_hand", Circle(0.1, 2, POINT)),
+    "posture": JointPosture(),
+    "some joints": JointPosture(
+        np.linspace(-1, 1, 7), joints=["panda_joint4", "panda_joint2"],
+        displacement=Circle(0.1, 1.0, [0.0, 0.1]),
+    ),
+    "pointing": Pointing(direction=[0, 0.6, 0.8]),
+    "pointing, turning": Pointing(trajectory=Spin([0, 1, 0], 0.5), axis=[1, 0, 0]),
+    "relative": RelativePose(reference="panda_link2"),
+    "relative, blended": RelativePose(
+        reference="panda_link2", trajectory=Line([0.1, 0.2, 0.3], 1.0), blend=1.0
+    ),
+}  # fmt: skip
+every_task = pytest.mark.parametrize("name", TASKS)
+
+
+@every_task
+def test_placing_twice_gives_an_equal_task(name: str) -> None:
+    """Also elsewhere: nothing is relative any more. And the task itself is as before."""
+    task, before = TASKS[name], repr(TASKS[name])
+    placed = place(task)
+    assert type(placed) is type(task)
+    for again in (place(placed), place(placed, state(seed=5)), place(task)):
+        assert again == placed
+        assert hash(again) == hash(placed)
+        assert repr(again) == repr(placed)
+    assert repr(task) == before
+    assert getattr(placed, "frame", TCP) is not None
+    assert getattr(placed, "blend", None) is None
+    assert placed.name == task.name
+    assert placed.rows <= 7
+
+
+@every_task
+def test_a_placed_task_says_all_that_is_to_be_known(name: str) -> None:
+    """It needs no start: it can be pickled and computes the same bits elsewhere."""
+    here = state()
+    placed = place(TASKS[name])
+    copies = [pickle.loads(pickle.dumps(placed)), copy.deepcopy(placed)]
+    sample = placed.evaluate(here)
+    for twin in copies:
+        for mine, other in zip(sample, twin.evaluate(here), strict=True):
+            np.testing.assert_array_equal(mine, other)
+        for mine, other in zip(placed.measure(here), twin.measure(here), strict=True):
+            np.testing.assert_array_equal(mine, other)
+    assert all(np.isfinite(array).all() for array in sample)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["mass", "orientation", "pose", "position", "posture", "relative", "mass on axes",
+     "orientation, blended", "pose of a point", "pose of a screw", "position on axes",
+     "pointing, turning", "relative, blended"],
+)  # fmt: skip
+def test_what_is_omitted_is_where_the_robot_starts(name: str) -> None:
+    """The error is zero there, or as large as the circle that has not yet blended."""
+    here = state()
+    placed = place(TASKS[name], here)
+    error = placed.evaluate(here).error
+    assert error.shape == (placed.rows,)
+    np.testing.assert_allclose(error, 0.0, rtol=0, atol=1e-14)
+
+
+def test_the_end_effector_is_the_frame() -> None:
+    for robot in (panda(), load("iiwa14")):
+        for kind in (FramePose, FramePosition, FrameOrientation):
+            assert place(kind(), state(robot)).frame == robot.end_effector
+    assert place(FramePosition()).name == "end_effector"
+    assert place(RelativePose(reference="panda_link1")).frame == TCP
+    assert place(Pointing(direction=[1, 0, 0])).frame == TCP
+
+
+def test_relative_points_count_from_the_start() -> None:
+    here = state()
+    x = here.position(TCP).copy()
+    level = place(FramePosition(trajectory=Circle(0.1, 2.0)), here)
+    assert level.trajectory == Circle(0.1, 2.0, x)
+    moved = Circle(0.1, 2.0, [0.1, 0.2, 0.3], origin="start")
+    assert place(FramePosition(trajectory=moved), here).trajectory == Circle(
+        0.1, 2.0, x + [0.1, 0.2, 0.3]
+    )
+    line = Line([0.0, 0.0, 0.1], 1.0, origin="start")
+    assert place(FramePosition(trajectory=line), here).trajectory == Line(
+        x + [0.0, 0.0, 0.1], 1.0, start=x
+    )
+    on_axes = place(FramePosition(trajectory=UniformLine([1, 2]), axes="zx"), here)
+    assert on_axes.trajectory == UniformLine([1, 2], x[[2, 0]])
+    world = FramePosition(trajectory=Hold(POINT))
+    assert place(world, here).trajectory == Hold(POINT)
+    c = here.centroidal.position.copy()
+    assert place(CenterOfMass(axes="yx"), here).trajectory == Hold(c[[1, 0]])
+    assert place(AngularMomentum(), here).trajectory == Hold([0.0, 0.0, 0.0])
+    assert place(AngularMomentum(Circle(1, 2)), here).trajectory == Circle(
+        1, 2, [0] * 3
+    )
+
+
+def test_relative_orientations_are_those_of_the_start() -> None:
+    here = state()
+    R = here.frame(TCP).rotation.copy()
+    assert place(FrameOrientation(), here).trajectory == HoldOrientation(R)
+    turning = place(FrameOrientation(trajectory=Spin([1, 0, 0], 2.0)), here)
+    assert turning.trajectory == Spin([1, 0, 0], 2.0, rotation=R)
+    path = OrientationPath([np.eye(3), TURNED], [0.0, 1.0])
+    assert place(FrameOrientation(trajectory=path), here).trajectory == path
+
+
+def test_a_point_trajectory_of_a_pose_holds_the_orientation() -> None:
+    here = state()
+    pose = pose_of(here, TCP)
+    x, R = pose.translation, pose.rotation
+    circle = Circle(0.1, 2.0)
+    expected = ComposedPose(Circle(0.1, 2.0, x), HoldOrientation(R))
+    assert place(FramePose(trajectory=circle), here).trajectory == expected
+    world = Circle(0.1, 2.0, POINT)
+    placed = place(FramePose(trajectory=world), here)
+    assert placed.trajectory == ComposedPose(world, HoldOrientation(R))
+    # As the same said with a pose; for a relative pose, in the reference's axes.
+    said = FramePose(trajectory=ComposedPose(position=world))
+    assert place(said, here) == placed
+    relative = seen(here, TCP, "panda_link2")
+    placed = place(RelativePose(reference="panda_link2", trajectory=circle), here)
+    assert placed.trajectory == ComposedPose(
+        Circle(0.1, 2.0, relative.translation), HoldOrientation(relative.rotation)
+    )
+    # Its six rows obey what those of the composed pose do.
+    for t in (0.0, 0.4):
+        at = panda().state(t, here.q, here.v)
+        sample = placed.evaluate(at)
+        R_d = relative.rotation
+        R_now = seen(at, TCP, "panda_link2").rotation
+        np.testing.assert_allclose(
+            sample.error[3:], -pin.log3(R_d.T @ R_now), rtol=0, atol=1e-13
+        )
+
+
+def test_a_pose_by_default_is_held() -> None:
+    here = state()
+    pose = pose_of(here, TCP)
+    held = ComposedPose(Hold(pose.translation), HoldOrientation(pose.rotation))
+    assert place(FramePose(), here).trajectory == held
+    only_turning = FramePose(trajectory=ComposedPose(orientation=Spin([0, 0, 1], 1.0)))
+    assert place(only_turning, here).trajectory == ComposedPose(
+        Hold(pose.translation), Spin([0, 0, 1], 1.0, rotation=pose.rotation)
+    )
+    screw = place(FramePose(trajectory=ScrewInterpolation(POINT, TURNED, 2.0)), here)
+    assert screw.trajectory == ScrewInterpolation(
+        POINT,
+        TURNED,
+        2.0,
+        start_position=pose.translation,
+        start_rotation=pose.rotation,
+    )
+
+
+@pytest.mark.parametrize("robot", ["panda", "planar3r"])
+def test_a_blend_leads_from_rest_at_the_start_into_the_trajectory(robot: str) -> None:
+    here = state(load(robot))
+    frame = here.robot.end_effector
+    x, R = (getattr(pose_of(here, frame), n) for n in ("translation", "rotation"))
+    path, turn = (
+        Circle(0.2, 2.0, [0.5, 0.2, 0.1]),
+        Spin([0, 0, 1], 0.7, rotation=TURNED),
+    )
+    cases: list[tuple[Any, Any]] = [
+        (
+            FramePosition(trajectory=path, blend=0.5),
+            Blend(path, 0.5, start=x),
+        ),
+        (
+            FramePosition(trajectory=Circle(0.2, 2.0), blend=0.5),
+            Blend(Circle(0.2, 2.0, x), 0.5, start=x),
+        ),
+        (
+            FrameOrientation(trajectory=turn, blend=0.5),
+            BlendOrientation(turn, 0.5, rotation=R),
+        ),
+        (
+            CenterOfMass(path, blend=0.5),
+            Blend(path, 0.5, start=here.centroidal.position),
+        ),
+    ]
+    if robot == "panda":
+        cases += [
+            (
+                FramePose(trajectory=ComposedPose(path, turn), blend=0.5),
+                ComposedPose(
+                    Blend(path, 0.5, start=x), BlendOrientation(turn, 0.5, rotation=R)
+                ),
+            ),
+            (
+                FramePose(trajectory=path, blend=0.5),
+                ComposedPose(
+                    Blend(path, 0.5, start=x),
+                    BlendOrientation(HoldOrientation(R), 0.5, rotation=R),
+                ),
+            ),
+        ]
+    for task, expected in cases:
+        placed = place(task, here)
+        assert placed.trajectory == expected
+        start, later = placed.trajectory.sample(0.0), placed.trajectory.sample(0.6)
+        if isinstance(expected, Blend):
+            for rate in start[1:]:
+                np.testing.assert_array_equal(rate, 0.0)
+            own = expected.trajectory.sample(0.6)
+            for mine, other in zip(later, own, strict=True):
+                np.testing.assert_array_equal(mine, other)
+        at_rest = here.robot.state(0.0, here.q, np.zeros(here.robot.nv))
+        sample = placed.evaluate(at_rest)
+        np.testing.assert_allclose(sample.error, 0.0, rtol=0, atol=1e-14)
+        np.testing.assert_allclose(sample.error_rate, 0.0, rtol=0, atol=1e-14)
+
+
+def test_pointing_with_a_relative_reference_begins_where_the_axis_points() -> None:
+    here = state()
+    R = here.frame(TCP).rotation
+    for axis in ([0, 0, 1], [1, 0, 0], [0, 0, -2], [0.3, -2.0, 0.9]):
+        task = Pointing(trajectory=HoldOrientation(), axis=axis)
+        placed = place(task, here)
+        m = R @ axis / np.linalg.norm(axis)
+        R_d = placed.trajectory.sample(0.0).rotation
+        np.testing.assert_allclose(R_d[:, 2], m, rtol=0, atol=1e-15)
+        np.testing.assert_allclose(R_d.T @ R_d, np.eye(3), rtol=0, atol=1e-15)
+    assert place(Pointing(trajectory=Spin([1, 0, 0], 1)), here).trajectory == Spin(
+        [1, 0, 0], 1, rotation=R
+    )
+    still = Spin([1, 0, 0], 1, rotation=TURNED)
+    assert place(Pointing(trajectory=still, axis=[1, 0, 0])).trajectory == still
+
+
+# --- postures ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "root"), [("panda", None), ("planar3r", None), ("ur5", "planar")]
+)
+def test_postures_are_given_in_four_ways(name: str, root: Any) -> None:
+    robot = load(name, root)
+    here = state(robot)
+    positions = np.linspace(-0.5, 0.5, robot.nv)
+    for reference, expected in (
+        ("start", here.q),
+        ("home", robot.home()),
+        (positions, robot.integrate(robot.neutral(), positions)),
+        (robot.home(), robot.home()),
+    ):
+        placed = place(JointPosture(reference), here)
+        np.testing.assert_array_equal(placed.reference, expected)
+        assert placed.joints == tuple(single_joints(robot))
+        assert placed.rows == len(single_joints(robot))
+        assert not placed.reference.flags.writeable
+    assert place(JointPosture(), here) == place(JointPosture("start"), here)
+    np.testing.assert_allclose(
+        place(JointPosture(), here).evaluate(here).error, 0.0, rtol=0, atol=1e-14
+    )
+
+
+def test_joints_keep_their_order() -> None:
+    joints = ["panda_joint4", "panda_joint2"]
+    placed = place(JointPosture(joints=joints, displacement=Hold([0.1, 0.2])))
+    assert placed.joints == tuple(joints)
+    here = state()
+    desired, actual = placed.measure(here)
+    np.testing.assert_array_equal(actual, here.q[[3, 1]])
+    np.testing.assert_allclose(desired - actual, [0.1, 0.2], rtol=0, atol=1e-15)
+
+
+def test_a_displacement_counts_from_the_posture() -> None:
+    placed = place(JointPosture(displacement=Hold()))
+    assert placed.displacement == Hold(np.zeros(7))
+    line = Line([0.1] * 7, 1.0, origin="start")
+    placed = place(JointPosture("home", displacement=line))
+    assert placed.displacement == Line([0.1] * 7, 1.0, start=[0.0] * 7)
+
+
+# --- by a controller -----------------------------------------------------------------
+
+
+def test_one_task_serves_several_starts() -> None:
+    task, states = FramePose(), [state(seed=k) for k in (1, 2, 3)]
+    controllers = [Controller(panda(), [task]) for _ in states]
+    for controller, here in zip(controllers, states, strict=True):
+        out = controller.compute(here.t, here.q, here.v)
+        np.testing.assert_allclose(out.task.error, 0.0, rtol=0, atol=1e-14)
+        assert controller.tasks == (place(task, here),)
+    assert task == FramePose()
+
+
+def test_the_first_state_is_the_start_unless_one_is_given() -> None:
+    """Until then the robot's home stands for it; `restart` begins anew."""
+    robot, first, second = panda(), state(seed=1), state(seed=2)
+    at_home = robot.state(0.0, robot.home(), np.zeros(7))
+    free = Controller(robot, [FramePosition()])
+    assert free.tasks == (place(FramePosition(), at_home),)
+    for here in (first, second):
+        free.compute(here.t, here.q, here.v)
+        assert free.tasks == (place(FramePosition(), first),)
+    free.restart()
+    free.compute(second.t, second.q, second.v)
+    assert free.tasks == (place(FramePosition(), second),)
+
+    given = Controller(robot, [FramePosition()], start=first.q)
+    for _ in range(2):
+        assert given.tasks == (place(FramePosition(), first),)
+        given.compute(second.t, second.q, second.v)
+        assert given.tasks == (place(FramePosition(), first),)
+        given.restart()
+
+
+MISTAKES: dict[str, tuple[Callable[[], Task], type[HspControlError], str]] = {
+    "frame": (
+        lambda: FramePose("panda_tpc", name="hand"),
+        FrameNotFoundError,
+        r"^tasks.hand.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'\?",
+    ),
+    "reference frame": (
+        lambda: RelativePose(reference="link", name="hand"),
+        FrameNotFoundError,
+        r"^tasks.hand.reference: no frame 'link'",
+    ),
+    "trajectory": (
+        lambda: FramePosition(trajectory=Hold([0, 0]), name="hand"),
+        TrajectoryError,
+        r"^tasks.hand.trajectory: point has 2 coordinates \[0.0, 0.0\]; needs 3$",
+    ),
+    "trajectory on axes": (
+        lambda: CenterOfMass(Circle(0.1, 2.0), axes="x", name="hand"),
+        TrajectoryError,
+        r"^tasks.hand.trajectory: ",
+    ),
+    "blend": (
+        lambda: FramePose(trajectory=HoldPose(POINT, TURNED), blend=1.0, name="hand"),
+        TaskError,
+        r"^tasks.hand.blend: HoldPose begins where it says; remove blend$",
+    ),
+    "gains": (
+        lambda: FramePosition(gains=Gains([1, 2], 3), name="hand"),
+        GainError,
+        r"^tasks.hand.gains: kp has shape \(2,\); needs a number, 3 numbers or a 3",
+    ),
+    "joints": (
+        lambda: JointPosture(joints=["joint1"], name="hand"),
+        JointNotFoundError,
+        r"^tasks.hand.joints: no joint 'joint1'",
+    ),
+    "reference": (
+        lambda: JointPosture([0.0] * 6, name="hand"),
+        ShapeError,
+        r"^tasks.hand.reference: a posture has shape \(6,\); needs 7 numbers$",
+    ),
+    "displacement": (
+        lambda: JointPosture(displacement=Hold([0.0]), name="hand"),
+        TrajectoryError,
+        r"^tasks.hand.displacement: point has 1 coordinates \[0.0\]; needs 7$",
+    ),
+}
+
+
+@pytest.mark.parametrize("which", MISTAKES)
+def test_the_message_has_the_key_path(which: str) -> None:
+    make, kind, message = MISTAKES[which]
+    with pytest.raises(kind, match=message) as raised:
+        Controller(panda(), [FramePosition(axes="x"), make()])
+    assert type(raised.value) is kind
+    running = Controller(panda(), [FramePosition(axes="x")])
+    with pytest.raises(kind, match=message.replace("^tasks.hand", "task")):
+        running.at(1.0).add(make())
+    assert running.changes == ()
+
+
+def test_too_many_rows_are_told_with_the_robot() -> None:
+    with pytest.raises(TaskError, match=r"^tasks.hand: the task has 6 rows; planar3r"):
+        Controller(planar(), [FramePose(name="hand")])
+
+
+# --- user-defined tasks --------------------------------------------------------------
+
+
+class Doubled(FramePosition):
+    """A user's task that overrides `evaluate` and calls the one that it replaces."""
+
+    def evaluate(
+        self, state: RobotState, out: TaskSample | None = None, feedback: Any = None
+    ) -> TaskSample:
+        out = super().evaluate(state, out, feedback)
+        out.acceleration[:] *= 2.0
+        return out
+
+
+def test_a_subclass_may_call_the_evaluate_that_it_overrides() -> None:
+    """At the same state as the task that it derives from, and in a controller."""
+    here = state()
+    plain, doubled = (
+        place(FramePosition(TCP, Hold(POINT))),
+        place(Doubled(TCP, Hold(POINT))),
+    )
+    for _ in range(2):
+        a = plain.evaluate(here).acceleration
+        np.testing.assert_array_equal(doubled.evaluate(here).acceleration, 2.0 * a)
+    out = Controller(panda(), [doubled]).compute(here.t, here.q, here.v)
+    np.testing.assert_array_equal(out.task.acceleration, 2.0 * a)

@@ -1,0 +1,484 @@
+"""Tasks and gains are values: one set of tests for all of them, by reflection."""
+
+import copy
+import inspect
+import pickle
+import re
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from threading import Barrier
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter
+from task_cases import panda, placed
+
+import hsp_control.tasks as tasks
+import hsp_control.trajectories as paths
+from hsp_control import (
+    CenterOfMass,
+    Circle,
+    FrameOrientation,
+    FramePose,
+    FramePosition,
+    Gains,
+    Hold,
+    JointPosture,
+    Line,
+    Pointing,
+    Robot,
+    Task,
+)
+from hsp_control.common.exceptions import (
+    GainError,
+    ImmutableError,
+    ScheduleError,
+    TaskError,
+)
+from hsp_control.declaration import Part
+from hsp_control.declaration.part import value_fields
+from hsp_control.tasks import AngularMomentum, RelativePose
+from hsp_control.trajectories import (
+    ComposedPose,
+    HoldOrientation,
+    HoldPose,
+    Schedule,
+    ScrewInterpolation,
+    Spin,
+)
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+NAMES: dict[str, Any] = {**vars(paths), **vars(tasks)}
+CLASSES = [
+    each
+    for each in vars(tasks).values()
+    if inspect.isclass(each) and issubclass(each, Part)
+]
+MEMBERS = [each for each in CLASSES if not inspect.isabstract(each)]
+EXAMPLES: dict[type[Part], Part] = {
+    AngularMomentum: AngularMomentum(),
+    CenterOfMass: CenterOfMass(),
+    FrameOrientation: FrameOrientation(),
+    FramePose: FramePose(),
+    FramePosition: FramePosition(),
+    Gains: Gains(4.0, 5.0),
+    JointPosture: JointPosture(),
+    Pointing: Pointing(direction=[0, 0, 1]),
+    RelativePose: RelativePose(reference="panda_link0"),
+}
+"""One of each class, with as few arguments as it needs."""
+
+_TASK: dict[str, Any] = {
+    "priority": 2,
+    "schedule": Schedule([(1.0, None)]),
+    "name": "mine",
+}
+_GAINS: dict[str, Any] = {"gains": Gains(natural_frequency=[1, 2, 3])}
+_TRACKING: dict[str, Any] = {**_TASK, **_GAINS, "blend": 2}
+_FRAME: dict[str, Any] = {"frame": "panda_hand"}
+_POINT = [Hold([0.1, 0, 0]), Circle(0.1, 2), Line([1, 2, 3], 1.0, origin="start")]
+_TURN = [Spin([0, 0, 1], 0.5), HoldOrientation(np.eye(3))]
+_POSE = [
+    *_POINT,
+    HoldPose([0.1, 0, 0], [0, 0, 0.5]),
+    ScrewInterpolation([0.1, 0, 0.2], [0, 0, 0.5], 1.0),
+    ComposedPose(Circle(0.1, 2), _TURN[0]),
+]
+OTHERS: dict[type[Part], dict[str, Any]] = {
+    AngularMomentum: {**_TASK, "trajectory": _POINT, "rate": 5},
+    CenterOfMass: {**_TRACKING, "trajectory": _POINT, "axes": ["xy", "zx"]},
+    FrameOrientation: {**_TRACKING, **_FRAME, "trajectory": _TURN},
+    FramePose: {**_TRACKING, **_FRAME, "trajectory": _POSE},
+    FramePosition: {**_TRACKING, **_FRAME, "trajectory": _POINT, "axes": "y"},
+    Gains: {
+        "kp": [3, [1, 2], np.array([1.0, 3.0]), [[4, 0.1], [0.2, 5]]],
+        "kv": [np.float32(2.5), [1.0, 2.0]],
+    },
+    JointPosture: {
+        **_TASK,
+        **_GAINS,
+        "reference": ["home", np.linspace(-1, 1, 7), [0, 1, 0]],
+        "joints": [["panda_joint1"], ("panda_joint2", "panda_joint1")],
+        "displacement": _POINT,
+    },
+    Pointing: {
+        **_TASK,
+        **_GAINS,
+        **_FRAME,
+        "direction": np.array([1.0, 0, 0]),
+        "axis": (0, 2, 0),
+    },
+    RelativePose: {**_TRACKING, **_FRAME, "trajectory": _POSE, "reference": "base"},
+}
+"""For each field, another value, or a list of them."""
+ALONE: dict[type[Part], list[Part]] = {
+    Gains: [
+        Gains(natural_frequency=3.0),
+        Gains(natural_frequency=[3.0, 4], damping_ratio=0.7),
+    ],
+    Pointing: [Pointing(trajectory=each) for each in _TURN],
+}
+"""Fields that exclude those of the example."""
+
+
+def others(part: Part) -> Iterator[Part]:
+    """Yield copies of the part with one other value each."""
+    for field, values in OTHERS[type(part)].items():
+        for value in values if isinstance(values, list) else [values]:
+            yield replace(part, **{field: value})  # type: ignore[type-var]
+    yield from ALONE.get(type(part), [])
+
+
+ALL = [each for part in EXAMPLES.values() for each in (part, *others(part))]
+
+
+def rebuilt(part: Part) -> Part:
+    return type(part)(**{f.name: getattr(part, f.name) for f in value_fields(part)})
+
+
+def test_every_class_and_every_field_is_tried() -> None:
+    assert Task.family is not None
+    own = [
+        each
+        for each in Task.family.members.values()
+        if each.__module__.startswith("hsp_control.")
+    ]
+    assert set(MEMBERS) == {*own, Gains}
+    assert set(EXAMPLES) == set(OTHERS) == set(MEMBERS)
+    for cls in MEMBERS:
+        tried = {name for each in ALONE.get(cls, []) for name in each.changed_fields()}
+        declared = {field.name for field in value_fields(cls)}
+        assert tried | set(OTHERS[cls]) == declared, cls
+
+
+@pytest.mark.parametrize("cls", CLASSES)
+def test_every_field_says_what_it_is_and_in_which_unit(cls: type[Part]) -> None:
+    assert cls.__doc__
+    for field in value_fields(cls):
+        said = cls.documentation[field.name]
+        assert re.search(r"\[[^\]]+\]", said), f"{cls.__name__}.{field.name}: {said}"
+
+
+@pytest.mark.parametrize("part", ALL, ids=repr)
+def test_equal_copies(part: Part) -> None:
+    copies = (rebuilt(part), pickle.loads(pickle.dumps(part)), replace(part))  # type: ignore[type-var]
+    for same in copies:
+        assert type(same) is type(part)
+        assert same == part
+        assert hash(same) == hash(part)
+        assert repr(same) == repr(part)
+    assert copy.deepcopy(part) is copy.copy(part) is part
+
+
+@pytest.mark.parametrize("part", ALL, ids=repr)
+def test_repr_makes_an_equal_part(part: Part) -> None:
+    assert eval(repr(part), dict(NAMES)) == part
+
+
+def test_every_field_counts() -> None:
+    assert len(set(ALL)) == len(ALL)
+    for k, part in enumerate(ALL):
+        assert [each == part for each in ALL].count(True) == 1
+        assert ALL.index(part) == k
+
+
+@pytest.mark.parametrize("part", ALL, ids=repr)
+def test_nothing_can_be_changed(part: Part) -> None:
+    for field in value_fields(part):
+        value = getattr(part, field.name)
+        with pytest.raises(ImmutableError, match=f"{field.name} cannot be assigned"):
+            setattr(part, field.name, value)
+        with pytest.raises(ImmutableError, match="cannot be deleted"):
+            delattr(part, field.name)
+        if isinstance(value, np.ndarray):
+            assert not value.flags.writeable
+        assert not isinstance(value, list | dict)
+    with pytest.raises(ImmutableError):
+        part.Kp = 1.0  # type: ignore[attr-defined]
+
+
+def test_what_was_given_may_change_afterwards() -> None:
+    posture, joints, axis, kp = np.ones(7), ["a", "b"], np.array([0.0, 0, 2]), [1.0, 2]
+    made = (
+        JointPosture(posture, joints=joints),
+        Pointing(direction=axis, axis=axis),
+        Gains(kp, kp),
+    )
+    posture[:], axis[:], joints[0], kp[0] = 0.0, 1.0, "c", 7.0
+    assert made == (
+        JointPosture(np.ones(7), joints=["a", "b"]),
+        Pointing(direction=[0, 0, 2], axis=[0, 0, 2]),
+        Gains([1.0, 2.0], [1.0, 2.0]),
+    )
+
+
+@pytest.mark.parametrize("part", ALL, ids=repr)
+def test_a_mapping_makes_an_equal_part(part: Part) -> None:
+    """What YAML says of it, and what YAML makes of that."""
+    adapter: TypeAdapter[Any] = TypeAdapter(Task if isinstance(part, Task) else Gains)
+    data = part.to_dict()
+    assert adapter.validate_python(data) == part
+    assert data.get("type") == part.yaml_type
+
+
+@pytest.mark.parametrize(
+    ("data", "task"),
+    [
+        ({"type": "frame_position"}, FramePosition()),
+        (
+            {
+                "type": "frame_position",
+                "frame": "a",
+                "axes": "zx",
+                "priority": 3,
+                "schedule": {"intervals": [[None, 1.0]], "ramp": 0.1},
+                "gains": {"natural_frequency": 5, "damping_ratio": [1, 0.7]},
+                "trajectory": {"type": "hold", "point": [1, 2]},
+                "blend": 2,
+                "name": "hand",
+            },
+            FramePosition(
+                "a",
+                Hold([1, 2]),
+                axes="zx",
+                priority=3,
+                schedule=Schedule([(None, 1.0)], ramp=0.1),
+                gains=Gains(natural_frequency=5, damping_ratio=[1.0, 0.7]),
+                blend=2.0,
+                name="hand",
+            ),
+        ),
+        (
+            {"type": "frame_pose", "trajectory": {"type": "circle", "radius": 1,
+             "angular_rate": 2}},
+            FramePose(trajectory=Circle(1, 2)),
+        ),
+        (
+            {"type": "frame_pose", "trajectory": {"type": "composed", "orientation":
+             {"type": "spin", "axis": [0, 0, 1], "rate": 1}}},
+            FramePose(trajectory=ComposedPose(orientation=Spin([0, 0, 1], 1))),
+        ),
+        (
+            {"type": "joint_posture", "reference": "home", "joints": ["a"]},
+            JointPosture("home", joints=["a"]),
+        ),
+        (
+            {"type": "joint_posture", "reference": [1, 2], "gains": {"kp": 1, "kv": 2}},
+            JointPosture([1.0, 2.0], gains=Gains(1, 2)),
+        ),
+        ({"type": "pointing", "direction": [0, 0, -1]}, Pointing(None, [0, 0, -1])),
+        ({"type": "angular_momentum", "rate": 3}, AngularMomentum(rate=3)),
+        (
+            {"type": "relative_pose", "frame": "a", "reference": "b"},
+            RelativePose("a", reference="b"),
+        ),
+    ],
+)  # fmt: skip
+def test_as_yaml_says_it(data: dict[str, Any], task: Task) -> None:
+    assert TypeAdapter(Task).validate_python(data) == task
+
+
+# --- what is refused -----------------------------------------------------------------
+
+Wrong = dict[str, list[tuple[Any, str]]]
+_WRONG_TASK: Wrong = {
+    "priority": [
+        (0, "priority: 0 is too small; must be at least 1"),
+        (1.5, "priority: 1.5 is a decimal number; expected an integer"),
+    ],
+    "schedule": [
+        ([(0, 1)], "schedule: .* is a list; expected a mapping"),
+        ({"intervals": [[0, 1]], "rmap": 1}, "schedule.rmap: unknown key 'rmap'; did"),
+    ],
+    "name": [(3, "name: 3 "), ("a b", "task name 'a b'")],
+}
+_WRONG_GAINS: Wrong = {
+    "gains": [
+        (3.0, "gains: 3.0 is a decimal number; expected a mapping"),
+        ({"kp": -1, "kv": 1}, "gains.kp: -1 is negative; must be greater than 0"),
+        ({"Kp": 1}, "gains.Kp: unknown key 'Kp'; did you mean 'kp'"),
+    ]
+}
+_WRONG_TRACKING: Wrong = {
+    **_WRONG_TASK,
+    **_WRONG_GAINS,
+    "blend": [(0.0, "blend: 0.0 is too small; must be greater than 0")],
+}
+_WRONG_FRAME: Wrong = {"frame": [(7, "frame: 7 is an integer; expected text")]}
+_WRONG_POINT: list[tuple[Any, str]] = [
+    ([0, 0, 1], "trajectory: .* expected a mapping"),
+    ({"type": "hodl"}, "trajectory.type: unknown type 'hodl'; did you mean 'hold'"),
+    ({"type": "circle", "radius": 1}, "trajectory: missing key 'angular_rate'"),
+    (HoldPose([0, 0, 0], np.eye(3)), "trajectory: a HoldPose is not one of the traj"),
+]
+_WRONG_TURN: list[tuple[Any, str]] = [
+    (Hold([0, 0, 0]), "trajectory: a Hold is not one of the orientations"),
+    (np.eye(3), "trajectory: .* expected a mapping"),
+]
+_WRONG_POSE: list[tuple[Any, str]] = [
+    (HoldOrientation(), "trajectory: a HoldOrientation is not one of the poses or tr"),
+    ({"type": "spin"}, "trajectory.type: unknown type 'spin'"),
+]
+_WRONG_AXES: list[tuple[Any, str]] = [
+    ("xx", "axes: 'xx' must be distinct letters of x, y and z"),
+    (["x"], r"axes: \['x'\] is a list; expected text"),
+]
+WRONG: dict[type[Part], Wrong] = {
+    AngularMomentum: {
+        **_WRONG_TASK,
+        "trajectory": _WRONG_POINT,
+        "rate": [(-1, "rate: -1 is negative"), (np.inf, "rate: .inf is not a finite")],
+    },
+    CenterOfMass: {
+        **_WRONG_TRACKING,
+        "trajectory": _WRONG_POINT,
+        "axes": _WRONG_AXES,
+    },
+    FrameOrientation: {**_WRONG_TRACKING, **_WRONG_FRAME, "trajectory": _WRONG_TURN},
+    FramePose: {**_WRONG_TRACKING, **_WRONG_FRAME, "trajectory": _WRONG_POSE},
+    FramePosition: {
+        **_WRONG_TRACKING,
+        **_WRONG_FRAME,
+        "trajectory": _WRONG_POINT,
+        "axes": _WRONG_AXES,
+    },
+    Gains: {
+        "kp": [(0, "kp: 0 is too small; must be greater than 0")],
+        "kv": [([1.0, np.nan], "kv.1: .nan is not a finite number")],
+        "natural_frequency": [(1.0, "give either kp and kv, or natural_frequency and")],
+        "damping_ratio": [(1.0, "give either kp and kv, or .* and damping_ratio")],
+    },
+    JointPosture: {
+        **_WRONG_TASK,
+        **_WRONG_GAINS,
+        "reference": [
+            (
+                "hom",
+                "reference: 'hom' is text; expected 'start', 'home' or a list",
+            ),
+            ([], "reference"),
+            ([0.0, np.nan], "reference.1: .nan is not a finite number"),
+        ],
+        "joints": [("joint1", "joints: 'joint1'"), ([3], "joints.0: 3 is an integer")],
+        "displacement": [(Spin([0, 0, 1], 1), "displacement: a Spin is not one of")],
+    },
+    Pointing: {
+        **_WRONG_TASK,
+        **_WRONG_GAINS,
+        **_WRONG_FRAME,
+        "direction": [
+            ([0, 0, 0], "direction must be non-zero"),
+            ([1, 0], r"direction: \[1, 0\] has 2 entries, needs 3"),
+            (None, "give one of direction and trajectory"),
+        ],
+        "axis": [([0, 0, 0], "axis must be non-zero"), ("x", "axis: 'x' is text")],
+        "trajectory": [(HoldOrientation(), "give one of direction and trajectory")],
+    },
+    RelativePose: {
+        **_WRONG_TRACKING,
+        **_WRONG_FRAME,
+        "trajectory": _WRONG_POSE,
+        "reference": [(None, "reference: .* expected text")],
+    },
+}
+"""For each field, wrong values and what is said about them."""
+
+
+def test_every_field_has_a_wrong_value() -> None:
+    assert set(WRONG) == set(MEMBERS)
+    for cls, fields in WRONG.items():
+        assert set(fields) == {field.name for field in value_fields(cls)}, cls
+
+
+@pytest.mark.parametrize(
+    ("cls", "field", "value", "message"),
+    [
+        (cls, field, value, message)
+        for cls, fields in WRONG.items()
+        for field, wrong in fields.items()
+        for value, message in wrong
+    ],
+)
+def test_wrong_values_are_refused(
+    cls: type[Part], field: str, value: Any, message: str
+) -> None:
+    """By one error of the family, which names the field."""
+    with pytest.raises(cls.error, match=f"^{cls.__name__}: .*{message}") as raised:
+        replace(EXAMPLES[cls], **{field: value})  # type: ignore[type-var]
+    assert field in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_mistake_within_a_part_keeps_its_class() -> None:
+    """If it is about how the fields of that part fit together."""
+    with pytest.raises(GainError, match=r"^CenterOfMass: gains: give both kp and kv"):
+        CenterOfMass(gains={"kp": 1})  # type: ignore[arg-type]
+    with pytest.raises(ScheduleError, match=r"^FramePose: schedule: the interval"):
+        FramePose(schedule={"intervals": [[1, 0]]})  # type: ignore[arg-type]
+
+
+def test_unknown_missing_and_positional_arguments() -> None:
+    with pytest.raises(TaskError, match=r"^FramePosition: axis: .* you mean 'axes'"):
+        FramePosition(axis="xy")  # type: ignore[call-arg]
+    with pytest.raises(TaskError, match=r"^RelativePose: missing key 'reference'"):
+        RelativePose("panda_tcp")  # type: ignore[call-arg]
+    with pytest.raises(TaskError, match=r"takes 2 positional arguments \(frame, traj"):
+        FramePosition("panda_tcp", Hold(), Gains(1, 1))  # type: ignore[misc]
+    with pytest.raises(TaskError, match=r"^FramePosition: frame: .* expected text"):
+        FramePosition(panda(), "panda_tcp")  # type: ignore[arg-type]
+
+
+# --- no memory -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("cls", [cls for cls in MEMBERS if issubclass(cls, Task)])
+def test_one_task_serves_many_states_of_many_robots_in_many_threads(cls: Any) -> None:
+    """As it does one after the other, to the last bit; and nothing stays in it."""
+    robots = [panda(), Robot.load("iiwa14")] if cls is not RelativePose else [panda()]
+    example = EXAMPLES[cls]
+    assert isinstance(example, Task)
+    rng, fields = np.random.default_rng(3), {field.name for field in value_fields(cls)}
+    work: list[tuple[Task, Robot, float, Any, Any]] = []
+    for robot in robots:
+        task = placed(example, robot)
+        assert set(vars(task)) == fields
+        for _ in range(6):
+            q, v = robot.random_configuration(rng), rng.standard_normal(robot.nv)
+            work.append((task, robot, rng.uniform(0.0, 1.0), q, v))
+    barrier = Barrier(len(work))
+
+    def evaluate(k: int, wait: bool) -> list[Any]:
+        task, robot, t, q, v = work[k]
+        state = robot.state(t, q, v)
+        if wait:
+            barrier.wait()
+        return [array.copy() for _ in range(3) for array in task.evaluate(state)]
+
+    one_by_one = [evaluate(k, wait=False) for k in range(len(work))]
+    with ThreadPoolExecutor(len(work)) as pool:
+        together = list(pool.map(lambda k: evaluate(k, wait=True), range(len(work))))
+    for first, second in zip(one_by_one, together, strict=True):
+        for a, b in zip(first, second, strict=True):
+            np.testing.assert_array_equal(a, b)
+    for task, *_ in work:  # functions of the fields alone
+        assert set(vars(task)) - fields <= {"_desired", "_axis", "_normals"}
+        assert pickle.loads(pickle.dumps(task)) == task
+
+
+def test_feedback_is_the_callers_and_is_followed() -> None:
+    """Gains and offset that a controller gives; without them the task's own."""
+    robot = panda()
+    task = placed(FramePosition(gains=Gains(4.0, 4.0)), robot)
+    state = robot.state(0.0, robot.home() + 0.1, np.linspace(-1.0, 1.0, 7))
+    own = task.evaluate(state)
+    feedback = task.feedback()
+    feedback.Kp[:], feedback.Kv[:] = 9.0 * np.eye(3), 5.0 * np.eye(3)
+    feedback.offset[:] = [1.0, 2.0, 3.0]
+    other = task.evaluate(state, feedback=feedback)
+    extra = 5.0 * own.error + own.error_rate + [1.0, 2.0, 3.0]
+    np.testing.assert_allclose(other.acceleration, own.acceleration + extra, rtol=1e-12)
+    np.testing.assert_array_equal(task.evaluate(state).acceleration, own.acceleration)
+    assert task.feedback().Kp is not task.feedback().Kp
