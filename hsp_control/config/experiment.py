@@ -1,12 +1,14 @@
 """An experiment: the objects of a configuration, ready to run."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError, SimulationError
@@ -22,11 +24,18 @@ from hsp_control.config.models.plant import MujocoPlantModel
 from hsp_control.config.models.simulation import Dop853Model, Rk4Model
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
+from hsp_control.constraints.contacts import Contact
+from hsp_control.constraints.limits import Limits
+from hsp_control.control.changes import Change
 from hsp_control.control.compensation import Compensation, RateFinding
+from hsp_control.control.composition import Base
 from hsp_control.control.controller import Controller
+from hsp_control.declaration.named import keyed
 from hsp_control.declaration.plain_data import plain_data
-from hsp_control.geometry.scene import Scene
-from hsp_control.null_space.fields import FieldSum
+from hsp_control.geometry.scene import Obstacle, Scene
+from hsp_control.null_space.fields import FieldSum, NullSpaceField
+from hsp_control.null_space.fields.field import terms_of
+from hsp_control.null_space.metrics import IdentityMetric, Metric
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import only_within
 from hsp_control.robot.description.sources import packaged_folders
@@ -35,11 +44,15 @@ from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.plants import Plant
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.simulate import check_steps, count_rows
+from hsp_control.tasks import Task
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False, eq=False)
 class Experiment:
-    """The objects of one configuration.
+    """A controller, and what it is tried on: the objects of one configuration.
+
+    It is made of the same parts in Python and in YAML: `load_experiment` reads what
+    `to_yaml` writes.
 
     Attributes:
         name: The configuration's name, for file names.
@@ -66,6 +79,77 @@ class Experiment:
     plant: Plant
     compensation: Compensation
     rate_findings: tuple[RateFinding, ...]
+
+    def __init__(
+        self,
+        robot: str | Mapping[str, object],
+        tasks: Sequence[Task],
+        field: NullSpaceField | None = None,
+        *,
+        null_space_gain: ArrayLike = 10.0,
+        metric: Metric | None = None,
+        singularity_threshold: float = 0.03,
+        limits: Limits | None = None,
+        contacts: Sequence[Contact] = (),
+        base: Base | None = None,
+        scene: Scene | Iterable[Obstacle] = (),
+        changes: Sequence[Change] = (),
+        name: str = "experiment",
+        **settings: object,
+    ) -> None:
+        """Build an experiment.
+
+        Args:
+            robot: The robot's name or the path of its URDF; or the keys of YAML's
+                ``robot``.
+            tasks: The tasks; this and all others up to ``changes`` as for `Controller`.
+            field: The null-space field.
+            null_space_gain: K_N [1/s].
+            metric: The joint-space metric.
+            singularity_threshold: Singular value below which the inverse is bounded.
+            limits: Limits on efforts and motion.
+            contacts: The contacts of a floating base.
+            base: What else moves a floating base.
+            scene: The obstacles.
+            changes: Changes while running.
+            name: Its name, for file names.
+            **settings: All other keys of a configuration, as mappings: ``start``,
+                ``plant``, ``compensation``, ``simulation``, ``live``, ``view``,
+                ``title``, ``description``.
+
+        Raises:
+            HspControlError: If a part or a key is wrong; see `load_experiment`.
+        """
+        null_space = {
+            "gain": null_space_gain,
+            "metric": IdentityMetric() if metric is None else metric,
+            "fields": () if field is None else terms_of(field),
+            "singularity_threshold": singularity_threshold,
+        }
+        data = {
+            "robot": {"name": robot} if isinstance(robot, str) else robot,
+            "tasks": keyed(tasks),
+            "null_space": null_space,
+            "limits": limits,
+            "contacts": keyed(contacts),
+            "base": base,
+            "scene": scene if isinstance(scene, Scene) else Scene(scene),
+            "changes": tuple(changes),
+            **settings,
+        }
+        vars(self).update(vars(build(Document(data, {}, name))))
+
+    def to_yaml(self) -> str:
+        """Return the configuration as YAML; `load_experiment` builds the same from it.
+
+        Raises:
+            ConfigError: If a part is not data: a Python function, or a class that has
+                no YAML type.
+        """
+        text: str = yaml.safe_dump(
+            plain_data(self.scenario), sort_keys=False, allow_unicode=True
+        )
+        return text
 
     def run(
         self,
@@ -149,12 +233,18 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
         return Document(source, {}, "configuration")
     path = Path(source)
     if path.suffix in {".npz", ".journal"}:
-        config = Rollout.load(path).config
-        if config is None:
+        run = Rollout.load(path)
+        if run.config is None:
             raise ConfigError(
                 f"{path}: this log was made from Python and contains no configuration"
             )
-        return Document(config, {}, str(path))
+        if lost := run.meta.get("changes_lost"):
+            raise ConfigError(
+                f"{path}: the run cannot be repeated, because changes were made while "
+                f"it ran that are not data: {lost}"
+            )
+        made = run.meta.get("changes") or []
+        return Document(run.config | {"changes": made}, {}, str(path))
     known = bundled_configs()
     if path.suffix in {".yaml", ".yml"} or _is_file(path):
         return Document.read(path)
@@ -218,7 +308,7 @@ def build(document: Document) -> Experiment:
     plant, scenario = build_plant(document, scenario, folder, robot, integrator)
     compensation = build_compensation(document, scenario, controller)
     rates = check_rates(document, scenario, controller, compensation, q0)
-    return Experiment(
+    return _experiment(
         name=Path(document.name).stem,
         scenario=scenario,
         robot=robot,
@@ -231,6 +321,12 @@ def build(document: Document) -> Experiment:
         compensation=compensation,
         rate_findings=rates,
     )
+
+
+def _experiment(**attributes: object) -> Experiment:
+    experiment = object.__new__(Experiment)
+    vars(experiment).update(attributes)
+    return experiment
 
 
 def _integrator(document: Document, scenario: Scenario) -> Integrator:

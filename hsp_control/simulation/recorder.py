@@ -10,11 +10,12 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.exceptions import ConfigError, SimulationError
 from hsp_control.common.version import __version__
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
+from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.shapes import shape_to_log
 from hsp_control.null_space.fields import NullSpaceField
@@ -195,8 +196,8 @@ class Recorder:
                 state.position(frame) if frame else state.data.oMi[joint].translation
             )
         moved = self._controller.scene
-        for obstacle in self._scene.values():
-            obstacle = moved[obstacle.name] if obstacle.name in moved else obstacle
+        for known in self._scene.values():
+            obstacle = moved.get(known.name, known)
             placement = pin.SE3ToXYZQUAT(obstacle.placement(state.t))
             columns[f"obstacle.{obstacle.name}"][i] = placement[:3]
             columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
@@ -305,6 +306,7 @@ class Recorder:
                 name: {**_task_meta(task), "level": self._levels[name]}
                 for name, task in self._logged.items()
             },
+            **_changes(controller),
             "field": controller.field.name,
             "controls_null_space": controller.field.controls,
             "null_space_gain": controller.null_space_gain.tolist(),
@@ -330,6 +332,15 @@ def versions() -> dict[str, str]:
         "python": platform.python_version(),
         **{package: version(package) for package in packages},
     }
+
+
+def _changes(controller: Controller) -> dict[str, Any]:
+    """Return the changes that were made, as data, so that the run can be repeated."""
+    try:
+        changes = [plain_data(change) for change in controller.changes]
+    except ConfigError as error:
+        return {"changes": None, "changes_lost": str(error)}
+    return {"changes": changes}
 
 
 def _terms(controller: Controller) -> dict[str, NullSpaceField]:

@@ -178,18 +178,20 @@ def crossfade(
     Raises:
         TrajectoryError: If they are of different kinds.
     """
-    when = {"start_time": start_time, "duration": duration}
+    t0, T = start_time, duration
     if isinstance(before, Trajectory) and isinstance(after, Trajectory):
-        return Crossfade(before, after, **when)
+        return Crossfade(before, after, start_time=t0, duration=T)
     if isinstance(before, OrientationTrajectory) and isinstance(
         after, OrientationTrajectory
     ):
-        return CrossfadeOrientation(before, after, **when)
+        return CrossfadeOrientation(before, after, start_time=t0, duration=T)
     if isinstance(before, PoseTrajectory) and isinstance(after, PoseTrajectory):
         old, new = _parts(before), _parts(after)
         return ComposedPose(
-            Crossfade(old.position, new.position, **when),
-            CrossfadeOrientation(old.orientation, new.orientation, **when),
+            Crossfade(old.position, new.position, start_time=t0, duration=T),
+            CrossfadeOrientation(
+                old.orientation, new.orientation, start_time=t0, duration=T
+            ),
         )
     raise TrajectoryError(
         f"{type(before).__name__} cannot change into {type(after).__name__}: one is a "

@@ -10,6 +10,7 @@ any.
 
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from time import monotonic
@@ -18,6 +19,8 @@ import numpy as np
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.geometry.scene import Scene
+from hsp_control.geometry.start import Start
 from hsp_control.robot import RobotState
 
 BATCH = 1000
@@ -303,12 +306,14 @@ def _field(robot: hsp.Robot, rng: np.random.Generator) -> hsp.NullSpaceField | N
 
 @cache
 def _clearances(robot: hsp.Robot) -> list[hsp.NullSpaceField]:
-    """Return fields that read meshes: made once."""
+    """Return fields that read meshes, and whose balls do not touch the robot at home."""
     rng = np.random.default_rng(0)
-    return [
-        hsp.SelfClearance(),
-        *(hsp.ObstacleClearance([_ball(rng)]) for _ in range(8)),
-    ]
+    home = Start(robot.state(0.0, robot.home(), np.zeros(robot.nv)), Scene())
+    found: list[hsp.NullSpaceField] = [hsp.SelfClearance()]
+    while len(found) < 9:
+        with suppress(hsp.errors.SceneError):
+            found.append(hsp.ObstacleClearance([_ball(rng)]).placed(home))
+    return found
 
 
 def _ball(rng: np.random.Generator) -> hsp.Obstacle:

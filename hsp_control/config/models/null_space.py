@@ -5,9 +5,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator
 
-from hsp_control.common.exceptions import FieldError
-from hsp_control.config.models.base import Model
-from hsp_control.declaration import within
+from hsp_control.common.exceptions import ConfigError, FieldError
+from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Gain, Positive
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.metrics import IdentityMetric, Metric
@@ -26,7 +25,7 @@ def _summable(fields: Sequence[NullSpaceField]) -> tuple[NullSpaceField, ...]:
     return tuple(fields)
 
 
-class NullSpaceModel(Model):
+class NullSpaceModel(Part, error=ConfigError):
     """The control of self-motion."""
 
     gain: Gain = 10.0

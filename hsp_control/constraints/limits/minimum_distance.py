@@ -7,16 +7,15 @@ from functools import cached_property
 from typing import Annotated, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, InstanceOf
-from pydantic.json_schema import SkipJsonSchema
+from pydantic import AfterValidator, Field
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LimitError
 from hsp_control.declaration import Part
-from hsp_control.declaration.quantities import Name, Names, NonNegative
-from hsp_control.geometry.scene import Obstacle
+from hsp_control.declaration.quantities import Names, NonNegative
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClearance
+from hsp_control.null_space.fields.obstacle_clearance import ObstacleOrName
 from hsp_control.robot import RobotState
 
 _STEP = 3e-4
@@ -107,7 +106,7 @@ class ObstacleDistance(MinimumDistance, type="obstacles"):
     _: KW_ONLY
     obstacles: (
         Annotated[
-            Sequence[Name | SkipJsonSchema[InstanceOf[Obstacle]]],
+            Sequence[ObstacleOrName],
             Field(min_length=1),
             AfterValidator(tuple),
         ]

@@ -65,7 +65,7 @@ class Clearance(Cost):
         """
         fitted = self.fitted(start)
         distance, pair = fitted.proximity(start.state).nearest(start.state)
-        if distance <= 0.0:
+        if start.known and distance <= 0.0:
             raise SceneError(
                 f"the robot starts in contact: {pair}, {-distance:.3g} m deep; "
                 "change the start or move the obstacle"

@@ -17,13 +17,14 @@ from hsp_control.null_space.fields.clearance import Clearance
 from hsp_control.null_space.fields.in_python import OrInstance
 from hsp_control.robot import Robot
 
-_Obstacle = Annotated[str | Obstacle, OrInstance(Name, Obstacle)]
+ObstacleOrName = Annotated[str | Obstacle, OrInstance(Name, Obstacle)]
+"""The name of an obstacle of the scene; in Python also the obstacle itself."""
 
 
 class ObstacleClearance(Clearance, type="obstacle_clearance"):
     """f = Σ b(d_k / influence) over pairs of a link's shape and an obstacle."""
 
-    obstacles: Annotated[Sequence[_Obstacle], AfterValidator(tuple)] | None = None
+    obstacles: Annotated[Sequence[ObstacleOrName], AfterValidator(tuple)] | None = None
     """Names of the obstacles, which may move; or, in Python, the obstacles themselves
     [-]; all of the scene by default."""
     _: KW_ONLY

@@ -111,7 +111,7 @@ every_task = pytest.mark.parametrize("name", TASKS)
 
 @every_task
 def test_placing_twice_gives_an_equal_task(name: str) -> None:
-    """Also elsewhere: nothing is relative any more. And the task itself is as before."""
+    """Also elsewhere: nothing is relative any more. The task itself is as before."""
     task, before = TASKS[name], repr(TASKS[name])
     placed = place(task)
     assert type(placed) is type(task)
@@ -172,11 +172,11 @@ def test_relative_points_count_from_the_start() -> None:
     assert level.trajectory == Circle(0.1, 2.0, x)
     moved = Circle(0.1, 2.0, [0.1, 0.2, 0.3], origin="start")
     assert place(FramePosition(trajectory=moved), here).trajectory == Circle(
-        0.1, 2.0, x + [0.1, 0.2, 0.3]
+        0.1, 2.0, x + moved.center
     )
     line = Line([0.0, 0.0, 0.1], 1.0, origin="start")
     assert place(FramePosition(trajectory=line), here).trajectory == Line(
-        x + [0.0, 0.0, 0.1], 1.0, start=x
+        x + line.end, 1.0, start=x
     )
     on_axes = place(FramePosition(trajectory=UniformLine([1, 2]), axes="zx"), here)
     assert on_axes.trajectory == UniformLine([1, 2], x[[2, 0]])
@@ -185,9 +185,8 @@ def test_relative_points_count_from_the_start() -> None:
     c = here.centroidal.position.copy()
     assert place(CenterOfMass(axes="yx"), here).trajectory == Hold(c[[1, 0]])
     assert place(AngularMomentum(), here).trajectory == Hold([0.0, 0.0, 0.0])
-    assert place(AngularMomentum(Circle(1, 2)), here).trajectory == Circle(
-        1, 2, [0] * 3
-    )
+    about_zero = place(AngularMomentum(Circle(1, 2)), here).trajectory
+    assert about_zero == Circle(1, 2, [0, 0, 0])
 
 
 def test_relative_orientations_are_those_of_the_start() -> None:
