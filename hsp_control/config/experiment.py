@@ -147,7 +147,11 @@ class Experiment:
                 no YAML type.
         """
         text: str = yaml.safe_dump(
-            plain_data(self.scenario), sort_keys=False, allow_unicode=True
+            plain_data(self.scenario),
+            sort_keys=False,
+            allow_unicode=True,
+            default_flow_style=None,
+            width=88,
         )
         return text
 

@@ -248,7 +248,8 @@ class ChangeContact(Change, type="contact"):
         if self.contact not in there:
             raise ControllerError(
                 f"there is no contact {self.contact!r}"
-                f"{did_you_mean(self.contact, there)} (there are {listing(there)})"
+                f"{did_you_mean(self.contact, there)} "
+                f"(there are {listing(there) or 'none'})"
             )
         contacts, k = list(setup.contacts), there[self.contact]
         presence = contacts[k].presence.then(self.at, self.ramp, float(self.bears))

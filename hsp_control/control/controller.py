@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 from itertools import pairwise, takewhile
+from math import isfinite
 from threading import Lock
 from typing import Any, overload
 
@@ -10,7 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ControllerError, NonFiniteError
+from hsp_control.common.exceptions import (
+    ControllerError,
+    ImmutableError,
+    NonFiniteError,
+)
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.active_stack import ActiveStack
@@ -269,7 +274,9 @@ class Controller:
         """Place what is relative at the first state, unless a start was given."""
         if self._given_start is None:
             here = self._robot.state(state.t, state.q, state.v)
+            last_effort = self._actuation.memory()
             self._compose(Start(here, self._scene))
+            self._actuation.remember(last_effort)
         self._begun = True
 
     # -- the step ---------------------------------------------------------------------
@@ -342,6 +349,8 @@ class Controller:
             tau, a, forces, status, relaxation = self._actuation.deliver(
                 state, a, active.resolution, active.support, offset
             )
+            if (status or offset is not None) and not isfinite(tau @ tau):
+                self._explain_non_finite()
             # By name, and without a call of nine arguments, which costs 1 µs.
             if out is None:
                 out = ControlOutput()
@@ -547,7 +556,7 @@ class Controller:
         """The joint-space metric."""
         return self._setup.metric
 
-    @read_only()
+    @read_only("use at(t).limits(...)")
     def limits(self) -> RobotLimits | None:
         """The limits, as numbers of this robot."""
         return self._actuation.limits
@@ -607,7 +616,7 @@ class Controller:
 
     # -- what explains it -------------------------------------------------------------
 
-    @property
+    @read_only("call compute")
     def active_stack(self) -> ActiveStack:
         """The contacts and tasks that the last `compute` resolved.
 
@@ -626,7 +635,7 @@ class Controller:
             self._mix()
             return self.active_stack.rows
 
-    @property
+    @read_only("call compute")
     def task_rows(self) -> Mapping[str, slice]:
         """The rows of each task in the last output's stack, by name."""
         return self.active_stack.task_rows
@@ -689,6 +698,13 @@ class Controller:
             f"the effort is not finite at t = {state.t:.6g} s, "
             f"q = {state.q.tolist()}, v = {state.v.tolist()}"
         )
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not name.startswith("_") and not hasattr(type(self), name):
+            raise ImmutableError(
+                f"Controller has no {name!r} to assign; at(t) changes it while it runs"
+            )
+        object.__setattr__(self, name, value)
 
     # -- copies -----------------------------------------------------------------------
 

@@ -138,6 +138,8 @@ def _at_key(
             found.append(Finding(path, "too_short", error["input"], holder, error))
         else:
             found.append(Finding(path, kind, [key], holder, error))
+    if path and getattr(holder.options[0], "yaml_key", None) == key:  # the key itself
+        return found + [Finding(path, "key", path[-1], holder, e) for _, e in deeper]
     within = entry(holder.options[0], key)
     if within is None and (*path, key) not in document:  # a label of pydantic
         return found + findings(document, shape(Any), deeper, path)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ConfigurationError, NonFiniteError, ShapeError
@@ -172,7 +173,7 @@ class ConfigurationSpace:
         upper[upper >= largest] = np.inf
         return lower, upper
 
-    def check_configuration(self, q: Any) -> Array:
+    def check_configuration(self, q: ArrayLike) -> Array:
         """Return q as a float array of shape (nq,) after checking that it is valid.
 
         Raises:
@@ -192,7 +193,7 @@ class ConfigurationSpace:
                 )
         return configuration
 
-    def check_tangent(self, vector: Any, what: str) -> Array:
+    def check_tangent(self, vector: ArrayLike, what: str) -> Array:
         """Return a velocity, acceleration or effort as a float array of shape (nv,).
 
         Args:
@@ -244,18 +245,44 @@ def _dof_names(joints: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _check_vector(
-    vector: Any, size: int, what: str, space: ConfigurationSpace
+def as_numbers(
+    vector: ArrayLike, size: int, what: str, space: ConfigurationSpace
 ) -> Array:
+    """Return numbers as doubles of shape (size,).
+
+    Args:
+        vector: The numbers.
+        size: How many they must be.
+        what: Their name, for messages.
+        space: The robot, for messages.
+
+    Raises:
+        ShapeError: If they are no real numbers, or have another shape.
+    """
     try:
-        array = np.asarray(vector, dtype=float)
+        array = np.asarray(vector)
+        if array.dtype.kind not in "fiu" and array.size:
+            raise TypeError  # complex numbers, booleans, text, objects
+        array = array.astype(float)
     except (TypeError, ValueError):
-        raise ShapeError(f"{what} is not an array of {size} numbers") from None
+        shown = f"{vector!r}"
+        kind = getattr(getattr(vector, "dtype", None), "name", type(vector).__name__)
+        raise ShapeError(
+            f"{what} is {shown[:60]}{'...' * (len(shown) > 60)} ({kind}); needs {size} "
+            "numbers"
+        ) from None
     if array.shape != (size,):
         raise ShapeError(
             f"{what} has shape {array.shape}; {space.name} needs ({size},)"
             + (f" (nq = {space.nq}, nv = {space.nv})" if space.nq != space.nv else "")
         )
+    return array
+
+
+def _check_vector(
+    vector: ArrayLike, size: int, what: str, space: ConfigurationSpace
+) -> Array:
+    array = as_numbers(vector, size, what, space)
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
         raise NonFiniteError(

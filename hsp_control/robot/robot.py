@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import (
@@ -22,9 +23,10 @@ from hsp_control.common.exceptions import (
     NonFiniteError,
 )
 from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.centroidal import CentroidalMotion
-from hsp_control.robot.configuration_space import ConfigurationSpace
+from hsp_control.robot.configuration_space import ConfigurationSpace, as_numbers
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.combining import Part, combine
 from hsp_control.robot.description.loading import (
@@ -42,6 +44,8 @@ from hsp_control.robot.kinematics import (
 from hsp_control.robot.matrix_view import matrix_view
 
 Made = TypeVar("Made")
+
+_DOUBLE = np.dtype(np.float64)
 
 _MADE_LIMIT = 1000
 """Number of parts whose memory a state keeps; then it starts anew."""
@@ -311,8 +315,19 @@ class RobotState:
         self._mass_matrix_rate: Array = np.zeros((robot.nv, robot.nv))
         self._displaced: RobotState | None = None
         self._made: dict[tuple[int, str], tuple[object, Any]] = {}
+        self._given_q, self._given_v = self.q.copy(), self.v.copy()
+        self._accept = bind(
+            _copy_valid,
+            self._given_q,
+            self._given_v,
+            self.q,
+            self.v,
+            self._unit_blocks,
+            self.stamp_array,
+            timed=True,
+        )
 
-    def update(self, t: float, q: Array, v: Array) -> Self:
+    def update(self, t: float, q: ArrayLike, v: ArrayLike) -> Self:
         """Move to time t [s], configuration q (nq,) and velocity v (nv,), in place.
 
         Raises:
@@ -320,25 +335,40 @@ class RobotState:
             NonFiniteError: If t, q or v contains NaN or inf.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
         """
-        robot, own_q, own_v = self.robot, self.q, self.v
-        t = float(t)
+        given_q, given_v = self._given_q, self._given_v
         try:
-            copied = q.ndim == v.ndim == 1 and _copy_valid(
-                t, q, v, own_q, own_v, self._unit_blocks, self.stamp_array
+            fits = (
+                q.dtype is v.dtype is _DOUBLE  # type: ignore[union-attr]
+                and q.shape == given_q.shape  # type: ignore[union-attr]
+                and v.shape == given_v.shape  # type: ignore[union-attr]
             )
-        except AttributeError:  # q or v is a list
-            copied = False
-        if not copied:
-            # Slow path: convert the arguments, or raise an error that says the fault.
-            q = robot.check_configuration(q)
-            v = robot.check_tangent(v, "velocity v")
-            if not np.isfinite(t):
-                raise NonFiniteError(f"time t is {t}; needs a finite number of seconds")
-            own_q[:], own_v[:] = q, v
-            self.stamp_array[0] += 1
-        self.t = t
+        except AttributeError:  # a list, for example
+            fits = False
+        if not fits:
+            q = as_numbers(q, self.robot.nq, "configuration q", self.robot)
+            v = as_numbers(v, self.robot.nv, "velocity v", self.robot)
+        given_q[:] = q
+        given_v[:] = v
+        try:
+            accepted = self._accept(t)
+        except TypeError:  # t is no number
+            accepted = 0.0
+        if not accepted:
+            self._refuse(t)
+        self.t = float(t)
         self._compute_jacobians()
         return self
+
+    def _refuse(self, t: float) -> None:
+        """Raise the error that says what is wrong with t, q and v."""
+        if not isinstance(t, float | int | np.number) or not np.isfinite(t):
+            raise NonFiniteError(f"time t is {t!r}; needs a finite number of seconds")
+        self.robot.check_configuration(self._given_q)
+        self.robot.check_tangent(self._given_v, "velocity v")
+        raise NonFiniteError(
+            f"t = {t!r}, q = {self._given_q.tolist()}, v = {self._given_v.tolist()} "
+            "overflow when they are added"
+        )
 
     def frame(self, name: str) -> FrameKinematics:
         """Return the placement, the Jacobian and the motion of a frame.
@@ -497,20 +527,18 @@ class WorldKinematics(NamedTuple):
 
 @kernel
 def _copy_valid(
-    t: float,
     q_in: Array,
     v_in: Array,
     q: Array,
     v: Array,
     unit_blocks: Indices,
     stamp: Indices,
-) -> bool:
-    """Copy q and v if they are valid; return whether they are.
+    t: float,
+) -> float:
+    """Copy q and v if they are valid; return 1 if they are, else 0.
 
-    Valid means of the right size, finite, and of norm 1 in the unit blocks.
+    Valid means finite, and of norm 1 in the unit blocks.
     """
-    if q_in.shape[0] != q.shape[0] or v_in.shape[0] != v.shape[0]:
-        return False
     total = t
     for i in range(q.shape[0]):
         total += q_in[i]
@@ -528,4 +556,4 @@ def _copy_valid(
         for i in range(v.shape[0]):
             v[i] = v_in[i]
         stamp[0] += 1
-    return bool(ok)
+    return 1.0 if ok else 0.0

@@ -342,9 +342,10 @@ class SecondOrderTask(Task):
 
     def feedback(self) -> Feedback:
         """Return new arrays of feedback; see `Task.feedback`."""
+        rows = self.rows
         with within("gains"):
-            Kp, Kv = self.gains.matrices(self.rows)
-        return Feedback(Kp, Kv, np.zeros(self.rows))
+            Kp, Kv = self.gains.matrices(rows)
+        return Feedback(Kp, Kv, np.zeros(rows))
 
 
 def default_name(frame: str) -> str:

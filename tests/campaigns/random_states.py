@@ -306,7 +306,7 @@ def _field(robot: hsp.Robot, rng: np.random.Generator) -> hsp.NullSpaceField | N
 
 @cache
 def _clearances(robot: hsp.Robot) -> list[hsp.NullSpaceField]:
-    """Return fields that read meshes, and whose balls do not touch the robot at home."""
+    """Return fields that read meshes; their balls do not touch the robot at home."""
     rng = np.random.default_rng(0)
     home = Start(robot.state(0.0, robot.home(), np.zeros(robot.nv)), Scene())
     found: list[hsp.NullSpaceField] = [hsp.SelfClearance()]

@@ -1,5 +1,6 @@
 """A small schema and a good text for it, to read documents by."""
 
+import re
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -127,8 +128,10 @@ def message(text: str, *overrides: str, model: type[BaseModel] = Scenario) -> st
 
 def line_of(text: str, path: str) -> int:
     """Return the line of a key path in a YAML text, or of its nearest ancestor."""
-    node, line = yaml.compose(text), 1
-    for part in path.split(".") if path else []:
+    node = yaml.compose(text)
+    line = node.start_mark.line + 1
+    for quoted in re.findall(r"'[^']*'|[^.]+", path):
+        part = quoted.strip("'")
         if isinstance(node, yaml.MappingNode):
             entries = {key.value: (key, value) for key, value in node.value}
         elif isinstance(node, yaml.SequenceNode):

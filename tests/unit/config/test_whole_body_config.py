@@ -102,8 +102,8 @@ MISTAKES: list[tuple[dict[str, Any], str, Any, str, str]] = [
     (PANDA, "limits.effort", [1, 2], "LimitError",
      "limits.effort: has 2 numbers; needs one number or 7"),
     (PANDA, "limits.effort", "robt", "ConfigError",
-     "limits.effort: 'robt' is text; expected 'robot', 'none', a mapping, a number or a "
-     "list of numbers; did you mean 'robot'?"),
+     "limits.effort: 'robt' is text; expected 'robot', 'none', a mapping, a number or "
+     "a list of numbers; did you mean 'robot'?"),
     (PANDA, "limits.effort_rate", 0, "ConfigError",
      "limits.effort_rate: 0 is too small; must be greater than 0"),
     (PANDA, "limits.position", {"lower": [0] * 7, "upper": [0] * 7}, "LimitError",

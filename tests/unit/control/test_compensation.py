@@ -1,12 +1,14 @@
 """Each compensator by itself, and what they are worth together."""
 
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
+from task_cases import placed
 
 from hsp_control import (
     CenterOfMass,
@@ -17,7 +19,6 @@ from hsp_control import (
     FramePosition,
     Gains,
     Hold,
-    JointFriction,
     JointPosture,
     Limits,
     Pointing,
@@ -42,6 +43,7 @@ from hsp_control.control.compensation import (
     VelocityFilter,
 )
 from hsp_control.null_space.fields import TargetPosture
+from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import (
     ImperfectPlant,
@@ -300,10 +302,11 @@ def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
         gains=Gains(natural_frequency=5.0),
         name="more",
     )
-    tasks: list[Any] = {
+    second, third = replace(turned, priority=2), replace(again, priority=3)
+    tasks: list[Task] = {
         1: [circle(), turned],
-        2: [[circle()], [turned]],
-        3: [[circle()], [turned], [again]],  # nine rows on seven freedoms
+        2: [circle(), second],
+        3: [circle(), second, third],  # nine rows on seven freedoms
     }[levels]
     made = Controller(robot, tasks, TargetPosture(np.zeros(7) + Q0 * 0.9))
     q = robot.integrate(Q0, rng.uniform(-0.3, 0.3, 7))
@@ -339,11 +342,13 @@ def all_tasks() -> list[Task]:
 @pytest.mark.parametrize("task", all_tasks(), ids=lambda task: type(task).__name__)
 def test_an_offset_enters_each_error_equation_exactly(task: Task) -> None:
     """e'' + Kv e' + Kp e + offset = 0, e'' by central differences of e'."""
-    robot, rng = task.robot, np.random.default_rng(5)
+    robot, rng = PANDA, np.random.default_rng(5)
+    task = placed(task, robot)
     q = robot.integrate(Q0, rng.uniform(-0.2, 0.2, 7))
     v = rng.uniform(-0.5, 0.5, 7)
-    task.offset[:] = rng.uniform(-3.0, 3.0, task.rows)
-    here = task.evaluate(robot.state(0.3, q, v))
+    feedback = task.feedback()
+    feedback.offset[:] = rng.uniform(-3.0, 3.0, task.rows)
+    here = task.evaluate(robot.state(0.3, q, v), feedback=feedback)
     e, e_dot = here.error.copy(), here.error_rate.copy()
     bent = here.acceleration - here.jacobian_dot @ v
     a = np.linalg.lstsq(here.jacobian, bent, rcond=None)[0]
@@ -352,10 +357,11 @@ def test_an_offset_enters_each_error_equation_exactly(task: Task) -> None:
     for s in (h, -h):
         moved = robot.integrate(q, s * v + 0.5 * s * s * a)
         near = robot.state(0.3 + s, moved, v + s * a)
-        rates.append(task.evaluate(near).error_rate.copy())
-    residual = (rates[0] - rates[1]) / (2 * h) + task.Kv @ e_dot + task.Kp @ e
+        rates.append(task.evaluate(near, feedback=feedback).error_rate)
+    Kp, Kv, offset = feedback
+    residual = (rates[0] - rates[1]) / (2 * h) + Kv @ e_dot + Kp @ e
     # Rounding 1e-16/h and the difference's own h², beside terms of 3 and more.
-    np.testing.assert_allclose(residual, -task.offset, atol=1e-7)
+    np.testing.assert_allclose(residual, -offset, atol=1e-7)
 
 
 def test_with_an_integral_the_error_is_that_of_the_third_order() -> None:
@@ -384,7 +390,9 @@ def test_with_an_integral_the_error_is_that_of_the_third_order() -> None:
 
 def test_a_lasting_error_dies_and_the_null_space_keeps_its_own() -> None:
     plant = RigidBodyPlant(changed(PANDA, [ScaledInertias(1.2)]))
-    hold = FramePosition("panda_tcp", Hold(circle().trajectory.sample(0.0).position), gains=Gains(natural_frequency=20.0), name="hand")  # fmt: skip
+    point = circle().trajectory.sample(0.0).position
+    gains = Gains(natural_frequency=20.0)
+    hold = FramePosition("panda_tcp", Hold(point), gains=gains, name="hand")
     made = Controller(PANDA, [hold])
     options = {"plant": plant, "duration": 1.5}
     alone = run(made, **options)
@@ -481,21 +489,22 @@ def test_matrix_gains_are_judged_by_their_modes() -> None:
 
 
 def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:
-    task = circle()
+    made = controller()
     action = IntegralAction(10.0, limit=8.0)
-    action.restart([task])
+    action.restart(made)
+    offset = made.feedback("hand").offset
     e = np.array([1e-3, -1e-3, 0.0])
     action.advance({"hand": e}, 0.5, saturated=False)
     np.testing.assert_allclose(action.integrals["hand"], 0.5 * e)
-    np.testing.assert_allclose(task.offset, 4000.0 * 0.5 * e)
+    np.testing.assert_allclose(offset, 4000.0 * 0.5 * e)
     action.advance({"hand": e}, 0.5, saturated=True)  # would grow: stays
     np.testing.assert_allclose(action.integrals["hand"], 0.5 * e)
     action.advance({"hand": -e}, 0.25, saturated=True)  # unwinds
     np.testing.assert_allclose(action.integrals["hand"], 0.25 * e)
     action.advance({"hand": e}, 100.0, saturated=False)
-    assert np.abs(task.offset).max() == pytest.approx(8.0)
+    assert np.abs(offset).max() == pytest.approx(8.0)
     action.advance({"hand": None}, 1.0, saturated=False)
-    assert np.abs(task.offset).max() == pytest.approx(8.0)
+    assert np.abs(offset).max() == pytest.approx(8.0)
 
 
 def test_an_arm_that_is_too_weak_does_not_wind_up() -> None:

@@ -252,12 +252,11 @@ def test_as_many_rows_as_freedoms_are_allowed() -> None:
         ("field", r"use at\(t\).field\(...\)"),
         ("null_space_gain", r"use at\(t\).null_space_gain\(...\)"),
         ("contacts", r"use at\(t\).contact\(name, bears=...\)"),
+        ("limits", r"use at\(t\).limits\(...\)"),
         ("changes", r"use at\(t\)"),
         ("state", "call compute"),
-        *(
-            (name, "build another one")
-            for name in ("robot", "metric", "limits", "base", "scene")
-        ),
+        ("scene", r"use at\(t\).obstacle\(name, center\)"),
+        *((name, "build another one") for name in ("robot", "metric", "base")),
     ],
 )
 def test_what_it_is_made_of_cannot_be_assigned(name: str, instead: str) -> None:

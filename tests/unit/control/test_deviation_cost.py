@@ -22,7 +22,7 @@ from hsp_control import (
     Rollout,
     simulate,
 )
-from hsp_control.constraints.limits import StaticEffort
+from hsp_control.constraints.limits import Scaled, StaticEffort
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.deviation_cost import (
     decay_rate,
@@ -128,9 +128,8 @@ def test_decay_rate_is_the_least(seed: int) -> None:
 def limited(seed: int, **options: Any) -> tuple[Controller, Array]:
     """Return a weak arm that is asked for more than it can do, and a start."""
     robot, rng = panda(), np.random.default_rng(seed)
-    own = Limits()
     limits = Limits(
-        effort=own.effort * rng.uniform(0.45, 0.6),
+        effort=Scaled(rng.uniform(0.45, 0.6)),
         velocity=None,
         position=None,
         **options,
@@ -205,7 +204,7 @@ def test_static_rows_are_the_second_derivative() -> None:
     """∇G·a + drift = G'' along q + s v + ½ s² a, by differences."""
     robot, rng = panda(), np.random.default_rng(4)
     effort, share, alpha, h = np.full(7, 20.0), 0.6, 7.0, 1e-3
-    limit = StaticEffort(robot, effort, share)
+    limit = StaticEffort(effort, share)
     q, v, a = robot.home(), 0.5 * rng.standard_normal(7), rng.standard_normal(7)
     A, b = limit.rows(robot.state(0.0, q, v), alpha, NOWHERE)
     assert len(A) > 0
@@ -225,7 +224,7 @@ def test_static_rows_are_the_second_derivative() -> None:
 
 def test_what_bears_a_contact_is_left_out() -> None:
     robot = panda()
-    limit = StaticEffort(robot, np.full(7, 1.0), 1.0)
+    limit = StaticEffort(np.full(7, 1.0), 1.0)
     state = robot.state(0.0, robot.home(), np.zeros(7))
     A, _ = limit.rows(state, 10.0, NOWHERE)
     fewer, _ = limit.rows(state, 10.0, np.array([1, 3]))
@@ -244,12 +243,14 @@ def test_an_arm_goes_where_it_can_be_held() -> None:
     used = {}
     for static in (None, share):
         limits = Limits(static_effort=static)
-        rollout = run(Controller(robot, [far], limits=limits), q0, 1.5)
+        controller = Controller(robot, [far], limits=limits)
+        assert controller.limits is not None
+        rollout = run(controller, q0, 1.5)
         assert rollout["status"].max() < Status.RELAXED
         held = np.array(
             [robot.inverse_dynamics(q, 0 * q, 0 * q) for q in rollout["q"][::20]]
         )
-        used[static] = (np.abs(held) / limits.effort).max()
+        used[static] = (np.abs(held) / controller.limits.effort).max()
     assert used[None] > share + 0.02
     # A barrier is kept to the error of an acceleration held for 1 ms, over α².
     assert used[share] < share + 1e-3

@@ -174,14 +174,15 @@ def test_the_linear_loop_is_the_chain_link_by_link(
         compensation=parts,
     ).q[:, 0]  # fmt: skip
     action = parts.integral_action
-    Ki = ZERO if action is None else action.gains([task])["posture"]
-    loop = LinearLoop(task.Kp, task.Kv, Ki, h, *delays, parts, 1.0 / heavy)
+    Ki = ZERO if action is None else action.gains(made.tasks)["posture"]
+    Kp, Kv, _ = made.feedback("posture")
+    loop = LinearLoop(Kp, Kv, Ki, h, *delays, parts, 1.0 / heavy)
     coefficients = np.poly(loop.transition())
     n, begun = len(coefficients), 8
     residuals = [coefficients[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
     # Rounding of coefficients of up to 10, on positions of 1 m.
     assert np.abs(residuals).max() < 1e-12
-    other = LinearLoop(1.1 * task.Kp, task.Kv, Ki, h, *delays, parts, 1.0 / heavy)
+    other = LinearLoop(1.1 * Kp, Kv, Ki, h, *delays, parts, 1.0 / heavy)
     wrong = np.poly(other.transition())
     missed = [wrong[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
     assert np.abs(missed).max() > 1e3 * np.abs(residuals).max()

@@ -1,0 +1,206 @@
+"""Whatever is assigned, given or asked for counts, or is refused."""
+
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import hsp_control as hsp
+from hsp_control.declaration import Part
+
+Array = NDArray[np.float64]
+
+BALL = hsp.Obstacle("ball", hsp.Sphere(0.1), hsp.Hold([0.6, 0.4, 0.6]))
+
+
+def panda(**options: Any) -> hsp.Controller:
+    robot = hsp.Robot.load("panda")
+    hand = hsp.FramePose("panda_tcp", hsp.Circle(0.1, 2.0), name="hand")
+    field = hsp.JointCentering() + 0.5 * hsp.ObstacleClearance()
+    return hsp.Controller(robot, [hand], field, scene=[BALL], **options)
+
+
+def public(thing: object) -> list[str]:
+    """Return the public attributes of an object that are no methods."""
+    return [
+        name
+        for name in dir(thing)
+        if not name.startswith("_") and not callable(getattr(thing, name, None))
+    ]
+
+
+def everything(controller: hsp.Controller) -> list[object]:
+    """Return the controller and all that one gets from it, parts of parts included."""
+    found: list[object] = [controller]
+    controller.compute(0.0, controller.robot.home(), np.zeros(controller.robot.nv))
+    waiting: list[object] = [getattr(controller, name) for name in public(controller)]
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, tuple):
+            waiting += each
+        elif isinstance(each, Part):
+            found.append(each)
+            waiting += list(each.all_fields().values())
+        elif type(each).__name__ == "RobotLimits":
+            found.append(each)
+            waiting += [getattr(each, name) for name in public(each)]
+    return found
+
+
+def test_no_attribute_can_be_assigned() -> None:
+    """Of the controller and of all its parts; a new attribute cannot escape."""
+    parts = everything(panda(limits=hsp.Limits()))
+    assert {"Controller", "FramePose", "Circle", "Gains", "JointCentering"} < {
+        type(part).__name__ for part in parts
+    }
+    assert {"Obstacle", "Sphere", "RobotLimits", "FieldSum"} < {
+        type(part).__name__ for part in parts
+    }
+    for part in parts:
+        names = public(part)
+        assert names
+        for name in [*names, "a_new_one"]:
+            with pytest.raises(AttributeError, match=r"assign"):
+                setattr(part, name, 1.0)
+
+
+def test_no_array_can_be_written_except_feedback() -> None:
+    for part in everything(panda(limits=hsp.Limits())):
+        if isinstance(part, hsp.Controller):
+            continue
+        for name in public(part):
+            value = getattr(part, name)
+            if isinstance(value, np.ndarray) and value.size:
+                with pytest.raises(ValueError, match="read-only"):
+                    value[...] = 0.0
+
+
+@pytest.mark.parametrize(
+    "convert",
+    [
+        list,
+        tuple,
+        lambda x: np.asarray(x, dtype=np.float32),
+        lambda x: np.stack([x, x], axis=1)[:, 0],
+        lambda x: np.broadcast_to(x, (len(x),)),
+        lambda x: np.asarray(x, dtype=">f8"),
+        lambda x: [np.float64(each) for each in x],
+    ],
+    ids=["list", "tuple", "float32", "strided", "read-only", "big-endian", "numbers"],
+)
+def test_any_array_will_do(convert: Any) -> None:
+    controller = panda()
+    q, v = controller.robot.home().round(3), np.full(7, 0.125)
+    plain = controller.compute(0.1, q.astype(np.float32).astype(float), v).tau
+    single = convert(q.astype(np.float32).astype(float))
+    np.testing.assert_array_equal(
+        controller.compute(0.1, single, convert(v)).tau, plain
+    )
+
+
+@pytest.mark.parametrize(
+    ("t", "q", "v", "message"),
+    [
+        (0.0, np.zeros(6), np.zeros(7), "6"),
+        (0.0, np.zeros(7), np.zeros((7, 1)), r"\(7, 1\)"),
+        (0.0, np.full(7, np.nan), np.zeros(7), "nan"),
+        (np.inf, np.zeros(7), np.zeros(7), "inf"),
+        (0.0, np.zeros(7, dtype=complex), np.zeros(7), "complex"),
+        (0.0, "home", np.zeros(7), "home"),
+        (0.0, ["a"] * 7, np.zeros(7), "'a'"),
+        (0.0, None, np.zeros(7), "needs t, q and v"),
+        (None, np.zeros(7), np.zeros(7), "time t is None"),
+    ],
+)
+def test_what_is_no_state_gives_one_exact_error(
+    t: Any, q: Any, v: Any, message: str
+) -> None:
+    with pytest.raises(hsp.HspControlError, match=message):
+        panda().compute(t, q, v)
+
+
+@pytest.mark.parametrize(
+    ("tau", "period", "message"),
+    [
+        (np.full(7, np.nan), 0.001, r"effort tau\[0\] is nan"),
+        (np.zeros(6), 0.001, "effort tau"),
+        (np.zeros(7), np.nan, "period is nan"),
+        (np.zeros(7), 0.0, "period is 0.0 s; must be positive"),
+    ],
+)
+def test_an_applied_effort_is_checked(tau: Array, period: float, message: str) -> None:
+    controller = panda(limits=hsp.Limits(effort_rate=1000.0))
+    with pytest.raises(hsp.HspControlError, match=message):
+        controller.applied(tau, period)
+    output = controller.compute(0.0, controller.robot.home(), np.zeros(7))
+    assert np.isfinite(output.tau).all()
+
+
+def test_an_offset_that_is_not_finite_is_never_delivered() -> None:
+    controller = panda()
+    with pytest.raises(hsp.errors.NonFiniteError):
+        controller.compute(
+            0.0,
+            controller.robot.home(),
+            np.zeros(7),
+            modifier=lambda state, stack, a: (a, np.full(7, np.nan)),
+        )
+
+
+def test_outputs_belong_to_the_caller() -> None:
+    controller = panda(limits=hsp.Limits())
+    q, v = controller.robot.home(), np.zeros(7)
+    first = controller.compute(0.0, q, v)
+    kept = [
+        first.tau,
+        first.acceleration,
+        first.null_space_error,
+        *first.task,
+        *first.field,
+    ]
+    copies = [array.copy() for array in kept]
+    second = controller.compute(0.7, q + 0.1, v + 0.2)
+    for array, copied in zip(kept, copies, strict=True):
+        np.testing.assert_array_equal(array, copied)
+    third = controller.compute(0.0, q, v, out=second)
+    assert third is second
+    for name in ("tau", "acceleration", "null_space_error"):
+        np.testing.assert_array_equal(getattr(third, name), getattr(first, name))
+
+
+def test_a_foreign_state_gives_the_same_effort() -> None:
+    controller = panda()
+    state = controller.robot.state(0.3, controller.robot.home(), np.full(7, 0.1))
+    np.testing.assert_array_equal(
+        controller.compute(state).tau, controller.compute(0.3, state.q, state.v).tau
+    )
+    other = hsp.Robot.load("panda").state(0.0, state.q, state.v)
+    with pytest.raises(hsp.errors.ControllerError, match="another robot object"):
+        controller.compute(other)
+
+
+def test_threads_with_a_controller_each_and_with_one_together() -> None:
+    """Parts are shared; so may be a controller: each call is one step of its own."""
+    shared = panda()
+    q, v = shared.robot.home(), np.zeros(7)
+    shared.compute(0.0, q, v)
+    times = np.linspace(0.0, 1.0, 200)
+    wanted = [shared.compute(t, q, v).tau for t in times]
+    own = [hsp.Controller(shared.robot, [shared.tasks[0]], shared.field) for _ in "ab"]
+    failures: list[str] = []
+
+    def compute(controller: hsp.Controller) -> None:
+        for t, tau in zip(times, wanted, strict=True):
+            if not np.array_equal(controller.compute(t, q, v).tau, tau):
+                failures.append(f"differs at t = {t}")
+
+    threads = [
+        threading.Thread(target=compute, args=[each]) for each in (*own, shared, shared)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert failures == []
