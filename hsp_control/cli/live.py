@@ -23,6 +23,7 @@ from hsp_control.config.build_live import (
     tolerance_of,
 )
 from hsp_control.control.compensation import Command
+from hsp_control.declaration.plain_data import plain_data
 from hsp_control.live import (
     Faults,
     InProcessRobot,
@@ -100,7 +101,7 @@ def _meta(experiment: Experiment) -> dict[str, Any]:
     return {
         "name": f"{experiment.name}, live",
         "title": experiment.scenario.title,
-        "config": experiment.scenario.model_dump(mode="json"),
+        "config": plain_data(experiment.scenario, defaults=True),
     }
 
 

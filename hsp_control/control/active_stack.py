@@ -38,6 +38,7 @@ class ActiveStack:
         first_task_row: Index of the first row that belongs to a task.
         rows: All rows stacked: J, J', e, e', a_x.
         row_count: Number of rows.
+        has_forces: Whether contacts exert forces.
         memory: The rows, the field and the law's results, in one block: see `Record`.
         acceleration: The law's acceleration, shape (nv,).
         term_samples: The weighted sample of each term of the field.
@@ -84,6 +85,7 @@ class ActiveStack:
         )
         self.rows = self.resolution.problem.task
         self.row_count = len(self.rows.error)
+        self.has_forces = support.size > 0
         self.memory = self.resolution.problem.record.memory
         self.acceleration = self.resolution.acceleration
         self.contact_rows = _places(self.contacts, 0)

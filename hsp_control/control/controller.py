@@ -360,7 +360,7 @@ class Controller:
                 out._keep(active.memory)
             out._rows = active.row_count
             out._acceleration = None if a is active.acceleration else a.copy()
-            out.forces = forces.copy() if active.support.size else forces
+            out.forces = forces.copy() if active.has_forces else forces
             out.damped = outcome is DAMPED
             out.status, out.relaxation = status, relaxation
             return out

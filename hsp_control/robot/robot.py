@@ -7,9 +7,10 @@ geometry, derivatives of gravity, plants with models of their own, and the viewe
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
+from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
 import pinocchio as pin
@@ -22,8 +23,7 @@ from hsp_control.common.exceptions import (
     ModelError,
     NonFiniteError,
 )
-from hsp_control.common.kernels import kernel
-from hsp_control.common.native import bind
+from hsp_control.common.kernels import is_compiled, kernel
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.centroidal import CentroidalMotion
 from hsp_control.robot.configuration_space import ConfigurationSpace, as_numbers
@@ -46,6 +46,8 @@ from hsp_control.robot.matrix_view import matrix_view
 Made = TypeVar("Made")
 
 _DOUBLE = np.dtype(np.float64)
+_PACKED = (8,)
+"""Strides of a vector of doubles one after another."""
 
 _MADE_LIMIT = 1000
 """Number of parts whose memory a state keeps; then it starts anew."""
@@ -315,17 +317,7 @@ class RobotState:
         self._mass_matrix_rate: Array = np.zeros((robot.nv, robot.nv))
         self._displaced: RobotState | None = None
         self._made: dict[tuple[int, str], tuple[object, Any]] = {}
-        self._given_q, self._given_v = self.q.copy(), self.v.copy()
-        self._accept = bind(
-            _copy_valid,
-            self._given_q,
-            self._given_v,
-            self.q,
-            self.v,
-            self._unit_blocks,
-            self.stamp_array,
-            timed=True,
-        )
+        _compile_once()
 
     def update(self, t: float, q: ArrayLike, v: ArrayLike) -> Self:
         """Move to time t [s], configuration q (nq,) and velocity v (nv,), in place.
@@ -335,40 +327,37 @@ class RobotState:
             NonFiniteError: If t, q or v contains NaN or inf.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
         """
-        given_q, given_v = self._given_q, self._given_v
+        q_in: Any = q
+        v_in: Any = v
         try:
-            fits = (
-                q.dtype is v.dtype is _DOUBLE  # type: ignore[union-attr]
-                and q.shape == given_q.shape  # type: ignore[union-attr]
-                and v.shape == given_v.shape  # type: ignore[union-attr]
+            packed = (
+                q_in.dtype is v_in.dtype is _DOUBLE
+                and q_in.strides == v_in.strides == _PACKED
             )
         except AttributeError:  # a list, for example
-            fits = False
-        if not fits:
-            q = as_numbers(q, self.robot.nq, "configuration q", self.robot)
-            v = as_numbers(v, self.robot.nv, "velocity v", self.robot)
-        given_q[:] = q
-        given_v[:] = v
+            packed = False
+        if not packed:  # a kernel would be compiled anew for each kind of array
+            q_in = as_numbers(q, self.robot.nq, "configuration q", self.robot)
+            v_in = as_numbers(v, self.robot.nv, "velocity v", self.robot)
         try:
-            accepted = self._accept(t)
+            accepted = _copy_valid(
+                t, q_in, v_in, self.q, self.v, self._unit_blocks, self.stamp_array
+            )
         except TypeError:  # t is no number
-            accepted = 0.0
+            accepted = False
         if not accepted:
-            self._refuse(t)
-        self.t = float(t)
+            self._refuse(t, q, v)
+        self.t = t
         self._compute_jacobians()
         return self
 
-    def _refuse(self, t: float) -> None:
+    def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
         """Raise the error that says what is wrong with t, q and v."""
         if not isinstance(t, float | int | np.number) or not np.isfinite(t):
             raise NonFiniteError(f"time t is {t!r}; needs a finite number of seconds")
-        self.robot.check_configuration(self._given_q)
-        self.robot.check_tangent(self._given_v, "velocity v")
-        raise NonFiniteError(
-            f"t = {t!r}, q = {self._given_q.tolist()}, v = {self._given_v.tolist()} "
-            "overflow when they are added"
-        )
+        self.robot.check_configuration(q)
+        self.robot.check_tangent(v, "velocity v")
+        raise NonFiniteError(f"t = {t!r}, q = {q!r}, v = {v!r}: their sum overflows")
 
     def frame(self, name: str) -> FrameKinematics:
         """Return the placement, the Jacobian and the motion of a frame.
@@ -525,20 +514,36 @@ class WorldKinematics(NamedTuple):
     v: Array
 
 
+@cache
+def _compile_once() -> None:
+    """Compile `_copy_valid` for packed doubles, and for nothing else, ever."""
+    if is_compiled(_copy_valid):
+        from numba import types
+
+        own, kernel = types.float64[::1], cast("Any", _copy_valid)
+        given = own, types.Array(types.float64, 1, "C", readonly=True)
+        rest = own, own, types.int64[:, ::1], types.int64[::1]
+        for q, v in product(given, given):
+            kernel.compile((types.float64, q, v, *rest))
+        kernel.disable_compile()
+
+
 @kernel
 def _copy_valid(
+    t: float,
     q_in: Array,
     v_in: Array,
     q: Array,
     v: Array,
     unit_blocks: Indices,
     stamp: Indices,
-    t: float,
-) -> float:
-    """Copy q and v if they are valid; return 1 if they are, else 0.
+) -> bool:
+    """Copy q and v if they are valid; return whether they are.
 
-    Valid means finite, and of norm 1 in the unit blocks.
+    Valid means of the right size, finite, and of norm 1 in the unit blocks.
     """
+    if q_in.shape[0] != q.shape[0] or v_in.shape[0] != v.shape[0]:
+        return False
     total = t
     for i in range(q.shape[0]):
         total += q_in[i]
@@ -556,4 +561,4 @@ def _copy_valid(
         for i in range(v.shape[0]):
             v[i] = v_in[i]
         stamp[0] += 1
-    return 1.0 if ok else 0.0
+    return bool(ok)

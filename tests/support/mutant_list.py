@@ -348,7 +348,7 @@ MUTANTS = (
         LIMITS + "minimum_distance.py",
         "h = d - self.minimum",
         "h = d",
-        OF_LIMITS + "distance_rows",
+        UNIT + "constraints/test_limits.py -k distance_rows",
     ),
     Mutant(
         "static effort: slope's sign",

@@ -193,7 +193,7 @@ class Actuation:
                 [N·m or N]; None: none. The limits hold for the sum.
         """
         wanted = state.inverse_dynamics(a)  # M a + N
-        violated = self._violations(state, a)
+        violated = 0.0 if self.limits is None else self._check.get(state, a)()
         if not violated and offset is None and self._only_box_limits:
             return wanted, a, self._no_forces, EXACT, 0.0
         motion_ok, effort_ok = violated in (0, EFFORT), violated in (0, MOTION)
@@ -222,16 +222,12 @@ class Actuation:
                 )
         return self._limit(state, wanted, a, forces, resolution, support, barriers)
 
-    def _violations(self, state: RobotState, a: Array) -> float:
-        """Write the bounds on the acceleration, and return which are violated.
-
-        Returns:
-            0, `MOTION` if a violates its bounds, `EFFORT` if the effort without
-            contacts does (read from Pinocchio's data), or the sum of both.
-        """
-        return 0.0 if self.limits is None else self._check.get(state, a)()
-
     def _compile_check(self, state: RobotState, a: Array) -> Callable[[], float]:
+        """Return the call that writes the bounds on the acceleration.
+
+        It returns 0, `MOTION` if a violates its bounds, `EFFORT` if the effort without
+        contacts does (read from Pinocchio's data), or the sum of both.
+        """
         assert self.limits is not None
         return bind(
             violated_limits,

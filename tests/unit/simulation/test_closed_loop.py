@@ -19,17 +19,16 @@ from numpy.typing import NDArray
 
 from hsp_control import (
     Controller,
-    Dop853,
     FramePose,
     FramePosition,
     Gains,
-    RigidBodyPlant,
-    Rk4,
     Robot,
     Rollout,
     TargetPosture,
     simulate,
 )
+from hsp_control.robot.integrators import Dop853, Rk4
+from hsp_control.simulation.plants import RigidBodyPlant
 from hsp_control.trajectories import ComposedPose, Lissajous, Spin
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -157,7 +156,7 @@ def test_a_floating_robot_follows_the_law() -> None:
     controller = Controller(
         robot,
         [task],
-        TargetPosture(robot.home()),
+        TargetPosture(configuration=robot.home()),
         null_space_gain=6.0,
         base="driven" if robot.unactuated else None,
     )

@@ -18,18 +18,18 @@ from hsp_control import (
     FramePosition,
     Gains,
     JointPosture,
-    MassMatrixMetric,
     Obstacle,
-    Rk4,
     Rollout,
-    Scene,
     simulate,
 )
 from hsp_control.common.exceptions import (
     LogError,
     ShapeError,
 )
+from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import Sphere
+from hsp_control.null_space.metrics import MassMatrixMetric
+from hsp_control.robot.integrators import Rk4
 from hsp_control.trajectories import Hold, Lissajous
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -100,7 +100,9 @@ def test_joint_positions_of_continuous_joints_wind_up() -> None:
     """Joints that are led to 17 and -34 rad have gone there, not to some of ±pi."""
     robot = load("planar3r", gravity=False)
     away = Lissajous([20.0, -40.0, 0.1], [0.5, 0.5, 1.0], center=[0.0, 0.0, 0.0])
-    task = JointPosture(robot.neutral(), gains=Gains(natural_frequency=10.0), displacement=away)
+    task = JointPosture(
+        robot.neutral(), gains=Gains(natural_frequency=10.0), displacement=away
+    )
     run = simulate(
         Controller(robot, [task]), robot.neutral(), [10.0, -20.0, 0.1], duration=2.0
     )

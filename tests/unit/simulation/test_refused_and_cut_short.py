@@ -9,22 +9,15 @@ import pytest
 from closed_loops import EXACT, load, planar_controller, planar_start
 from numpy.typing import NDArray
 
-from hsp_control import (
-    Controller,
-    FunctionField,
-    HspControlError,
-    Rk4,
-    RobotState,
-    Rollout,
-    SemiImplicitEuler,
-    simulate,
-)
+from hsp_control import Controller, HspControlError, RobotState, Rollout, simulate
 from hsp_control.common.exceptions import (
     ConfigurationError,
     NonFiniteError,
     ShapeError,
     SimulationError,
 )
+from hsp_control.null_space.fields import FunctionField
+from hsp_control.robot.integrators import Rk4, SemiImplicitEuler
 
 pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
@@ -245,7 +238,11 @@ def test_a_runaway_is_told_with_its_speed() -> None:
 def test_an_error_on_the_way_keeps_the_rollout() -> None:
     """A field that returns NaN at some time is named; the rows before are kept."""
     robot = load("planar3r", gravity=False)
-    field = FunctionField(lambda state: np.full(3, np.nan if state.t > 0.25 else 0.0), rate_function=lambda state: np.zeros(3), name="mine")
+    field = FunctionField(
+        lambda state: np.full(3, np.nan if state.t > 0.25 else 0.0),
+        rate_function=lambda state: np.zeros(3),
+        name="mine",
+    )
     controller = Controller(robot, planar_controller().tasks, field)
     with pytest.raises(
         SimulationError, match=r"^the simulation stopped: field 'mine' returned g = "

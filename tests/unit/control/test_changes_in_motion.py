@@ -1,0 +1,478 @@
+"""Changes while the robot moves: no effort jumps, and the law's proofs hold throughout.
+
+`test_changes.py` has changes that overlap, in any number.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.integrate import quad, solve_ivp
+from task_cases import placed
+
+from hsp_control import (
+    Circle,
+    Controller,
+    FrameOrientation,
+    FramePosition,
+    Gains,
+    Hold,
+    JointCentering,
+    Manipulability,
+    NullSpaceField,
+    Rest,
+    Robot,
+    RobotState,
+    Rollout,
+    TargetPosture,
+    Task,
+    simulate,
+)
+from hsp_control.common.exceptions import (
+    ControllerError,
+    GainError,
+    HspControlError,
+    ShapeError,
+)
+from hsp_control.control.changes import AddTask, ChangeGains, RemoveTask
+from hsp_control.null_space.differences import rate_along_flow
+from hsp_control.null_space.fields import FieldSample, Uncontrolled
+from hsp_control.null_space.fields.field import terms_of
+from hsp_control.null_space.metrics import (
+    IdentityMetric,
+    MassMatrixMetric,
+    Metric,
+    MetricSample,
+)
+from hsp_control.robot.integrators import Dop853
+from hsp_control.simulation.recorder import Recorder
+from hsp_control.trajectories import HoldOrientation
+from hsp_control.trajectories.timing import smooth_step
+
+Array = NDArray[np.float64]
+K_N = 4.0
+START, RAMP = 0.2, 0.3
+KEPT = 1.0
+"""How long a controller remembers a change after its end [s]."""
+W0 = 10.0
+GAINS = Gains(natural_frequency=W0)
+COUPLED = Gains(
+    [[60.0, 8.0, 0.0], [-5.0, 40.0, 3.0], [0.0, 2.0, 30.0]],
+    [[12.0, 1.0, 0.0], [0.0, 15.0, 2.0], [1.0, 0.0, 9.0]],
+)
+
+
+@cache
+def panda() -> Robot:
+    return Robot.load("panda")
+
+
+def posture() -> NullSpaceField:
+    q = panda().home().copy()
+    q[2] += 0.5
+    return TargetPosture(q, weight=2.0)
+
+
+def hand() -> FramePosition:
+    start = panda().state(0.0, panda().home(), np.zeros(7)).position("panda_tcp")
+    center = start + np.array([0.0, 0.0, 0.05])
+    path = Circle(0.05, 2.0, center, normal=[1.0, 0.0, 0.0])
+    return FramePosition("panda_tcp", path, gains=GAINS, name="hand")
+
+
+TURNED = FrameOrientation(
+    "panda_tcp",
+    HoldOrientation([3.0, 0.2, 0.1]),
+    gains=Gains(natural_frequency=5.0),
+    name="turned",
+    priority=2,
+)
+
+
+def controller(
+    field: NullSpaceField | None = None,
+    *more: Task,
+    metric: Metric | None = None,
+    **options: Any,
+) -> Controller:
+    options = {"null_space_gain": K_N, "metric": metric, **options}
+    return Controller(panda(), [hand(), *more], field or JointCentering(), **options)
+
+
+def run(law: Controller, duration: float = 0.8, **options: Any) -> Rollout:
+    settings = {"log_period": 0.02, "integrator": Dop853(rtol=1e-10, atol=1e-10)}
+    v0 = 0.2 * np.ones(7)
+    return simulate(law, panda().home(), v0, duration=duration, **settings | options)
+
+
+def share(t: float, start: float = START, ramp: float = RAMP) -> float:
+    return smooth_step(t, start, ramp)[0]
+
+
+# --- Proposition 2: V decays through every change ------------------------------------
+
+
+def g_at(field: NullSpaceField, metric: Metric, state: RobotState) -> FieldSample:
+    sample, at = FieldSample.allocate(7), MetricSample.allocate(7)
+    return field.evaluate(state, metric.evaluate(state, at), metric.form, sample)
+
+
+@given(t=st.floats(-0.5, 2.0), seed=st.integers(0, 2**32 - 1))
+def test_the_rate_of_what_is_in_between_is_exact(t: float, seed: int) -> None:
+    """Of a field that changes to another, and before it is there to a third."""
+    # Where a change begins or ends it is C², not more.
+    assume(all(abs(t - edge) > 0.01 for edge in (0.0, 0.6, 1.0, 1.4)))
+    rng = np.random.default_rng(seed)
+    law, metric = controller(), IdentityMetric()
+    law.at(0.0).ramp(1.0).field(posture(), 0.5 * Manipulability("panda_tcp"))
+    law.at(0.6).ramp(0.8).field(TargetPosture("home"))
+    state = panda().state(t, panda().random_configuration(rng), rng.standard_normal(7))
+    exact = g_at(law.field, metric, state).g_dot.copy()
+
+    def g(at: RobotState) -> Array:
+        return g_at(law.field, metric, at).g.copy()
+
+    # Differences along the flow are good to about 1e-9 of g'.
+    np.testing.assert_allclose(
+        exact, rate_along_flow(g, state), atol=1e-8 * (1.0 + np.abs(exact).max())
+    )
+
+
+CHANGES: dict[str, Callable[[Controller], Any]] = {
+    "field": lambda law: law.at(START).ramp(RAMP).field(Manipulability("panda_tcp")),
+    "several fields": lambda law: (
+        law.at(START).ramp(RAMP).field(posture(), Manipulability("panda_tcp"))
+    ),
+    "rest": lambda law: law.at(START).ramp(RAMP).field(),
+    "weight": lambda law: law.at(START).ramp(RAMP).weight("joint_centering", 3.0),
+    "gains": lambda law: law.at(START).ramp(RAMP).gains("hand", COUPLED),
+    "all": lambda law: (
+        law.at(START).ramp(RAMP).field(posture(), Rest()).gains("hand", COUPLED)
+    ),
+    "two at a time": lambda law: (
+        law.at(START).ramp(RAMP).field(posture()),
+        law.at(START + 0.1).ramp(0.1).field(JointCentering()),
+        law.at(START + 0.15).ramp(0.3).weight("joint_centering", 2.0),
+    ),
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+@pytest.mark.parametrize("metric", [IdentityMetric(), MassMatrixMetric()])
+def test_proposition_2_holds_all_the_way(what: str, metric: Metric) -> None:
+    """‖e_N‖_W decays like exp(-K_N t) before, through and after the change."""
+    law = controller(metric=metric)
+    CHANGES[what](law)
+    log = run(law)
+    expected = log["null_space_norm"][0] * np.exp(-K_N * log.t)
+    assert log["null_space_norm"][0] > 0.1
+    np.testing.assert_allclose(log["null_space_norm"], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("metric", [IdentityMetric(), MassMatrixMetric()])
+def test_proposition_2_holds_while_its_gain_changes(metric: Metric) -> None:
+    """‖e_N‖_W' = -K_N(t) ‖e_N‖_W."""
+    law = controller(metric=metric)
+    law.at(START).ramp(RAMP).null_space_gain(15.0).field(posture())
+    log = run(law)
+    passed = [
+        quad(lambda t: K_N + (15.0 - K_N) * share(t), 0.0, end, points=[START])[0]
+        for end in log.t
+    ]
+    expected = log["null_space_norm"][0] * np.exp(-np.array(passed))
+    np.testing.assert_allclose(log["null_space_norm"], expected, rtol=1e-6)
+    np.testing.assert_array_equal(law.null_space_gain, 15.0 * np.eye(7))
+
+
+def test_in_the_end_the_field_is_the_new_one() -> None:
+    """Then the controller forgets the old one."""
+    law, new = controller(), posture()
+    law.at(START).ramp(RAMP).field(new)
+    q, v = panda().home(), np.zeros(7)
+    law.compute(START + RAMP, q, v)
+    assert law.field != placed(new, panda())
+    law.compute(START + RAMP + KEPT + 1e-9, q, v)
+    assert terms_of(law.field) == (placed(new, panda()),)
+    law.at(2.0).ramp(RAMP).weight(new.name, 0.5)
+    law.compute(2.0 + RAMP + 1.1 * KEPT, q, v)
+    assert terms_of(law.field) == (replace(placed(new, panda()), weight=0.5),)
+
+
+# --- the error equation --------------------------------------------------------------
+
+
+def solution(log: Rollout, gains: Callable[[float], tuple[Array, Array]]) -> Array:
+    """Return e(t) of e'' + Kv(t) e' + Kp(t) e = 0 from the log's first error."""
+    m = log["task.hand.error"].shape[1]
+
+    def rate(t: float, x: Array) -> Array:
+        Kp, Kv = gains(t)
+        return np.r_[x[m:], -Kv @ x[m:] - Kp @ x[:m]]
+
+    first = np.r_[log["task.hand.error"][0], log["task.hand.error_rate"][0]]
+    found = solve_ivp(
+        rate, (0.0, log.t[-1]), first, "DOP853", log.t, rtol=1e-11, atol=1e-13
+    )
+    return found.y[:m].T
+
+
+def far() -> FramePosition:
+    """Return a hand that is 10 cm from its path."""
+    return replace(
+        hand(), trajectory=Circle(0.05, 2.0, [0.45, 0.1, 0.5], normal=[1.0, 0.0, 0.0])
+    )
+
+
+def test_the_error_equation_holds_while_gains_change() -> None:
+    """Of two changes that overlap, by coupled gains, beside an integrated solution."""
+    law = Controller(panda(), [far()], JointCentering(), null_space_gain=K_N)
+    law.at(START).ramp(RAMP).gains("hand", COUPLED)
+    law.at(START + 0.1).ramp(0.15).gains("hand", Gains([9.0, 16.0, 25.0], 9.0))
+
+    def gains(t: float) -> tuple[Array, Array]:
+        Kp, Kv = GAINS.matrices(3)
+        for new, start, ramp in (
+            (COUPLED, START, RAMP),
+            (Gains([9.0, 16.0, 25.0], 9.0), START + 0.1, 0.15),
+        ):
+            s = share(t, start, ramp)
+            Kp, Kv = (
+                (1.0 - s) * old + s * to
+                for old, to in zip((Kp, Kv), new.matrices(3), strict=True)
+            )
+        return Kp, Kv
+
+    log = run(law)
+    error = log["task.hand.error"]
+    assert np.abs(error[0]).max() > 0.05
+    np.testing.assert_allclose(error, solution(log, gains), rtol=0, atol=1e-8)
+    # It is another motion than with either gains.
+    for one in (GAINS, COUPLED):
+        other = solution(log, lambda t, one=one: one.matrices(3))
+        assert np.abs(error - other).max() > 1e-3
+
+
+@pytest.mark.parametrize("priority", [1, 2])
+def test_the_error_equation_of_other_tasks_holds_while_one_comes_and_goes(
+    priority: int,
+) -> None:
+    law = Controller(panda(), [far()], JointCentering(), null_space_gain=K_N)
+    law.at(0.1).ramp(0.2).add(replace(TURNED, priority=priority))
+    law.at(0.4).ramp(0.3).remove("turned").weight("joint_centering", 0.1)
+    log = run(law)
+    expected = solution(log, lambda t: GAINS.matrices(3))
+    np.testing.assert_allclose(log["task.hand.error"], expected, rtol=0, atol=1e-8)
+    # While it counts fully its own error obeys its own equation.
+    t, e = log.t, log["task.turned.error"]
+    alone = (t >= 0.3) & (t <= 0.4)
+    first = np.flatnonzero(alone)[0]
+    s, w = (t[alone] - t[first])[:, None], 5.0
+    rate = log["task.turned.error_rate"][first]
+    expected = np.exp(-w * s) * (e[first] + (rate + w * e[first]) * s)
+    np.testing.assert_allclose(e[alone], expected, rtol=0, atol=1e-8)
+
+
+# --- efforts -------------------------------------------------------------------------
+
+
+def efforts(law: Controller, times: Array) -> Array:
+    """Return efforts at one state while time goes on."""
+    q, v = panda().home(), np.full(7, 0.1)
+    return np.array([law.compute(t, q, v).tau for t in times])
+
+
+def still(*more: Task, **options: Any) -> Controller:
+    """Return a controller whose effort changes with the state alone."""
+    task = FramePosition("panda_tcp", Hold([0.5, 0.1, 0.4]), gains=GAINS, name="hand")
+    options = {"null_space_gain": K_N, **options}
+    return Controller(panda(), [task, *more], JointCentering(), **options)
+
+
+FINAL: dict[str, tuple[Callable[[], Controller], Any, Callable[[], Controller]]] = {
+    "gains": (
+        still,
+        lambda change: change.gains("hand", COUPLED),
+        lambda: Controller(
+            panda(),
+            [replace(still().tasks[0], gains=COUPLED)],
+            JointCentering(),
+            null_space_gain=K_N,
+        ),
+    ),
+    "null-space gain": (
+        still,
+        lambda change: change.null_space_gain(9.0),
+        lambda: still(null_space_gain=9.0),
+    ),
+    "add": (still, lambda change: change.add(TURNED), lambda: still(TURNED)),
+    "remove": (
+        lambda: still(TURNED),
+        lambda change: change.remove("turned"),
+        still,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", FINAL)
+@pytest.mark.parametrize("ramp", [RAMP, 0.0])
+def test_efforts_go_over_as_the_ramp_does(what: str, ramp: float) -> None:
+    """At one state: (1 - s) times the old effort plus s times the new; a ramp of 0 s is
+    a jump at its time."""
+    before, change, after = FINAL[what]
+    law = before()
+    change(law.at(START).ramp(ramp))
+    times = np.linspace(0.0, 0.8, 41)
+    s = np.array([share(t) if ramp else float(t >= START) for t in times])[:, None]
+    (old,), (new,) = efforts(before(), times[:1]), efforts(after(), times[:1])
+    assert np.abs(new - old).max() > 0.1
+    expected = (1.0 - s) * old + s * new
+    np.testing.assert_allclose(efforts(law, times), expected, rtol=0, atol=1e-10)
+    # To the last bit where nothing changes any more.
+    np.testing.assert_array_equal(efforts(law, times[times > 0.6])[0], new)
+
+
+def test_the_effort_does_not_jump_and_ends_as_the_new_field_s() -> None:
+    law = controller()
+    law.at(START).ramp(RAMP).field(posture())
+    times = np.arange(0.0, 0.8, 1e-4)
+    # One state, moving time: what is left is the circle's own motion and the ramp's.
+    changing = efforts(law, times)
+    old, final = (efforts(controller(f), times) for f in (None, posture()))
+    rtol = {"rtol": 1e-12, "atol": 1e-12}
+    np.testing.assert_allclose(changing[times < START], old[times < START], **rtol)
+    over = times >= START + RAMP
+    np.testing.assert_allclose(changing[over], final[over], **rtol)
+    most = np.abs(final - old).max()
+    # The quintic's slope is at most 15/8 over the ramp; g' adds its second derivative.
+    steepest = most * (15 / 8 / RAMP + 10 / np.sqrt(3) / RAMP**2 / K_N) * 1e-4
+    circles = np.abs(np.diff(old, axis=0)).max() + np.abs(np.diff(final, axis=0)).max()
+    assert np.abs(np.diff(changing, axis=0)).max() < 2.0 * steepest + circles
+
+
+def test_a_change_of_mind_begins_where_the_field_is() -> None:
+    law = controller()
+    law.at(0.1).ramp(0.4).field(posture())
+    taus = []
+    for t in np.arange(0.0, 1.2, 1e-3):
+        if abs(t - 0.3) < 1e-9:  # half-way: back to rest
+            law.at(0.3).ramp(0.4).field()
+        taus.append(law.compute(t, panda().home(), np.zeros(7)).tau)
+    # 1e-3 s of a change over 0.4 s: a jump would be the whole of it.
+    steps = np.abs(np.diff(taus, axis=0)).max(axis=1)
+    assert steps.max() < 0.05 * np.abs(np.ptp(taus, axis=0)).max()
+    law.compute(0.7 + 1.1 * KEPT, panda().home(), np.zeros(7))
+    assert law.field == Rest()
+
+
+# --- what is on the time line --------------------------------------------------------
+
+
+def test_calls_can_be_chained_and_are_values() -> None:
+    law = controller()
+    law.at(2.0).ramp(0.5).gains("hand", COUPLED).add(TURNED).remove("hand")
+    law.at(1.0).gains("hand", GAINS)
+    turned = placed(TURNED, panda())
+    assert law.changes == (
+        ChangeGains("hand", GAINS, at=1.0),
+        ChangeGains("hand", COUPLED, at=2.0, ramp=0.5),
+        AddTask(turned, at=2.0, ramp=0.5),
+        RemoveTask("hand", at=2.0, ramp=0.5),
+    )
+    given = controller(changes=law.changes)
+    assert given.changes == law.changes
+    times = np.linspace(0.0, 3.0, 16)
+    np.testing.assert_array_equal(efforts(given, times), efforts(law, times))
+    assert [task.name for task in given.tasks] == ["turned"]
+    assert law.weight_of("turned", 2.25) == pytest.approx(0.5)
+    with pytest.raises(ControllerError, match="no task 'hand'"):
+        law.weight_of("hand", 0.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "kind", "message"),
+    [
+        (
+            lambda c: c.at(0).field(Uncontrolled()),
+            ControllerError,
+            "uncontrolled null space cannot be blended with a controlled one",
+        ),
+        (
+            lambda c: c.at(0).ramp(-1).field(Rest()),
+            ControllerError,
+            "^ChangeField: ramp: -1 is negative; must be at least 0$",
+        ),
+        (
+            lambda c: c.at(np.inf).field(Rest()),
+            ControllerError,
+            "^ChangeField: at: .inf is not a finite number$",
+        ),
+        (
+            lambda c: c.at(0).field(Rest(), TargetPosture([0.0, 1.0])),
+            ShapeError,
+            "^fields.1.target: ",
+        ),
+        (
+            lambda c: c.at(0).gains("hand", Gains([1, 2], 1)),
+            GainError,
+            r"^gains: kp has shape \(2,\); needs a number, 3 numbers or",
+        ),
+        (
+            lambda c: c.at(0).null_space_gain([1.0, 2.0]),
+            GainError,
+            r"^gain: null_space_gain has shape \(2,\)",
+        ),
+    ],
+)
+def test_what_cannot_change_is_refused(
+    make: Any, kind: type[HspControlError], message: str
+) -> None:
+    law = controller()
+    before = efforts(law, np.zeros(1))
+    with pytest.raises(kind, match=message):
+        make(law)
+    assert law.changes == ()
+    assert law.field == placed(JointCentering(), panda())
+    np.testing.assert_array_equal(efforts(law, np.zeros(1)), before)
+
+
+def test_the_log_has_the_terms_of_both_and_of_tasks_that_come() -> None:
+    law = controller()
+    other = FramePosition(
+        "panda_link4",
+        Hold([0.3]),
+        gains=Gains(natural_frequency=5.0),
+        name="elbow",
+        axes="x",
+    )
+
+    def change(recorder: Recorder) -> None:
+        done = len(recorder.rows(0)["t"])
+        if done == 3:
+            law.at(0.03).ramp(0.03).field(posture())
+        if done == 5:
+            law.at(0.05).ramp(0.02).add(other)
+
+    options: dict[str, Any] = {"control_period": 0.001, "log_period": 0.01}
+    log = simulate(law, panda().home(), duration=1.15, on_row=change, **options)
+    assert log.meta["tasks"]["elbow"]["rows"] == 1
+    for name, first in (
+        ("field.target_posture.g", 3),
+        ("task.elbow.error", 5),
+    ):
+        seen = np.isfinite(log[name]).all(axis=1)
+        assert not seen[:first].any()
+        assert seen[first + 1 :].all()
+    # What is drawn has a place before it came: where it first was.
+    place = log["task.elbow.actual"]
+    assert (place[:5] == place[5]).all()
+    # The old field's share is gone from the log when it is gone from the sum.
+    np.testing.assert_array_equal(log["field.joint_centering.g"][6:100], 0.0)
+    assert np.isnan(log["field.joint_centering.g"][-1]).all()
+    assert np.isfinite(log["field.g"]).all()
+    assert log["singular_values"].shape[1] == 4
