@@ -18,6 +18,7 @@ from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.config.build_live import (
     interface_of,
+    live_period,
     simulated_robot,
     stop_of,
     tolerance_of,
@@ -29,6 +30,7 @@ from hsp_control.live import (
     InProcessRobot,
     LoopReport,
     OperatorRequests,
+    connect,
     run_loop,
 )
 from hsp_control.live.latency import Quantiles
@@ -68,6 +70,21 @@ def live(options: argparse.Namespace) -> int:
             duration=min(duration, _DRY_RUN),
             **settings,
         )
+        if options.robot is not None:
+            hardware = connect(options.robot, experiment.robot, live_period(experiment))
+            report = run_loop(
+                command,
+                hardware,
+                duration=None if duration == inf else duration,
+                log=loop_log,
+                meta=_meta(experiment),
+                priority=options.priority,
+                **settings,
+            )
+            out.print(_times(report, experiment))
+            out.print(f"The loop: {report.reason}")
+            _convert(loop_log)
+            return 0 if report.ended in {"completed", "operator"} else 2
         with RobotProcess(
             experiment, faults=faults, log=robot_log, log_period=simulation.log_period
         ) as robot:

@@ -331,6 +331,11 @@ def _add_bench(bench: argparse.ArgumentParser) -> None:
 def _add_live(live: argparse.ArgumentParser) -> None:
     _add_configuration(live)
     live.add_argument(
+        "--robot",
+        metavar="NAME://ADDRESS",
+        help="a robot that an installed package can reach; default: a simulated one",
+    )
+    live.add_argument(
         "--duration",
         type=float,
         metavar="S",
@@ -386,15 +391,17 @@ def _add_strict(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strict",
         action="store_true",
-        help="for untrusted files: read only files beside them and bundled ones",
+        help="for untrusted files: read only files beside them and bundled ones, and "
+        "admit only our own types",
     )
     parser.add_argument(
         "--allow",
         action="append",
         default=[],
         type=Path,
-        metavar="DIR",
-        help="another folder to read from; means --strict; may be repeated",
+        metavar="DIR|PACKAGE",
+        help="another folder to read from, or a package to admit types of; means "
+        "--strict; may be repeated",
     )
 
 

@@ -18,6 +18,7 @@ from hsp_control.simulation.plants import (
     ImperfectPlant,
     IntegratedPlant,
     Plant,
+    PlantPart,
     Push,
     RigidBodyPlant,
     RigidContact,
@@ -71,12 +72,16 @@ def build_plant(
 ) -> tuple[Plant, Scenario]:
     """Return the plant, and the scenario with its paths made absolute."""
     chosen = scenario.plant
+    if isinstance(chosen, PlantPart):
+        with document.at("plant"):
+            made = chosen.build(robot, integrator)
+            check_plant(made, robot)
+        return _checked(document, made, scenario), scenario
     model = _BY_NAME[chosen] if isinstance(chosen, str) else chosen
     if model.robot is not None:
         found = located_model(_with_defaults(model.robot, scenario.robot), folder)
         model = model.model_copy(update={"robot": found})
         scenario = scenario.model_copy(update={"plant": model})
-    period = scenario.simulation.control_period
     with document.at("plant"):
         own = _robot(document, model, robot)
         plant = _engine(document, model, own, integrator)
@@ -87,13 +92,19 @@ def build_plant(
             plant = ImperfectPlant(plant, sensors, drives)
         check_plant(plant, robot)
         _check_imperfections(document, own, sensors, drives)
+    return _checked(document, plant, scenario), scenario
+
+
+def _checked(document: Document, plant: Plant, scenario: Scenario) -> Plant:
+    """Return the plant, which has the control period that it needs."""
+    period = scenario.simulation.control_period
     if isinstance(plant, SampledPlant) and period is None:
         raise document.error(
             ("plant",),
             "this plant needs efforts that are held for a period: set "
             "simulation.control_period [s], for example to 0.001",
         )
-    return plant, scenario
+    return plant
 
 
 def _check_imperfections(

@@ -32,6 +32,7 @@ class Document:
     Attributes:
         name: The file's path as it was given, for messages.
         access: Which files the configuration may name.
+        packages: The packages whose types it may name, besides our own; None: all.
     """
 
     def __init__(
@@ -49,6 +50,7 @@ class Document:
         """
         self.name = name
         self.access = ANYWHERE
+        self.packages: frozenset[str] | None = None
         self._data = deepcopy(data)
         self._origins: dict[KeyPath, Mark | str] = dict(marks)
         rename_keys(self._data, self._origins, self.location)

@@ -196,8 +196,9 @@ def load_experiment(
             (whose stored configuration is used), or the data itself.
         overrides: Values to change, each ``key.path=value``.
         strict: For untrusted files: the files that they name must be in the source's
-            own folder, bundled, or in an allowed folder.
-        allow: Further allowed folders, for strict reading.
+            own folder, bundled, or in an allowed folder, and the types that they name
+            must be those of this package, or of an allowed one.
+        allow: Further allowed folders and packages, for strict reading.
 
     Raises:
         ConfigError: If the configuration does not follow the schema.
@@ -229,6 +230,7 @@ def read_document(
     if strict:
         own = [] if isinstance(source, dict) else [Path(document.name).parent]
         document.access = only_within([*own, *packaged_folders(), *allow])
+        document.packages = frozenset(map(str, allow))
     return document
 
 

@@ -1,11 +1,13 @@
 """Check a document against its schema, and report all mistakes in one error."""
 
+from contextlib import AbstractContextManager, nullcontext
 from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config.document import Document
+from hsp_control.declaration.families import only_packages
 from hsp_control.declaration.findings import Finding, Pending, findings
 from hsp_control.declaration.located import locate
 from hsp_control.declaration.mistakes import domain_error
@@ -26,8 +28,12 @@ def validate(document: Document, model: type[Model]) -> Model:
         HspControlError: If it does not follow the model. The message describes the
             first mistake in the order of the file, then up to five others, a line each.
     """
+    admitted: AbstractContextManager[None] = nullcontext()
+    if document.packages is not None:
+        admitted = only_packages(*document.packages)
     try:
-        return model.model_validate(document.to_dict())
+        with admitted:
+            return model.model_validate(document.to_dict())
     except ValidationError as error:
         pending = _first_entries(
             [(each["loc"], each) for each in error.errors(include_url=False)]

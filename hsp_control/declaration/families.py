@@ -1,12 +1,20 @@
 """Families of parts: the members that ``type:`` may name."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from importlib.metadata import EntryPoint, entry_points
 from typing import TYPE_CHECKING, Any, cast
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, SchemaValidator, core_schema
+from pydantic_core import (
+    CoreSchema,
+    PydanticCustomError,
+    SchemaValidator,
+    core_schema,
+)
 
-from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.exceptions import AccessError, ConfigError
 from hsp_control.declaration.plain import joined
 from hsp_control.declaration.quantities import plain
 
@@ -67,6 +75,7 @@ class Family:
         entry = self.entry_points().get(type_name)
         if entry is None:
             return
+        _check_admitted(type_name, entry.value)
         try:
             entry.load()  # it registers itself
         except (ImportError, AttributeError) as error:
@@ -115,6 +124,8 @@ class AnyOf:
                 assert base.family is not None
                 base.family.load(value.get("type"))
         members = self.members
+        if isinstance(value, dict) and (member := members.get(str(value.get("type")))):
+            _check_admitted(str(value["type"]), member.__module__)
         if self._validator is None or members != self._checked:
             self._checked = members
             self._validator = SchemaValidator(_union(members))
@@ -176,6 +187,35 @@ def _is_known(reference: Any, handler: GetJsonSchemaHandler) -> bool:
     except LookupError:
         return False
     return True
+
+
+_ADMITTED: ContextVar[frozenset[str] | None] = ContextVar("_ADMITTED", default=None)
+
+
+@contextmanager
+def only_packages(*names: str) -> Iterator[None]:
+    """Within the block, data may name members of these packages and our own only."""
+    token = _ADMITTED.set(frozenset(names) | {"hsp_control"})
+    try:
+        yield
+    finally:
+        _ADMITTED.reset(token)
+
+
+def _check_admitted(type_name: str, module: str) -> None:
+    """Check that strict reading admits the package of a module.
+
+    Raises:
+        PydanticCustomError: With an `AccessError`, if it does not.
+    """
+    admitted = _ADMITTED.get()
+    package = module.partition(":")[0].partition(".")[0]
+    if admitted is not None and package not in admitted:
+        error = AccessError(
+            f"type {type_name!r} is of the package {package}, which strict reading "
+            f"does not admit; if you trust it, add --allow {package}"
+        )
+        raise PydanticCustomError("value_error", "{error}", {"error": error})
 
 
 def _union(members: "dict[str, type[Part]]") -> CoreSchema:

@@ -1,5 +1,6 @@
 """Real-time control: run a controller on a robot each period, ending in a safe stop."""
 
+from .backends import connect as connect
 from .deadlines import Deadlines as Deadlines
 from .effort_source import EffortSource as EffortSource
 from .faults import Faults as Faults

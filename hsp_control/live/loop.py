@@ -173,7 +173,7 @@ class _Loop:
     def period(self, on_period: Callable[[float], object] | None) -> None:
         """Read a state, send an effort, then log and make the requested changes."""
         reader, limiter = self.reader, self.limiter
-        reader.read(limiter.applied)
+        reader.read(limiter.applied, self.effort_source.controller.limits)
         if reader.fault is not None:
             self.stop("fault", reader.fault, reader.error)
         elif self.requests.reason is not None:

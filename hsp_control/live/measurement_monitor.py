@@ -26,11 +26,28 @@ class MeasurementMonitor:
                 states.
         """
         self._robot, self._tolerance = robot, tolerance
-        limits = own_limits(robot) if limits is None else limits
-        self._lower = limits.lower - tolerance.position_margin
-        self._upper = limits.upper + tolerance.position_margin
-        self._speed = limits.velocity * (1.0 + tolerance.velocity_margin)
+        self._own = own_limits(robot) if limits is None else None
         self.last: Measurement | None = None
+        self._read(limits)
+
+    def follow(self, limits: RobotLimits | None) -> None:
+        """Check against the controller's limits of now, which may change in a run.
+
+        A controller without limits may receive some: then those of the robot's model
+        count as well.
+        """
+        if limits is not self._limits:
+            self._read(limits)
+
+    def _read(self, limits: RobotLimits | None) -> None:
+        self._limits, tolerance = limits, self._tolerance
+        both = [each for each in (limits, self._own) if each is not None]
+        lower = np.max([each.lower for each in both], axis=0)
+        upper = np.min([each.upper for each in both], axis=0)
+        speed = np.min([each.velocity for each in both], axis=0)
+        self._lower = lower - tolerance.position_margin
+        self._upper = upper + tolerance.position_margin
+        self._speed = speed * (1.0 + tolerance.velocity_margin)
 
     def if_new(self, measurement: Measurement | None) -> Measurement | None:
         """Return the measurement if it is later than the last one, else None."""

@@ -99,12 +99,14 @@ class StateReader:
         self._last_arrival = self._clock()
         self._due = self._last_arrival + (1.0 + _READ_MARGIN) * self._period
 
-    def read(self, applied: Array) -> None:
+    def read(self, applied: Array, limits: RobotLimits | None) -> None:
         """Read the period's measurement; predict the state if there is none.
 
         Args:
             applied: The effort that the motors apply, shape (nv,).
+            limits: The controller's limits of now; None: those of the robot's model.
         """
+        self._monitor.follow(limits)
         self.fault = self.error = self.measurement = None
         raw = self._read()
         if raw is not None:

@@ -2,7 +2,8 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf
+from pydantic.json_schema import SkipJsonSchema
 
 from hsp_control.common.exceptions import SceneError
 from hsp_control.config.models.base import (
@@ -14,7 +15,9 @@ from hsp_control.config.models.base import (
     Weights,
 )
 from hsp_control.config.models.robot import LoadModel
+from hsp_control.declaration import AnyOf
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
+from hsp_control.simulation.plants import PlantPart
 
 Share = Annotated[float, Field(ge=0.0, lt=1.0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0)]
@@ -211,10 +214,23 @@ class MujocoPlantModel(FrictionalPlantModel):
     """The ground; it exists only if `contacts` has entries."""
 
 
-AnyPlant = (
+def _installed(plant: object) -> object:
+    """Return the plant of an installed package that a mapping names, if it does."""
+    own = ("rigid_body", "rigid_contacts", "mujoco")
+    if isinstance(plant, dict) and plant.get("type") not in own:
+        family = AnyOf(PlantPart)
+        PlantPart.family.load(plant.get("type"))  # type: ignore[union-attr]
+        if plant.get("type") in family.members:
+            return family.validate(plant)
+    return plant
+
+
+AnyPlant = Annotated[
     Literal["rigid_body", "mujoco"]
     | Annotated[
         RigidBodyPlantModel | ContactPlantModel | MujocoPlantModel,
         Field(discriminator="type"),
     ]
-)
+    | SkipJsonSchema[InstanceOf[PlantPart]],
+    BeforeValidator(_installed),
+]

@@ -70,6 +70,7 @@ class TargetPosture(CompiledCost, type="target_posture"):
             return robot.check_configuration(self.configuration)
         if isinstance(self.target, str):
             return start.q if self.target == "start" else robot.home()
+        assert self.target is not None
         positions = robot.check_tangent(self.target, "the list of joint positions")
         return robot.integrate(robot.neutral(), positions)
 

@@ -3,6 +3,7 @@
 from .contact_plant import ContactKind as ContactKind
 from .contact_plant import ContactPlant as ContactPlant
 from .contact_plant import RigidContact as RigidContact
+from .declared import PlantPart as PlantPart
 from .imperfect_plant import ImperfectPlant as ImperfectPlant
 from .integrated_plant import IntegratedPlant as IntegratedPlant
 from .plant import ContinuousPlant as ContinuousPlant

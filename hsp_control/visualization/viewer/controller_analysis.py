@@ -1,6 +1,7 @@
 """Quantities of a controller that the viewer draws: field terms and projector."""
 
 from collections.abc import Iterator
+from copy import copy
 from typing import TypeVar
 
 import numpy as np
@@ -18,6 +19,18 @@ _Term = TypeVar("_Term", bound=NullSpaceField)
 def terms_of_type(field: NullSpaceField, kind: type[_Term]) -> Iterator[_Term]:
     """Yield the terms of a field that are instances of a class."""
     yield from (term for term in terms_of(field) if isinstance(term, kind))
+
+
+def from_the_start(controller: Controller) -> Controller:
+    """Return the controller as it is before a run; its changes are all ahead.
+
+    A controller forgets changes that are complete, but the rows of a run begin before.
+    """
+    if not controller.changes:
+        return controller
+    fresh = copy(controller)
+    fresh.restart()
+    return fresh
 
 
 def null_space_projector(controller: Controller, state: RobotState) -> Array:

@@ -11,6 +11,7 @@ from hsp_control.visualization.viewer.appearance import CHALK, INK
 from hsp_control.visualization.viewer.clip import Clip, Track
 from hsp_control.visualization.viewer.commands import Command, delete, set_property
 from hsp_control.visualization.viewer.contacts import Contacts
+from hsp_control.visualization.viewer.controller_analysis import from_the_start
 from hsp_control.visualization.viewer.distances import Distances
 from hsp_control.visualization.viewer.ellipsoid import Ellipsoid
 from hsp_control.visualization.viewer.influence import Influence
@@ -63,9 +64,11 @@ def all_layers(
         "contacts": Contacts(robot, motion, f"{root}/contacts"),
     }
     if controller is not None:
-        field = controller.field
+        controller = from_the_start(controller)
         layers |= {
-            "influence": Influence(field, obstacles.shapes, f"{root}/influence"),
+            "influence": Influence(
+                controller.field, obstacles.shapes, f"{root}/influence"
+            ),
             "distances": Distances(controller, f"{root}/distances", ink),
         }
         if "field.g" in motion.rows:

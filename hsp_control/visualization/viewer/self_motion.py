@@ -17,7 +17,10 @@ from hsp_control.visualization.viewer.appearance import (
 from hsp_control.visualization.viewer.arrows import arrow_tracks, unit_arrow
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object
-from hsp_control.visualization.viewer.controller_analysis import null_space_projector
+from hsp_control.visualization.viewer.controller_analysis import (
+    from_the_start,
+    null_space_projector,
+)
 from hsp_control.visualization.viewer.materials import always_visible, material
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.scene_path import path_element
@@ -105,10 +108,11 @@ class SelfMotion:
 
         Each has the shape (N, njoints - 1, 3).
         """
-        data = self._controller.robot.model.createData()
+        controller = from_the_start(self._controller)
+        data = controller.robot.model.createData()
         rows: list[tuple[Array, Array, Array]] = []
         for state, g in zip(motion.states(), motion.rows["field.g"], strict=True):
-            P = null_space_projector(self._controller, state)
+            P = null_space_projector(controller, state)
             positions = np.array([pose.translation for pose in state.data.oMi])
             velocities = _joint_velocities(state, P @ state.v, data)
             fields = _joint_velocities(state, P @ g, data)

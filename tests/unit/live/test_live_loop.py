@@ -1,5 +1,6 @@
 """The live loop's logic: robots in this process, clocks that nobody waits for."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -626,3 +627,26 @@ def test_the_monitor_uses_the_limits_of_the_controller() -> None:
     assert report.ended == "fault"
     assert "outside" in report.reason
     assert report.t < 3.0
+
+
+@pytest.mark.parametrize("at_first", [None, Limits()])
+def test_the_monitor_follows_limits_that_change(at_first: Limits | None) -> None:
+    q = start()
+    wide = PositionRange(q - 0.3, q + 0.3)
+    narrow = PositionRange(q - 0.05, q + 0.05)
+    unaware = law()
+
+    class Beyond(Command):
+        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
+            super().effort(t, q, v, period)
+            return unaware.compute(t, q, v).tau
+
+    source = Beyond(law(limits=at_first))
+    source.controller.at(0.05).ramp(0.05).limits(Limits(position=wide))
+    source.controller.at(0.2).ramp(0.05).limits(Limits(position=narrow))
+    report = run_loop(source, Rig(), duration=5.0)
+    assert report.ended == "fault"
+    assert re.search("panda_joint. is at .*, outside", report.reason)
+    # Only the narrow range is left so early; the ranges grow by 0.02 of tolerance.
+    reference = run_loop(Beyond(law(limits=Limits(position=wide))), Rig(), duration=5.0)
+    assert 0.2 < report.t < reference.t

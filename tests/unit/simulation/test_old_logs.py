@@ -1,7 +1,14 @@
-"""Logs of version 0.1 have ``robot.freedoms`` instead of ``robot.dofs``; they load."""
+"""Logs of version 0.1 load, are drawn and run again.
 
+They have ``robot.freedoms`` instead of ``robot.dofs``, the class of a task instead of
+what its error consists of, and a configuration with the keys of that version.
+"""
+
+import json
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from hsp_control import Rollout, load_experiment
@@ -18,6 +25,25 @@ SMALL = {
 }
 
 
+EVERY: dict[str, Any] = {
+    "robot": {"name": "panda"},
+    "tasks": {
+        "position": {"type": "frame_position", "axes": "xz", "priority": 2},
+        "orientation": {"type": "frame_orientation", "priority": 3},
+        "pose": {"type": "frame_pose", "priority": 4},
+        "pointing": {"type": "pointing", "direction": [0, 0, -1], "priority": 5},
+        "mass": {"type": "center_of_mass", "axes": "xy", "priority": 6},
+        "posture": {"type": "joint_posture", "joints": ["panda_joint1"], "priority": 7},
+        "relative": {"type": "relative_pose", "reference": "panda_link4",
+                     "priority": 8},
+        "momentum": {"type": "angular_momentum", "priority": 9,
+                     "trajectory": {"type": "hold", "point": [0, 0, 0]}},
+    },
+    "simulation": {"duration": 0.01},
+}  # fmt: skip
+"""A task of each type."""
+
+
 @pytest.fixture(scope="module")
 def new() -> Rollout:
     return load_experiment(SMALL).run()
@@ -28,7 +54,13 @@ def old(new: Rollout) -> Rollout:
     """A log as version 0.1 wrote it."""
     robot = dict(new.meta["robot"])
     robot["freedoms"] = robot.pop("dofs")
-    return Rollout(new.columns, {**new.meta, "robot": robot})
+    tasks = {name: older(task) for name, task in new.meta["tasks"].items()}
+    return Rollout(new.columns, {**new.meta, "robot": robot, "tasks": tasks})
+
+
+def older(task: dict[str, Any]) -> dict[str, Any]:
+    """Return the meta data of a task as version 0.1 wrote it."""
+    return {key: each for key, each in task.items() if key not in ("error", "drawn")}
 
 
 def check(read: Rollout, new: Rollout) -> None:
@@ -70,6 +102,30 @@ def test_an_old_journal_is_loaded(
     assert read.status == ("interrupted" if truncated else "completed")
     check(read, new)
     check(Rollout.load(read.save(tmp_path / "again.npz")), new)
+
+
+def test_the_error_of_every_task_is_known_from_its_class() -> None:
+    tasks = load_experiment(EVERY).run().meta["tasks"]
+    assert len(tasks) == 8
+    old = {name: older(task) for name, task in tasks.items()}
+    assert old != tasks
+    assert renamed_entries({"tasks": old})["tasks"] == tasks
+
+
+def test_a_task_of_another_class_stays_as_it_is() -> None:
+    tasks = {"mine": {"type": "MyTask", "rows": 3}, "odd": {"type": "FramePosition"}}
+    assert renamed_entries({"tasks": tasks})["tasks"] == tasks
+
+
+def test_an_old_log_is_run_again(new: Rollout, old: Rollout, tmp_path: Path) -> None:
+    """Its configuration holds every key, null where there was nothing."""
+    config = json.loads(json.dumps(new.config))
+    config["tasks"]["tip"] |= {"schedule": None, "blend": None, "priority": 1}
+    config |= {"limits": None, "contacts": {}, "base": None}
+    del config["changes"]
+    old.meta["config"] = config
+    again = load_experiment(old.save(tmp_path / "old.npz")).run()
+    np.testing.assert_array_equal(again.tau, new.tau)
 
 
 @pytest.mark.parametrize("robot", [None, [], "freedoms", {"dofs": ["a"]}, {}])

@@ -99,7 +99,7 @@ def test_times_that_fit_but_for_rounding() -> None:
         ([np.nan] * 6, None, NonFiniteError, r"^configuration q\[0\] is nan"),
         (None, [0.0] * 6, ShapeError, r"^velocity v0 has shape \(6,\); planar3r needs"),
         (None, [0.0, np.inf, 0.0], NonFiniteError, r"^velocity v0\[1\] is inf"),
-        (None, "fast", ShapeError, r"^velocity v0 is not an array of 3 numbers$"),
+        (None, "fast", ShapeError, r"^velocity v0 is 'fast' \(str\); needs 3 numbers$"),
     ],
 )
 def test_starts_that_are_none(q0: Any, v0: Any, kind: Any, message: str) -> None:

@@ -38,10 +38,13 @@ from hsp_control.visualization.viewer import (
     live,
 )
 from hsp_control.visualization.viewer.commands import CAPTION, CLIP, unpack
-from hsp_control.visualization.viewer.controller_analysis import null_space_projector
+from hsp_control.visualization.viewer.controller_analysis import (
+    from_the_start,
+    null_space_projector,
+)
 from hsp_control.visualization.viewer.ellipsoid import SECONDS, principal_axes
 from hsp_control.visualization.viewer.influence import zone
-from hsp_control.visualization.viewer.motion import drawn_times
+from hsp_control.visualization.viewer.motion import drawn_times, motion_of
 from hsp_control.visualization.viewer.run_drawing import LAYERS
 
 PLANAR, SPATIAL = "paper/4_moving_obstacle", "panda_obstacle"
@@ -189,6 +192,27 @@ def test_the_robot_of_the_view_may_be_another_object(recorder: Recorder) -> None
     for path in paths:
         first, second = (clip.values(path, "scale") for clip in clips)
         np.testing.assert_allclose(first, second, atol=1e-12)
+
+
+def test_arrows_are_of_the_tasks_of_their_time(recorder: Recorder) -> None:
+    """Also of those that are gone at the end: the controller has forgotten them."""
+    robot = Robot.load("panda")
+    elbow = FramePosition("panda_link4", axes="z", name="elbow")
+    controller = Controller(robot, [FramePosition(), elbow], TargetPosture([0.5] * 7))
+    controller.at(0.1).ramp(0.0).remove("elbow")
+    run = simulate(controller, robot.home(), duration=1.5)
+    assert [task.name for task in controller.tasks] == ["end_effector"]
+    fresh = from_the_start(controller)
+    assert [task.name for task in fresh.tasks] == ["end_effector", "elbow"]
+    motion = motion_of(robot, run)
+    free = [
+        np.trace(null_space_projector(fresh, state))  # its rank: the free motions
+        for state in motion.states()
+    ]
+    wanted = np.where(motion.times < 0.1, 3.0, 4.0)
+    np.testing.assert_allclose(free, wanted, atol=1e-9)
+    Viewer(robot, transport=recorder).play(run, controller=controller)
+    assert [task.name for task in controller.tasks] == ["end_effector"]  # left alone
 
 
 # -- distances ------------------------------------------------------------------------
