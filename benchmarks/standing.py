@@ -153,7 +153,7 @@ class Standing:
         return hsp.Controller(
             robot,
             tasks,
-            hsp.TargetPosture(configuration=self.q0, weights=weights),
+            hsp.TargetPosture(self.q0, weights=weights),
             null_space_gain=GAIN,
             singularity_threshold=threshold,
             contacts=[

@@ -7,8 +7,8 @@ of a field that may move in time.
 The names that most programs need are here. All others are in namespaces:
 ``hsp.trajectories``, ``hsp.tasks``, ``hsp.fields``, ``hsp.metrics``, ``hsp.contacts``,
 ``hsp.limits``, ``hsp.shapes``, ``hsp.changes``, ``hsp.compensation``,
-``hsp.integrators``, ``hsp.plants``, ``hsp.live``, ``hsp.sweeps``, ``hsp.viewer`` and
-``hsp.errors``.
+``hsp.integrators``, ``hsp.robot``, ``hsp.plants``, ``hsp.live``, ``hsp.sweeps``,
+``hsp.viewer`` and ``hsp.errors``.
 """
 
 from importlib import import_module
@@ -18,6 +18,7 @@ from hsp_control.common.version import __version__ as __version__
 
 if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from . import live as live
+    from . import robot as robot
     from . import sweeps as sweeps
     from . import tasks as tasks
     from . import trajectories as trajectories
@@ -102,6 +103,7 @@ _NAMESPACES = {
     "live": "live",
     "metrics": "null_space.metrics",
     "plants": "simulation.plants",
+    "robot": "robot",
     "shapes": "geometry.shapes",
     "sweeps": "sweeps",
     "tasks": "tasks",
@@ -135,7 +137,7 @@ def _hint(name: str) -> str:
         return ""
     for namespace, room in _NAMESPACES.items():
         if hasattr(import_module(f"{__name__}.{room}"), name):
-            return f"; it is hsp_control.{namespace}.{name}"
+            return f"; there is hsp_control.{namespace}.{name}"
     return ""
 
 

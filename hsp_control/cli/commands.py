@@ -172,7 +172,8 @@ def check(options: argparse.Namespace) -> int:
     _warn_of_rates(experiment)
     if output.damped:
         _out.print(
-            "The tasks are singular at the start: the law is damped there, not exact."
+            f"The tasks {output.damped} are singular at the start: the law is damped "
+            "there, not exact."
         )
     _out.print(f"{options.config}: OK")
     return 0
@@ -319,7 +320,7 @@ def _summary(rollout: Rollout) -> Table:
         f"smallest singular value {rollout['singular_values'].min():.3g}",
     )
     table.add_row("effort", f"largest {np.abs(rollout.tau).max():.3g}")
-    if damped := int(rollout["damped"].sum()):
+    if damped := int((rollout["damped"] > 0.0).sum()):
         table.add_row("singular", f"{damped} rows: the law was damped there, not exact")
     return table
 

@@ -13,7 +13,7 @@ from hsp_control.constraints.contacts.unactuated import UnactuatedRows, unactuat
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
 from hsp_control.law import Outcome, Resolution
-from hsp_control.law.outcome import OUTCOMES
+from hsp_control.law.outcome import EXACT, outcome_of
 from hsp_control.null_space.fields import FieldSample, FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
@@ -38,6 +38,9 @@ class ActiveStack:
         first_task_row: Index of the first row that belongs to a task.
         rows: All rows stacked: J, J', e, e', a_x.
         row_count: Number of rows.
+        level_names: The names of each level's tasks; ``contacts`` for those at the top.
+        damped_level: Where the last `resolve` was damped, the first level with a
+            bounded inverse, 1 the highest.
         has_forces: Whether contacts exert forces.
         memory: The rows, the field and the law's results, in one block: see `Record`.
         acceleration: The law's acceleration, shape (nv,).
@@ -107,6 +110,11 @@ class ActiveStack:
             plans.append(partial(each.task.compile, state, feedback[each.key], sample))
             row += each.task.rows
         self._plans = plans
+        self.damped_level = 0
+        self.level_names = [
+            *(["contacts"] if first else []),
+            *(", ".join(task.name for task in level) for level in self.levels),
+        ]
         self._rest = None
         if free:
             self._rest = UnactuatedRows(robot, base, free)
@@ -120,10 +128,13 @@ class ActiveStack:
         Args:
             t: The time of the state [s].
         """
-        outcome = 0.0
+        code = 0.0
         for step in self._steps:
-            outcome = step(t)
-        return OUTCOMES[int(outcome)]
+            code = step(t)
+        if code == 0.0:
+            return EXACT
+        self.damped_level = int(code)
+        return outcome_of(code)
 
     def prepare(self) -> None:
         """Compile what `resolve` calls, now instead of at its first call."""

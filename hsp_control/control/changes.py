@@ -34,6 +34,21 @@ from hsp_control.trajectories import (
 )
 from hsp_control.trajectories.crossfade import AnyReference
 
+__all__ = [
+    "AddTask",
+    "Change",
+    "ChangeContact",
+    "ChangeField",
+    "ChangeGains",
+    "ChangeLimits",
+    "ChangeNullSpaceGain",
+    "ChangeReference",
+    "ChangeWeight",
+    "Changes",
+    "MoveObstacle",
+    "RemoveTask",
+]
+
 
 class Change(Part, ABC, family="changes", error=ControllerError):
     """A change that begins at a time and takes a while; efforts stay continuous.
@@ -209,7 +224,7 @@ class ChangeWeight(Change, type="weight"):
         if self.field not in there:
             raise ControllerError(
                 f"there is no field {self.field!r}{did_you_mean(self.field, there)} "
-                f"(there are {listing(there)})"
+                f"(there are {listing(there) or 'none'})"
             )
         terms, k = list(setup.terms), there[self.field]
         old = terms[k]

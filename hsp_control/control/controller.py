@@ -361,7 +361,9 @@ class Controller:
             out._rows = active.row_count
             out._acceleration = None if a is active.acceleration else a.copy()
             out.forces = forces.copy() if active.has_forces else forces
-            out.damped = outcome is DAMPED
+            out.damped = ""
+            if outcome is DAMPED:
+                out.damped = active.level_names[active.damped_level - 1]
             out.status, out.relaxation = status, relaxation
             return out
 

@@ -20,8 +20,9 @@ class ControlOutput:
     Attributes:
         tau: Effort M a + N minus what the contact forces supply, shape (nv,)
             [N·m or N].
-        damped: Whether a task is so near a singularity that its inverse is bounded,
-            and the law not exact.
+        damped: The tasks of the highest level that is so near a singularity that its
+            inverse is bounded, and the law not exact: their names, or ``contacts``.
+            Empty, and so false, where the law is exact.
         forces: Forces at the points of the active contacts, in the axes of each
             contact (two tangents, normal), shape (3 points,) [N]; see
             `ActiveStack.support`.
@@ -42,7 +43,7 @@ class ControlOutput:
     )
 
     tau: Array
-    damped: bool
+    damped: str
     forces: Array
     status: Status
     relaxation: float

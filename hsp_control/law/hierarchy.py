@@ -68,8 +68,10 @@ def resolve_levels(
     scratch: LevelScratch,
     e_N: Array,
     a: Array,
-) -> bool:
-    """Write e_N and a; return whether a singular value was damped.
+) -> int:
+    """Write e_N and a; return the first level with a damped singular value.
+
+    1 is the highest level; 0: none was damped.
 
     Args:
         task: All tasks, level after level: J, J' and a_x, m rows.
@@ -91,7 +93,7 @@ def resolve_levels(
     Q, QJ, G_inverse = scratch.Q, scratch.QJ, scratch.G_inverse
     square, rows = scratch.square, scratch.rows
     n = v.shape[0]
-    damped = False
+    damped = 0
     _invert(metric.L, Q)
     for i in range(n):
         a[i] = 0.0
@@ -100,8 +102,9 @@ def resolve_levels(
         end = ends[level]
         block = slice(start, end)
         G_inv, rest = G_inverse[block, block], rows[0, start:end]
-        if _open_level(J[block], Q, QJ[:, block], G_inv, square, threshold):
-            damped = True
+        bounded = _open_level(J[block], Q, QJ[:, block], G_inv, square, threshold)
+        if bounded and damped == 0:
+            damped = level + 1
         for k in range(start, end):
             total = a_x[k]
             for i in range(n):

@@ -14,6 +14,20 @@ class Outcome(IntEnum):
     """The acceleration contains NaN or inf."""
 
 
-OUTCOMES = EXACT, DAMPED, NOT_FINITE = tuple(Outcome)
-"""By number: a native call returns floats. And by name, for the step: up to Python 3.11
-`Outcome.EXACT` takes 80 ns."""
+EXACT, DAMPED, NOT_FINITE = tuple(Outcome)
+"""By name, for the step: up to Python 3.11 `Outcome.EXACT` takes 80 ns."""
+
+BEYOND_ANY_LEVEL = 1_000_000
+"""What kernels return if the acceleration is not finite."""
+
+
+def outcome_of(code: float) -> Outcome:
+    """Return the outcome that a kernel's number means.
+
+    Args:
+        code: 0: exact; from 1 on, the first level with a bounded inverse; or
+            `BEYOND_ANY_LEVEL`.
+    """
+    if code == 0.0:
+        return EXACT
+    return DAMPED if code < BEYOND_ANY_LEVEL else NOT_FINITE

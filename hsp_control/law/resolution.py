@@ -16,15 +16,12 @@ from hsp_control.common.linalg import (
 from hsp_control.common.native import bind
 from hsp_control.law.hierarchy import LevelScratch, resolve_levels
 from hsp_control.law.law import acceleration, null_space_command
-from hsp_control.law.outcome import OUTCOMES, Outcome
+from hsp_control.law.outcome import BEYOND_ANY_LEVEL, Outcome, outcome_of
 from hsp_control.law.problem import Problem
 from hsp_control.law.pseudo_inverse import weighted_pseudo_inverse, whiten
 from hsp_control.null_space.fields import FieldSample
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.tasks import TaskSample
-
-_EXACT, _DAMPED, _NOT_FINITE = map(int, OUTCOMES)
-"""What kernels return."""
 
 
 class Resolved(NamedTuple):
@@ -110,13 +107,11 @@ class Resolution:
             v: Velocity, shape (nv,).
             controls_null_space: False for φ_N = 0, the paper's first simulation.
         """
-        outcome = self.compile(v, controls=controls_null_space)()
-        return Resolved(
-            self.acceleration, self.null_space_error, OUTCOMES[int(outcome)]
-        )
+        code = self.compile(v, controls=controls_null_space)()
+        return Resolved(self.acceleration, self.null_space_error, outcome_of(code))
 
     def compile(self, v: Array, *, controls: bool) -> Callable[[], float]:
-        """Return the call that `resolve` makes; it returns the number of an `Outcome`.
+        """Return the call that `resolve` makes; it returns what `outcome_of` takes.
 
         Args:
             v: The velocity, shape (nv,); the call reads this array each time.
@@ -175,18 +170,20 @@ def _resolve(
     e_N: Array,
     a: Array,
 ) -> int:
-    """Write e_N and a; return the number of an `Outcome`."""
+    """Write e_N and a; return what `outcome_of` takes."""
     m, n = task.jacobian.shape
     Q, X, rows = scratch.wide[1], scratch.square[1], scratch.rows
     u = rows[6, :n]
 
     conflicting = m > n
-    damped = False
+    damped = 0
     if not conflicting:
-        damped = weighted_pseudo_inverse(
-            task.jacobian, metric.L, form, threshold, scratch.wide[0], Q, X
+        damped = int(
+            weighted_pseudo_inverse(
+                task.jacobian, metric.L, form, threshold, scratch.wide[0], Q, X
+            )
         )
-        conflicting = damped and ends.shape[0] > 1
+        conflicting = damped > 0 and ends.shape[0] > 1
     if conflicting:
         levels = LevelScratch(
             scratch.inner, scratch.tall, scratch.square[2], scratch.square, rows
@@ -204,8 +201,8 @@ def _resolve(
     for i in range(n):
         total += a[i]
     if not np.isfinite(total):
-        return _NOT_FINITE
-    return _DAMPED if damped else _EXACT
+        return BEYOND_ANY_LEVEL
+    return damped
 
 
 @kernel

@@ -71,7 +71,7 @@ def run_loop(
             between periods. Ctrl-C (`KeyboardInterrupt`) is the operator's stop, too.
         log: The journal to write; `Rollout.load` reads it also after a crash.
         log_period: Time between two rows [s], a period or longer.
-        scene: Obstacles to log.
+        scene: Obstacles to log; None: those of the controller.
         meta: JSON data to add to the log's.
         start_time: The controller's time at the first state [s].
         priority: Real-time priority (SCHED_FIFO), 1 to 99; None: ordinary scheduling.
@@ -102,7 +102,8 @@ def run_loop(
             effort_source.effort(start_time, first.q, first.v, period)
             safe_stop.effort(reader.state)
             limiter.reset(first.q)
-        loop_log = LoopLog(log, log_period, effort_source, scene, dict(meta or {}))
+        shown = scene or effort_source.controller.scene
+        loop_log = LoopLog(log, log_period, effort_source, shown, dict(meta or {}))
         loop_log.warm_up(reader, limiter)
         effort_source.restart()
         effort_source.controller.compute(start_time, first.q, first.v)  # begins there

@@ -1,5 +1,6 @@
 """The robot: its model, its state, and the kinematic and dynamic terms there."""
 
+from .description.loading import ToolFrame as ToolFrame
 from .friction import JointFriction as JointFriction
 from .integrators import Dop853 as Dop853
 from .integrators import Integrator as Integrator

@@ -71,7 +71,12 @@ class Recorder:
         column("manipulability", (), "-", "det(J W⁻¹ Jᵀ) of all tasks")
         rows_of_tasks = sum(task.rows for task in controller.tasks)
         column("singular_values", (rows_of_tasks,), "-", "of J L⁻ᵀ, W = L Lᵀ")
-        column("damped", (), "-", "1 where the law is damped at a singularity")
+        column(
+            "damped",
+            (),
+            "-",
+            "first level, 1 the highest, that is damped at a singularity; 0: exact",
+        )
         column("status", (), "-", "0 exact law; 1 forces redistributed; 2 limited; "
                "3 limits relaxed")  # fmt: skip
         column("relaxation", (), "(rad or m)/s²", "largest violation of a limit")
@@ -230,7 +235,8 @@ class Recorder:
                 old, ((0, 0), (0, added)), constant_values=np.nan
             )
         columns["singular_values"][i, : len(values)] = values
-        columns["damped"][i] = output.damped
+        level = controller.active_stack.damped_level if output.damped else 0
+        columns["damped"][i] = level
         columns["status"][i] = output.status
         columns["relaxation"][i] = output.relaxation
         self._record_contacts(output)

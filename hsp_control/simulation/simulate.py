@@ -61,7 +61,7 @@ def simulate(
             plant has its own integrator, and needs a control period.
         compensation: Compensators for what the model lacks; they need a control
             period.
-        scene: Obstacles to log.
+        scene: Obstacles to log; None: those of the controller.
         start_time: Time of the first row [s].
         on_progress: Called at every row with the fraction of the run that is done.
         on_row: Called with the recorder after every recorded row.
@@ -101,7 +101,7 @@ def simulate(
             f"{type(plant).__name__} holds the effort during a period: it needs a "
             "control_period [s], for example 0.001"
         )
-    recorder = Recorder(controller, scene or Scene(), rows)
+    recorder = Recorder(controller, scene or controller.scene, rows)
     description = {**plant.describe(), **differing_bodies(plant, robot)}
     meta = {"plant": description, **(meta or {})}
 

@@ -280,7 +280,7 @@ def _field(robot: hsp.Robot, rng: np.random.Generator) -> hsp.NullSpaceField | N
     frame = robot.end_effector
     limited = np.isfinite(robot.position_limits()[0]).all()
     choices: list[Callable[[], hsp.NullSpaceField]] = [
-        lambda: hsp.TargetPosture(configuration=drawn_configurations(robot, rng, 1)[0]),
+        lambda: hsp.TargetPosture(drawn_configurations(robot, rng, 1)[0]),
         lambda: hsp.fields.PointDistance([frame], _ball(rng)),
         lambda: _clearances(robot)[rng.integers(len(_clearances(robot)))],
     ]

@@ -174,7 +174,7 @@ def hold_and_centre(robot: Robot, kind: str) -> float:
             gains=gains,
             name="hand",
         )
-    pull: NullSpaceField = TargetPosture(configuration=robot.integrate(q0, off(0.5)))
+    pull: NullSpaceField = TargetPosture(robot.integrate(q0, off(0.5)))
     if np.isfinite(robot.position_limits()[0]).any() and (high - low < 6.28).any():
         pull = pull + JointCentering(weights=reach**2)
     controller = Controller(robot, [task], pull, null_space_gain=FREQUENCY)

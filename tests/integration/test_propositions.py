@@ -287,7 +287,7 @@ def tracked(which: str) -> tuple[Controller, Rollout]:
     robot = load(case.robot)
     q0 = home(case.robot)
     start = plain(case.robot).placement(q0, FRAMES[case.robot])
-    field = TargetPosture(configuration=robot.integrate(q0, np.full(robot.nv, 0.2)))
+    field = TargetPosture(robot.integrate(q0, np.full(robot.nv, 0.2)))
     metric = METRICS[case.metric][0](robot.nv)
     controller = Controller(robot, case.build(robot, start), field, metric=metric)
     v0 = 0.3 * np.sin(2.0 + np.arange(robot.nv))
@@ -380,7 +380,7 @@ def moving(robot: Robot, name: str) -> NullSpaceField:
     """Return a field that moves in time: an obstacle, and a vector field with ∂g/∂t."""
     lookout = Lissajous([0.2, 0.3, 0.1], [3.0, 2.0, 4.0], center=[0.7, 0.9, 1.1])
     ball = Obstacle("ball", Sphere(0.1), lookout)
-    posture = TargetPosture(configuration=home(name), weights=2.0)
+    posture = TargetPosture(home(name), weights=2.0)
     frame = FRAMES[name]
 
     def wave(state: RobotState) -> Array:
@@ -621,7 +621,7 @@ HELD: dict[str, Held] = {
             "panda_tcp", Hold(start.translation), gains=Gains(natural_frequency=10)
         ),
         lambda robot: (
-            2.0 * JointCentering() + 3.0 * TargetPosture(configuration=posture())
+            2.0 * JointCentering() + 3.0 * TargetPosture(posture())
         ),
         centering_and_posture,
         lambda q: plain("panda").placement(q, "panda_tcp").translation,
@@ -636,7 +636,7 @@ HELD: dict[str, Held] = {
             gains=Gains(natural_frequency=10),
         ),
         lambda robot: (
-            2.0 * JointCentering() + 3.0 * TargetPosture(configuration=posture())
+            2.0 * JointCentering() + 3.0 * TargetPosture(posture())
         ),
         centering_and_posture,
         lambda q: (

@@ -97,7 +97,7 @@ class Passage:
         return Controller(
             self.robot,
             [self.task],
-            TargetPosture(configuration=self.start),
+            TargetPosture(self.start),
             null_space_gain=FREQUENCY,
             singularity_threshold=threshold,
         )
@@ -328,7 +328,7 @@ def test_a_target_out_of_reach_is_pointed_at(threshold: float) -> None:
     controller = Controller(
         robot,
         [task],
-        TargetPosture(configuration=robot.home()),
+        TargetPosture(robot.home()),
         singularity_threshold=threshold,
     )
     rollout = simulate(
@@ -418,7 +418,7 @@ def test_random_starts(name: str) -> None:
     robot = loaded(name)
     rng = np.random.default_rng(sum(map(ord, name)))
     target = Target(robot, ROBOTS[name])
-    field = TargetPosture(configuration=robot.random_configuration(rng))
+    field = TargetPosture(robot.random_configuration(rng))
     controller = Controller(robot, [target.task], field, null_space_gain=FREQUENCY)
     state = RobotState(robot)
     singular = 0
@@ -432,8 +432,8 @@ def test_random_starts(name: str) -> None:
         assert np.isfinite(output.tau).all()
         assert np.linalg.norm(a) <= limit
         values = controller.diagnose().singular_values
-        assert output.damped == (values[-1] < DEFAULT)
-        singular += output.damped
+        assert bool(output.damped) == (values[-1] < DEFAULT)
+        singular += bool(output.damped)
         # ‖e_N‖ ≤ ‖g - v‖: a projection where exact, a contraction where damped.
         x = output.field.g - v
         assert np.linalg.norm(output.null_space_error) <= np.linalg.norm(x) * (1 + 1e-9)
@@ -453,7 +453,7 @@ def test_rollouts_from_singular_starts(name: str) -> None:
     robot = loaded(name)
     rng = np.random.default_rng(5)
     target = Target(robot, ROBOTS[name])
-    field = TargetPosture(configuration=robot.home())
+    field = TargetPosture(robot.home())
     controller = Controller(robot, [target.task], field, null_space_gain=FREQUENCY)
     state, runs = RobotState(robot), 0
     while runs < 12:

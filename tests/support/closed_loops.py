@@ -58,7 +58,7 @@ def planar_controller(gain: float = 10.0) -> Controller:
     ball = Obstacle(
         "ball", Sphere(0.1), Lissajous([0, 0.7, 0], [1, 3, 1], center=[-1, 1.7, 0])
     )
-    field = TargetPosture(configuration=planar_start()) + PointDistance(["link3"], ball)
+    field = TargetPosture(planar_start()) + PointDistance(["link3"], ball)
     return Controller(robot, [task], field, null_space_gain=gain)
 
 

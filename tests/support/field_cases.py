@@ -110,7 +110,7 @@ class Member:
 
 
 def posture(name: str, **options: Any) -> TargetPosture:
-    return TargetPosture(configuration=target(name), **options)
+    return TargetPosture(target(name), **options)
 
 
 def weighted(name: str) -> NullSpaceField:

@@ -20,6 +20,7 @@ from sweep_runs import MOVING, OVER, QUICK
 import hsp_control as hsp
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ConfigError, HspControlError, SweepError
+from hsp_control.declaration.plain_data import plain_data
 from hsp_control.sweeps import (
     Choices,
     Sweep,
@@ -173,7 +174,8 @@ def test_failures_are_rows_with_their_reason() -> None:
 
 
 def test_the_configuration_given_is_not_changed() -> None:
-    data = hsp.load_experiment(MOVING, *QUICK).scenario.model_dump(mode="json")
+    scenario = hsp.load_experiment(MOVING, *QUICK).scenario
+    data = plain_data(scenario, defaults=True)
     before = json.dumps(data)
     hsp.sweep(data, {"null_space.gain": [3.0, 4.0]}, workers=1)
     assert json.dumps(data) == before

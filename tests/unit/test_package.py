@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -31,14 +32,18 @@ def test_types_and_names_agree() -> None:
     """What a type checker reads is what is looked up at run time."""
     tree = ast.parse(Path(hsp_control.__file__).read_text(encoding="utf-8"))
     seen = {
-        (name.name, node.module)
+        name.asname or name.name: (node.module, name.name)
         for block in tree.body
         if isinstance(block, ast.If)
         for node in block.body
         if isinstance(node, ast.ImportFrom)
         for name in node.names
     }
-    assert seen == {(name, room) for name, room in hsp_control._HOMES.items()}
+    names = {name: (room, name) for name, room in hsp_control._HOMES.items()}
+    for name, room in hsp_control._NAMESPACES.items():
+        outer, _, inner = room.rpartition(".")
+        names[name] = (outer or None, inner)
+    assert seen == names
 
 
 def test_all_names_exist_and_are_listed() -> None:
@@ -46,8 +51,24 @@ def test_all_names_exist_and_are_listed() -> None:
     for name in hsp_control.__all__:
         assert getattr(hsp_control, name) is not None
     assert set(hsp_control.__all__) <= set(dir(hsp_control))
-    with pytest.raises(AttributeError, match="has no attribute 'Robto'"):
+    with pytest.raises(AttributeError, match=r"has no attribute 'Robto'$"):
         _ = hsp_control.Robto
+
+
+def test_few_names_are_at_the_top() -> None:
+    """What most programs need; a hint leads to the others."""
+    names = [name for name in hsp_control._HOMES if name not in hsp_control._NAMESPACES]
+    assert len(names) <= 40
+    message = r"no attribute 'Spline'; it is hsp_control\.trajectories\.Spline$"
+    with pytest.raises(AttributeError, match=message):
+        _ = hsp_control.Spline
+
+
+@pytest.mark.parametrize("namespace", hsp_control._NAMESPACES)
+def test_each_namespace_has_names_of_its_own(namespace: str) -> None:
+    module = getattr(hsp_control, namespace)
+    assert module is import_module(f"hsp_control.{hsp_control._NAMESPACES[namespace]}")
+    assert [name for name in vars(module) if name[0].isupper()]
 
 
 @pytest.mark.process

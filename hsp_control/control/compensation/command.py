@@ -246,7 +246,7 @@ class Command:
         t, controller = self.state.t, self.controller
         starting = ramp is not None and ramp.weight(t) < 1.0
         limited = output.status >= Status.LIMITED
-        saturated = output.damped or limited or clipped or starting
+        saturated = bool(output.damped) or limited or clipped or starting
         errors: dict[str, Array | None] = {}
         for name, rows in controller.task_rows.items():
             if controller.weight_of(name, t) >= 1.0:

@@ -2,7 +2,7 @@
 
 from dataclasses import KW_ONLY, replace
 from math import cos, sin
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 
@@ -11,12 +11,13 @@ from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.declaration import within
-from hsp_control.declaration.quantities import Vector, Weights
+from hsp_control.declaration.quantities import Weights
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
 from hsp_control.null_space.fields.joint_centering import per_dof
 from hsp_control.robot import RobotState
 from hsp_control.robot.configuration_space import joint_displacements
+from hsp_control.robot.postures import Posture, configuration
 
 
 class TargetPosture(CompiledCost, type="target_posture"):
@@ -27,24 +28,12 @@ class TargetPosture(CompiledCost, type="target_posture"):
     of freedom, such as a floating root, do not count: use a task for them.
     """
 
-    target: Literal["start", "home"] | Vector | None = None
-    """Joint positions, shape (nv,) [rad or m], or ``start`` or ``home``; ``start`` by
-    default."""
+    target: Posture = "start"
+    """The posture: ``start``, ``home``, nv joint positions or a configuration of nq
+    numbers [rad or m]."""
     _: KW_ONLY
-    configuration: Vector | None = None
-    """Instead of a target: a configuration q, shape (nq,) [rad, m or -]."""
     weights: Weights = 1.0
     """w_i of the joints [1/s], one number or nv."""
-
-    def __post_init__(self) -> None:
-        """Check that there is one posture."""
-        if self.target is not None and self.configuration is not None:
-            raise FieldError("give a target or a configuration, not both")
-
-    def _complete(self) -> None:
-        if self.target is None and self.configuration is None:
-            self._set_default("target", "start")
-        super()._complete()
 
     def placed(self, start: Start) -> Self:
         """Return the cost with its posture as a configuration, checked.
@@ -59,30 +48,18 @@ class TargetPosture(CompiledCost, type="target_posture"):
             weights = per_dof(self.weights, robot.nv)
             if not weights[robot.single_dof_joints[:, 0]].any():
                 raise FieldError("every weight is 0")
-        given = "target" if self.configuration is None else "configuration"
-        with within(given):
-            q = self._configuration(start.state)
-        return replace(self, target=None, configuration=q)
-
-    def _configuration(self, start: RobotState) -> Array:
-        robot = start.robot
-        if self.configuration is not None:
-            return robot.check_configuration(self.configuration)
-        if isinstance(self.target, str):
-            return start.q if self.target == "start" else robot.home()
-        assert self.target is not None
-        positions = robot.check_tangent(self.target, "the list of joint positions")
-        return robot.integrate(robot.neutral(), positions)
+        with within("target"):
+            return replace(self, target=configuration(self.target, start.state))
 
     def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
         robot = state.robot
-        if self.configuration is None:
+        if self.target is None:
             raise self._not_placed("posture")
         return bind(
             _posture,
             state.q,
             state.v,
-            np.array(self.configuration),
+            np.array(self.target),
             robot.single_dof_joints,
             per_dof(self.weights, robot.nv),
             gradient,

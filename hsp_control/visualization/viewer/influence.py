@@ -5,7 +5,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from hsp_control.common.arrays import Array
 from hsp_control.geometry import shapes
@@ -109,6 +108,8 @@ def _rounded(points: Array, distance: float) -> Json:
         points: The centres [m], shape (K, 3).
         distance: The radius [m].
     """
+    from scipy.spatial import ConvexHull  # here: SciPy takes long to import
+
     cloud = (hull_corners(points)[:, None, :] + distance * _unit_sphere()).reshape(
         -1, 3
     )

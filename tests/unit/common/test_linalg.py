@@ -449,7 +449,7 @@ def step_results() -> dict[str, list[float]]:
             results[f"{name} {where}"] = [
                 *(*out.tau, *out.acceleration, *out.null_space_error),
                 *(*out.task.acceleration, *diagnosis.singular_values),
-                *(*controller.flow(0.2, q), float(out.damped)),
+                *(*controller.flow(0.2, q), float(bool(out.damped))),
             ]
     return results
 

@@ -275,7 +275,7 @@ def test_coordinates_metric_is_equation_13_in_those_coordinates(name: str) -> No
     )
     # A cost's field is raised with the metric: -∇_θ f in the other coordinates.
     robot = c.robot
-    cost = placed(TargetPosture(configuration=c.posture, weights=2.0), robot)
+    cost = placed(TargetPosture(c.posture, weights=2.0), robot)
     sample = metric.evaluate(state, MetricSample.allocate(nv))
     state = robot.state(0.3, robot.integrate(c.q, 0.3 * c.v), c.v)
     g = cost.evaluate(state, sample, metric.form, FieldSample.allocate(nv)).g

@@ -128,7 +128,7 @@ def test_target_posture_is_smooth_all_the_way_round() -> None:
 
 def test_target_posture_agrees_with_the_square_to_fourth_order() -> None:
     robot = load("planar3r")
-    field = TargetPosture(configuration=robot.neutral())
+    field = TargetPosture(robot.neutral())
     for d in (0.1, 0.05):
         q = robot.integrate(robot.neutral(), np.array([d, 0.0, 0.0]))
         value = field.value(robot.state(0.0, q, np.zeros(3)))
@@ -145,14 +145,14 @@ def test_target_posture_holds_limited_joints_beyond_pi() -> None:
     state = robot.state(
         0.0, robot.integrate(robot.neutral(), moved), np.zeros(robot.nv)
     )
-    gradient = TargetPosture(configuration=robot.neutral()).gradient(state)
+    gradient = TargetPosture(robot.neutral()).gradient(state)
     np.testing.assert_allclose(gradient, moved, rtol=0, atol=1e-14)
 
 
 def test_target_posture_leaves_a_root_alone() -> None:
     robot = load("floating ur5")
     q, v = draw("floating ur5", 7)
-    field = TargetPosture(configuration=robot.neutral())
+    field = TargetPosture(robot.neutral())
     state = robot.state(0.0, q, v)
     for vector in (field.gradient(state), field.gradient_rate(state)):
         np.testing.assert_array_equal(vector[:6], 0.0)
@@ -280,7 +280,7 @@ def test_postures_are_placed() -> None:
         ):
             found = placed(field, start)
             np.testing.assert_array_equal(found.configuration, expected)
-            assert found == TargetPosture(configuration=expected)
+            assert found == TargetPosture(expected)
             assert placed(found, robot.state(0.0, robot.home(), start.v)) == found
     assert TargetPosture() == TargetPosture("start")
 

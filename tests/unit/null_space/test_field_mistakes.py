@@ -255,7 +255,7 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
         r"^weights: weights have shape \(2,\); needs one number or 7$",
     ),
     "posture, shape of the configuration": (
-        lambda: on("planar3r", TargetPosture(configuration=[0.0, 0.0, 0.0])),
+        lambda: on("planar3r", TargetPosture([0.0, 0.0, 0.0])),
         ShapeError,
         r"^configuration: configuration q has shape \(3,\); planar3r needs \(6,\)",
     ),
@@ -487,7 +487,7 @@ def test_a_user_s_own_exception_passes() -> None:
 
 def test_arguments_are_copied() -> None:
     goal, w = target("planar3r"), np.ones(3)
-    field = TargetPosture(configuration=goal, weights=w)
+    field = TargetPosture(goal, weights=w)
     state = arm().state(0.0, target("planar3r"), np.zeros(3))
     goal[:] = arm().neutral()
     w[:] = 7.0

@@ -40,7 +40,7 @@ def test_natural_gradient_descends_where_the_plain_one_need_not() -> None:
     robot = load("panda")
     frame = "panda_tcp"
     rng = np.random.default_rng(31)
-    cost: Cost = TargetPosture(configuration=robot.home())
+    cost: Cost = TargetPosture(robot.home())
     metric = MassMatrixMetric()
     rises = 0
     for _ in range(200):

@@ -217,7 +217,7 @@ def moving_sum(robot: Robot) -> FieldSum:
     rising = Ramp(initial=0.2, final=2.0, start=0.1, duration=1.5)
     falling = Ramp(initial=2.0, final=0.0, start=0.0, duration=2.0)
     of_state = StateWeight(lambda s: 1.2 + np.cos(s.t + s.position("panda_hand")[2]))
-    home = TargetPosture(configuration=robot.home())
+    home = TargetPosture(robot.home())
     inner = rising * JointCentering() + 3.0 * home
     return FieldSum(
         [

@@ -156,7 +156,7 @@ def test_a_floating_robot_follows_the_law() -> None:
     controller = Controller(
         robot,
         [task],
-        TargetPosture(configuration=robot.home()),
+        TargetPosture(robot.home()),
         null_space_gain=6.0,
         base="driven" if robot.unactuated else None,
     )

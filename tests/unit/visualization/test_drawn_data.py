@@ -1,6 +1,7 @@
 """Check that what is drawn is what the log says, predictions of e_N among it."""
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -32,6 +33,7 @@ from hsp_control import (
     Rollout,
     simulate,
 )
+from hsp_control.common.exceptions import LogError
 from hsp_control.geometry import Scene
 from hsp_control.geometry.shapes import (
     Box,
@@ -228,6 +230,29 @@ def test_an_old_log_has_the_class_instead_and_is_drawn_alike(
         np.testing.assert_array_equal(part.norm, np.linalg.norm(error, axis=1))
     for figure in both(bare):
         figure.canvas.draw()
+
+
+@pytest.mark.parametrize(
+    ("entries", "message"),
+    [
+        ({"error": []}, "wrong at 'tasks.panda_tcp.error'"),
+        ({"error": [["position", "m", "m/s", "3"]]}, "wrong at .*error.0.3'"),
+        ({"error": [["a", "m", "m/s", -3], ["b", "", "", 9]]}, "wrong at .*error.0.3'"),
+        ({"error": [["position", "m", "m/s", 3]]}, r"shape \(6,\); .* needs \(3,\)"),
+        ({"drawn": ["colour"]}, "wrong at 'tasks.panda_tcp.drawn.0'"),
+        ({"drawn": ["position"]}, r"rows of shape \(7,\); .* needs \(3,\)"),
+        ({"drawn": ["orientation", "position"]}, "not of unit norm"),
+        ({"axes": "xy"}, r"rows of shape \(7,\); .* needs \(6,\)"),
+    ],
+)
+def test_entries_that_contradict_the_columns_are_refused(
+    entries: dict[str, Any], message: str, logs: dict[str, Rollout], tmp_path: Path
+) -> None:
+    log = logs["pose"]
+    tasks = {"panda_tcp": log.meta["tasks"]["panda_tcp"] | entries}
+    path = changed(log, tasks=tasks).save(tmp_path / "bad.npz")
+    with pytest.raises(LogError, match=message):
+        Rollout.load(path)
 
 
 def test_paths_are_the_logs_in_the_plane_of_the_robot(logs: dict[str, Rollout]) -> None:
