@@ -45,6 +45,8 @@ from hsp_control.robot.matrix_view import matrix_view
 
 Made = TypeVar("Made")
 
+_LIMB = 4
+"""Fewest joints of an arm or a leg; heads and fingers have fewer."""
 _DOUBLE = np.dtype(np.float64)
 _PACKED = (8,)
 """Strides of a vector of doubles one after another."""
@@ -226,14 +228,27 @@ class Robot(ConfigurationSpace):
         model = self.joints[joint]
         return slice(model.idx_v, model.idx_v + model.nv)
 
-    def is_on_root(self, frame: str) -> bool:
-        """Return whether a frame is fixed to a floating base.
+    def is_on_trunk(self, frame: str) -> bool:
+        """Return whether a frame belongs to the trunk of a robot with a floating base.
+
+        The trunk is the base, and every body that carries two limbs or more: chains of
+        at least four joints, such as arms and legs.
 
         Raises:
             FrameNotFoundError: If there is no such frame.
         """
         joint = self.model.frames[self.frame_id(frame)].parentJoint
-        return bool(self.unactuated) and joint == 1
+        return bool(self.unactuated) and (joint == 1 or self._limbs(joint)[0] >= 2)
+
+    def _limbs(self, joint: int) -> tuple[int, int]:
+        """Return the number of limbs beyond a joint, and the joints of the longest."""
+        limbs = longest = 0
+        for child in range(joint + 1, self.model.njoints):
+            if self.model.parents[child] == joint:
+                beyond, length = self._limbs(child)
+                longest = max(longest, 1 + length)
+                limbs += max(beyond, int(1 + length >= _LIMB))
+        return limbs, longest
 
     # -- dynamics ---------------------------------------------------------------------
 

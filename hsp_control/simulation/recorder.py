@@ -202,7 +202,7 @@ class Recorder:
             )
         moved = self._controller.scene
         for known in self._scene.values():
-            obstacle = moved.get(known.name, known)
+            obstacle = moved[known.name] if known.name in moved else known
             placement = pin.SE3ToXYZQUAT(obstacle.placement(state.t))
             columns[f"obstacle.{obstacle.name}"][i] = placement[:3]
             columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]

@@ -78,8 +78,8 @@ class FrameTask(SecondOrderTask):
         return StepPlan((follow,), (frame.compute, write))
 
     def keeps_balance(self, robot: Robot) -> bool:
-        """Whether the frame is fixed to the floating base."""
-        return robot.is_on_root(self.frame_name)
+        """Whether the frame belongs to the trunk; see `Robot.is_on_trunk`."""
+        return robot.is_on_trunk(self.frame_name)
 
 
 def frame_of(frame: str | None, robot: Robot) -> str:

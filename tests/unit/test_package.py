@@ -59,7 +59,7 @@ def test_few_names_are_at_the_top() -> None:
     """What most programs need; a hint leads to the others."""
     names = [name for name in hsp_control._HOMES if name not in hsp_control._NAMESPACES]
     assert len(names) <= 40
-    message = r"no attribute 'Spline'; it is hsp_control\.trajectories\.Spline$"
+    message = r"no attribute 'Spline'; there is hsp_control\.trajectories\.Spline$"
     with pytest.raises(AttributeError, match=message):
         _ = hsp_control.Spline
 

@@ -52,7 +52,7 @@ from hsp_control.null_space.metrics import (
 )
 from hsp_control.robot.integrators import Dop853
 from hsp_control.simulation.recorder import Recorder
-from hsp_control.trajectories import HoldOrientation
+from hsp_control.trajectories import HoldOrientation, Spin
 from hsp_control.trajectories.timing import smooth_step
 
 Array = NDArray[np.float64]
@@ -207,15 +207,17 @@ def test_in_the_end_the_field_is_the_new_one() -> None:
 # --- the error equation --------------------------------------------------------------
 
 
-def solution(log: Rollout, gains: Callable[[float], tuple[Array, Array]]) -> Array:
+def solution(
+    log: Rollout, gains: Callable[[float], tuple[Array, Array]], task: str = "hand"
+) -> Array:
     """Return e(t) of e'' + Kv(t) e' + Kp(t) e = 0 from the log's first error."""
-    m = log["task.hand.error"].shape[1]
+    m = log[f"task.{task}.error"].shape[1]
 
     def rate(t: float, x: Array) -> Array:
         Kp, Kv = gains(t)
         return np.r_[x[m:], -Kv @ x[m:] - Kp @ x[:m]]
 
-    first = np.r_[log["task.hand.error"][0], log["task.hand.error_rate"][0]]
+    first = np.r_[log[f"task.{task}.error"][0], log[f"task.{task}.error_rate"][0]]
     found = solve_ivp(
         rate, (0.0, log.t[-1]), first, "DOP853", log.t, rtol=1e-11, atol=1e-13
     )
@@ -256,6 +258,25 @@ def test_the_error_equation_holds_while_gains_change() -> None:
     for one in (GAINS, COUPLED):
         other = solution(log, lambda t, one=one: one.matrices(3))
         assert np.abs(error - other).max() > 1e-3
+
+
+def test_the_error_equation_holds_while_references_change() -> None:
+    """Of a position and an orientation, whose error counts from what is in between."""
+    turned = replace(TURNED, priority=1)
+    law = Controller(panda(), [far(), turned], JointCentering(), null_space_gain=K_N)
+    law.at(START).ramp(RAMP).reference("hand", Hold([0.5, 0.0, 0.4]))
+    law.at(START + 0.1).ramp(0.4).reference("turned", Spin([0, 0, 1], 0.5))
+    law.at(START + 0.2).ramp(RAMP).reference("hand", hand().trajectory)
+    log = run(law, 1.0)
+    for task in (far(), turned):
+        gains = task.gains.matrices(3)
+        found = log[f"task.{task.name}.error"]
+        assert np.abs(found[0]).max() > 0.05
+        expected = solution(log, lambda t, gains=gains: gains, task.name)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(
+        log["task.hand.reference"][-1], hand().trajectory.sample(1.0).position
+    )
 
 
 @pytest.mark.parametrize("priority", [1, 2])
