@@ -24,7 +24,6 @@ from hsp_control.config.build_live import (
     tolerance_of,
 )
 from hsp_control.control.compensation import Command
-from hsp_control.declaration.plain_data import plain_data
 from hsp_control.live import (
     Faults,
     InProcessRobot,
@@ -118,7 +117,7 @@ def _meta(experiment: Experiment) -> dict[str, Any]:
     return {
         "name": f"{experiment.name}, live",
         "title": experiment.scenario.title,
-        "config": plain_data(experiment.scenario, defaults=True),
+        "config": experiment.config,
     }
 
 

@@ -15,7 +15,6 @@ from typing import Any, Self
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.config import Experiment
 from hsp_control.config.build_live import live_period
-from hsp_control.declaration.plain_data import plain_data
 from hsp_control.live.faults import Faults
 from hsp_control.live.settings import check_fixed
 from hsp_control.live.udp_hardware import UdpHardware
@@ -60,7 +59,7 @@ class RobotProcess:
         period = live_period(experiment)
         self.hardware = UdpHardware(experiment.robot, period, faults=faults)
         self._settings = {
-            "config": plain_data(experiment.scenario, defaults=True),
+            "config": experiment.config,
             "meta": {
                 "name": f"{experiment.name}, the robot",
                 "title": experiment.scenario.title,

@@ -139,6 +139,15 @@ class Experiment:
         }
         vars(self).update(vars(build(Document(data, {}, name))))
 
+    @property
+    def config(self) -> dict[str, Any] | None:
+        """The whole configuration as data, for the log; None if a part is no data."""
+        try:
+            config: dict[str, Any] = plain_data(self.scenario, defaults=True)
+        except ConfigError:
+            return None
+        return config
+
     def to_yaml(self) -> str:
         """Return the configuration as YAML; `load_experiment` builds the same from it.
 
@@ -178,7 +187,7 @@ class Experiment:
             meta={
                 "name": self.name,
                 "title": self.scenario.title,
-                "config": plain_data(self.scenario, defaults=True),
+                "config": self.config,
             },
         )
 

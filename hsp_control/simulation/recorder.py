@@ -202,7 +202,8 @@ class Recorder:
             )
         moved = self._controller.scene
         for known in self._scene.values():
-            obstacle = moved[known.name] if known.name in moved else known
+            # No `get`: a scene raises its own error, not KeyError.
+            obstacle = moved[known.name] if known.name in moved else known  # noqa: SIM401
             placement = pin.SE3ToXYZQUAT(obstacle.placement(state.t))
             columns[f"obstacle.{obstacle.name}"][i] = placement[:3]
             columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]

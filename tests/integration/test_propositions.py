@@ -620,9 +620,7 @@ HELD: dict[str, Held] = {
         lambda robot, start: FramePosition(
             "panda_tcp", Hold(start.translation), gains=Gains(natural_frequency=10)
         ),
-        lambda robot: (
-            2.0 * JointCentering() + 3.0 * TargetPosture(posture())
-        ),
+        lambda robot: 2.0 * JointCentering() + 3.0 * TargetPosture(posture()),
         centering_and_posture,
         lambda q: plain("panda").placement(q, "panda_tcp").translation,
         2.0,
@@ -635,9 +633,7 @@ HELD: dict[str, Held] = {
             HoldPose(start.translation, start.rotation),
             gains=Gains(natural_frequency=10),
         ),
-        lambda robot: (
-            2.0 * JointCentering() + 3.0 * TargetPosture(posture())
-        ),
+        lambda robot: 2.0 * JointCentering() + 3.0 * TargetPosture(posture()),
         centering_and_posture,
         lambda q: (
             pin.log6(

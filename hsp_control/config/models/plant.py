@@ -2,8 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf
-from pydantic.json_schema import SkipJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from hsp_control.common.exceptions import SceneError
 from hsp_control.config.models.base import (
@@ -16,6 +15,7 @@ from hsp_control.config.models.base import (
 )
 from hsp_control.config.models.robot import LoadModel
 from hsp_control.declaration import AnyOf
+from hsp_control.declaration.quantities import OrInstance
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from hsp_control.simulation.plants import PlantPart
 
@@ -216,21 +216,22 @@ class MujocoPlantModel(FrictionalPlantModel):
 
 def _installed(plant: object) -> object:
     """Return the plant of an installed package that a mapping names, if it does."""
-    own = ("rigid_body", "rigid_contacts", "mujoco")
-    if isinstance(plant, dict) and plant.get("type") not in own:
+    name = plant.get("type") if isinstance(plant, dict) else None
+    if isinstance(name, str) and name not in ("rigid_body", "rigid_contacts", "mujoco"):
         family = AnyOf(PlantPart)
-        PlantPart.family.load(plant.get("type"))  # type: ignore[union-attr]
-        if plant.get("type") in family.members:
+        PlantPart.family.load(name)  # type: ignore[union-attr]
+        if name in family.members:
             return family.validate(plant)
     return plant
 
 
+_OwnPlant = RigidBodyPlantModel | ContactPlantModel | MujocoPlantModel
 AnyPlant = Annotated[
-    Literal["rigid_body", "mujoco"]
-    | Annotated[
-        RigidBodyPlantModel | ContactPlantModel | MujocoPlantModel,
-        Field(discriminator="type"),
-    ]
-    | SkipJsonSchema[InstanceOf[PlantPart]],
+    Literal["rigid_body", "mujoco"] | _OwnPlant | PlantPart,
+    OrInstance(
+        Literal["rigid_body", "mujoco"]
+        | Annotated[_OwnPlant, Field(discriminator="type")],
+        PlantPart,
+    ),
     BeforeValidator(_installed),
 ]

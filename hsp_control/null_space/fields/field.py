@@ -17,9 +17,8 @@ from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.quantities import NonNegative
+from hsp_control.declaration.quantities import NonNegative, OrInstance
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.fields.in_python import OrInstance
 from hsp_control.null_space.fields.weight import Ramp, Weight, product, sample_weight
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.robot import RobotState

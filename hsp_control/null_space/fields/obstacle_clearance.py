@@ -9,12 +9,11 @@ from pydantic import AfterValidator
 from hsp_control.common.exceptions import FieldError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import within
-from hsp_control.declaration.quantities import Name, Names, Positive
+from hsp_control.declaration.quantities import Name, Names, OrInstance, Positive
 from hsp_control.geometry import LinkShape, Proximity, Proxy, link_shapes
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.clearance import Clearance
-from hsp_control.null_space.fields.in_python import OrInstance
 from hsp_control.robot import Robot
 
 ObstacleOrName = Annotated[str | Obstacle, OrInstance(Name, Obstacle)]

@@ -11,11 +11,10 @@ from hsp_control.common.exceptions import FieldError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.declaration import within
-from hsp_control.declaration.quantities import Name, Names
+from hsp_control.declaration.quantities import Name, Names, OrInstance
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields.compiled_cost import CompiledCost, Derivatives
-from hsp_control.null_space.fields.in_python import OrInstance
 from hsp_control.robot import RobotState
 from hsp_control.trajectories import TrajectorySample
 

@@ -289,7 +289,7 @@ MISTAKES = [
      "JointNotFoundError", "null_space.fields.0.joints.0: no joint 'a'"),
     ("null_space.fields.0", {"type": "target_posture", "target": [1.0]},
      "ShapeError",
-     "null_space.fields.0.target: the list of joint positions has shape (1,)"),
+     "null_space.fields.0.target: a posture has shape (1,); needs 7 numbers"),
     ("null_space.fields.0", {"type": "joint_centering", "weights": [1, 1]},
      "FieldError",
      "null_space.fields.0.weights: weights have shape (2,); needs one number or 7"),

@@ -254,7 +254,7 @@ def test_lists_will_do_for_integrate_and_difference() -> None:
 @pytest.mark.parametrize("wrong", [[0.1], np.zeros(8), "left", None])
 def test_integrate_and_difference_say_what_does_not_fit(wrong: object) -> None:
     robot = load("panda")
-    with pytest.raises(ShapeError, match=r"^displacement (has shape|is not an array)"):
+    with pytest.raises(ShapeError, match=r"^displacement (has shape|.*; needs 7 n)"):
         robot.integrate(robot.home(), wrong)
     with pytest.raises(ShapeError, match=r"^configuration q "):
         robot.integrate(wrong, np.zeros(7))

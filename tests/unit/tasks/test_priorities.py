@@ -86,21 +86,25 @@ def test_without_a_floating_base_all_tasks_have_the_first(name: str, root: Any) 
     assert priority_of(given, robot) == 3
 
 
-def test_any_frame_that_is_fixed_to_the_base_is_the_trunk() -> None:
-    pytest.importorskip("example_robot_data")
-    talos = Robot.load("talos")
-    assert talos.unactuated
-    fixed = {
-        frame.name
-        for frame in talos.model.frames
-        if frame.parentJoint == 1 and frame.name in talos.frame_names
-    }
-    assert len(fixed) > 1
-    for frame in talos.frame_names:
+@pytest.mark.parametrize(
+    ("name", "trunk"),
+    [
+        ("talos", {"root_joint", "torso_1_joint", "torso_2_joint"}),
+        ("solo12", {"root_joint"}),
+        ("panda", set()),
+    ],
+)
+def test_frames_of_the_trunk_keep_the_balance(name: str, trunk: set[str]) -> None:
+    """The base, and what carries two arms; not the head, nor a hand of many fingers."""
+    if name != "panda":
+        pytest.importorskip("example_robot_data")
+    robot = Robot.load(name)
+    for frame in robot.frame_names:
         if frame == "universe":
             continue
-        needed = frame in fixed
-        assert FramePosition(frame).keeps_balance(talos) is needed
+        joint = robot.model.frames[robot.frame_id(frame)].parentJoint
+        needed = robot.model.names[joint] in trunk
+        assert FramePosition(frame).keeps_balance(robot) is needed, frame
 
 
 def test_a_controller_s_levels(quadruped: Robot) -> None:
