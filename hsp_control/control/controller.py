@@ -232,6 +232,7 @@ class Controller:
         field = setup.field
         if field != self._field:
             self._field = field
+            self._stacks.clear()
         known = {id(task): self._feedback[key] for key, task in self._by_key.items()}
         by_key = {each.key: each.task for each in setup.tasks}
         if any(self._by_key.get(key, task) is not task for key, task in by_key.items()):
@@ -510,7 +511,7 @@ class Controller:
                 change = replace(change, at=max(change.at, now))
                 state = self._state
                 here = self._robot.state(state.t, state.q, state.v)
-                start = Start(here, self._scene)
+                start = Start(here, self._setup.start.scene)
             earlier = [each for each in self._open if each.at <= change.at]
             placed = change.placed(start, _applied(earlier, self._settled))
             opened = _in_order((*self._open, placed))

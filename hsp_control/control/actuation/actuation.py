@@ -112,6 +112,8 @@ class Actuation:
         self.limits = planned.at(t, self._robot)
         self._check = IdentityCache(self._compile_check)  # it reads their arrays
         self._slacks = planned.slacks(t)
+        if self.limits is not None and not np.isfinite(self.limits.effort_rate).any():
+            self.forget()
         self._only_box_limits = not (
             self._floating
             or planned.distances

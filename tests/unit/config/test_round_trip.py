@@ -1,23 +1,38 @@
 """A configuration as plain data says the same: logs keep it like this."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
 import yaml
 
-from hsp_control import FunctionCost, Gains, Sphere, load_experiment
-from hsp_control.common.exceptions import ConfigError
+from hsp_control import (
+    Experiment,
+    FunctionCost,
+    Gains,
+    JointCentering,
+    JointPosture,
+    Limits,
+    ObstacleClearance,
+    Sphere,
+    load_experiment,
+)
+from hsp_control.common.exceptions import ConfigError, HspControlError
 from hsp_control.common.resources import bundled_configs
 from hsp_control.config import json_schema
 from hsp_control.config.document import Document
 from hsp_control.config.models.null_space import NullSpaceModel
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
+from hsp_control.constraints.limits import Scaled
+from hsp_control.control.changes import ChangeGains
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry import Obstacle
 from hsp_control.geometry.scene import Scene
+from hsp_control.null_space.metrics import MassMatrixMetric
 from hsp_control.tasks import FramePosition
 from hsp_control.trajectories import Hold
 
@@ -169,3 +184,55 @@ def test_a_log_keeps_the_configuration() -> None:
     experiment = load_experiment("paper/4_moving_obstacle", short)
     config = json.loads(json.dumps(experiment.run().config))
     assert validate(Document(config, {}, "log"), Scenario) == experiment.scenario
+
+
+# -- experiments ----------------------------------------------------------------------
+
+
+def parts(**settings: Any) -> Experiment:
+    """Return an experiment made of parts."""
+    here = [0.4, 0.0, 0.5]
+    return Experiment(
+        "panda",
+        [
+            FramePosition(trajectory=Hold(here), gains=Gains(9, 6), name="hand"),
+            JointPosture(priority=2, reference="home"),
+        ],
+        2.0 * JointCentering() + ObstacleClearance(["ball"]),
+        null_space_gain=[5.0] * 7,
+        metric=MassMatrixMetric(),
+        limits=Limits(velocity=Scaled(0.5)),
+        scene=[Obstacle("ball", Sphere(0.1), Hold([0.9, 0.0, 0.9]))],
+        changes=[ChangeGains("hand", Gains(16, 8), at=0.01)],
+        **{"simulation": {"duration": 0.03}, **settings},
+    )
+
+
+def test_an_experiment_of_parts_goes_to_yaml_and_back(tmp_path: Path) -> None:
+    made = parts()
+    file = tmp_path / "mine.yaml"
+    file.write_text(made.to_yaml(), encoding="utf-8")
+    again = load_experiment(file)
+    assert again.scenario == made.scenario
+    first, second = made.run(), again.run()
+    np.testing.assert_array_equal(first.tau, second.tau)
+    assert not list(SCHEMA.iter_errors(yaml.safe_load(made.to_yaml())))
+    # A log says the same, and its run can be repeated.
+    log = load_experiment(first.save(tmp_path / "run.npz"))
+    np.testing.assert_array_equal(log.run().tau, first.tau)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"simulation": {"duraton": 1}},
+         r"^experiment: simulation\.duraton: unknown key 'duraton'; did you mean"),
+        ({"simulaton": {}}, r"^experiment: simulaton: unknown key 'simulaton'; did you"),
+        ({"plant": "mujco"}, r"^experiment: plant: 'mujco' is text; expected"),
+        ({"name": "mine", "start": {"joints": [1]}},
+         r"^mine: start\.joints: joints has shape \(1,\)"),
+    ],
+)  # fmt: skip
+def test_a_wrong_setting_is_named(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(HspControlError, match=message):
+        parts(**settings)
