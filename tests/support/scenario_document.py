@@ -1,6 +1,7 @@
 """A small schema and a good text for it, to read documents by."""
 
 import re
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -126,9 +127,14 @@ def message(text: str, *overrides: str, model: type[BaseModel] = Scenario) -> st
     return str(caught.value)
 
 
+@cache
+def _composed(text: str) -> yaml.Node:
+    return yaml.compose(text)
+
+
 def line_of(text: str, path: str) -> int:
     """Return the line of a key path in a YAML text, or of its nearest ancestor."""
-    node = yaml.compose(text)
+    node = _composed(text)
     line = node.start_mark.line + 1
     for quoted in re.findall(r"'[^']*'|[^.]+", path):
         part = quoted.strip("'")

@@ -227,7 +227,7 @@ def test_an_experiment_of_parts_goes_to_yaml_and_back(tmp_path: Path) -> None:
     [
         ({"simulation": {"duraton": 1}},
          r"^experiment: simulation\.duraton: unknown key 'duraton'; did you mean"),
-        ({"simulaton": {}}, r"^experiment: simulaton: unknown key 'simulaton'; did you"),
+        ({"simulaton": {}}, r"^experiment: simulaton: unknown key 'simulaton'; did"),
         ({"plant": "mujco"}, r"^experiment: plant: 'mujco' is text; expected"),
         ({"name": "mine", "start": {"joints": [1]}},
          r"^mine: start\.joints: joints has shape \(1,\)"),

@@ -379,11 +379,11 @@ MESSAGES: dict[str, Callable[[], Any]] = {
     "Bag: first.radius: 'wide' is text; expected a number": (
         lambda: Bag({"type": "ball", "radius": "wide"})  # type: ignore
     ),
-    "Bag: first: missing key 'radius'; required here: radius": (
+    "Bag: first: missing key 'radius'; required here: type, radius": (
         lambda: Bag({"type": "ball"})  # type: ignore
     ),
-    "Bag: first.radus: unknown key 'radus'; did you mean 'radius'? (allowed: label, "
-    "radius, center)": lambda: Bag({"type": "ball", "radus": 1}),  # type: ignore
+    "Bag: first.radus: unknown key 'radus'; did you mean 'radius'? (allowed: type, "
+    "label, radius, center)": lambda: Bag({"type": "ball", "radus": 1}),  # type: ignore
     "Bag: first: a mass of 11.0 is too much for this size": (
         lambda: Bag({"type": "rod", "size": 1, "mass": 11})  # type: ignore
     ),
