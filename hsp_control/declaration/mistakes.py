@@ -28,9 +28,10 @@ def argument_error(cls: "type[Part]", error: ValidationError) -> HspControlError
         if path and isinstance(path[0], int):  # the position of an argument
             if path[0] >= len(names):
                 plural = "" if len(names) == 1 else "s"
+                taken = f"{len(names)} positional argument{plural} ({', '.join(names)})"
                 return cls.error(
-                    f"{cls.__name__}: takes {len(names)} positional argument{plural} "
-                    f"({', '.join(names)}); the others are given by name"
+                    f"{cls.__name__}: takes {taken if names else 'none by position'}; "
+                    f"{'the others' if names else 'arguments'} are given by name"
                 )
             path = (names[path[0]], *path[1:])
         pending.append((path, each))

@@ -14,6 +14,8 @@ from hsp_control.trajectories import (
     CallableTrajectory,
     Circle,
     ComposedPose,
+    Crossfade,
+    CrossfadeOrientation,
     Hold,
     HoldOrientation,
     HoldPose,
@@ -128,6 +130,10 @@ POINT_MEMBERS: dict[str, tuple[Trajectory, list[float]]] = {
         [0.0, 1.5],
     ),
 }
+POINT_MEMBERS["crossfade"] = (
+    Crossfade(CIRCLE, Line([3, -1], 4.0, start=[0, 1]), start_time=0.5, duration=1.0),
+    [0.5, 1.5],
+)
 ORIENTATION_MEMBERS: dict[str, tuple[OrientationTrajectory, list[float]]] = {
     "hold orientation": (HoldOrientation(R1), []),
     "spin": (SPIN, []),
@@ -138,6 +144,10 @@ ORIENTATION_MEMBERS: dict[str, tuple[OrientationTrajectory, list[float]]] = {
         [0.5, 2.0],
     ),
     "blend orientation in motion": (BLENDED_SPIN, [0.5, 2.0]),
+    "crossfade orientation": (
+        CrossfadeOrientation(SPIN, BLENDED_SPIN, start_time=0.5, duration=1.0),
+        [0.5, 1.5, 2.0],
+    ),
 }
 POSE_MEMBERS: dict[str, tuple[PoseTrajectory, list[float]]] = {
     "composed pose": (ComposedPose(LISSAJOUS, SPIN), []),

@@ -53,13 +53,13 @@ class TargetPosture(CompiledCost, type="target_posture"):
 
     def _compile(self, state: RobotState, gradient: Array, rate: Array) -> Derivatives:
         robot = state.robot
-        if self.target is None:
+        if isinstance(self.target, str) or np.shape(self.target) != (robot.nq,):
             raise self._not_placed("posture")
         return bind(
             _posture,
             state.q,
             state.v,
-            np.array(self.target),
+            np.asarray(self.target, dtype=float),
             robot.single_dof_joints,
             per_dof(self.weights, robot.nv),
             gradient,

@@ -16,28 +16,18 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hsp_control import (
-    BallContact,
-    Blend,
     CenterOfMass,
     Circle,
-    Contact,
     Controller,
-    Dop853,
     FrameOrientation,
     FramePose,
     FramePosition,
     Gains,
     Hold,
-    HoldOrientation,
     JointPosture,
     Limits,
-    PointContact,
-    Rk4,
     Robot,
     RobotState,
-    Scene,
-    Schedule,
-    SurfaceContact,
     TargetPosture,
     Task,
     simulate,
@@ -47,15 +37,23 @@ from hsp_control.common.exceptions import (
     FrameNotFoundError,
     ScheduleError,
 )
+from hsp_control.constraints.contacts import (
+    BallContact,
+    Contact,
+    PointContact,
+    SurfaceContact,
+)
 from hsp_control.constraints.contacts.unactuated import UnactuatedRows
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.evolution import PRESENT
 from hsp_control.control.planned_contact import PlannedContact
+from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.start import Start
+from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import ContactPlant, RigidContact
 from hsp_control.tasks import TaskSample
-from hsp_control.trajectories import HoldPose
+from hsp_control.trajectories import Blend, HoldOrientation, HoldPose, Schedule
 
 pytest.importorskip("example_robot_data")
 Array = NDArray[np.float64]

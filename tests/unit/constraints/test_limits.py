@@ -12,18 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hsp_control import (
-    Box,
-    Hold,
-    Limits,
-    Lissajous,
-    MinimumDistance,
-    Obstacle,
-    Robot,
-    RobotState,
-    Scene,
-    Sphere,
-)
+from hsp_control import Hold, Limits, Obstacle, Robot, RobotState, Sphere
 from hsp_control.common.exceptions import (
     FieldError,
     HspControlError,
@@ -32,6 +21,7 @@ from hsp_control.common.exceptions import (
     SceneError,
 )
 from hsp_control.constraints.limits import (
+    MinimumDistance,
     ObstacleDistance,
     PositionRange,
     RobotLimits,
@@ -40,7 +30,10 @@ from hsp_control.constraints.limits import (
     StaticEffort,
 )
 from hsp_control.constraints.limits.acceleration_bounds import acceleration_bounds
+from hsp_control.geometry.scene import Scene
+from hsp_control.geometry.shapes import Box
 from hsp_control.geometry.start import Start
+from hsp_control.trajectories import Lissajous
 
 Array = NDArray[np.float64]
 
@@ -159,7 +152,7 @@ def test_numbers_cannot_be_changed() -> None:
     limits = of(panda(), effort_rate=1.0, null_space_speed=1.0, static_effort=1.0)
     arrays = [*vars(limits).values(), *limits.motion, limits.static_effort.effort]  # type: ignore[union-attr]
     arrays = [each for each in arrays if isinstance(each, np.ndarray)]
-    assert len(arrays) == 11
+    assert len(arrays) == 12
     for each in arrays:
         assert not each.flags.writeable
     with pytest.raises(AttributeError):

@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 
 import hsp_control.constraints.contacts as contacts
 import hsp_control.constraints.limits as limits
-from hsp_control import Hold, Obstacle, Schedule, Sphere
+from hsp_control import Hold, Obstacle, Sphere
 from hsp_control.common.exceptions import ImmutableError
 from hsp_control.constraints.contacts import (
     BallContact,
@@ -32,6 +32,7 @@ from hsp_control.constraints.limits import (
 )
 from hsp_control.declaration import Part
 from hsp_control.declaration.part import value_fields
+from hsp_control.trajectories import Schedule
 
 NAMES: dict[str, Any] = {
     name: each
@@ -313,7 +314,11 @@ WRONG: dict[type[Part], dict[str, list[tuple[Any, str]]]] = {
     },
     ObstacleDistance: {
         "minimum": [(-1.0, "-1.0 is negative; must be at least 0")],
-        "obstacles": [("ball", "Sequence"), ([], "needs at least 1"), ([3], "0")],
+        "obstacles": [
+            ("ball", "expected a list"),
+            ([], "needs at least 1"),
+            ([3], "0"),
+        ],
         "links": [([3], "3 is an integer; expected text")],
     },
     PointContact: {**_WRONG_CONTACT, "point": [([0, np.nan, 0], "not a finite")]},
@@ -378,9 +383,9 @@ def test_unknown_and_positional_arguments() -> None:
         BallContact("foot")  # type: ignore[call-arg]
     with pytest.raises(Limits.error, match="did you mean 'velocity'"):
         Limits(velocities=1.0)  # type: ignore[call-arg]
-    with pytest.raises(Limits.error, match="the others are given by name"):
-        Limits()  # type: ignore[misc]
-    with pytest.raises(Contact.error, match="takes 1 positional argument"):
+    with pytest.raises(Limits.error, match="arguments are given by name"):
+        Limits(1.0)  # type: ignore[misc]
+    with pytest.raises(Contact.error, match="expected text"):
         PointContact([0, 0, 0])  # type: ignore[misc]
 
 

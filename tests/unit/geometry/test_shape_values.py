@@ -12,10 +12,15 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from hsp_control import Obstacle, Scene
-from hsp_control.common.exceptions import ImmutableError, SceneError
+from hsp_control import Obstacle
+from hsp_control.common.exceptions import (
+    HspControlError,
+    ImmutableError,
+    SceneError,
+)
 from hsp_control.declaration import Part
 from hsp_control.declaration.part import value_fields
+from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import (
     Box,
     Capsule,
@@ -114,7 +119,6 @@ WRONG: list[tuple[type[Part], str, Any]] = [
     (Obstacle, "center", Hold()),
     (Obstacle, "center", Hold([0.0, 0.0, 0.0], origin="start")),
     (Obstacle, "orientation", HERE),
-    (Obstacle, "orientation", None),
     (Scene, "obstacles", [BALL, BALL]),
     (Scene, "obstacles", [Sphere(0.1)]),
     (Scene, "obstacles", {"bell": BALL}),
@@ -340,9 +344,14 @@ def test_obstacles_in_yaml_are_named_by_their_keys() -> None:
     same: Any = {"ball": BALL}
     assert Scene(same) == Scene([BALL])
     flat: Any = {"ball": ball | {"center": {"type": "hold", "point": [0.0]}}}
-    others: list[Any] = [{"bell": BALL}, {"bell": {"name": "ball", **ball}}]
-    for other in others:
-        with pytest.raises(SceneError, match="'bell' has another name, 'ball'"):
+    others: dict[str, Any] = {
+        "'bell' has another name, 'ball'": {"bell": BALL},
+        "unknown key 'name'; the key 'bell' is the name": {
+            "bell": {"name": "ball", **ball}
+        },
+    }
+    for message, other in others.items():
+        with pytest.raises(HspControlError, match=message):
             Scene(other)
     with pytest.raises(SceneError, match=r"^Scene: obstacles\.ball\.center: its dim"):
         Scene(flat)

@@ -279,7 +279,7 @@ def test_postures_are_placed() -> None:
             (posture(name), target(name)),
         ):
             found = placed(field, start)
-            np.testing.assert_array_equal(found.configuration, expected)
+            np.testing.assert_array_equal(found.target, expected)
             assert found == TargetPosture(expected)
             assert placed(found, robot.state(0.0, robot.home(), start.v)) == found
     assert TargetPosture() == TargetPosture("start")

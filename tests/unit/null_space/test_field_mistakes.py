@@ -124,11 +124,6 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
         r"^TargetPosture: target: 'hom' is text; expected 'start', 'home' or a list "
         r"of numbers; did you mean 'home'\?",
     ),
-    "posture, twice": (
-        lambda: TargetPosture("home", configuration=[0.0]),
-        FieldError,
-        r"^TargetPosture: give a target or a configuration, not both$",
-    ),
     "equal angles, one joint": (
         lambda: EqualJointAngles(["joint1"]),
         FieldError,
@@ -254,15 +249,10 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
         FieldError,
         r"^weights: weights have shape \(2,\); needs one number or 7$",
     ),
-    "posture, shape of the configuration": (
-        lambda: on("planar3r", TargetPosture([0.0, 0.0, 0.0])),
+    "posture, shape": (
+        lambda: on("planar3r", TargetPosture([0.0, 0.0])),
         ShapeError,
-        r"^configuration: configuration q has shape \(3,\); planar3r needs \(6,\)",
-    ),
-    "posture, shape of the joint positions": (
-        lambda: on("planar3r", TargetPosture(arm().neutral())),
-        ShapeError,
-        r"^target: the list of joint positions has shape \(6,\); planar3r needs \(3,\)",
+        r"^target: a posture has shape \(2,\); needs 3 or 6 numbers$",
     ),
     "posture, no weight": (
         lambda: on("planar3r", TargetPosture("home", weights=0.0)),

@@ -53,7 +53,7 @@ EXAMPLES: dict[str, list[dict[str, Any]]] = {
     "target_posture": [
         COMMON | {"target": np.linspace(-0.5, 0.5, 7), "weights": 2},
         {"target": "home"},
-        {"configuration": np.linspace(-0.5, 0.5, 7)},
+        {"target": np.linspace(-0.4, 0.5, 7)},
     ],
     "equal_joint_angles": [COMMON | {"joints": ["panda_joint1", "panda_joint3"]}],
     "point_distance": [
@@ -134,8 +134,6 @@ def test_equality_and_hash(name: str) -> None:
                 changed = replace(value, **{key: OTHER[key]})  # type: ignore[type-var]
             elif key == "target":
                 changed = member(**arguments | {key: "start"})
-            elif key == "configuration":
-                changed = member(**arguments | {key: np.zeros(7)})
             else:
                 rest = {k: v for k, v in arguments.items() if k != key}
                 if name == "transmission" and key == "axes":
@@ -319,7 +317,7 @@ OF_ANY_ROBOT: dict[str, Callable[[], NullSpaceField | Metric]] = {
     ),
     # These have numbers for 7 joints: both robots have 7.
     "target_posture": lambda: null_space_fields.TargetPosture(
-        configuration=np.linspace(-0.5, 0.5, 7)
+        np.linspace(-0.5, 0.5, 7)
     ),
     "constant": lambda: metrics.ConstantMetric(W),
     "coordinates": lambda: metrics.CoordinatesMetric(np.tril(np.ones((7, 7)))),

@@ -557,7 +557,7 @@ MISTAKES: list[tuple[Callable[[], Any], str]] = [
     (lambda: Ramp(final=1.0, start=np.nan, duration=1.0), "start: .nan is not a finit"),
     (lambda: Ramp(final=1.0, duration=np.inf), "Ramp: duration: .inf is not a finite "),
     (lambda: Ramp(final=1.0), "Ramp: missing key 'duration'"),
-    (lambda: Ramp(0.0, 1.0), "Ramp: takes 0 positional arguments"),  # type: ignore
+    (lambda: Ramp(0.0, 1.0), "Ramp: takes none by position; argu"),  # type: ignore
     (lambda: StateWeight(lambda s: -0.5).sample(at(0.0)), "weight is -0.5"),
     (lambda: StateWeight(lambda s: np.nan).sample(at(0.0)), "weight is nan"),
     (lambda: StateWeight(2.0), "StateWeight: function: "),  # type: ignore

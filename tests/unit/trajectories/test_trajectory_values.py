@@ -40,6 +40,8 @@ from hsp_control.trajectories import (
     CallableTrajectory,
     Circle,
     ComposedPose,
+    Crossfade,
+    CrossfadeOrientation,
     Hold,
     HoldOrientation,
     HoldPose,
@@ -337,7 +339,17 @@ WRONG: dict[type, tuple[dict[str, Any], dict[str, list[Any]]]] = {
         {"trajectory": SPIN, "duration": 1},
         {"trajectory": [*CHILD, CIRCLE], "duration": POSITIVE,
          "rotation": OPTIONAL_ROTATION, "start_angular_velocity": VECTOR3,
-         "start_time": NUMBER},
+         "start_angular_acceleration": VECTOR3, "start_time": NUMBER},
+    ),
+    Crossfade: (
+        {"before": CIRCLE, "after": CIRCLE},
+        {"before": [*CHILD, SPIN], "after": [*CHILD, SPIN], "start_time": NUMBER,
+         "duration": [-1.0, "up", np.nan, None]},
+    ),
+    CrossfadeOrientation: (
+        {"before": SPIN, "after": SPIN},
+        {"before": [*CHILD, CIRCLE], "after": [*CHILD, CIRCLE], "start_time": NUMBER,
+         "duration": [-1.0, "up", np.nan, None]},
     ),
     HoldPose: ({}, {"position": OPTIONAL_VECTOR3, "rotation": OPTIONAL_ROTATION}),
     ComposedPose: (
