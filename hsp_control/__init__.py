@@ -7,8 +7,8 @@ of a field that may move in time.
 The names that most programs need are here. All others are in namespaces:
 ``hsp.trajectories``, ``hsp.tasks``, ``hsp.fields``, ``hsp.metrics``, ``hsp.contacts``,
 ``hsp.limits``, ``hsp.shapes``, ``hsp.changes``, ``hsp.compensation``,
-``hsp.integrators``, ``hsp.robot``, ``hsp.plants``, ``hsp.live``, ``hsp.sweeps``,
-``hsp.viewer`` and ``hsp.errors``.
+``hsp.integrators``, ``hsp.robot``, ``hsp.plants``, ``hsp.simulation``, ``hsp.live``,
+``hsp.config``, ``hsp.sweeps``, ``hsp.viewer`` and ``hsp.errors``.
 """
 
 from importlib import import_module
@@ -17,8 +17,10 @@ from typing import TYPE_CHECKING, Any
 from hsp_control.common.version import __version__ as __version__
 
 if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
+    from . import config as config
     from . import live as live
     from . import robot as robot
+    from . import simulation as simulation
     from . import sweeps as sweeps
     from . import tasks as tasks
     from . import trajectories as trajectories
@@ -95,6 +97,7 @@ _NAMES = {
 _NAMESPACES = {
     "changes": "control.changes",
     "compensation": "control.compensation",
+    "config": "config",
     "contacts": "constraints.contacts",
     "errors": "common.exceptions",
     "fields": "null_space.fields",
@@ -105,6 +108,7 @@ _NAMESPACES = {
     "plants": "simulation.plants",
     "robot": "robot",
     "shapes": "geometry.shapes",
+    "simulation": "simulation",
     "sweeps": "sweeps",
     "tasks": "tasks",
     "trajectories": "trajectories",
@@ -136,7 +140,8 @@ def _hint(name: str) -> str:
     if name.startswith("_"):
         return ""
     for namespace, room in _NAMESPACES.items():
-        if hasattr(import_module(f"{__name__}.{room}"), name):
+        value = getattr(import_module(f"{__name__}.{room}"), name, None)
+        if getattr(value, "__module__", "").startswith(f"{__name__}.{room}"):
             return f"; there is hsp_control.{namespace}.{name}"
     return ""
 

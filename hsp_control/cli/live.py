@@ -13,16 +13,10 @@ from typing import Any
 from rich.table import Table
 
 from hsp_control.cli.consoles import out
+from hsp_control.cli.live_experiment import live_period, simulated_robot
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment, load_experiment
-from hsp_control.config.build_live import (
-    interface_of,
-    live_period,
-    simulated_robot,
-    stop_of,
-    tolerance_of,
-)
 from hsp_control.control.compensation import Command
 from hsp_control.live import (
     Faults,
@@ -52,10 +46,8 @@ def live(options: argparse.Namespace) -> int:
     loop_log = options.out / f"{experiment.name}-live.journal"
     robot_log = options.out / f"{experiment.name}-robot.journal"
     requests = OperatorRequests()
-    settings: dict[str, Any] = {
-        "interface": interface_of(experiment),
-        "tolerance": tolerance_of(experiment),
-        "stop": stop_of(experiment),
+    options_of_loop: dict[str, Any] = {
+        "settings": experiment.scenario.live,
         "requests": requests,
         "scene": experiment.scene,
         "log_period": simulation.log_period,
@@ -67,7 +59,7 @@ def live(options: argparse.Namespace) -> int:
             command,
             dry_run_robot,
             duration=min(duration, _DRY_RUN),
-            **settings,
+            **options_of_loop,
         )
         if options.robot is not None:
             hardware = connect(options.robot, experiment.robot, live_period(experiment))
@@ -78,7 +70,7 @@ def live(options: argparse.Namespace) -> int:
                 log=loop_log,
                 meta=_meta(experiment),
                 priority=options.priority,
-                **settings,
+                **options_of_loop,
             )
             out.print(_times(report, experiment))
             out.print(f"The loop: {report.reason}")
@@ -95,7 +87,7 @@ def live(options: argparse.Namespace) -> int:
                 meta=_meta(experiment),
                 priority=options.priority,
                 on_period=_kill_action(kill, robot),
-                **settings,
+                **options_of_loop,
             )
             robot_report = robot.wait()
     link = robot.hardware.link

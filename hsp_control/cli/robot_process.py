@@ -12,9 +12,9 @@ from time import monotonic
 from types import TracebackType
 from typing import Any, Self
 
+from hsp_control.cli.live_experiment import live_period
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.config import Experiment
-from hsp_control.config.build_live import live_period
 from hsp_control.live.faults import Faults
 from hsp_control.live.settings import check_fixed
 from hsp_control.live.udp_hardware import UdpHardware

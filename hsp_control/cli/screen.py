@@ -33,7 +33,7 @@ class Screen:
         announce: Callable[[str], None],
     ) -> Self | None:
         """Open the view; if that fails, print why and return None."""
-        view = experiment.scenario.view.model_dump()
+        view = experiment.scenario.view.all_fields()
         with ExitStack() as stack:
             try:
                 viewer = Viewer(experiment.robot, port=options.port, **view)

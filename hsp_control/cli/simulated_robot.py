@@ -17,16 +17,16 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import Experiment, load_experiment
-from hsp_control.config.build_live import simulated_robot
 from hsp_control.control.output import ControlOutput
 from hsp_control.live.faults import Faults
 from hsp_control.live.link import Link
 from hsp_control.live.live_log import LiveLog, Row, live_channels
 from hsp_control.live.packets import Kind
-from hsp_control.live.settings import StopSettings
+from hsp_control.live.settings import LiveSettings
 from hsp_control.live.simulated_robot import SimulatedRobot
 from hsp_control.live.udp_robot import CLOSED_BY_LOOP, serve
 from hsp_control.robot import RobotState
@@ -146,7 +146,7 @@ def _warm_up(robot: SimulatedRobot, experiment: Experiment) -> None:
     """Execute each real-time operation once, so that none is compiled later."""
     experiment.controller.compute(0.0, experiment.q0, experiment.v0)
     trial = SimulatedRobot(
-        robot.plant, robot.q, robot.v, robot.period, watchdog=1, stop=StopSettings()
+        robot.plant, robot.q, robot.v, robot.period, settings=LiveSettings(watchdog=1)
     )
     trial.advance([robot.tau])
     for _ in range(10):

@@ -4,3 +4,5 @@ from .experiment import Experiment as Experiment
 from .experiment import load_experiment as load_experiment
 from .scenario import Scenario as Scenario
 from .scenario import json_schema as json_schema
+from .view_settings import ShownItems as ShownItems
+from .view_settings import ViewSettings as ViewSettings

@@ -1,29 +1,24 @@
 """An experiment: the objects of a configuration, ready to run."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
-import numpy as np
 import yaml
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ConfigError, SimulationError
+from hsp_control.common.exceptions import ConfigError, ImmutableError, ModelError
 from hsp_control.common.resources import bundled_configs
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.config.build_compensation import build_compensation, check_rates
-from hsp_control.config.build_plant import build_plant
-from hsp_control.config.build_robot import build_robot, build_start
 from hsp_control.config.document import Document
-from hsp_control.config.ground import put_on_ground
 from hsp_control.config.located_scene import located_scene
-from hsp_control.config.models.plant import MujocoPlantModel
-from hsp_control.config.models.simulation import Dop853Model, Rk4Model
+from hsp_control.config.loop_check import check_compensation, check_rates
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
+from hsp_control.config.view_settings import ViewSettings
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.changes import Change
@@ -33,26 +28,29 @@ from hsp_control.control.controller import Controller
 from hsp_control.declaration.named import keyed
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
-from hsp_control.null_space.fields import FieldSum, NullSpaceField
+from hsp_control.live.settings import LiveSettings
+from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import IdentityMetric, Metric
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import only_within
+from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.robot.description.sources import packaged_folders
-from hsp_control.robot.integrators import Dop853, Integrator, Rk4, SemiImplicitEuler
+from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation import Rollout, simulate
-from hsp_control.simulation.plants import Plant
+from hsp_control.simulation.initial_state import InitialState
+from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant
 from hsp_control.simulation.recorder import Recorder
-from hsp_control.simulation.simulate import check_steps, count_rows
+from hsp_control.simulation.settings import SimulationSettings
+from hsp_control.simulation.simulate import check_steps
 from hsp_control.tasks import Task
 
 
-@dataclass(frozen=True, init=False, eq=False)
 class Experiment:
     """A controller, and what it is tried on: the objects of one configuration.
 
     It is made of the same parts in Python and in YAML: `load_experiment` reads what
-    `to_yaml` writes.
+    `to_yaml` writes. It does not change.
 
     Attributes:
         name: The configuration's name, for file names.
@@ -62,9 +60,7 @@ class Experiment:
         scene: Its obstacles.
         q0: Start configuration, shape (nq,).
         v0: Start velocity, shape (nv,).
-        integrator: The integrator of the simulation.
         plant: The simulated system that the efforts act on.
-        compensation: Compensators for differences between plant and model.
         rate_findings: Gains that are high for the control period.
     """
 
@@ -75,14 +71,12 @@ class Experiment:
     scene: Scene
     q0: Array
     v0: Array
-    integrator: Integrator
     plant: Plant
-    compensation: Compensation
     rate_findings: tuple[RateFinding, ...]
 
     def __init__(
         self,
-        robot: str | Mapping[str, object],
+        robot: str | Robot | RobotDescription,
         tasks: Sequence[Task],
         field: NullSpaceField | None = None,
         *,
@@ -94,14 +88,21 @@ class Experiment:
         base: Base | None = None,
         scene: Scene | Iterable[Obstacle] = (),
         changes: Sequence[Change] = (),
+        start: InitialState | None = None,
+        plant: PlantPart | str = "rigid_body",
+        compensation: Compensation | None = None,
+        simulation: SimulationSettings | None = None,
+        live: LiveSettings | None = None,
+        view: ViewSettings | None = None,
+        title: str = "",
+        description: str = "",
         name: str = "experiment",
-        **settings: object,
     ) -> None:
         """Build an experiment.
 
         Args:
-            robot: The robot's name or the path of its URDF; or the keys of YAML's
-                ``robot``.
+            robot: The robot, as `Robot.load` made it, or its name, the path of its
+                URDF, or its description.
             tasks: The tasks; this and all others up to ``changes`` as for `Controller`.
             field: The null-space field.
             null_space_gain: K_N [1/s].
@@ -112,13 +113,19 @@ class Experiment:
             base: What else moves a floating base.
             scene: The obstacles.
             changes: Changes while running.
+            start: Where the run begins; at home and at rest by default.
+            plant: What the efforts act on; the controller's own model by default.
+            compensation: Compensators for what the model lacks.
+            simulation: Duration, periods and integrator.
+            live: Settings of a live run.
+            view: Settings of the 3-D view.
+            title: One line that says what the experiment shows.
+            description: A longer description.
             name: Its name, for file names.
-            **settings: All other keys of a configuration, as mappings: ``start``,
-                ``plant``, ``compensation``, ``simulation``, ``live``, ``view``,
-                ``title``, ``description``.
 
         Raises:
-            HspControlError: If a part or a key is wrong; see `load_experiment`.
+            HspControlError: If a part is wrong, or does not fit the others; see
+                `load_experiment`.
         """
         null_space = {
             "gain": null_space_gain,
@@ -126,8 +133,17 @@ class Experiment:
             "fields": () if field is None else terms_of(field),
             "singularity_threshold": singularity_threshold,
         }
+        given = {
+            "start": start,
+            "compensation": compensation,
+            "simulation": simulation,
+            "live": live,
+            "view": view,
+        }
         data = {
-            "robot": {"name": robot} if isinstance(robot, str) else robot,
+            "title": title,
+            "description": description,
+            "robot": _description(robot),
             "tasks": keyed(tasks),
             "null_space": null_space,
             "limits": limits,
@@ -135,9 +151,31 @@ class Experiment:
             "base": base,
             "scene": scene if isinstance(scene, Scene) else Scene(scene),
             "changes": tuple(changes),
-            **settings,
+            "plant": plant,
+            **{key: part for key, part in given.items() if part is not None},
         }
         vars(self).update(vars(build(Document(data, {}, name))))
+
+    def __setattr__(self, attribute: str, value: object) -> NoReturn:
+        """Raise: an experiment does not change.
+
+        Raises:
+            ImmutableError: Always.
+        """
+        raise ImmutableError(
+            f"Experiment.{attribute} cannot be assigned: build another experiment, or "
+            "change the controller while it runs with experiment.controller.at(t)"
+        )
+
+    @property
+    def compensation(self) -> Compensation:
+        """Compensators for differences between plant and model."""
+        return self.scenario.compensation
+
+    @property
+    def integrator(self) -> Integrator:
+        """The integrator of the simulation."""
+        return self.scenario.simulation.integrator
 
     @property
     def config(self) -> dict[str, Any] | None:
@@ -286,43 +324,40 @@ def build(document: Document) -> Experiment:
     """
     scenario = validate(document, Scenario)
     folder = Path(document.name).resolve().parent
-    robot, scenario = build_robot(document, scenario, folder)
-    q0 = build_start(document, scenario.start, robot)
+    scenario = replace(scenario, robot=scenario.robot.located(folder))
+    robot = load_robot(document, scenario)
+    contacts = tuple(scenario.contacts.values())
+    for contact in contacts:
+        with document.at("contacts", contact.name, "frame"):
+            robot.frame_id(contact.frame)
+    with document.at("start"):
+        q0 = scenario.start.configuration_of(robot, contacts)
     with document.at():
-        if scenario.start.ground is not None:
-            contacts = scenario.contacts.values()
-            q0 = put_on_ground(scenario.start.ground, contacts, robot, q0)
         scene = located_scene(scenario.scene, folder, document.access)
-        scenario = scenario.model_copy(update={"scene": scene})
-        fields, null_space = scenario.null_space.fields, scenario.null_space
+        scenario = replace(scenario, scene=scene)
+        null_space = scenario.null_space
         controller = Controller(
             robot,
             tuple(scenario.tasks.values()),
-            fields[0] if len(fields) == 1 else FieldSum(fields) if fields else None,
+            null_space.field,
             null_space_gain=null_space.gain,
             metric=null_space.metric,
             singularity_threshold=null_space.singularity_threshold,
             limits=scenario.limits,
-            contacts=tuple(scenario.contacts.values()),
+            contacts=contacts,
             base=scenario.base,
             scene=scene,
             start=q0,
             changes=scenario.changes,
         )
-    start = robot.state(0.0, q0, np.zeros(robot.nv))
-    velocity = scenario.start.velocity
-    with document.at("start", "velocity"):
-        if velocity == "flow":
-            v0 = controller.flow(0.0, q0)
-        else:
-            v0 = robot.check_tangent(start.v if velocity == "rest" else velocity, "v0")
-    if controller.limits is not None:
-        with document.at("start"):
+    with document.at("start"):
+        v0 = scenario.start.velocity_of(controller, q0)
+        if controller.limits is not None:
             controller.limits.check_start(q0, v0)
-    integrator = _integrator(document, scenario)
-    plant, scenario = build_plant(document, scenario, folder, robot, integrator)
-    compensation = build_compensation(document, scenario, controller)
-    rates = check_rates(document, scenario, controller, compensation, q0)
+    scenario = replace(scenario, plant=scenario.plant.located(folder))
+    plant = _plant(document, scenario, robot)
+    check_compensation(document, scenario, controller)
+    rates = check_rates(document, scenario, controller, q0)
     return _experiment(
         name=Path(document.name).stem,
         scenario=scenario,
@@ -330,40 +365,59 @@ def build(document: Document) -> Experiment:
         controller=controller,
         scene=scene,
         q0=q0,
-        v0=v0.copy(),
-        integrator=integrator,
+        v0=v0,
         plant=plant,
-        compensation=compensation,
         rate_findings=rates,
     )
+
+
+def load_robot(document: Document, scenario: Scenario) -> Robot:
+    """Return the robot of a configuration.
+
+    Raises:
+        HspControlError: If it cannot be loaded; with a location.
+    """
+    parts = scenario.robot.parts is not None
+    with document.at("robot", *(() if parts else ("name",))):
+        return Robot.load(scenario.robot, access=document.access)
+
+
+def _plant(document: Document, scenario: Scenario, robot: Robot) -> Plant:
+    """Return the plant, which has the control period and the steps that it needs."""
+    settings = scenario.simulation
+    if (step := scenario.plant.longest_step) is not None:
+        with document.at("simulation"):
+            check_steps(settings.duration, step, "plant.timestep")
+    with document.at("plant"):
+        plant = scenario.plant.build(robot, settings.integrator, access=document.access)
+    if isinstance(plant, SampledPlant) and settings.control_period is None:
+        raise document.error(
+            ("plant",),
+            "this plant needs efforts that are held for a period: set "
+            "simulation.control_period [s], for example to 0.001",
+        )
+    return plant
+
+
+def _description(robot: str | Robot | RobotDescription) -> RobotDescription:
+    """Return what a configuration says about a robot.
+
+    Raises:
+        ModelError: If it was not loaded.
+    """
+    if isinstance(robot, str):
+        return RobotDescription(robot)
+    if isinstance(robot, RobotDescription):
+        return robot
+    if robot.description is None:
+        raise ModelError(
+            f"{robot.name} was not loaded by Robot.load, so that no configuration can "
+            "name it; give a name, a path or a RobotDescription"
+        )
+    return robot.description
 
 
 def _experiment(**attributes: object) -> Experiment:
     experiment = object.__new__(Experiment)
     vars(experiment).update(attributes)
     return experiment
-
-
-def _integrator(document: Document, scenario: Scenario) -> Integrator:
-    settings = scenario.simulation
-    with document.at("simulation"):
-        count_rows(settings.duration, settings.log_period, settings.control_period)
-        if isinstance(plant := scenario.plant, MujocoPlantModel):
-            check_steps(settings.duration, plant.timestep, "plant.timestep")
-    model = settings.integrator
-    if isinstance(model, Dop853Model):
-        return Dop853(model.rtol, model.atol)
-    whole = settings.control_period or settings.log_period
-    ratio = whole / model.step
-    with document.at("simulation", "integrator", "step"):
-        check_steps(settings.duration, model.step, "step")
-        if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6 * ratio:
-            period = "control_period" if settings.control_period else "log_period"
-            raise SimulationError(
-                f"{model.step:g} s is not an integer fraction of {period} = {whole:g} s"
-            )
-    return (
-        Rk4(model.step)
-        if isinstance(model, Rk4Model)
-        else SemiImplicitEuler(model.step)
-    )

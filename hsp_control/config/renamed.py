@@ -31,13 +31,21 @@ _ORIENTATIONS: tuple[KeyPath, ...] = (
     ("scene", "obstacles", "*", "orientation"),
 )
 
+_PLACEMENTS: tuple[KeyPath, ...] = (
+    ("robot", "tool_frames", "*"),
+    ("robot", "parts", "*"),
+    ("robot", "parts", "*", "tool_frames", "*"),
+    ("plant", "robot", "tool_frames", "*"),
+)
+
 RENAMED = (
     Renamed(("remedies",), ("compensation",)),
     Renamed(
         ("limits", "distances", "*", "least"), ("limits", "distances", "*", "minimum")
     ),
+    Renamed(("plant", "contacts", "*", "rpy"), ("plant", "contacts", "*", "rotation")),
     *(Renamed((*at, "rpy"), (*at, "rotations"), "path") for at in _ORIENTATIONS),
-    *(Renamed((*at, "rpy"), (*at, "rotation")) for at in _ORIENTATIONS),
+    *(Renamed((*at, "rpy"), (*at, "rotation")) for at in _ORIENTATIONS + _PLACEMENTS),
 )
 """All keys that have a new name; of two that fit, the first counts."""
 

@@ -1,79 +1,83 @@
-"""The schema of a YAML configuration, as a tree of typed models.
+"""What a YAML configuration says: the parts of an experiment.
 
-Each ``type:`` selects one class of a union; the builders map it to the object of the
-same name. Units are SI: metres, radians, seconds.
+Each ``type:`` selects a class of a family. Units are SI: metres, radians, seconds.
 """
 
 from collections.abc import Sequence
 from copy import deepcopy
+from dataclasses import KW_ONLY, field
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 
-from hsp_control.config.models.base import Model
-from hsp_control.config.models.compensation import CompensationModel
-from hsp_control.config.models.live import LiveModel
-from hsp_control.config.models.null_space import NullSpaceModel
-from hsp_control.config.models.plant import AnyPlant
-from hsp_control.config.models.robot import RobotModel, StartModel
-from hsp_control.config.models.simulation import SimulationModel
-from hsp_control.config.models.view import ViewModel
+from hsp_control.common.exceptions import ConfigError
+from hsp_control.config.view_settings import ViewSettings
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.changes import Change
+from hsp_control.control.compensation import Compensation
 from hsp_control.declaration import Part
 from hsp_control.declaration.named import BY_NAME
 from hsp_control.declaration.plain_data import plain_data
-from hsp_control.declaration.quantities import Name
+from hsp_control.declaration.quantities import READ_ONLY, Name, ReadOnlyDict
 from hsp_control.geometry.scene import Scene
+from hsp_control.live.settings import LiveSettings
+from hsp_control.null_space.settings import NullSpaceSettings
+from hsp_control.robot.description.robot_description import RobotDescription
+from hsp_control.simulation.initial_state import InitialState
+from hsp_control.simulation.plants import AnyPlant, RigidBody
+from hsp_control.simulation.settings import SimulationSettings
 from hsp_control.tasks import Task
 
 
-class Scenario(Model):
+class Scenario(Part, error=ConfigError):
     """A whole configuration."""
 
+    _: KW_ONLY
     title: str = ""
     """One line that says what the configuration shows; the title of its plots."""
     description: str = ""
     """A longer description, for readers."""
-    robot: RobotModel
+    robot: RobotDescription
     """The robot that is controlled."""
-    start: StartModel = StartModel()
+    start: InitialState = InitialState()
     """Configuration and velocity at t = 0."""
     scene: Scene = Scene()
     """The obstacles."""
-    tasks: Annotated[dict[Name, Task], Field(min_length=1, max_length=100), BY_NAME]
+    tasks: Annotated[
+        dict[Name, Task], Field(min_length=1, max_length=100), BY_NAME, READ_ONLY
+    ]
     """The tasks, by name; tasks of the same priority form one level."""
-    contacts: Annotated[dict[Name, Contact], Field(max_length=100), BY_NAME] = Field(
-        default_factory=dict
-    )
+    contacts: Annotated[
+        dict[Name, Contact], Field(max_length=100), BY_NAME, READ_ONLY
+    ] = field(default_factory=ReadOnlyDict)
     """The contacts that support a robot with a free-flyer root, by name."""
     base: Literal["flying", "driven"] | None = None
     """For a free-flyer root without contacts: ``flying`` if nothing holds it,
     ``driven`` if something outside the controller moves it."""
     limits: Limits | None = None
     """Limits on efforts and motion that the controller keeps; no limits by default."""
-    null_space: NullSpaceModel = NullSpaceModel()
+    null_space: NullSpaceSettings = NullSpaceSettings()
     """The control of self-motion: fields, metric and gain."""
     changes: Annotated[Sequence[Change], AfterValidator(tuple)] = ()
     """Changes of tasks, gains, fields and contacts while the controller runs."""
-    plant: AnyPlant = "rigid_body"
+    plant: AnyPlant = RigidBody()
     """The simulated system that the efforts act on, and its differences from the
     controller's model."""
-    compensation: CompensationModel = CompensationModel()
+    compensation: Compensation = Compensation()
     """Compensators for the differences between the plant and the model."""
-    simulation: SimulationModel = SimulationModel()
+    simulation: SimulationSettings = SimulationSettings()
     """Settings of the simulation."""
-    live: LiveModel = LiveModel()
+    live: LiveSettings = LiveSettings()
     """Settings of `hsp live`."""
-    view: ViewModel = ViewModel()
+    view: ViewSettings = ViewSettings()
     """Settings of the 3-D view."""
 
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a configuration, for editors."""
-    schema = Scenario.model_json_schema(schema_generator=_Generator)
+    schema = TypeAdapter(Scenario).json_schema(schema_generator=_Generator)
     for model in schema["$defs"].values():
         if "const" in (kind := model.get("properties", {}).get("type", {})):
             kind.setdefault("description", f"{kind['const']}: {model['description']}")

@@ -3,10 +3,11 @@
 from contextlib import AbstractContextManager, nullcontext
 from typing import TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config.document import Document
+from hsp_control.declaration import Part
 from hsp_control.declaration.families import only_packages
 from hsp_control.declaration.findings import Finding, Pending, findings
 from hsp_control.declaration.located import locate
@@ -14,31 +15,32 @@ from hsp_control.declaration.mistakes import domain_error
 from hsp_control.declaration.schema import shape
 from hsp_control.declaration.wording import explained
 
-Model = TypeVar("Model", bound=BaseModel)
+Value = TypeVar("Value", bound=Part)
 
 _OTHERS = 5
 _MANY = 2000
 _ENTRIES = 20
 
 
-def validate(document: Document, model: type[Model]) -> Model:
-    """Return the document as an instance of the pydantic model.
+def validate(document: Document, part: type[Value]) -> Value:
+    """Return the document as a part.
 
     Raises:
-        HspControlError: If it does not follow the model. The message describes the
-            first mistake in the order of the file, then up to five others, a line each.
+        HspControlError: If it does not follow the declaration of the part. The message
+            describes the first mistake in the order of the file, then up to five
+            others, a line each.
     """
     admitted: AbstractContextManager[None] = nullcontext()
     if document.packages is not None:
         admitted = only_packages(*document.packages)
     try:
         with admitted:
-            return model.model_validate(document.to_dict())
+            return TypeAdapter(part).validate_python(document.to_dict())
     except ValidationError as error:
         pending = _first_entries(
             [(each["loc"], each) for each in error.errors(include_url=False)]
         )
-        found = findings(document, shape(model), pending)
+        found = findings(document, shape(part), pending)
     raise _summary(document, sorted(found, key=lambda f: _order(document, f)))
 
 

@@ -126,6 +126,7 @@ class AnyOf:
         members = self.members
         if isinstance(value, dict) and (member := members.get(str(value.get("type")))):
             _check_admitted(str(value["type"]), member.__module__)
+            _check_complete(str(value["type"]), member)
         if self._validator is None or members != self._checked:
             self._checked = members
             self._validator = SchemaValidator(_union(members))
@@ -161,10 +162,7 @@ def _described(name: str, member: "type[Part]", handler: GetJsonSchemaHandler) -
     reference = handler(definition)
     if full_name in _UNDER_WAY or _is_known(reference, handler):
         return reference
-    schema: Any = member.__pydantic_core_schema__
-    others: list[CoreSchema] = []
-    if schema["type"] == "definitions":
-        schema, others = schema["schema"], schema["definitions"]
+    schema, others = _own_and_others(member)
     own = cast(CoreSchema, {**schema, "ref": full_name})
     _UNDER_WAY.add(full_name)
     try:
@@ -218,16 +216,39 @@ def _check_admitted(type_name: str, module: str) -> None:
         raise PydanticCustomError("value_error", "{error}", {"error": error})
 
 
+def _check_complete(type_name: str, member: "type[Part]") -> None:
+    """Check that a class implements what its family asks for.
+
+    Raises:
+        ConfigError: If it does not.
+    """
+    missing = sorted(getattr(member, "__abstractmethods__", ()))
+    if missing:
+        raise ConfigError(
+            f"type {type_name!r}: {_full_name(member)} does not implement "
+            f"{joined(missing)}"
+        )
+
+
 def _union(members: "dict[str, type[Part]]") -> CoreSchema:
-    return core_schema.tagged_union_schema(
-        {
-            name: core_schema.no_info_before_validator_function(
-                _without_type, member.__pydantic_core_schema__
-            )
-            for name, member in members.items()
-        },
-        discriminator="type",
-    )
+    choices: dict[str, CoreSchema] = {}
+    shared: dict[str, CoreSchema] = {}  # each definition once, whoever refers to it
+    for name, member in members.items():
+        schema, others = _own_and_others(member)
+        shared |= {str(other["ref"]): other for other in others}
+        choices[name] = core_schema.no_info_before_validator_function(
+            _without_type, schema
+        )
+    union = core_schema.tagged_union_schema(choices, discriminator="type")
+    return core_schema.definitions_schema(union, [*shared.values()])
+
+
+def _own_and_others(member: "type[Part]") -> tuple[CoreSchema, list[CoreSchema]]:
+    """Return the schema of a member, and the definitions that it refers to."""
+    schema: Any = member.__pydantic_core_schema__
+    if schema["type"] == "definitions":
+        return schema["schema"], schema["definitions"]
+    return schema, []
 
 
 def _without_type(value: Any) -> Any:

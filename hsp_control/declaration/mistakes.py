@@ -47,9 +47,24 @@ def as_error(finding: Finding, cls: "type[Part]") -> HspControlError:
     return kind(f"{where}: {explained(finding)}")
 
 
+class Carrier(ValueError):
+    """Carries an error that is no `ValueError` through pydantic, which collects those.
+
+    Attributes:
+        error: The error.
+    """
+
+    def __init__(self, error: HspControlError) -> None:
+        """Carry an error."""
+        super().__init__(str(error))
+        self.error = error
+
+
 def domain_error(error: Mapping[str, Any]) -> HspControlError | None:
     """Return the package's own error that a check raised, if it did."""
     raised = error.get("ctx", {}).get("error")
+    if isinstance(raised, Carrier):
+        return raised.error
     return raised if isinstance(raised, HspControlError) else None
 
 

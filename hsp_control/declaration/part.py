@@ -21,7 +21,7 @@ from hsp_control.common.exceptions import HspControlError, ImmutableError
 from hsp_control.declaration.docstrings import attribute_docstrings
 from hsp_control.declaration.equality import same
 from hsp_control.declaration.families import Family
-from hsp_control.declaration.mistakes import argument_error
+from hsp_control.declaration.mistakes import Carrier, argument_error
 from hsp_control.declaration.plain_data import plain_data
 
 _CONFIG = ConfigDict(
@@ -260,7 +260,10 @@ def _completed(check: Callable[[Any], None]) -> Callable[[Any], None]:
     @wraps(check)
     def checked(self: Part) -> None:
         self._complete()
-        check(self)
+        try:
+            check(self)
+        except HspControlError as error:
+            raise error if isinstance(error, ValueError) else Carrier(error) from None
 
     return checked
 

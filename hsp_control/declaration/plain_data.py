@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any, get_origin
 
 import numpy as np
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.declaration import schema
+from hsp_control.declaration.by_type import ByType, as_entry
 from hsp_control.declaration.equality import same
 from hsp_control.declaration.located import within
 
@@ -49,18 +51,41 @@ def plain_data(value: Any, *, defaults: bool = False) -> Any:
 def _of_part(part: "Part", defaults: bool) -> dict[str, Any]:
     data: dict[str, Any] = {}
     if part.family is not None:
-        if part.yaml_type is None:
-            raise ConfigError(
-                f"YAML has no name for {type(part).__name__}: declare it with "
-                f'class {type(part).__name__}(..., type="...")'
-            )
-        data["type"] = part.yaml_type
+        data["type"] = _type_of(part)
     fields = part.all_fields() if defaults else part.changed_fields()
     for name, value in fields.items():
-        if isinstance(value, tuple) and _is_mapping(part, name):
-            value = {getattr(each, each.yaml_key): each for each in value}
+        field = schema.fields(type(part)).get(name)
+        if isinstance(value, tuple) and field is not None:
+            value = _keyed(value, field, defaults)
         data[name] = _inside(name, value, defaults)
     return data
+
+
+def _type_of(part: "Part") -> str:
+    """Return what YAML calls the part's class.
+
+    Raises:
+        ConfigError: If it has no name.
+    """
+    if part.yaml_type is None:
+        raise ConfigError(
+            f"YAML has no name for {type(part).__name__}: declare it with "
+            f'class {type(part).__name__}(..., type="...")'
+        )
+    return part.yaml_type
+
+
+def _keyed(parts: tuple[Any, ...], field: FieldInfo, defaults: bool) -> Any:
+    """Return parts as the mapping that YAML gives for a field, if it is one."""
+    if any(isinstance(each, ByType) for each in field.metadata):
+        return {
+            _type_of(each): each.all_fields() if defaults else as_entry(each)
+            for each in parts
+        }
+    (option, *_) = schema.field_shape(field).options
+    if get_origin(option) is dict:
+        return {getattr(each, each.yaml_key): each for each in parts}
+    return parts
 
 
 def _of_model(model: BaseModel, defaults: bool) -> dict[str, Any]:
@@ -71,12 +96,6 @@ def _of_model(model: BaseModel, defaults: bool) -> dict[str, Any]:
         if defaults or field.is_required() or not same(value, default):
             data[name] = _inside(name, value, defaults)
     return data
-
-
-def _is_mapping(part: "Part", field: str) -> bool:
-    """Return whether YAML gives the parts that a field holds as a mapping by name."""
-    (option, *_) = schema.field_shape(schema.fields(type(part))[field]).options
-    return get_origin(option) is dict
 
 
 def _entry(key: Any, value: Any, defaults: bool) -> Any:

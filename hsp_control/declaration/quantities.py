@@ -6,7 +6,7 @@ a read-only copy of doubles.
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, core_schema
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ImmutableError
 
 
 def plain(value: Any) -> Any:
@@ -59,7 +60,7 @@ Name = Annotated[
 """What a user calls a part, in messages and in columns of the log."""
 FileName = Annotated[
     str | Path,
-    AfterValidator(lambda value: str(Path(value))),
+    AfterValidator(str),
     WithJsonSchema({"type": "string"}),
 ]
 """The path of a file, stored as text."""
@@ -73,6 +74,26 @@ def _distinct_axes(letters: str) -> str:
     return letters
 
 
+class ReadOnlyDict(dict[Any, Any]):
+    """A mapping that cannot be changed."""
+
+    def _refuse(self, *_: Any, **__: Any) -> NoReturn:
+        """Raise: a value does not change.
+
+        Raises:
+            ImmutableError: Always.
+        """
+        raise ImmutableError("the mappings of a part cannot be changed")
+
+    __setitem__ = __delitem__ = _refuse
+    clear = pop = popitem = setdefault = update = __ior__ = _refuse
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ReadOnlyDict, (dict(self),)
+
+
+READ_ONLY = AfterValidator(ReadOnlyDict)
+"""For a field that holds a mapping."""
 Axes = Annotated[str, AfterValidator(_distinct_axes)]
 """World axes by their letters, such as ``xz``."""
 
@@ -185,3 +206,5 @@ Gain = Annotated[
 """A number, one number for each row, or a matrix."""
 Weights = Annotated[ArrayLike, ArrayField(NonNegative | list[NonNegative], read_only)]
 """One number, or one for each joint."""
+Periods = Annotated[int, Strict(), Field(ge=0, le=100_000), _PLAIN]
+"""A number of control periods."""

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 from pydantic import RootModel
 from pydantic.fields import FieldInfo
 
+from hsp_control.declaration.by_type import ByType
 from hsp_control.declaration.families import AnyOf
 from hsp_control.declaration.quantities import ArrayField
 
@@ -56,6 +57,8 @@ def shape(annotation: Any, *metadata: Any) -> Shape:
             return shape(each.items)
         if isinstance(each, AnyOf):
             return Shape(tuple(each.members.values()), (_BY_TYPE,))
+        if isinstance(each, ByType):
+            return Shape((each.model,))
     if get_origin(annotation) is Annotated:
         inner, *more = get_args(annotation)
         for each in more:
@@ -63,6 +66,8 @@ def shape(annotation: Any, *metadata: Any) -> Shape:
                 return shape(each.items, *known)
             if isinstance(each, AnyOf):
                 return Shape(tuple(each.members.values()), (*known, _BY_TYPE))
+            if isinstance(each, ByType):
+                return Shape((each.model,), known)
         return shape(inner, *more, *known)
     if hasattr(annotation, "__value__"):  # an alias: type Gain = float | list[float]
         return shape(annotation.__value__, *known)
@@ -82,7 +87,7 @@ def shape(annotation: Any, *metadata: Any) -> Shape:
 def field_shape(field: FieldInfo) -> Shape:
     """Return the shape of a model's field."""
     for each in field.metadata:  # what pydantic took out of ``Annotated``
-        if isinstance(each, ArrayField | AnyOf):
+        if isinstance(each, ArrayField | AnyOf | ByType):
             return shape(Annotated[Any, each])
     return shape(field.annotation, field)
 

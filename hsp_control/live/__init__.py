@@ -13,9 +13,8 @@ from .operator_requests import OperatorRequests as OperatorRequests
 from .report import LoopReport as LoopReport
 from .safe_stop import Phase as Phase
 from .safe_stop import SafeStop as SafeStop
-from .settings import EffortInterface as EffortInterface
+from .settings import LiveSettings as LiveSettings
 from .settings import StopSettings as StopSettings
-from .settings import Tolerance as Tolerance
 from .simulated_robot import SimulatedRobot as SimulatedRobot
 from .udp_hardware import UdpHardware as UdpHardware
 from .udp_robot import serve as serve

@@ -3,7 +3,8 @@
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.live.settings import EffortInterface
+from hsp_control.constraints.limits import RobotLimits
+from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
 
@@ -16,30 +17,43 @@ class EffortLimiter:
         gravity: g(q) at the last configuration, shape (nv,).
     """
 
-    def __init__(self, robot: Robot, interface: EffortInterface, period: float) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        settings: LiveSettings,
+        period: float,
+        limits: RobotLimits | None = None,
+    ) -> None:
         """Read the limits.
 
         Args:
             robot: The model.
-            interface: Limits, and whether the robot adds g(q) itself.
+            settings: Limits, and whether the robot adds g(q) itself.
             period: Time between two efforts [s].
+            limits: The controller's limits, for efforts that the settings do not limit.
 
         Raises:
-            LiveError: If a limit is not positive or has the wrong shape.
+            LiveError: If there are neither one nor nv numbers for a limit.
         """
-        self._robot = robot
+        self._robot, self._settings, self._limits = robot, settings, limits
         self._rest = np.zeros(robot.nv)
-        self._compensates = interface.compensates_gravity
-        self._upper = interface.effort_limits(robot)
-        self._step = interface.rate_limits(robot) * period
+        self._compensates = settings.compensates_gravity
+        self._upper = settings.effort_limits(robot, limits)
+        self._step = settings.rate_limits(robot) * period
         self.sent: Array = np.zeros(robot.nv)
         self.applied: Array = np.zeros(robot.nv)
         self.gravity: Array = np.zeros(robot.nv)
 
     @property
     def effort_limits(self) -> Array:
-        """The upper limits of the motors' efforts, shape (nv,)."""
+        """The upper limits of the motors' efforts, shape (nv,); `follow` sets them."""
         return self._upper
+
+    def follow(self, limits: RobotLimits | None) -> None:
+        """Use the controller's limits of now, which may change in a run."""
+        if limits is not self._limits:
+            self._limits = limits
+            self._upper[:] = self._settings.effort_limits(self._robot, limits)
 
     def reset(self, q: Array) -> None:
         """Start at rest at q, shape (nq,): brakes or motors provide g(q)."""

@@ -20,12 +20,7 @@ from hsp_control.live.live_log import LoopLog
 from hsp_control.live.operator_requests import OperatorRequests
 from hsp_control.live.report import Ended, LoopReport
 from hsp_control.live.safe_stop import Phase, SafeStop
-from hsp_control.live.settings import (
-    EffortInterface,
-    StopSettings,
-    Tolerance,
-    check_fixed,
-)
+from hsp_control.live.settings import LiveSettings, check_fixed
 from hsp_control.live.state_reader import StateReader
 from hsp_control.robot import Robot
 
@@ -38,9 +33,7 @@ def run_loop(
     hardware: Hardware,
     *,
     duration: float | None = None,
-    interface: EffortInterface | None = None,
-    tolerance: Tolerance | None = None,
-    stop: StopSettings | None = None,
+    settings: LiveSettings | None = None,
     requests: OperatorRequests | None = None,
     log: str | Path | None = None,
     log_period: float = 0.01,
@@ -64,9 +57,8 @@ def run_loop(
         hardware: The robot.
         duration: Time from the first state to the stop [s]; None: until the operator
             stops.
-        interface: Which efforts the robot accepts.
-        tolerance: Faults that are tolerated.
-        stop: How the safe stop brakes and holds.
+        settings: Which efforts the robot accepts, the faults that are tolerated, and
+            how the safe stop brakes and holds; None: the defaults.
         requests: The operator's requests: stop the loop, or change the controller
             between periods. Ctrl-C (`KeyboardInterrupt`) is the operator's stop, too.
         log: The journal to write; `Rollout.load` reads it also after a crash.
@@ -87,15 +79,14 @@ def run_loop(
         LogError: If the journal cannot be created.
         HspControlError: If the controller raises at the first state.
     """
-    effort_source, tolerance = as_effort_source(controller), tolerance or Tolerance()
-    settings, interface = stop or StopSettings(), interface or EffortInterface()
+    effort_source, settings = as_effort_source(controller), settings or LiveSettings()
     robot, period = effort_source.controller.robot, hardware.period
     try:
         _check(robot, period, duration, log_period)
-        limiter = EffortLimiter(robot, interface, period)
-        safe_stop = SafeStop(robot, settings, limiter.effort_limits, period)
         limits = effort_source.controller.limits
-        reader = StateReader(robot, limits, hardware, tolerance, clock)
+        limiter = EffortLimiter(robot, settings, period, limits)
+        safe_stop = SafeStop(robot, settings.stop, limiter.effort_limits, period)
+        reader = StateReader(robot, limits, hardware, settings, clock)
         first = reader.wait_for_first(start_time)
         # Compile and allocate everything now, not in real-time operation.
         for _ in range(_WARM_UP):
@@ -111,7 +102,7 @@ def run_loop(
         end = np.inf if duration is None else start_time + duration - 0.5 * period
         loop = _Loop(effort_source, hardware, reader, limiter, safe_stop, loop_log, end)
         loop.requests = requests or OperatorRequests()
-        loop.prediction_time = tolerance.prediction_time
+        loop.prediction_time = settings.prediction_time
         scheduling = nullcontext() if priority is None else real_time_priority(priority)
         with scheduling, no_garbage_collection():
             loop.run(on_period)
@@ -184,6 +175,7 @@ class _Loop:
         tau = self.controller_effort() if self.phase == Phase.RUNNING else None
         if self.phase != Phase.RUNNING:
             tau = self.stop_effort()
+        limiter.follow(self.effort_source.controller.limits)
         if tau is not None and not limiter.apply(tau, reader.state.q):
             self.stop("fault", f"the effort is not finite: {tau.tolist()}")
         self.send()

@@ -5,7 +5,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.live.hardware import Measurement
-from hsp_control.live.settings import Tolerance
+from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
 
@@ -16,16 +16,18 @@ class MeasurementMonitor:
         last: The last valid measurement.
     """
 
-    def __init__(self, robot: Robot, limits: RobotLimits | None, tolerance: Tolerance):
+    def __init__(
+        self, robot: Robot, limits: RobotLimits | None, settings: LiveSettings
+    ) -> None:
         """Read the limits.
 
         Args:
             robot: The model.
             limits: The controller's limits; None: those of the robot's model.
-            tolerance: Margins beyond the limits, greatest age and number of missing
+            settings: Margins beyond the limits, greatest age and number of missing
                 states.
         """
-        self._robot, self._tolerance = robot, tolerance
+        self._robot, self._settings = robot, settings
         self._own = own_limits(robot) if limits is None else None
         self.last: Measurement | None = None
         self._read(limits)
@@ -40,14 +42,14 @@ class MeasurementMonitor:
             self._read(limits)
 
     def _read(self, limits: RobotLimits | None) -> None:
-        self._limits, tolerance = limits, self._tolerance
+        self._limits, settings = limits, self._settings
         both = [each for each in (limits, self._own) if each is not None]
         lower = np.max([each.lower for each in both], axis=0)
         upper = np.min([each.upper for each in both], axis=0)
         speed = np.min([each.velocity for each in both], axis=0)
-        self._lower = lower - tolerance.position_margin
-        self._upper = upper + tolerance.position_margin
-        self._speed = speed * (1.0 + tolerance.velocity_margin)
+        self._lower = lower - settings.position_margin
+        self._upper = upper + settings.position_margin
+        self._speed = speed * (1.0 + settings.velocity_margin)
 
     def if_new(self, measurement: Measurement | None) -> Measurement | None:
         """Return the measurement if it is later than the last one, else None."""
@@ -88,7 +90,7 @@ class MeasurementMonitor:
 
         Checks the robot's own stop, state age, skipped states, positions and speeds.
         """
-        last, allowed = self.last, self._tolerance
+        last, allowed = self.last, self._settings
         if measurement.halted:
             return "the robot has stopped by itself"
         if measurement.age > allowed.age:

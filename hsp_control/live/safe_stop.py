@@ -46,7 +46,7 @@ class SafeStop:
         Args:
             robot: The model.
             settings: Gains and durations.
-            effort_limits: Upper limits of the efforts, shape (nv,).
+            effort_limits: Upper limits of the efforts, shape (nv,); they may change.
             period: Time between two calls of `effort` [s].
 
         Raises:

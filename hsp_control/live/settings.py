@@ -1,125 +1,41 @@
-"""Settings of a live loop: the robot's interface, tolerances, the safe stop."""
+"""Settings of a live run: the robot's interface, what is tolerated, the safe stop."""
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY
 from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LiveError
+from hsp_control.common.exceptions import LimitError, LiveError
+from hsp_control.constraints.limits import RobotLimits
+from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.quantities import (
+    Count,
+    Flag,
+    NonNegative,
+    Positive,
+    PositiveCount,
+)
 from hsp_control.robot import Robot
 
 
-@dataclass(frozen=True)
-class EffortInterface:
-    """Which efforts a robot accepts.
+class StopSettings(Part, error=LiveError):
+    """The safe stop: damping, then holding the position."""
 
-    Attributes:
-        compensates_gravity: Whether the robot adds g(q) itself, so that tau - g(q) is
-            sent: a Panda (libfranka) and an iiwa (FRI) do.
-        effort_rate: Upper limit of the rate of the *sent* value, one number or one per
-            degree of freedom [N·m/s or N/s]; None: unlimited. A Panda rejects more
-            than 1000.
-        effort: Upper limit of the motors' efforts, gravity included, one number or one
-            per degree of freedom [N·m or N]; None: the URDF's.
-    """
-
-    compensates_gravity: bool = False
-    effort_rate: Any | None = None
-    effort: Any | None = None
-
-    def rate_limits(self, robot: Robot) -> Array:
-        """Return the limits of the effort rates, shape (nv,), inf where unlimited.
-
-        Raises:
-            LiveError: If they are not one or nv positive numbers.
-        """
-        return _per_dof(robot, self.effort_rate, "effort_rate")
-
-    def effort_limits(self, robot: Robot) -> Array:
-        """Return the limits of the efforts, shape (nv,), inf where unlimited.
-
-        Raises:
-            LiveError: If they are not one or nv positive numbers.
-        """
-        if self.effort is not None:
-            return _per_dof(robot, self.effort, "effort")
-        own = np.array(robot.model.effortLimit, dtype=float)
-        # URDFs contain 0, or the largest float, where there is no limit.
-        own[(own <= 0.0) | (own >= np.finfo(np.float32).max)] = np.inf
-        return own
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """Faults that a loop tolerates before it starts the safe stop.
-
-    Attributes:
-        missing: Periods in a row without a new state; the last effort is held.
-        age: Largest state age [s].
-        prediction_time: How long the safe stop uses the model's prediction without a
-            measurement [s]. Then the loop falls silent (stops sending efforts), and
-            the robot's own watchdog must stop it.
-        position_margin: How far a measured position may exceed its limits [rad or m].
-        velocity_margin: How far a measured speed may exceed its limit, as a fraction
-            of the limit.
-        start_timeout: Longest time to wait for the first state [s].
-    """
-
-    missing: int = 20
-    age: float = 0.02
-    prediction_time: float = 0.2
-    position_margin: float = 0.02
-    velocity_margin: float = 0.1
-    start_timeout: float = 10.0
-
-    def __post_init__(self) -> None:
-        """Check the ranges of all values.
-
-        Raises:
-            LiveError: If a value is out of range.
-        """
-        if not isinstance(self.missing, int) or self.missing < 0:
-            raise LiveError(f"missing is {self.missing!r}; needs a number of periods")
-        for name in ("age", "start_timeout"):
-            if not getattr(self, name) > 0.0:
-                raise LiveError(f"{name} is {getattr(self, name)} s; must be positive")
-        for name in ("prediction_time", "position_margin", "velocity_margin"):
-            if not getattr(self, name) >= 0.0:
-                raise LiveError(f"{name} is {getattr(self, name)}; must be at least 0")
-
-
-@dataclass(frozen=True)
-class StopSettings:
-    """How the safe stop brakes, and how it then holds.
-
-    Attributes:
-        damping: k of the braking effort -k M(q) v [1/s]: speeds fall like exp(-k t).
-        natural_frequency: Of the position hold [rad/s], critically damped.
-        rest_speed: The hold starts when all joints are slower [rad/s or m/s].
-        longest_damping: Longest time of damping [s], if noise keeps the measured speed
-            above ``rest_speed``.
-        hold: Time of the hold before the loop ends [s].
-    """
-
-    damping: float = 20.0
-    natural_frequency: float = 10.0
-    rest_speed: float = 0.01
-    longest_damping: float = 2.0
-    hold: float = 0.2
-
-    def __post_init__(self) -> None:
-        """Check the ranges of all values.
-
-        Raises:
-            LiveError: If a value is out of range.
-        """
-        for name in ("damping", "natural_frequency", "rest_speed", "longest_damping"):
-            value = getattr(self, name)
-            if not 0.0 < value < np.inf:
-                raise LiveError(f"{name} is {value}; must be positive and finite")
-        if not 0.0 <= self.hold < np.inf:
-            raise LiveError(f"hold is {self.hold} s; must be at least 0 and finite")
+    _: KW_ONLY
+    damping: Positive = 20.0
+    """k of the braking effort -k M(q) v [1/s]: joint speeds decay like exp(-k t)."""
+    natural_frequency: Positive = 10.0
+    """Natural frequency of the position control that then holds the robot [rad/s]; it
+    is critically damped."""
+    rest_speed: Positive = 0.01
+    """Joint speed below which holding begins [rad/s or m/s]."""
+    longest_damping: Positive = 2.0
+    """Maximum duration of braking [s], for measured speeds that noise keeps above
+    ``rest_speed``."""
+    hold: NonNegative = 0.2
+    """Duration of holding before the loop ends [s]."""
 
     def check_period(self, period: float) -> None:
         """Check that the sampled safe stop is stable at this period [s].
@@ -140,6 +56,74 @@ class StopSettings:
                 )
 
 
+class LiveSettings(Part, error=LiveError):
+    """How a loop communicates with a robot, and when it stops the robot.
+
+    The loop and a `SimulatedRobot` have the same settings: ``watchdog`` is the robot's,
+    the tolerances are the loop's, and both have the interface and the safe stop.
+    """
+
+    _: KW_ONLY
+    compensates_gravity: Flag = False
+    """Whether the robot adds g(q) itself, as a Panda (libfranka) and an iiwa (FRI) do;
+    tau - g(q) is then sent [-]."""
+    effort_rate: Positives | None = None
+    """Maximum rate of the effort that is *sent* [N·m/s or N/s], one number or nv; a
+    Panda rejects more than 1000. Unlimited by default."""
+    effort: Positives | None = None
+    """Maximum effort of the motors, gravity included [N·m or N], one number or nv; by
+    default that of the controller's limits, or the URDF's without limits."""
+    missing: Count = 20
+    """Consecutive periods without a new state before the safe stop [periods]; the last
+    effort is held meanwhile."""
+    age: Positive = 0.02
+    """Maximum age of a state [s]."""
+    prediction_time: NonNegative = 0.2
+    """How long the safe stop uses the model's prediction without a measurement [s].
+    Then the loop falls silent (stops sending efforts), and the robot's own watchdog
+    must stop it."""
+    position_margin: NonNegative = 0.02
+    """How far a measured joint position may exceed its limits [rad or m]."""
+    velocity_margin: NonNegative = 0.1
+    """How far a measured joint speed may exceed its limit, as a fraction of it [-]."""
+    start_timeout: Positive = 10.0
+    """Maximum time to wait for the first state [s]."""
+    watchdog: PositiveCount = 20
+    """Periods without a valid effort before the simulated robot stops itself, the same
+    as a Panda's [periods]."""
+    stop: StopSettings = StopSettings()
+    """The safe stop of the loop and of the simulated robot."""
+
+    def rate_limits(self, robot: Robot) -> Array:
+        """Return the limits of the effort rates, shape (nv,), inf where unlimited.
+
+        Raises:
+            LiveError: If they are neither one nor nv numbers.
+        """
+        with within("effort_rate"):
+            return _per_dof(self.effort_rate, robot)
+
+    def effort_limits(self, robot: Robot, limits: RobotLimits | None = None) -> Array:
+        """Return the limits of the efforts, shape (nv,), inf where unlimited.
+
+        Args:
+            robot: The model.
+            limits: The controller's limits; None: without them.
+
+        Raises:
+            LiveError: If they are neither one nor nv numbers.
+        """
+        if self.effort is None and limits is not None:
+            return np.array(limits.effort)
+        if self.effort is not None:
+            with within("effort"):
+                return _per_dof(self.effort, robot)
+        own = np.array(robot.model.effortLimit, dtype=float)
+        # URDFs contain 0, or the largest float, where there is no limit.
+        own[(own <= 0.0) | (own >= np.finfo(np.float32).max)] = np.inf
+        return own
+
+
 def check_fixed(robot: Robot) -> None:
     """Check that the robot has a fixed base.
 
@@ -153,20 +137,13 @@ def check_fixed(robot: Robot) -> None:
         )
 
 
-def _per_dof(robot: Robot, value: Any, what: str) -> Array:
-    """Return limits as an array, shape (nv,), from None, one number or nv numbers."""
-    if value is None:
-        return np.full(robot.nv, np.inf)
+def _per_dof(numbers: Any, robot: Robot) -> Array:
+    """Return limits as an array, shape (nv,), from None, one number or nv numbers.
+
+    Raises:
+        LiveError: If there are neither one nor nv numbers.
+    """
     try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise LiveError(f"{what} is {value!r}; needs numbers") from None
-    if array.ndim == 0:
-        array = np.full(robot.nv, float(array))
-    if array.shape != (robot.nv,):
-        raise LiveError(
-            f"{what} has shape {array.shape}; needs one number or {robot.nv}"
-        )
-    if not (array > 0.0).all():
-        raise LiveError(f"{what} is {array.tolist()}; must be positive")
-    return array
+        return by_dof(np.inf if numbers is None else numbers, robot.nv)
+    except LimitError as error:
+        raise LiveError(error.bare_message) from None

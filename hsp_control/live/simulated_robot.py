@@ -6,13 +6,17 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LiveError
+from hsp_control.constraints.limits import RobotLimits
 from hsp_control.live.safe_stop import Phase, SafeStop
-from hsp_control.live.settings import EffortInterface, StopSettings
+from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import RobotState
-from hsp_control.simulation.plants import SampledPlant
-
-WATCHDOG = 20
-"""Periods without a valid effort before the robot stops itself; the same as a Panda."""
+from hsp_control.robot.integrators import Integrator, Rk4
+from hsp_control.simulation.plants import (
+    ContinuousPlant,
+    IntegratedPlant,
+    Plant,
+    SampledPlant,
+)
 
 
 class SimulatedRobot:
@@ -44,9 +48,8 @@ class SimulatedRobot:
         v: Array,
         period: float,
         *,
-        interface: EffortInterface | None = None,
-        watchdog: int = WATCHDOG,
-        stop: StopSettings | None = None,
+        settings: LiveSettings | None = None,
+        limits: RobotLimits | None = None,
     ) -> None:
         """Set the robot to its start, at rest or moving.
 
@@ -55,24 +58,22 @@ class SimulatedRobot:
             q: Start configuration, shape (nq,).
             v: Start velocity, shape (nv,).
             period: Length of a period [s].
-            interface: Which efforts it accepts; if it compensates gravity, then with
-                its true mass.
-            watchdog: Number of periods without a valid effort that are tolerated.
-            stop: Settings of its own safe stop.
+            settings: Its watchdog, its own safe stop, and whether it compensates
+                gravity, with its true mass; None: the defaults.
+            limits: Limits on the efforts of its safe stop, if the settings have none;
+                None: the URDF's.
 
         Raises:
-            LiveError: If the settings contradict each other.
+            LiveError: If the settings do not fit the robot or the period.
         """
-        if watchdog < 1:
-            raise LiveError(f"watchdog is {watchdog}; needs at least 1 period")
-        robot = plant.robot
-        self._interface = interface or EffortInterface()
-        limits = self._interface.effort_limits(robot)
-        self._interface.rate_limits(robot)  # raises if they are invalid
-        self._stop = SafeStop(robot, stop or StopSettings(), limits, period)
+        robot, settings = plant.robot, settings or LiveSettings()
+        settings.rate_limits(robot)  # raises if they do not fit
+        upper = settings.effort_limits(robot, limits)
+        self._stop = SafeStop(robot, settings.stop, upper, period)
+        self._compensates = settings.compensates_gravity
         self._state = RobotState(robot)
         self._rest = np.zeros(robot.nv)
-        self.plant, self.period, self.watchdog = plant, period, watchdog
+        self.plant, self.period, self.watchdog = plant, period, settings.watchdog
         self.q, self.v = q.copy(), v.copy()
         self.t, self.periods = 0.0, 0
         self.phase, self.reason = Phase.WAITING, ""
@@ -113,7 +114,7 @@ class SimulatedRobot:
             return
         if self.phase == Phase.RUNNING:
             self.tau = self._command
-            if self._interface.compensates_gravity:
+            if self._compensates:
                 self.tau = self.tau + self._gravity()
         else:
             state = self._state.update(self.t, self.q, self.v)
@@ -140,3 +141,27 @@ class SimulatedRobot:
             self.halt(f"an effort is not finite: {efforts[-1].tolist()}")
             return
         self._command = np.array(efforts[-1], dtype=float)
+
+
+def sampled(plant: Plant, integrator: Integrator, period: float) -> SampledPlant:
+    """Return a plant as one that advances period by period.
+
+    A continuous plant is integrated by the integrator. An adaptive one may take any
+    time, so one Runge-Kutta step per period replaces it.
+
+    Args:
+        plant: The plant.
+        integrator: The integrator of a continuous plant.
+        period: Length of a period [s].
+
+    Raises:
+        LiveError: If the plant is neither continuous nor sampled.
+    """
+    if isinstance(plant, ContinuousPlant):
+        adaptive = integrator.longest_step is None
+        return IntegratedPlant(plant, Rk4(period) if adaptive else integrator)
+    if not isinstance(plant, SampledPlant):
+        raise LiveError(
+            f"{type(plant).__name__} is neither a continuous nor a sampled plant"
+        )
+    return plant

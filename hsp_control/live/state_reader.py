@@ -9,7 +9,7 @@ from hsp_control.live.dead_reckoning import DeadReckoning
 from hsp_control.live.deadlines import Deadlines
 from hsp_control.live.hardware import Hardware, Measurement
 from hsp_control.live.measurement_monitor import MeasurementMonitor
-from hsp_control.live.settings import Tolerance
+from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot, RobotState
 
 _READ_MARGIN = 0.5
@@ -33,7 +33,7 @@ class StateReader:
         robot: Robot,
         limits: RobotLimits | None,
         hardware: Hardware,
-        tolerance: Tolerance,
+        settings: LiveSettings,
         clock: Callable[[], float],
     ) -> None:
         """Allocate.
@@ -42,11 +42,11 @@ class StateReader:
             robot: The model.
             limits: The controller's limits; None: those of the robot's model.
             hardware: The robot.
-            tolerance: Faults that are tolerated.
+            settings: Faults that are tolerated.
             clock: A monotonic clock [s].
         """
-        self._hardware, self._tolerance, self._clock = hardware, tolerance, clock
-        self._monitor = MeasurementMonitor(robot, limits, tolerance)
+        self._hardware, self._settings, self._clock = hardware, settings, clock
+        self._monitor = MeasurementMonitor(robot, limits, settings)
         self._reckoning = DeadReckoning(robot, hardware.period)
         self._period = hardware.period
         self._missing = 0
@@ -77,7 +77,7 @@ class StateReader:
         Raises:
             HardwareError: If none arrives in time, or the robot cannot be started.
         """
-        end = self._clock() + self._tolerance.start_timeout
+        end = self._clock() + self._settings.start_timeout
         while (left := end - self._clock()) > 0.0:
             measurement = self._hardware.read(left)
             if measurement is None:
@@ -90,7 +90,7 @@ class StateReader:
             self._accept(measurement)
             return measurement
         raise HardwareError(
-            f"no state of the robot arrived in {self._tolerance.start_timeout:g} s"
+            f"no state of the robot arrived in {self._settings.start_timeout:g} s"
         )
 
     def start(self) -> None:
@@ -149,5 +149,5 @@ class StateReader:
         self._missing += 1
         self.deadlines.without_state += 1
         self._due = max(self._due + self._period, self._clock())
-        if self.fault is None and self._missing > self._tolerance.missing:
+        if self.fault is None and self._missing > self._settings.missing:
             self.fault = f"no new state for {self._missing} periods"

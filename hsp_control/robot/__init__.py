@@ -1,6 +1,8 @@
 """The robot: its model, its state, and the kinematic and dynamic terms there."""
 
-from .description.loading import ToolFrame as ToolFrame
+from .description.robot_description import PlacedRobot as PlacedRobot
+from .description.robot_description import RobotDescription as RobotDescription
+from .description.robot_description import ToolFrame as ToolFrame
 from .friction import JointFriction as JointFriction
 from .integrators import Dop853 as Dop853
 from .integrators import Integrator as Integrator

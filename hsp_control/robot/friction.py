@@ -1,18 +1,22 @@
 """Joint friction of a plant."""
 
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.quantities import Weights
 from hsp_control.robot.per_joint import per_dof
 from hsp_control.robot.robot import Robot
 
 
 @dataclass(frozen=True)
 class JointFriction:
-    """Coulomb and viscous friction in each joint.
+    """Coulomb and viscous friction in each joint of one robot.
 
     Attributes:
         coulomb: Dry friction, shape (nv,) [N·m or N]; a joint at rest sticks until the
@@ -24,7 +28,9 @@ class JointFriction:
     viscous: Array
 
     @classmethod
-    def of(cls, robot: Robot, coulomb: Any = 0.0, viscous: Any = 0.0) -> Self:
+    def of(
+        cls, robot: Robot, coulomb: ArrayLike = 0.0, viscous: ArrayLike = 0.0
+    ) -> Self:
         """Return friction from one number for all joints, or nv numbers.
 
         Args:
@@ -33,16 +39,35 @@ class JointFriction:
             viscous: One number or shape (nv,) [N·m·s/rad or N·s/m].
 
         Raises:
-            SimulationError: If a number is negative or not finite, or the shape is
-                wrong.
+            SimulationError: If a number is negative or not finite, or there are not 1
+                or nv numbers.
         """
-        return cls(
-            per_dof(robot, coulomb, "coulomb"),
-            per_dof(robot, viscous, "viscous"),
-        )
+        given = Friction(coulomb, viscous)
+        with within("coulomb"):
+            dry = per_dof(robot, given.coulomb)
+        with within("viscous"):
+            return cls(dry, per_dof(robot, given.viscous))
 
     @classmethod
     def of_model(cls, robot: Robot) -> Self:
         """Return the friction in the URDF: ``<dynamics friction= damping=>``."""
         model = robot.model
         return cls.of(robot, np.abs(model.upperDryFrictionLimit), np.abs(model.damping))
+
+
+class Friction(Part, error=SimulationError):
+    """Friction of the joints."""
+
+    coulomb: Weights = 0.0
+    """Coulomb friction [N·m or N], one number or nv; a joint at rest sticks until the
+    effort on it exceeds this value."""
+    viscous: Weights = 0.0
+    """Viscous friction [N·m·s/rad or N·s/m], one number or nv."""
+
+    def of(self, robot: Robot) -> JointFriction:
+        """Return the friction of each joint of a robot.
+
+        Raises:
+            SimulationError: If there are not 1 or nv numbers.
+        """
+        return JointFriction.of(robot, self.coulomb, self.viscous)

@@ -4,14 +4,16 @@ In a chart q = base ⊕ δ the motion is an ordinary differential equation of y 
 with δ' = v for single-dof joints and δ' = J_r(δ)⁻¹ v for a root.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, SimulationError
+from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import Positive
 from hsp_control.robot.robot import Robot
 
 Dynamics = Callable[[float, Array, Array], Array]
@@ -68,9 +70,10 @@ class Chart:
         return not self.robot.flat and largest > CHART_RADIUS
 
 
-class Integrator(Protocol):
+class Integrator(Part, ABC, family="integrators", error=SimulationError):
     """Integrates the motion from one time to another."""
 
+    @abstractmethod
     def advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
     ) -> tuple[Array, Array]:
@@ -84,19 +87,28 @@ class Integrator(Protocol):
             q: Configuration at the start, shape (nq,).
             v: Velocity at the start, shape (nv,).
         """
-        ...
+
+    @property
+    def longest_step(self) -> float | None:
+        """The longest step [s]; None: it adapts its steps."""
+        return None
 
 
-class Rk4:
-    """The classical fourth-order Runge-Kutta method, with a new chart in each step."""
+class FixedStep(Integrator):
+    """An integrator with steps of equal length."""
 
-    def __init__(self, step: float) -> None:
-        """Set the maximum step [s]; each interval is divided into equal steps.
+    step: Positive = 1e-3
+    """Integration step [s]; an integer fraction of the control period. Any other
+    interval is divided into equal steps that are not longer."""
 
-        Raises:
-            SimulationError: If the step is not positive.
-        """
-        self.step = _positive(step, "step")
+    @property
+    def longest_step(self) -> float:
+        """The longest step [s]."""
+        return self.step
+
+
+class Rk4(FixedStep, type="rk4"):
+    """The classical fourth-order Runge-Kutta step, with a new chart in each step."""
 
     def advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
@@ -121,16 +133,8 @@ class Rk4:
         return chart.point(y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
 
 
-class SemiImplicitEuler:
-    """Semi-implicit Euler: v ← v + h v', then q ← q ⊕ h v. First order and cheap."""
-
-    def __init__(self, step: float) -> None:
-        """Set the maximum step [s]; each interval is divided into equal steps.
-
-        Raises:
-            SimulationError: If the step is not positive.
-        """
-        self.step = _positive(step, "step")
+class SemiImplicitEuler(FixedStep, type="semi_implicit_euler"):
+    """The semi-implicit Euler step, of first order: v ← v + h v', q ← q ⊕ h v."""
 
     def advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
@@ -144,20 +148,17 @@ class SemiImplicitEuler:
         return q, v
 
 
-class Dop853:
-    """Dormand and Prince's adaptive eighth-order method (SciPy's DOP853).
+class Dop853(Integrator, type="dop853"):
+    """Dormand and Prince's adaptive eighth-order method, from SciPy.
 
     The first trial step covers the whole interval. A step is shortened if it misses the
     tolerance, or if the dynamics raise an error at one of its trial states.
     """
 
-    def __init__(self, rtol: float = 1e-9, atol: float = 1e-9) -> None:
-        """Set the relative and the absolute tolerance of a step.
-
-        Raises:
-            SimulationError: If a tolerance is not positive.
-        """
-        self.rtol, self.atol = _positive(rtol, "rtol"), _positive(atol, "atol")
+    rtol: Positive = 1e-9
+    """Relative tolerance of a step [-]."""
+    atol: Positive = 1e-9
+    """Absolute tolerance of a step [rad, m, rad/s or m/s]."""
 
     def advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
@@ -218,12 +219,6 @@ class _Trial:
             except (HspControlError, ArithmeticError, np.linalg.LinAlgError) as failure:
                 self.failure = failure
         return np.full(y.shape, np.nan)
-
-
-def _positive(value: float, name: str) -> float:
-    if not 0.0 < value < np.inf:
-        raise SimulationError(f"integrator: {name} is {value}; must be positive")
-    return value
 
 
 def number_of_steps(duration: float, step: float) -> int:

@@ -1,9 +1,7 @@
 """Settings that are one number for all joints, or one per degree of freedom."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
@@ -21,28 +19,20 @@ def joint_dofs(robot: Robot) -> NDArray[np.bool_]:
     return joints
 
 
-def per_dof(robot: Robot, value: Any, what: str) -> Array:
+def per_dof(robot: Robot, value: ArrayLike) -> Array:
     """Return a setting for each degree of freedom, shape (nv,).
 
     Args:
         robot: The robot.
         value: One number for all single-dof joints (the others get 0), or shape (nv,).
-        what: Name of the setting, for messages.
 
     Raises:
-        SimulationError: If a number is negative or not finite, or the shape is wrong.
+        SimulationError: If the shape is wrong.
     """
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise SimulationError(f"{what} is {value!r}; needs numbers") from None
+    array = np.asarray(value, dtype=float)
     if array.shape not in ((), (robot.nv,)):
         raise SimulationError(
-            f"{what} has shape {array.shape}; needs one number, or one for each of the "
+            f"has shape {array.shape}; needs one number, or one for each of the "
             f"{robot.nv} degrees of freedom of {robot.name}"
-        )
-    if not (np.isfinite(array).all() and (array >= 0.0).all()):
-        raise SimulationError(
-            f"{what} is {array.tolist()}; must be finite and not negative"
         )
     return np.where(joint_dofs(robot), array, 0.0) if array.ndim == 0 else array

@@ -25,16 +25,17 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.common.kernels import is_compiled, kernel
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.declaration import within
 from hsp_control.robot.centroidal import CentroidalMotion
 from hsp_control.robot.configuration_space import ConfigurationSpace, as_numbers
 from hsp_control.robot.description.access import ANYWHERE, Access
-from hsp_control.robot.description.combining import Part, combine
+from hsp_control.robot.description.combining import Part, combine, placement
 from hsp_control.robot.description.loading import (
-    ToolFrame,
     end_effector_frame,
     load_model,
     reference_posture,
 )
+from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
 from hsp_control.robot.description.sources import RobotSource, Root, find_robot
 from hsp_control.robot.kinematics import (
     FrameKinematics,
@@ -64,18 +65,24 @@ class Robot(ConfigurationSpace):
 
     Attributes:
         source: Where it was loaded from.
+        description: What `load` was given; None for a robot made otherwise.
         parts: The robots that it consists of: itself only, unless it was combined.
         frame_names: Names of all frames.
     """
 
     def __init__(
-        self, model: pin.Model, source: RobotSource, parts: Sequence[Part] = ()
+        self,
+        model: pin.Model,
+        source: RobotSource,
+        parts: Sequence[Part] = (),
+        description: RobotDescription | None = None,
     ) -> None:
         """Wrap a Pinocchio model; `Robot.load` is the usual way to create a robot."""
         super().__init__(
             model, source.name, source.home or reference_posture(model, source)
         )
         self.source = source
+        self.description = description
         self.parts = tuple(parts) or (Part("", source, pin.SE3.Identity()),)
         self.frame_names: tuple[str, ...] = tuple(f.name for f in model.frames)
         # If a joint and a link have the same name, it means the link's frame.
@@ -90,19 +97,20 @@ class Robot(ConfigurationSpace):
     @classmethod
     def load(
         cls,
-        name: str | Path,
+        name: str | Path | RobotDescription,
         *,
         root: Root | None = None,
         locked: Mapping[str, float] | None = None,
         tool_frames: Mapping[str, ToolFrame] | None = None,
-        gravity: Sequence[float] | None = None,
+        gravity: ArrayLike | None = None,
         mimic: bool = True,
         access: Access = ANYWHERE,
     ) -> Self:
         """Load a bundled robot, one of example-robot-data, or a URDF file.
 
         Args:
-            name: For example ``"panda"``, ``"talos_arm"`` or ``"my_arm/arm.urdf"``.
+            name: For example ``"panda"``, ``"talos_arm"`` or ``"my_arm/arm.urdf"``; or
+                a whole description, and then nothing else.
             root: How its base is attached to the world: ``fixed``, ``planar``
                 (x, y, yaw) or ``free_flyer``. None: as its source says; ``fixed`` for a
                 file.
@@ -119,23 +127,48 @@ class Robot(ConfigurationSpace):
         Raises:
             RobotNotFoundError: If there is no such robot.
             AccessError: If a file is not allowed.
-            ModelError: If the URDF is invalid, an option does not fit the model, or the
-                mass matrix is singular.
+            ModelError: If an option is wrong or does not fit the model, the URDF is
+                invalid, or the mass matrix is singular.
             JointNotFoundError: If a joint to lock does not exist.
             FrameNotFoundError: If a tool frame's parent does not exist.
-            ShapeError: If gravity or a tool frame's placement is not 3 numbers.
-            NonFiniteError: If one of these, or a locked joint's value, is NaN or inf.
         """
-        source = find_robot(name, access)
-        model = load_model(
-            source,
-            root=root,
-            locked=locked,
-            tool_frames=tool_frames,
-            gravity=gravity,
-            mimic=mimic,
-        )
-        return cls(model, source)
+        if not isinstance(name, RobotDescription):
+            name = RobotDescription(
+                name,
+                root=root,
+                locked=locked,
+                tool_frames=tool_frames or {},
+                gravity=gravity,
+                mimic=mimic,
+            )
+        elif not mimic or any(
+            option is not None for option in (root, locked, tool_frames, gravity)
+        ):
+            raise ModelError(
+                "a RobotDescription says all about the robot: give root, locked, "
+                "tool_frames, gravity and mimic in it"
+            )
+        return cls._described(name, access)
+
+    @classmethod
+    def _described(cls, description: RobotDescription, access: Access) -> Self:
+        """Return the robot of a description."""
+        gravity = description.gravity
+        if description.parts is None:
+            assert description.name is not None
+            source = find_robot(description.name, access)
+            model = load_model(source, description, gravity)
+            return cls(model, source, description=description)
+        robots = {}
+        for name, part in description.parts.items():
+            with within("parts", name, "name"):
+                source = find_robot(part.name, access)
+                robot = cls(load_model(source, part, gravity), source)
+            robots[name] = robot, placement(part.position, part.rotation)
+        with within("parts"):
+            whole = cls.combine(robots)
+        whole.description = description
+        return whole
 
     @classmethod
     def combine(cls, robots: Mapping[str, tuple["Robot", pin.SE3]]) -> Self:
@@ -174,10 +207,11 @@ class Robot(ConfigurationSpace):
                 f"{self.name}: a robot with mimic joints cannot be pickled; "
                 "load it in each process, or with mimic=False"
             )
-        return (type(self), (self.model, self.source, self.parts))
+        own = self.model, self.source, self.parts, self.description
+        return (type(self), own)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        return type(self)(self.model.copy(), self.source, self.parts)
+        return type(self)(self.model.copy(), self.source, self.parts, self.description)
 
     @property
     def joint_coordinates(self) -> Array | None:

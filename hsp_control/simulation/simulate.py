@@ -8,6 +8,7 @@ import numpy as np
 from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.controller import Controller
+from hsp_control.declaration import within
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot.integrators import Dop853, Integrator
 from hsp_control.simulation.loops import continuous_loop, sampled_loop
@@ -15,6 +16,7 @@ from hsp_control.simulation.plants import (
     ContinuousPlant,
     IntegratedPlant,
     Plant,
+    PlantPart,
     RigidBodyPlant,
     SampledPlant,
     check_plant,
@@ -38,7 +40,7 @@ def simulate(
     control_period: float | None = None,
     log_period: float = 0.01,
     integrator: Integrator | None = None,
-    plant: Plant | None = None,
+    plant: Plant | PlantPart | None = None,
     compensation: Compensation | None = None,
     scene: Scene | None = None,
     start_time: float = 0.0,
@@ -57,8 +59,10 @@ def simulate(
             law is evaluated in the integrator's stages, as in the proofs.
         log_period: Time between two rows [s]; with a control period, a multiple of it.
         integrator: Integrates a continuous plant; None: `Dop853`.
-        plant: The plant; None: rigid bodies, the controller's own model. A sampled
-            plant has its own integrator, and needs a control period.
+        plant: The plant: a value such as `Mujoco`, from which it is built for the
+            controller's robot, or one that was built; None: rigid bodies, the
+            controller's own model. A sampled plant has its own integrator, and needs a
+            control period.
         compensation: Compensators for what the model lacks; they need a control
             period.
         scene: Obstacles to log; None: those of the controller.
@@ -74,11 +78,16 @@ def simulate(
     Raises:
         SimulationError: If durations, periods and plant do not fit, or the motion
             diverged; its ``rollout`` then holds what was computed.
-        HspControlError: If q0 or v0 is not a valid state of the robot.
+        HspControlError: If q0 or v0 is not a valid state of the robot, or the plant
+            does not fit it.
     """
     robot = controller.robot
-    plant = RigidBodyPlant(robot) if plant is None else plant
     integrator = Dop853() if integrator is None else integrator
+    if plant is None:
+        plant = RigidBodyPlant(robot)
+    elif isinstance(plant, PlantPart):
+        with within("plant"):
+            plant = plant.build(robot, integrator)
     rows, periods = count_rows(duration, log_period, control_period)
     check_plant(plant, robot)
     q = robot.check_configuration(q0).copy()

@@ -21,13 +21,13 @@ from hsp_control.common.rotations import (
     turn,
 )
 from hsp_control.declaration.quantities import Number, Positive, Vector3
+from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.trajectories.following import Follower, follow_blended
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
 )
 from hsp_control.trajectories.polynomial import QUINTIC, horner
-from hsp_control.trajectories.rotation import Rotation, matrix_of
 
 
 class BlendOrientation(OrientationTrajectory, type="blend"):

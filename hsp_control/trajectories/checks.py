@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.declaration.rotation import matrix_of
 
 _ORTHONORMAL = 1e-8  # largest entry of A Aᵀ - I that counts as rounding error
 
@@ -65,19 +66,6 @@ def direction(value: ArrayLike, name: str) -> Array:
     return vector / length
 
 
-def unit(value: ArrayLike, name: str) -> Array:
-    """Return ``value``, shape (4,), if its norm is 1.
-
-    Raises:
-        TrajectoryError: If it has another norm.
-    """
-    vector = array(value, name, (4,))
-    norm = float(np.linalg.norm(vector))
-    if abs(norm - 1.0) > _ORTHONORMAL:
-        raise TrajectoryError(f"{name} must have norm 1; it has {norm:.9g}")
-    return vector
-
-
 def orthonormal(value: ArrayLike, name: str, shape: tuple[int, int]) -> Array:
     """Return ``value`` as a matrix with orthonormal rows.
 
@@ -100,9 +88,7 @@ def rotation(value: ArrayLike, name: str) -> Array:
     Raises:
         TrajectoryError: If it is not orthonormal, or its determinant is -1.
     """
-    matrix = orthonormal(value, name, (3, 3))
-    if np.linalg.det(matrix) < 0.0:
-        raise TrajectoryError(
-            f"{name} must be a rotation; it is a reflection (determinant -1)"
-        )
-    return matrix
+    try:
+        return matrix_of(array(value, name, (3, 3)), name)
+    except ValueError as error:
+        raise TrajectoryError(str(error)) from None

@@ -1,11 +1,11 @@
 """A constant orientation."""
 
+from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.trajectories.following import Follower, stay
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
 )
-from hsp_control.trajectories.rotation import Rotation, matrix_of
 
 
 class HoldOrientation(OrientationTrajectory, type="hold"):

@@ -5,11 +5,11 @@ from functools import cached_property
 import pinocchio as pin
 
 from hsp_control.declaration.quantities import Vector3
+from hsp_control.declaration.rotation import Rotation
 from hsp_control.trajectories.following import Follower
 from hsp_control.trajectories.hold import Hold
 from hsp_control.trajectories.hold_orientation import HoldOrientation
 from hsp_control.trajectories.pose import ComposedPose, PoseSample, PoseTrajectory
-from hsp_control.trajectories.rotation import Rotation
 
 
 class HoldPose(PoseTrajectory, type="hold_pose"):

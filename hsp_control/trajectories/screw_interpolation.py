@@ -11,8 +11,8 @@ from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.rotations import compose_back, jlog3, log3, stumpff, turn
 from hsp_control.declaration.quantities import Number, Positive, Vector3
+from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
-from hsp_control.trajectories.rotation import Rotation, matrix_of
 from hsp_control.trajectories.timing import smooth_step
 
 

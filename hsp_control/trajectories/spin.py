@@ -8,10 +8,10 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
 from hsp_control.common.rotations import turn
 from hsp_control.declaration.quantities import Number, Vector3
+from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.following import Compiled, Kernel
 from hsp_control.trajectories.orientation import OrientationTrajectory
-from hsp_control.trajectories.rotation import Rotation, matrix_of
 
 
 class Spin(Compiled, OrientationTrajectory, type="spin"):

@@ -3,7 +3,6 @@
 import re
 import shlex
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,11 +15,9 @@ from places import ROOT
 import hsp_control
 from hsp_control import load_experiment
 from hsp_control.cli.main import _parser
-from hsp_control.config.models.live import LiveModel
-from hsp_control.config.models.view import ShowModel
-from hsp_control.live import EffortInterface, StopSettings, Tolerance, run_loop
-from hsp_control.live.simulated_robot import WATCHDOG
+from hsp_control.live import LiveSettings, run_loop
 from hsp_control.null_space.fields.weight import sample_weight
+from hsp_control.visualization.viewer import ShownItems
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -107,7 +104,7 @@ def test_the_view_s_document_is_true(monkeypatch: pytest.MonkeyPatch) -> None:
     configuration = {**yaml.safe_load(view), **yaml.safe_load(SMALL)}
     assert load_experiment(configuration).scenario.view.show.ellipsoid
     told = re.findall(r"^\| `(\w+)` \| (on|off) \|", text, re.MULTILINE)
-    defaults = ShowModel().model_dump()
+    defaults = ShownItems().all_fields()
     assert {name: state == "on" for name, state in told} == defaults
     (snippet,) = blocks(text, "python")
     exec(compile(snippet, "view.md", "exec"), {})
@@ -178,11 +175,14 @@ def test_pictures_that_documents_show_exist() -> None:
                 assert (document.parent / target).exists(), f"{document.name}: {target}"
 
 
+PANDA = LiveSettings(compensates_gravity=True, effort_rate=1000.0)
+
+
 class _FakeFranka:
     """pylibfranka as far as the page uses it, around a simulated Panda."""
 
     def __init__(self, address: str) -> None:
-        self.watched = watched(EffortInterface(True, 1000.0))
+        self.watched = watched(PANDA)
         self.efforts: list[np.ndarray] = []
         self.stopped = False
 
@@ -225,8 +225,7 @@ def test_the_live_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setitem(sys.modules, "pylibfranka", module)
     exec(compile(panda, "live.md", "exec"), space)
     robot = space["Panda"]("fake")
-    interface = EffortInterface(True, 1000.0)
-    report = run_loop(law(), robot, duration=0.2, interface=interface)
+    report = run_loop(law(), robot, duration=0.2, settings=PANDA)
     assert report.ended == "completed", report.reason
     assert robot._robot.stopped
     assert robot._robot.watched.t > 0.2
@@ -234,12 +233,10 @@ def test_the_live_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 def test_the_live_page_s_defaults_are_the_code_s() -> None:
     text = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
-    settings = LiveModel()
-    told = set(re.findall(r"`(\w+)`", text))
-    assert set(settings.model_dump()) | set(settings.stop.model_dump()) <= told
-    tolerance = Tolerance()
-    assert settings.missing == tolerance.missing == settings.watchdog == WATCHDOG == 20
-    assert settings.age == tolerance.age == 0.02
-    assert settings.position_margin == tolerance.position_margin == 0.02
-    assert settings.velocity_margin == tolerance.velocity_margin == 0.1
-    assert settings.stop.model_dump() == asdict(StopSettings())
+    told = dict(re.findall(r"^\| `([\w.]+)` \|.*\| ([^|]*) \|$", text, re.MULTILINE))
+    settings = LiveSettings().all_fields()
+    stop = settings.pop("stop").all_fields()
+    settings |= {f"stop.{name}": value for name, value in stop.items()}
+    for name, value in settings.items():
+        shown = "none" if value is None else str(value).lower().removesuffix(".0")
+        assert re.split("[ ,:]", told[name])[0] == shown, name

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +17,8 @@ from hsp_control import (
     TargetPosture,
 )
 from hsp_control.live import (
-    EffortInterface,
     InProcessRobot,
+    LiveSettings,
     Measurement,
     SimulatedRobot,
 )
@@ -54,11 +53,9 @@ def law(
     return Controller(panda(), [task], field, null_space_gain=10.0, limits=limits)
 
 
-def watched(interface: EffortInterface | None = None, **options: Any) -> SimulatedRobot:
+def watched(settings: LiveSettings | None = None) -> SimulatedRobot:
     plant = IntegratedPlant(RigidBodyPlant(panda()), SemiImplicitEuler(PERIOD))
-    return SimulatedRobot(
-        plant, start(), np.zeros(7), PERIOD, interface=interface, **options
-    )
+    return SimulatedRobot(plant, start(), np.zeros(7), PERIOD, settings=settings)
 
 
 Trick = Callable[[Measurement], Measurement | None]

@@ -22,7 +22,7 @@ from hsp_control import Rollout
 from hsp_control.cli import main
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.common.exceptions import HardwareError, LiveError
-from hsp_control.live import Faults, Phase, Tolerance, run_loop
+from hsp_control.live import Faults, LiveSettings, Phase, run_loop
 
 pytestmark = pytest.mark.process
 
@@ -55,8 +55,9 @@ CONFIG: dict[str, Any] = {
 COUNTED = {"late": "stale", "duplicated": "duplicated", "corrupted": "corrupted"}
 
 
-def tolerance(**changes: Any) -> Tolerance:
-    return Tolerance(**{"missing": 1000, "age": 5.0, "start_timeout": 60.0} | changes)
+def patient(**changes: Any) -> LiveSettings:
+    patience = {"missing": 1000, "age": 5.0, "start_timeout": 60.0}
+    return LiveSettings(**patience | changes)
 
 
 def assert_stopped(log: Rollout) -> None:
@@ -104,7 +105,7 @@ def test_a_bad_line_is_seen_counted_and_survived(tmp_path: Path) -> None:
             experiment.controller,
             robot.hardware,
             duration=1.0,
-            tolerance=tolerance(),
+            settings=patient(),
             log=logs[0],
         )
         told = robot.wait(60.0)
@@ -150,7 +151,7 @@ def test_the_robot_s_process_is_killed(tmp_path: Path) -> None:
             experiment.controller,
             robot.hardware,
             duration=60.0,
-            tolerance=tolerance(missing=300),
+            settings=patient(missing=300),
             log=logs[0],
             on_period=kill,
         )

@@ -8,7 +8,7 @@ import pytest
 from clips import Clip
 
 from hsp_control import Robot, Rollout, load_experiment
-from hsp_control.common.exceptions import ConfigError, ViewerError
+from hsp_control.common.exceptions import ViewerError
 from hsp_control.visualization.viewer import (
     Recorder,
     Viewer,
@@ -101,7 +101,7 @@ def test_what_cannot_be_played_is_refused(arm: Robot, run: Rollout) -> None:
     viewer = Viewer(arm, transport=Recorder())
     with pytest.raises(ViewerError, match="speed -1 must be positive"):
         viewer.play(run, speed=-1)
-    with pytest.raises(ConfigError, match=r"view: camra: .*did you mean 'camera'"):
+    with pytest.raises(ViewerError, match=r"ings: camra: .*did you mean 'camera'"):
         Viewer(arm, transport=Recorder(), camra=[1, 2, 3])
     with pytest.raises(ViewerError, match=r"controller is for iiwa14 with nq = 7"):
         viewer.play(run, controller=load_experiment("iiwa_singular").controller)

@@ -62,6 +62,10 @@ def test_few_names_are_at_the_top() -> None:
     message = r"no attribute 'Spline'; there is hsp_control\.trajectories\.Spline$"
     with pytest.raises(AttributeError, match=message):
         _ = hsp_control.Spline
+    # `changes` imports this name, but it is not the name's home.
+    message = r"no attribute 'Trajectory'; there is hsp_control\.trajectories"
+    with pytest.raises(AttributeError, match=message):
+        _ = hsp_control.Trajectory
 
 
 @pytest.mark.parametrize("namespace", hsp_control._NAMESPACES)

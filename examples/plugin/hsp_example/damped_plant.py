@@ -30,6 +30,6 @@ class Damped(PlantPart, type="damped"):
     damping: NonNegative = 1.0
     """Damping d of all joints [N·m·s/rad or N·s/m]."""
 
-    def build(self, robot: Robot, integrator: Integrator) -> DampedPlant:
-        """Return the plant."""
+    def engine(self, robot: Robot, integrator: Integrator) -> DampedPlant:
+        """Return the plant without sensors and drives."""
         return DampedPlant(robot, self.damping)

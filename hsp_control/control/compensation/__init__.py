@@ -2,7 +2,6 @@
 
 from .command import Command as Command
 from .compensation import Compensation as Compensation
-from .effort_rate import EffortRateClip as EffortRateClip
 from .friction_feed_forward import FrictionFeedForward as FrictionFeedForward
 from .integral_action import IntegralAction as IntegralAction
 from .momentum_observer import MomentumObserver as MomentumObserver

@@ -1,50 +1,30 @@
-"""Checks of settings that the compensators share."""
+"""Checks that the compensators share."""
 
 from typing import Any
 
-import numpy as np
-
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import CompensationError
+from hsp_control.common.exceptions import CompensationError, LimitError
+from hsp_control.constraints.limits.numbers_by_joint import by_dof
 from hsp_control.robot import Robot
 
 
-def positive(value: Any, what: str) -> float:
-    """Return a setting as a number greater than zero, inf included.
+def per_dof(robot: Robot, numbers: Any) -> Array:
+    """Return a bound for each degree of freedom, shape (nv,); inf where there is none.
+
+    Args:
+        robot: The robot.
+        numbers: One number, or nv numbers; None is no bound.
 
     Raises:
-        CompensationError: If it is not such a number.
+        CompensationError: If there are neither one nor nv numbers.
     """
     try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise CompensationError(f"{what} is {value!r}; needs a number") from None
-    if not number > 0.0:
-        raise CompensationError(f"{what} is {number:g}; must be greater than 0")
-    return number
+        return by_dof(numbers, robot.nv)
+    except LimitError as error:
+        raise CompensationError(error.bare_message) from None
 
 
-def per_dof(robot: Robot, value: Any, what: str) -> Array:
-    """Return a setting greater than zero for each degree of freedom, shape (nv,).
-
-    Raises:
-        CompensationError: If a number is not positive, or their count is not nv.
-    """
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise CompensationError(f"{what} is {value!r}; needs numbers") from None
-    if array.shape not in ((), (robot.nv,)):
-        raise CompensationError(
-            f"{what} has shape {array.shape}; needs one number, or one for each of the "
-            f"{robot.nv} degrees of freedom of {robot.name}"
-        )
-    if not (array > 0.0).all():
-        raise CompensationError(f"{what} is {array.tolist()}; must be greater than 0")
-    return np.broadcast_to(array, (robot.nv,)).copy()
-
-
-def check_fixed_base(robot: Robot, what: str) -> None:
+def check_fixed_base(robot: Robot) -> None:
     """Check that a motor moves every degree of freedom of the robot.
 
     Raises:
@@ -52,6 +32,6 @@ def check_fixed_base(robot: Robot, what: str) -> None:
     """
     if robot.unactuated:
         raise CompensationError(
-            f"{what}: {robot.name} has a free-flyer root, and its contact forces are "
-            f"not measured; {what} needs a robot with a fixed base"
+            f"{robot.name} has a free-flyer root, and its contact forces are not "
+            "measured; needs a robot with a fixed base"
         )

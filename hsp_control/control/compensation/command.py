@@ -19,6 +19,13 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation.compensation import Compensation
+from hsp_control.control.compensation.effort_rate import EffortRateClip
+from hsp_control.control.compensation.friction_feed_forward import FrictionFeedForward
+from hsp_control.control.compensation.integral_action import RunningIntegral
+from hsp_control.control.compensation.momentum_observer import RunningObserver
+from hsp_control.control.compensation.predictor import Predictor
+from hsp_control.control.compensation.start_up_ramp import RunningRamp
+from hsp_control.control.compensation.velocity_filter import RunningFilter
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
@@ -29,7 +36,8 @@ class Command:
     """A controller with its compensators: computes one effort per period.
 
     Without compensators it returns the controller's effort, bit for bit. A run is one
-    `restart`, then one `effort` per period, in order of time.
+    `restart`, then one `effort` per period, in order of time. What the compensators
+    remember during a run is the command's own.
 
     Attributes:
         controller: The controller.
@@ -52,9 +60,8 @@ class Command:
         """
         self.controller = controller
         self.compensation = Compensation() if compensation is None else compensation
-        robot = controller.robot
-        self.compensation.check(robot, controller.tasks, controller.limits)
-        own = self.compensation
+        own, robot = self.compensation, controller.robot
+        own.check(robot, controller.tasks, controller.limits)
         self.state = controller.state
         self._measured = self.state if own.predictor is None else RobotState(robot)
         self._tau, self._zero = np.zeros(robot.nv), np.zeros(robot.nv)
@@ -73,18 +80,20 @@ class Command:
         """Reset all memory, for a new run."""
         own, robot = self.compensation, self.controller.robot
         self.controller.restart()
+        self._filter: RunningFilter | None = None
         if own.velocity_filter is not None:
-            own.velocity_filter.restart()
+            self._filter = own.velocity_filter.begin()
+        self._observer: RunningObserver | None = None
         if own.momentum_observer is not None:
-            own.momentum_observer.restart(robot)
-        if own.friction_feed_forward is not None:
-            own.friction_feed_forward.restart(robot)
+            self._observer = own.momentum_observer.begin(robot)
+        self._feed_forward: FrictionFeedForward | None = own.friction(robot)
+        self._integral: RunningIntegral | None = None
         if own.integral_action is not None:
-            own.integral_action.restart(self.controller)
+            self._integral = own.integral_action.begin(self.controller)
+        self._clip: EffortRateClip | None = None
         if own.effort_rate is not None:
-            own.effort_rate.restart(robot)
-        if own.start_up_ramp is not None:
-            own.start_up_ramp.restart()
+            self._clip = EffortRateClip(robot, own.effort_rate)
+        self._ramp: RunningRamp | None = None  # begins at the first state
         self._period = 0.0
         self._friction_sent = self._friction = self._zero
         self._shown = self.state.q.copy(), self.state.v.copy()
@@ -109,26 +118,26 @@ class Command:
                 the effort is not finite.
         """
         own, last = self.compensation, self._period
-        if own.velocity_filter is not None:
-            v = own.velocity_filter.apply(np.asarray(v, dtype=float), last)
-        if own.momentum_observer is not None:
-            self._observe(t, q, v, last)
+        if self._filter is not None:
+            v = self._filter.apply(np.asarray(v, dtype=float), last)
+        if self._observer is not None:
+            self._observe(self._observer, t, q, v, last)
         if own.predictor is not None:
-            t, q, v = self._predict(t, q, v, period)
+            t, q, v = self._predict(own.predictor, t, q, v, period)
         state = self.state.update(t, q, v)
-        if own.start_up_ramp is not None:
-            own.start_up_ramp.begin(state)
+        if own.start_up_ramp is not None and self._ramp is None:
+            self._ramp = own.start_up_ramp.begin(state)
         self.output = output = self._law(state)
         self._friction_sent = self._friction
         if self._changes_state:
             self._shown = state.q.copy(), state.v.copy()
         tau = self._tau
         tau[:] = output.tau
-        clipped = own.effort_rate is not None and own.effort_rate.apply(tau, last)
+        clipped = self._clip is not None and self._clip.apply(tau, last)
         self.controller.applied(tau, period)
-        if own.integral_action is not None:
-            self._integrate(output, period, clipped)
-        if own.momentum_observer is not None or own.predictor is not None:
+        if self._integral is not None:
+            self._integrate(self._integral, output, period, clipped)
+        if self._observer is not None or own.predictor is not None:
             self._record_sent(tau - self._friction_sent)
         self._period = period
         return tau
@@ -159,18 +168,17 @@ class Command:
 
     def log_channels(self) -> Mapping[str, LogChannel]:
         """Return the log channels of the active compensators, by name."""
-        own, found = self.compensation, dict[str, LogChannel]()
-        unit = "N·m or N"
-        if (observer := own.momentum_observer) is not None:
+        found, unit = dict[str, LogChannel](), "N·m or N"
+        if self._observer is not None:
             found["observer.disturbance"] = LogChannel(
-                observer.disturbance, unit, "estimated disturbance r"
+                self._observer.disturbance, unit, "estimated disturbance r"
             )
-        if own.friction_feed_forward is not None:
+        if self._feed_forward is not None:
             found["friction.feed_forward"] = LogChannel(
                 self._friction_sent, unit, "feed-forward of friction"
             )
-        if own.integral_action is not None:
-            for name, integral in own.integral_action.integrals.items():
+        if self._integral is not None:
+            for name, integral in self._integral.integrals.items():
                 found[f"task.{name}.integral"] = LogChannel(
                     integral, "m·s or rad·s", "∫e"
                 )
@@ -185,23 +193,19 @@ class Command:
 
     # -- the links of the chain -------------------------------------------------------
 
-    def _observe(self, t: float, q: Array, v: Array, period: float) -> None:
+    def _observe(
+        self, observer: RunningObserver, t: float, q: Array, v: Array, period: float
+    ) -> None:
         """Update the observer with the effort that acted since the last measurement."""
-        observer = self.compensation.momentum_observer
-        assert observer is not None
         acted = self._under_way[0] if self._under_way else self._zero
         observer.update(self._measured.update(t, q, v), acted, period)
 
     def _predict(
-        self, t: float, q: Array, v: Array, period: float
+        self, predictor: Predictor, t: float, q: Array, v: Array, period: float
     ) -> tuple[float, Array, Array]:
         """Return the time and the state at which the next effort will act."""
-        predictor, observer = (
-            self.compensation.predictor,
-            self.compensation.momentum_observer,
-        )
-        assert predictor is not None
         # Before any effort is sent, the robot is assumed to stay where it is.
+        observer = self._observer
         disturbance = self._zero if observer is None else observer.disturbance
         efforts = (tau + disturbance for tau in islice(self._under_way, 1, None))
         q, v = predictor.predict(self.controller.robot, q, v, efforts, period)
@@ -215,15 +219,14 @@ class Command:
         self, state: RobotState, active: ActiveStack, a: Array
     ) -> tuple[Array, Array | None]:
         """Return the acceleration to deliver, and the effort besides M a + N."""
-        own = self.compensation
-        if own.start_up_ramp is not None:
-            a = own.start_up_ramp.blend(state, a)
+        if self._ramp is not None:
+            a = self._ramp.blend(state, a)
         offset = self._zero
         self._friction = self._zero
-        if own.friction_feed_forward is not None:
-            self._friction = offset = own.friction_feed_forward.effort(state, active)
-        if own.momentum_observer is not None:
-            offset = offset - own.momentum_observer.cancelled
+        if self._feed_forward is not None:
+            self._friction = offset = self._feed_forward.effort(state, active)
+        if self._observer is not None:
+            offset = offset - self._observer.cancelled
         return a, offset
 
     def _record_sent(self, tau: Array) -> None:
@@ -236,19 +239,20 @@ class Command:
         while len(self._under_way) > waiting:
             self._under_way.popleft()
 
-    def _integrate(self, output: ControlOutput, period: float, clipped: bool) -> None:
+    def _integrate(
+        self,
+        integral: RunningIntegral,
+        output: ControlOutput,
+        period: float,
+        clipped: bool,
+    ) -> None:
         """Integrate the errors of the fully active tasks over this period."""
-        action, ramp = (
-            self.compensation.integral_action,
-            self.compensation.start_up_ramp,
-        )
-        assert action is not None
         t, controller = self.state.t, self.controller
-        starting = ramp is not None and ramp.weight(t) < 1.0
+        starting = self._ramp is not None and self._ramp.weight(t) < 1.0
         limited = output.status >= Status.LIMITED
         saturated = bool(output.damped) or limited or clipped or starting
         errors: dict[str, Array | None] = {}
         for name, rows in controller.task_rows.items():
             if controller.weight_of(name, t) >= 1.0:
                 errors[name] = output.task.error[rows]
-        action.advance(errors, period, saturated)
+        integral.advance(errors, period, saturated)

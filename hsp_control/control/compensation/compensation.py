@@ -1,52 +1,62 @@
 """The set of compensators around the law."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import KW_ONLY
+from typing import Literal
 
 import numpy as np
 
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.control.compensation.effort_rate import EffortRateClip
+from hsp_control.constraints.limits.numbers_by_joint import Positives
+from hsp_control.control.compensation.checks import per_dof
 from hsp_control.control.compensation.friction_feed_forward import FrictionFeedForward
 from hsp_control.control.compensation.integral_action import IntegralAction
 from hsp_control.control.compensation.momentum_observer import MomentumObserver
 from hsp_control.control.compensation.predictor import Predictor
 from hsp_control.control.compensation.start_up_ramp import StartUpRamp
 from hsp_control.control.compensation.velocity_filter import VelocityFilter
+from hsp_control.declaration import Part, within
 from hsp_control.robot import Robot
 from hsp_control.tasks import Task
 
 
-@dataclass(frozen=True)
-class Compensation:
+class Compensation(Part, error=CompensationError):
     """Compensators for the differences between the robot and its model.
 
-    Each may be None. They have memory: use one set in one `Command` at a time.
-
-    Attributes:
-        velocity_filter: Filters the measured velocity.
-        predictor: Predicts the state at which the effort will act.
-        momentum_observer: Estimates and cancels efforts that the model does not
-            explain.
-        friction_feed_forward: Adds the friction effort at the desired velocity.
-        integral_action: Removes steady-state errors of tasks.
-        effort_rate: Limits the rate of the effort that is sent.
-        start_up_ramp: Blends from holding still into the law.
+    Each is off unless it is given; None turns it off. They have no memory: a `Command`
+    makes what runs, so one set serves many controllers, runs and threads.
     """
 
+    _: KW_ONLY
     velocity_filter: VelocityFilter | None = None
+    """Butterworth low-pass filter of the measured velocity."""
     predictor: Predictor | None = None
+    """Evaluates the law for the predicted state in which its effort will act."""
     momentum_observer: MomentumObserver | None = None
-    friction_feed_forward: FrictionFeedForward | None = None
+    """Estimates the efforts that the model does not explain, and cancels them."""
+    friction_feed_forward: Literal["urdf"] | FrictionFeedForward | None = None
+    """Adds efforts against friction at the desired velocity; ``urdf`` takes the
+    friction from the robot's file."""
     integral_action: IntegralAction | None = None
-    effort_rate: EffortRateClip | None = None
+    """Removes constant task errors by integral feedback."""
+    effort_rate: Positives | None = None
+    """Maximum rate of the effort that is sent [N·m/s or N/s], one number or nv; for
+    controllers without `limits.effort_rate`, which deviate in the null space first."""
     start_up_ramp: StartUpRamp | None = None
+    """Changes the effort smoothly from holding still to the law."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names of the compensators that are not None."""
-        return tuple(f.name for f in fields(self) if getattr(self, f.name) is not None)
+        return tuple(self.changed_fields())
+
+    def friction(self, robot: Robot) -> FrictionFeedForward | None:
+        """Return the friction feed-forward for a robot, its own in place of "urdf"."""
+        given = self.friction_feed_forward
+        if isinstance(given, str):
+            return FrictionFeedForward.of_model(robot)
+        return given
 
     def check(
         self, robot: Robot, tasks: Sequence[Task], limits: RobotLimits | None = None
@@ -57,23 +67,24 @@ class Compensation:
             CompensationError: Names the compensator, the setting, and what it must be.
             GainError: If errors would not decay with the integral action.
         """
-        for part in (
-            self.predictor,
-            self.momentum_observer,
-            self.friction_feed_forward,
-            self.effort_rate,
-            self.start_up_ramp,
-        ):
+        parts = {
+            "predictor": self.predictor,
+            "momentum_observer": self.momentum_observer,
+            "friction_feed_forward": self.friction(robot),
+            "start_up_ramp": self.start_up_ramp,
+        }
+        for name, part in parts.items():
             if part is not None:
-                part.check(robot)
+                with within(name):
+                    part.check(robot)
         if self.integral_action is not None:
-            self.integral_action.check(tasks)
-        if (
-            self.effort_rate is not None
-            and limits is not None
-            and np.isfinite(limits.effort_rate).any()
-        ):
-            raise CompensationError(
-                "effort_rate: limits.effort_rate keeps the rate already, and deviates "
-                "in the null space first; remove one of the two"
-            )
+            with within("integral_action"):
+                self.integral_action.check(tasks)
+        if self.effort_rate is not None:
+            with within("effort_rate"):
+                per_dof(robot, self.effort_rate)
+                if limits is not None and np.isfinite(limits.effort_rate).any():
+                    raise CompensationError(
+                        "limits.effort_rate keeps the rate already, and deviates in "
+                        "the null space first; remove one of the two"
+                    )

@@ -10,30 +10,23 @@ from hsp_control.robot import Robot
 
 
 class EffortRateClip:
-    """Clips each effort to within rate · period of the last one.
+    """Clips each effort to within rate · period of the last one, in one run.
 
     For robots without `Limits`. Prefer `Limits`, whose QP keeps the rate by deviating
     in the null space first; clipping disturbs the tasks as well.
-
-    Attributes:
-        rate: Maximum rate, a number or shape (nv,) [N·m/s or N/s].
     """
 
-    def __init__(self, rate: Any) -> None:
-        """Set the maximum rate, a number or shape (nv,); a Panda's is 1000 N·m/s."""
-        self.rate = rate
+    def __init__(self, robot: Robot, rate: Any) -> None:
+        """Set the maximum rate. The first effort is not clipped.
 
-    def check(self, robot: Robot) -> None:
-        """Check that the rate fits the robot.
+        Args:
+            robot: The robot.
+            rate: One number or nv numbers [N·m/s or N/s]; None for no limit.
 
         Raises:
-            CompensationError: If a rate is not positive, or there are not nv of them.
+            CompensationError: If there are neither one nor nv numbers.
         """
-        per_dof(robot, self.rate, "effort_rate")
-
-    def restart(self, robot: Robot) -> None:
-        """Forget the last effort: the first one is not clipped."""
-        self._rate = per_dof(robot, self.rate, "effort_rate")
+        self._rate = per_dof(robot, rate)
         self._last: Array | None = None
 
     def apply(self, tau: Array, period: float) -> bool:

@@ -1,20 +1,21 @@
 """Feed-forward of joint friction."""
 
-from typing import Any
+from typing import Self
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, SimulationError
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.compensation.checks import positive
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.quantities import Positive, Weights
 from hsp_control.law.pseudo_inverse import apply_pseudo_inverse, weighted_pseudo_inverse
 from hsp_control.null_space.metrics.metric import VARYING
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.friction import JointFriction
 
 
-class FrictionFeedForward:
+class FrictionFeedForward(Part, error=CompensationError):
     """Adds the friction effort at the desired velocity.
 
     The desired velocity is v_d = J# x_d' + P g, the velocity of the robot once both
@@ -23,41 +24,30 @@ class FrictionFeedForward:
 
         tau = c tanh(v_d / v_s) + D v_d
 
-    Attributes:
-        coulomb: c, a number or shape (nv,) [N·m or N].
-        viscous: D, a number or shape (nv,) [N·m·s/rad or N·s/m].
-        smoothing: v_s [rad/s or m/s].
+    Coefficients that are too small are better than ones that are too large.
     """
 
-    def __init__(
-        self, coulomb: Any = 0.0, viscous: Any = 0.0, smoothing: float = 0.02
-    ) -> None:
-        """Set the friction coefficients; too small is better than too large.
+    coulomb: Weights = 0.0
+    """Coulomb friction c [N·m or N], one number or nv."""
+    viscous: Weights = 0.0
+    """Viscous friction D [N·m·s/rad or N·s/m], one number or nv."""
+    smoothing: Positive = 0.02
+    """Speed v_s at which three quarters of the Coulomb friction are compensated [rad/s
+    or m/s]."""
 
-        Args:
-            coulomb: Coulomb friction c, a number or shape (nv,) [N·m or N].
-            viscous: Viscous friction D, a number or shape (nv,) [N·m·s/rad or N·s/m].
-            smoothing: v_s > 0, the speed at which three quarters of c are compensated
-                [rad/s or m/s].
-
-        Raises:
-            CompensationError: If the smoothing is not positive.
-        """
-        self.coulomb = coulomb
-        self.viscous = viscous
-        self.smoothing = positive(smoothing, "smoothing")
+    @classmethod
+    def of_model(cls, robot: Robot) -> Self:
+        """Return the feed-forward of the friction in the robot's URDF."""
+        own = JointFriction.of_model(robot)
+        return cls(own.coulomb, own.viscous)
 
     def check(self, robot: Robot) -> None:
         """Check that the coefficients fit the robot.
 
         Raises:
-            CompensationError: If a coefficient is negative, or their number is not nv.
+            CompensationError: If there are neither one nor nv numbers.
         """
         self._friction(robot)
-
-    def restart(self, robot: Robot) -> None:
-        """Compute the coefficients of the robot's degrees of freedom."""
-        self._coefficients = self._friction(robot)
 
     def effort(self, state: RobotState, active: ActiveStack) -> Array:
         """Return the friction effort, shape (nv,) [N·m or N].
@@ -67,15 +57,21 @@ class FrictionFeedForward:
             active: The active stack, resolved at this state.
         """
         v = desired_velocity(state, active)
-        friction = self._coefficients
+        friction = state.made(self, "friction", lambda: self._friction(state.robot))
         coulomb = friction.coulomb * np.tanh(v / self.smoothing)
         return np.asarray(coulomb + friction.viscous * v)
 
     def _friction(self, robot: Robot) -> JointFriction:
+        """Return the coefficients of each degree of freedom.
+
+        Raises:
+            CompensationError: If there are neither one nor nv numbers.
+        """
         try:
             return JointFriction.of(robot, self.coulomb, self.viscous)
         except SimulationError as error:
-            raise CompensationError(f"friction_feed_forward: {error}") from None
+            with within(*error.path):
+                raise CompensationError(error.bare_message) from None
 
 
 def desired_velocity(state: RobotState, active: ActiveStack) -> Array:

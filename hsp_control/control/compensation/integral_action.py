@@ -1,20 +1,24 @@
 """Integral action: e'' + Kv e' + Kp e + Ki ∫e = 0."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import KW_ONLY
+from typing import Annotated
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, GainError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.control.compensation.checks import positive
+from hsp_control.control.compensation.gains_by_task import GainsByTask
 from hsp_control.control.controller import Controller
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.quantities import ArrayField, Gain, Names, Positive
 from hsp_control.tasks import Task
 from hsp_control.tasks.gains import as_gain, as_matrix
 
 
-class IntegralAction:
+class IntegralAction(Part, error=CompensationError):
     """Removes the steady-state errors of tasks; it has no effect in the null space.
 
     Anti-windup: while the law is not delivered exactly (a limit binds, a singularity
@@ -24,35 +28,26 @@ class IntegralAction:
     A robot heavier than its model performs only a part β of the acceleration that the
     law requires: e'' + β (Kv e' + Kp e + Ki ∫e) = d. Its error grows if β < Ki/(Kv Kp)
     (Routh). `check_rate` reports this in advance.
-
-    Attributes:
-        rate: The rate at which a constant error decays, Ki = rate · Kp [1/s], for tasks
-            that ``ki`` does not name; None: only those in ``ki`` have integral action.
-        ki: Ki by task: a number, shape (m,) or (m, m) [1/s³].
-        tasks: Names of the tasks with integral action; None: all.
-        limit: Upper limit of every component of Ki ∫e [m/s² or rad/s²].
     """
 
-    def __init__(
-        self,
-        rate: float | None = None,
-        *,
-        ki: Mapping[str, Any] | None = None,
-        tasks: Sequence[str] | None = None,
-        limit: float = np.inf,
-    ) -> None:
-        """Set the integral action; see the attributes.
+    rate: Positive | None = None
+    """Rate at which a constant error decays [1/s]: Ki = rate · Kp, for tasks that `ki`
+    does not name."""
+    _: KW_ONLY
+    ki: Annotated[Mapping[str, ArrayLike], ArrayField(dict[str, Gain], GainsByTask)] = (
+        GainsByTask()
+    )
+    """Ki by task name [1/s³]: a number, one for each row, or a matrix."""
+    tasks: Names | None = None
+    """Names of the tasks with integral action [-]; all by default."""
+    limit: Positive | None = None
+    """Largest acceleration from the integral in a row [m/s² or rad/s²]; unlimited by
+    default."""
 
-        Raises:
-            CompensationError: If neither a rate nor a gain is given, or the rate or the
-                limit is not positive.
-        """
-        self.ki = dict(ki or {})
-        if rate is None and not self.ki:
+    def __post_init__(self) -> None:
+        """Check that there is a rate or a gain."""
+        if self.rate is None and not self.ki:
             raise CompensationError("integral action needs a rate [1/s], or ki by task")
-        self.rate = None if rate is None else positive(rate, "rate")
-        self.tasks = None if tasks is None else tuple(tasks)
-        self.limit = positive(limit, "limit")
 
     def check(self, tasks: Sequence[Task]) -> None:
         """Check that the gains fit the tasks, and that errors decay.
@@ -72,39 +67,55 @@ class IntegralAction:
             GainError: As `check` does.
         """
         names = [task.name for task in tasks]
-        for name in (*self.ki, *(self.tasks or ())):
+        named = [("ki", name) for name in self.ki]
+        named += [("tasks", name) for name in self.tasks or ()]
+        for field, name in named:
             if name not in names:
-                raise CompensationError(
-                    f"integral_action: there is no task {name!r}"
-                    f"{did_you_mean(name, names)} (there are {listing(names)})"
-                )
+                with within(field):
+                    raise CompensationError(
+                        f"there is no task {name!r}{did_you_mean(name, names)} "
+                        f"(there are {listing(names)})"
+                    )
         gains = {}
         for task in tasks:
             if self.tasks is not None and task.name not in self.tasks:
                 continue
             if task.name in self.ki:
-                what = f"ki of task {task.name!r}"
-                Ki = as_matrix(as_gain(self.ki[task.name], what), task.rows, what)
+                with within("ki", task.name):
+                    Ki = as_matrix(as_gain(self.ki[task.name], "Ki"), task.rows, "Ki")
             elif self.rate is not None:
                 Ki = self.rate * task.feedback().Kp
             else:
                 continue
             if task.order == 1:
                 raise CompensationError(
-                    f"integral_action: task {task.name!r} has a first-order error "
-                    "equation; list the other tasks in tasks"
+                    f"task {task.name!r} has a first-order error equation; list the "
+                    "other tasks in tasks"
                 )
             _check_decay(task, Ki)
             gains[task.name] = Ki
         return gains
 
-    def restart(self, controller: Controller) -> None:
-        """Set all integrals to zero.
+    def begin(self, controller: Controller) -> "RunningIntegral":
+        """Return the integral action of a controller for one run; it begins at zero.
 
         Args:
             controller: The controller, in whose feedback the action is written.
         """
-        self._gains = self.gains(controller.tasks)
+        return RunningIntegral(self, controller)
+
+
+class RunningIntegral:
+    """Integral action in one run: it keeps the integrals.
+
+    Attributes:
+        integrals: ∫e by task, shape (m,) [m·s or rad·s].
+    """
+
+    def __init__(self, declared: IntegralAction, controller: Controller) -> None:
+        """Set all integrals to zero."""
+        self._limit = np.inf if declared.limit is None else declared.limit
+        self._gains = declared.gains(controller.tasks)
         self._feedback = {name: controller.feedback(name) for name in self._gains}
         self.integrals: dict[str, Array] = {
             name: np.zeros(len(Ki)) for name, Ki in self._gains.items()
@@ -128,9 +139,9 @@ class IntegralAction:
             integral += np.where(grows, 0.0, e) * period
             action = self._gains[name] @ integral
             largest = float(np.abs(action).max(initial=0.0))
-            if largest > self.limit:
-                integral *= self.limit / largest
-                action *= self.limit / largest
+            if largest > self._limit:
+                integral *= self._limit / largest
+                action *= self._limit / largest
             feedback.offset[:] = action
 
 

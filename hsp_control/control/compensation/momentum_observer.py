@@ -9,67 +9,71 @@ is a low-pass of d. It needs no measured acceleration.
 """
 
 from math import exp
-from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.compensation.checks import (
-    check_fixed_base,
-    per_dof,
-    positive,
-)
+from hsp_control.common.exceptions import CompensationError
+from hsp_control.constraints.limits.numbers_by_joint import Positives
+from hsp_control.control.compensation.checks import check_fixed_base, per_dof
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.quantities import Positive
 from hsp_control.robot import Robot, RobotState
 
 
-class MomentumObserver:
-    """Estimates the disturbance r: the efforts that the model does not explain.
+class MomentumObserver(Part, error=CompensationError):
+    """The efforts that the model does not explain are estimated and cancelled.
 
-    Over a period h with a constant effort, the mean of d is
-    Δp/h - tau - (mean of Cᵀv - G), to second order in h. r moves towards it by the part
-    1 - exp(-K_O h), the exact step of the filter, so the observer by itself is stable
-    for every K_O h.
+    Over a period h with a constant effort, the mean of the disturbance d is
+    Δp/h - tau - (mean of Cᵀv - G), to second order in h. The estimate r moves towards
+    it by the part 1 - exp(-K_O h), the exact step of the filter, so the observer by
+    itself is stable for every K_O h.
 
     The cancelled part of r is clipped. Otherwise the robot would resist a person who
     holds it, or a collision, with its full effort.
-
-    Attributes:
-        bandwidth: K_O [1/s].
-        clip: Maximum |r| that is cancelled, a number or shape (nv,) [N·m or N].
-        disturbance: r, shape (nv,) [N·m or N], since `restart`.
-        cancelled: r, clipped, shape (nv,) [N·m or N].
     """
 
-    def __init__(self, bandwidth: float = 50.0, clip: Any = np.inf) -> None:
-        """Set the observer.
-
-        Args:
-            bandwidth: K_O > 0 [1/s]; 20 to 50 is usual.
-            clip: Maximum |r| that is cancelled, a number or shape (nv,) [N·m or N].
-
-        Raises:
-            CompensationError: If the bandwidth is not positive.
-        """
-        self.bandwidth = positive(bandwidth, "bandwidth")
-        self.clip = clip
+    bandwidth: Positive = 50.0
+    """Rate K_O at which the estimate converges [1/s]; 20 to 50 is usual."""
+    clip: Positives | None = None
+    """Largest effort that is cancelled [N·m or N], one number or nv; unlimited by
+    default."""
 
     def check(self, robot: Robot) -> None:
         """Check that the observer fits the robot.
 
         Raises:
-            CompensationError: If the robot has a free-flyer root, or the clip is not
-                positive, or has another shape.
+            CompensationError: If the robot has a free-flyer root, or there are neither
+                one nor nv numbers in `clip`.
         """
-        check_fixed_base(robot, "momentum_observer")
-        per_dof(robot, self.clip, "clip")
+        check_fixed_base(robot)
+        self._bounds(robot)
 
-    def restart(self, robot: Robot) -> None:
-        """Set the estimate to zero."""
-        self.disturbance: Array = np.zeros(robot.nv)
-        self.cancelled: Array = np.zeros(robot.nv)
-        self._clip = per_dof(robot, self.clip, "clip")
+    def begin(self, robot: Robot) -> "RunningObserver":
+        """Return the observer of a robot for one run; its estimate is zero."""
+        return RunningObserver(self.bandwidth, self._bounds(robot))
+
+    def _bounds(self, robot: Robot) -> Array:
+        """Return the maximum of |r| that is cancelled, shape (nv,) [N·m or N]."""
+        with within("clip"):
+            return per_dof(robot, self.clip)
+
+
+class RunningObserver:
+    """A momentum observer in one run: it keeps the estimate and the last momentum.
+
+    Attributes:
+        disturbance: r, shape (nv,) [N·m or N].
+        cancelled: r, clipped, shape (nv,) [N·m or N].
+    """
+
+    def __init__(self, bandwidth: float, clip: Array) -> None:
+        """Set K_O [1/s], and the maximum of |r| that is cancelled, shape (nv,)."""
+        self._bandwidth, self._clip = bandwidth, clip
+        self.disturbance: Array = np.zeros(len(clip))
+        self.cancelled: Array = np.zeros(len(clip))
         self._momentum: Array | None = None
-        self._drift: Array = np.zeros(robot.nv)
+        self._drift: Array = np.zeros(len(clip))
 
     def update(self, state: RobotState, tau: Array, period: float) -> Array:
         """Update the estimate with a measurement, and return it.
@@ -87,7 +91,7 @@ class MomentumObserver:
         if self._momentum is not None:
             mean = 0.5 * (drift + self._drift)
             disturbance = (momentum - self._momentum) / period - tau - mean
-            share = 1.0 - exp(-self.bandwidth * period)
+            share = 1.0 - exp(-self._bandwidth * period)
             self.disturbance += share * (disturbance - self.disturbance)
             np.clip(self.disturbance, -self._clip, self._clip, out=self.cancelled)
         self._momentum, self._drift = momentum, drift

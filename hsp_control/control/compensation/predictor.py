@@ -7,40 +7,30 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.control.compensation.checks import check_fixed_base
+from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import Count
 from hsp_control.robot import Robot
 from hsp_control.robot.integrators import Rk4
 
 
-class Predictor:
-    """Integrates the model over the known delays, with the efforts under way.
+class Predictor(Part, error=CompensationError):
+    """The law is evaluated for the predicted state in which its effort will act.
 
-    The law is then evaluated at the state and the time at which its effort will act.
-
-    Attributes:
-        effort_delay: Delay of efforts, in whole control periods.
-        sensor_delay: Delay of measurements, in whole control periods.
+    The predictor integrates the model over the known delays, with the efforts under
+    way.
     """
 
-    def __init__(self, effort_delay: int = 1, sensor_delay: int = 0) -> None:
-        """Set the known delays.
+    effort_delay: Count = 1
+    """Delay from an effort to its action [control periods]."""
+    sensor_delay: Count = 0
+    """Age of a measurement [control periods]."""
 
-        Raises:
-            CompensationError: If a delay is not an integer ≥ 0, or both are 0.
-        """
-        for what, delay in (
-            ("effort_delay", effort_delay),
-            ("sensor_delay", sensor_delay),
-        ):
-            if not isinstance(delay, int) or delay < 0:
-                raise CompensationError(
-                    f"{what} is {delay!r}; needs a number of periods"
-                )
-        if effort_delay + sensor_delay == 0:
+    def __post_init__(self) -> None:
+        """Check that there is a delay."""
+        if self.periods == 0:
             raise CompensationError(
                 "a predictor needs a delay: effort_delay or sensor_delay"
             )
-        self.effort_delay = effort_delay
-        self.sensor_delay = sensor_delay
 
     @property
     def periods(self) -> int:
@@ -53,7 +43,7 @@ class Predictor:
         Raises:
             CompensationError: If the robot has a free-flyer root.
         """
-        check_fixed_base(robot, "predictor")
+        check_fixed_base(robot)
 
     def predict(
         self,

@@ -16,8 +16,8 @@ from hsp_control.common.exceptions import CompensationError, UnstableRateError
 from hsp_control.control.compensation.compensation import Compensation
 from hsp_control.control.compensation.linear_loop import LinearLoop
 from hsp_control.control.compensation.momentum_observer import MomentumObserver
-from hsp_control.control.compensation.velocity_filter import VelocityFilter
 from hsp_control.control.controller import Controller
+from hsp_control.declaration import within
 from hsp_control.null_space.fields import FieldSample
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.robot import Robot, RobotState
@@ -72,6 +72,7 @@ def check_rate(
     Raises:
         UnstableRateError: If the loop is unstable; with the gain that is too large, and
             values that make the loop stable.
+        CompensationError: If the velocity filter's cut-off is too high for the rate.
     """
     found = rate_findings(
         controller,
@@ -83,7 +84,8 @@ def check_rate(
     )
     for finding in found:
         if finding.unstable:
-            raise UnstableRateError(finding.message)
+            with within(*finding.path):
+                raise UnstableRateError(finding.message)
     return found
 
 
@@ -105,8 +107,14 @@ def rate_findings(
         compensation: The compensators; None: none.
         effort_delay: Delay of efforts, in periods; None: the predictor's setting.
         sensor_delay: Delay of measurements, in periods; None: the predictor's setting.
+
+    Raises:
+        CompensationError: If the velocity filter's cut-off is too high for the rate.
     """
     compensation = Compensation() if compensation is None else compensation
+    if compensation.velocity_filter is not None:
+        with within("compensation", "velocity_filter"):
+            compensation.velocity_filter.coefficients(period)
     known = compensation.predictor
     if effort_delay is None:
         effort_delay = 0 if known is None else known.effort_delay
@@ -325,7 +333,7 @@ def _stabilising_changes(
         filter_ = own.velocity_filter
 
         def wider(s: float) -> LinearLoop:
-            other = VelocityFilter(filter_.cutoff / s, filter_.order)
+            other = replace(filter_, cutoff=filter_.cutoff / s)
             return replace(loop, compensation=replace(own, velocity_filter=other))
 
         # Up to 0.45 of the rate, where the filter has almost no effect.

@@ -4,36 +4,26 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.control.compensation.checks import check_fixed_base, positive
+from hsp_control.control.compensation.checks import check_fixed_base
+from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import NonNegative, Positive
 from hsp_control.robot import Robot, RobotState
 from hsp_control.trajectories.schedule import Schedule
 
 
-class StartUpRamp:
-    """Blends the acceleration from that of holding still into the law's.
+class StartUpRamp(Part, error=CompensationError):
+    """The effort changes smoothly from holding still to the law.
 
     a = (1 - s) a_hold + s a_law with a_hold = -2 ω v + ω² (q_0 ⊖ q) and s from 0 to 1,
     twice continuously differentiable. At first the effort compensates gravity and acts
     as a spring to the first configuration q_0. The limits hold for the blend.
-
-    Attributes:
-        duration: Time until s = 1 [s].
-        natural_frequency: ω of the spring [rad/s]; 0: gravity compensation only.
     """
 
-    def __init__(self, duration: float, natural_frequency: float = 0.0) -> None:
-        """Set the ramp; see the attributes.
-
-        Raises:
-            CompensationError: If the duration is not positive, or the frequency is
-                negative.
-        """
-        self.duration = positive(duration, "duration")
-        if not 0.0 <= natural_frequency < np.inf:
-            raise CompensationError(
-                f"natural_frequency is {natural_frequency}; must not be negative"
-            )
-        self.natural_frequency = float(natural_frequency)
+    duration: Positive = 1.0
+    """Time until the law is fully active, s = 1 [s]."""
+    natural_frequency: NonNegative = 0.0
+    """Natural frequency ω of the spring that holds the robot meanwhile [rad/s]; 0 is
+    pure gravity compensation."""
 
     def check(self, robot: Robot) -> None:
         """Check that the motors alone can hold the robot still.
@@ -41,27 +31,31 @@ class StartUpRamp:
         Raises:
             CompensationError: If the robot has a free-flyer root.
         """
-        check_fixed_base(robot, "start_up_ramp")
+        check_fixed_base(robot)
 
-    def restart(self) -> None:
-        """Start the ramp anew, at the next state passed to `begin`."""
-        self._schedule: Schedule | None = None
+    def begin(self, state: RobotState) -> "RunningRamp":
+        """Return the ramp that begins at a state: at its time and configuration."""
+        return RunningRamp(self, state)
 
-    def begin(self, state: RobotState) -> None:
-        """Store the first state; later states have no effect."""
-        if self._schedule is None:
-            self._schedule = Schedule([(state.t, None)], ramp=self.duration)
-            self._q0 = state.q.copy()
+
+class RunningRamp:
+    """A start-up ramp in one run: it knows when and where it began."""
+
+    def __init__(self, declared: StartUpRamp, state: RobotState) -> None:
+        """Set the ramp, and the state at which it begins."""
+        self._frequency = declared.natural_frequency
+        self._schedule = Schedule([(state.t, None)], ramp=declared.duration)
+        self._q0 = state.q.copy()
 
     def weight(self, t: float) -> float:
         """Return the weight s of the law at time t [s]."""
-        return 0.0 if self._schedule is None else self._schedule.weight(t)
+        return self._schedule.weight(t)
 
     def blend(self, state: RobotState, a: Array) -> Array:
         """Return the blend with the law's acceleration a, shape (nv,)."""
         s = self.weight(state.t)
         if s >= 1.0:
             return a
-        w = self.natural_frequency
+        w = self._frequency
         away = state.robot.difference(state.q, self._q0)
         return np.asarray((1.0 - s) * (w * w * away - 2.0 * w * state.v) + s * a)

@@ -1,66 +1,37 @@
 """A low-pass filter of the measured velocity."""
 
 from math import exp, pi, sqrt, tan
+from typing import Literal
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.control.compensation.checks import positive
+from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import Positive
 
 
-class VelocityFilter:
-    """A Butterworth low-pass of first or second order, for each degree of freedom.
+class VelocityFilter(Part, error=CompensationError):
+    """A Butterworth low-pass filter of the measured velocity.
 
-    It delays slow motion by 1/(2π f) at first order, and by √2 times that at second
-    order; `check_rate` takes this into account. Its initial state is the steady state
-    for the first measurement.
-
-    Attributes:
-        cutoff: Cut-off frequency f, at which half of the power passes [Hz].
-        order: 1 or 2.
+    It filters each degree of freedom by itself. It delays slow motion by 1/(2π f) at
+    first order, and by √2 times that at second order; `check_rate` takes this into
+    account. Its initial state is the steady state for the first measurement.
     """
 
-    def __init__(self, cutoff: float, order: int = 1) -> None:
-        """Set the filter.
-
-        Args:
-            cutoff: f > 0 [Hz].
-            order: 1 or 2.
-
-        Raises:
-            CompensationError: If the cut-off is not positive, or the order is neither 1
-                nor 2.
-        """
-        self.cutoff = positive(cutoff, "cutoff")
-        if order not in (1, 2):
-            raise CompensationError(f"order is {order!r}; must be 1 or 2")
-        self.order = int(order)
+    cutoff: Positive
+    """Cut-off frequency f, at which half of the power passes [Hz]."""
+    order: Literal[1, 2] = 1
+    """Order of the filter [-]."""
 
     @property
     def delay(self) -> float:
         """The delay of slow motion [s]."""
         return (1.0 if self.order == 1 else sqrt(2.0)) / (2.0 * pi * self.cutoff)
 
-    def restart(self) -> None:
-        """Forget all measurements."""
-        self._past: tuple[Array, ...] | None = None
-
-    def apply(self, v: Array, period: float) -> Array:
-        """Return the filtered velocity, a new array of shape (nv,).
-
-        Args:
-            v: Measured velocity, shape (nv,).
-            period: Time since the last measurement [s].
-
-        Raises:
-            CompensationError: If the cut-off is too high for the sampling rate.
-        """
-        if self._past is None:
-            self._past = tuple(v.copy() for _ in range(4))
-            return v.copy()
-        filtered, self._past = self.step(v, self._past, period)
-        return filtered.copy()
+    def begin(self) -> "RunningFilter":
+        """Return the filter for one run; it knows no measurement yet."""
+        return RunningFilter(self)
 
     def step(
         self, v: Array, past: tuple[Array, ...], period: float
@@ -105,3 +76,28 @@ class VelocityFilter:
         b = w * w / scale
         a = 2.0 * (w * w - 1.0) / scale, (1.0 - sqrt(2.0) * w + w * w) / scale
         return (b, 2.0 * b, b), a
+
+
+class RunningFilter:
+    """A velocity filter in one run: it keeps the last inputs and outputs."""
+
+    def __init__(self, declared: VelocityFilter) -> None:
+        """Set the filter."""
+        self._filter = declared
+        self._past: tuple[Array, ...] | None = None
+
+    def apply(self, v: Array, period: float) -> Array:
+        """Return the filtered velocity, a new array of shape (nv,).
+
+        Args:
+            v: Measured velocity, shape (nv,).
+            period: Time since the last measurement [s].
+
+        Raises:
+            CompensationError: If the cut-off is too high for the sampling rate.
+        """
+        if self._past is None:
+            self._past = tuple(v.copy() for _ in range(4))
+            return v.copy()
+        filtered, self._past = self._filter.step(v, self._past, period)
+        return filtered.copy()

@@ -4,7 +4,6 @@ from .clearance import Clearance as Clearance
 from .compiled_cost import CompiledCost as CompiledCost
 from .cost import Cost as Cost
 from .cost import FunctionCost as FunctionCost
-from .crossfade import crossfade as crossfade
 from .equal_joint_angles import EqualJointAngles as EqualJointAngles
 from .field import FieldSample as FieldSample
 from .field import FieldSum as FieldSum

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from hsp_control.common.exceptions import ModelError
+from hsp_control.declaration.rotation import matrix_of
 from hsp_control.robot.description.sources import RobotSource
 
 
@@ -71,6 +73,6 @@ def combine(parts: Sequence[tuple[Part, pin.Model]]) -> pin.Model:
     return whole
 
 
-def placement(position: Sequence[float], rpy: Sequence[float]) -> pin.SE3:
-    """Return a placement from a position [m] and roll, pitch, yaw [rad]."""
-    return pin.SE3(pin.rpy.rpyToMatrix(*rpy), np.asarray(position, dtype=float))
+def placement(position: ArrayLike, rotation: ArrayLike) -> pin.SE3:
+    """Return a placement from a position [m], shape (3,), and a `Rotation`."""
+    return pin.SE3(matrix_of(rotation), np.asarray(position, dtype=float))

@@ -4,24 +4,28 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from hsp_control.common.exceptions import (
     FrameNotFoundError,
     JointNotFoundError,
     ModelError,
-    NonFiniteError,
-    ShapeError,
 )
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.robot.description.combining import placement
 from hsp_control.robot.description.mesh_files import check_mesh_name
+from hsp_control.robot.description.robot_description import (
+    PlacedRobot,
+    RobotDescription,
+    ToolFrame,
+)
 from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.description.urdf_checks import named_files, read_urdf
 
@@ -31,63 +35,40 @@ _ROOT_JOINTS = {
 }
 
 
-@dataclass(frozen=True)
-class ToolFrame:
-    """A frame to add to the model, fixed to one of its frames.
-
-    Attributes:
-        parent: Name of the frame that it is fixed to.
-        translation: Its origin in the parent frame [m], shape (3,).
-        rpy: Its roll, pitch and yaw in the parent frame [rad], as in a URDF.
-    """
-
-    parent: str
-    translation: Sequence[float] = (0.0, 0.0, 0.0)
-    rpy: Sequence[float] = (0.0, 0.0, 0.0)
-
-
 def load_model(
     source: RobotSource,
-    *,
-    root: Root | None = None,
-    locked: Mapping[str, float] | None = None,
-    tool_frames: Mapping[str, ToolFrame] | None = None,
-    gravity: Sequence[float] | None = None,
-    mimic: bool = True,
+    settings: RobotDescription | PlacedRobot | None = None,
+    gravity: ArrayLike | None = None,
 ) -> pin.Model:
     """Return the Pinocchio model of a robot, built from its URDF.
 
+    Joints that mimic a locked joint are locked with it.
+
     Args:
         source: Where the robot comes from.
-        root: ``fixed``, ``planar`` (x, y, yaw) or ``free_flyer``; None: as the source
-            says.
-        locked: Joints to lock, name to value [rad or m]; None: as the source says.
-            Joints that mimic a locked joint are locked with it.
-        tool_frames: Frames to add, by name.
+        settings: How it is loaded; its name is not used. None: as the source says.
         gravity: Acceleration of gravity in the world [m/s²], shape (3,); None: -9.81
             along z.
-        mimic: Whether a joint with ``<mimic>`` follows its leader and has no degree of
-            freedom of its own. False: it is an independent joint.
 
     Raises:
-        ModelError: If the URDF is invalid, the root is unknown, a joint cannot be
-            locked, a tool frame's name exists already, a joint's limits are reversed,
-            or the mass matrix is singular.
+        ModelError: If the URDF is invalid, a joint cannot be locked, a tool frame's
+            name exists already, a joint's limits are reversed, or the mass matrix is
+            singular.
         RobotNotFoundError: If the URDF cannot be read.
         AccessError: If the URDF names a file that the source's access does not allow.
         JointNotFoundError: If a joint to lock does not exist.
         FrameNotFoundError: If a tool frame's parent does not exist.
-        ShapeError: If gravity or a tool frame's placement is not 3 numbers.
-        NonFiniteError: If one of these, or a locked joint's value, is NaN or inf.
     """
-    model = _parse(source, root or source.root, mimic=mimic)
-    locks = source.locked if locked is None else locked
+    if settings is None:
+        settings = RobotDescription(source.name)
+    model = _parse(source, settings.root or source.root, mimic=settings.mimic)
+    locks = source.locked if settings.locked is None else settings.locked
     if locks:
         model = _lock(model, locks)
-    for name, tool in (tool_frames or {}).items():
+    for name, tool in settings.tool_frames.items():
         _add_frame(model, name, tool)
     if gravity is not None:
-        model.gravity.linear = _vector3(gravity, "gravity")
+        model.gravity.linear = np.asarray(gravity)
     _check_limits(model, source)
     _check_mass_matrix(model, source)
     return model
@@ -152,11 +133,6 @@ def _parse(source: RobotSource, root: Root, *, mimic: bool) -> pin.Model:
     if source.access.strict:
         for name, where in named_files(xml):
             check_mesh_name(source, name, f"{urdf}: {where}", source.access)
-    if root not in get_args(Root):
-        roots = get_args(Root)
-        raise ModelError(
-            f"root {root!r} is not one of {listing(roots)}{did_you_mean(root, roots)}"
-        )
     parser_errors: list[str] = []
     try:
         with _collect_parser_errors(parser_errors):
@@ -223,10 +199,6 @@ def _lock(model: pin.Model, locks: Mapping[str, float]) -> pin.Model:
                 f"cannot lock {name!r}: no such joint{did_you_mean(name, names)} "
                 f"(the model has {listing(names)})"
             )
-        if not np.isfinite(value):
-            raise NonFiniteError(
-                f"cannot lock joint {name!r} at {value}; needs a finite number"
-            )
         index = model.getJointId(name)
         joint = model.joints[index]
         ids.add(index)
@@ -287,14 +259,12 @@ def _add_frame(model: pin.Model, name: str, tool: ToolFrame) -> None:
             f"{did_you_mean(tool.parent, names)} (the model has {listing(names)})"
         )
     parent = model.frames[model.getFrameId(tool.parent)]
-    rotation = pin.rpy.rpyToMatrix(_vector3(tool.rpy, f"rpy of {name!r}"))
-    translation = _vector3(tool.translation, f"translation of {name!r}")
     model.addFrame(
         pin.Frame(
             name,
             parent.parentJoint,
             model.getFrameId(tool.parent),
-            parent.placement * pin.SE3(rotation, translation),
+            parent.placement * placement(tool.translation, tool.rotation),
             pin.FrameType.OP_FRAME,
         )
     )
@@ -342,15 +312,3 @@ def _check_mass_matrix(model: pin.Model, source: RobotSource) -> None:
         f"{values[-1]:.1e}); give the links an inertia, or "
         + (f"lock the joints: locked: {{{locks}}}" if single else "root: fixed")
     )
-
-
-def _vector3(values: Sequence[float], what: str) -> np.ndarray:
-    try:
-        vector = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ShapeError(f"{what} is {values!r}; needs 3 numbers") from None
-    if vector.shape != (3,):
-        raise ShapeError(f"{what} has shape {vector.shape}; needs 3 numbers")
-    if not np.isfinite(vector).all():
-        raise NonFiniteError(f"{what} is {vector.tolist()}; needs finite numbers")
-    return vector

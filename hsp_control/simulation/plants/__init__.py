@@ -1,16 +1,39 @@
 """Plants: the simulated robots that the controller's effort moves."""
 
-from .contact_plant import ContactKind as ContactKind
+from hsp_control.robot.friction import Friction as Friction
+
 from .contact_plant import ContactPlant as ContactPlant
-from .contact_plant import RigidContact as RigidContact
+from .declared import AnyPlant as AnyPlant
 from .declared import PlantPart as PlantPart
+from .drives import Drive as Drive
+from .drives import DroppedPeriods as DroppedPeriods
+from .drives import EffortDelay as EffortDelay
+from .drives import EffortNoise as EffortNoise
+from .drives import Jitter as Jitter
+from .drives import Saturation as Saturation
+from .frictional import FrictionalPart as FrictionalPart
 from .imperfect_plant import ImperfectPlant as ImperfectPlant
 from .integrated_plant import IntegratedPlant as IntegratedPlant
+from .model_changes import Inertias as Inertias
+from .model_changes import Payload as Payload
+from .mujoco import ContactShape as ContactShape
+from .mujoco import Ground as Ground
+from .mujoco import Mujoco as Mujoco
 from .plant import ContinuousPlant as ContinuousPlant
 from .plant import Plant as Plant
 from .plant import SampledPlant as SampledPlant
 from .plant import check_plant as check_plant
 from .plant import differing_bodies as differing_bodies
 from .push import Push as Push
+from .rigid_body import RigidBody as RigidBody
 from .rigid_body_plant import RigidBodyPlant as RigidBodyPlant
+from .rigid_contact import ContactKind as ContactKind
+from .rigid_contact import RigidContact as RigidContact
+from .rigid_contacts import RigidContacts as RigidContacts
+from .sensors import DifferencedVelocity as DifferencedVelocity
+from .sensors import Encoder as Encoder
+from .sensors import PositionNoise as PositionNoise
+from .sensors import Sensor as Sensor
+from .sensors import SensorDelay as SensorDelay
+from .sensors import VelocityNoise as VelocityNoise
 from .sticking_plant import StickingPlant as StickingPlant

@@ -1,63 +1,24 @@
 """A plant of rigid bodies with bilateral contacts, whose constraints hold exactly."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.log_channel import LogChannel
+from hsp_control.declaration import within
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.plants.contact_channels import contact_channels
 from hsp_control.simulation.plants.floating_roots import FloatingRoots
 from hsp_control.simulation.plants.json_data import to_json_data
 from hsp_control.simulation.plants.plant import ContinuousPlant
 from hsp_control.simulation.plants.push import Push, Pushes
-
-ContactKind = Literal["point", "surface"]
+from hsp_control.simulation.plants.rigid_contact import RigidContact
 
 REDUNDANT = 1e-12
 """Eigenvalues of J M⁻¹ Jᵀ below this share of the largest are redundant rows."""
-
-
-@dataclass(frozen=True)
-class RigidContact:
-    """A frame that is fixed to the world while the contact is on; it can also pull.
-
-    Attributes:
-        frame: The frame; forces are logged under its name.
-        kind: ``point`` holds its origin, ``surface`` also its orientation.
-        on: Intervals (start, end) [s] during which it holds; None: always.
-    """
-
-    frame: str
-    kind: ContactKind = "surface"
-    on: Sequence[tuple[float, float]] | None = None
-
-    def __post_init__(self) -> None:
-        """Check the kind, and that each interval starts before it ends."""
-        if self.kind not in get_args(ContactKind):
-            raise SimulationError(
-                f"contact of {self.frame!r}: kind {self.kind!r}: choose among "
-                f"{', '.join(get_args(ContactKind))}"
-            )
-        for span in self.on or ():
-            if len(span) != 2 or not span[0] < span[1]:
-                raise SimulationError(
-                    f"contact of {self.frame!r}: on from {span[0]} to {span[-1]} s; "
-                    "the start must be before the end"
-                )
-
-    @property
-    def rows(self) -> int:
-        """How many velocities it keeps at zero."""
-        return 3 if self.kind == "point" else 6
-
-    def holds(self, t: float) -> bool:
-        """Return whether it holds at time t [s]."""
-        return self.on is None or any(begin <= t < end for begin, end in self.on)
 
 
 class ContactPlant(ContinuousPlant):
@@ -97,7 +58,8 @@ class ContactPlant(ContinuousPlant):
         super().__init__(robot)
         names = [contact.frame for contact in contacts]
         for name in names:
-            robot.frame_id(name)
+            with within("contacts", name):
+                robot.frame_id(name)
             if names.count(name) > 1:
                 raise SimulationError(f"two contacts have the same frame {name!r}")
         if not 0.0 <= damping < np.inf:

@@ -1,26 +1,183 @@
-"""Plants that a configuration can name: for packages that add one."""
+"""Plants as values: what a configuration says about the simulated system."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, replace
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import AfterValidator, GetJsonSchemaHandler
+from pydantic_core import CoreSchema
 
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.declaration import Part
+from hsp_control.declaration import AnyOf, Part, within
+from hsp_control.declaration.quantities import Count, Weights
 from hsp_control.robot import Robot
+from hsp_control.robot.description.access import ANYWHERE, Access
+from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.robot.integrators import Integrator
-from hsp_control.simulation.plants.plant import Plant
+from hsp_control.simulation.plants.drives import Drives
+from hsp_control.simulation.plants.imperfect_plant import ImperfectPlant
+from hsp_control.simulation.plants.integrated_plant import IntegratedPlant
+from hsp_control.simulation.plants.model_changes import (
+    Inertias,
+    ModelChange,
+    MotorInertia,
+    Payload,
+    changed,
+)
+from hsp_control.simulation.plants.plant import (
+    ContinuousPlant,
+    Plant,
+    SampledPlant,
+    check_plant,
+)
+from hsp_control.simulation.plants.push import Push
+from hsp_control.simulation.plants.sensors import Sensors
 
 
 class PlantPart(Part, ABC, family="plants", error=SimulationError):
-    """What YAML says about a plant: ``plant: {type: mine, ...}``.
+    """What Python and YAML say about a plant; `build` makes what runs.
 
-    A package declares its parameters as fields (see `Part`), implements `build`, and
-    names the class as an entry point of the group ``hsp_control.plants``.
+    A subclass declares the parameters of its engine as fields (see `Part`) and
+    implements `engine`. The fields below and what they do are common to all plants. A
+    package names its class as an entry point of the group ``hsp_control.plants``.
+
+    Sensors and drives are applied in the order of their stages, whatever the order in
+    which they are given.
     """
 
+    _: KW_ONLY
+    robot: RobotDescription | None = None
+    """The simulated robot [-], with the same joints; the controller's robot by
+    default. What it does not say is as in the controller's robot."""
+    inertias: Inertias = Inertias()
+    """Differences of masses and inertias from the controller's model [-]."""
+    payload: Payload | None = None
+    """A payload that the controller does not know about [-]."""
+    motor_inertia: Weights = 0.0
+    """Rotor inertia times gear ratio squared [kg·m² or kg], one number or nv."""
+    pushes: Annotated[Sequence[Push], AfterValidator(tuple)] = ()
+    """External wrenches [-]; the engine applies them."""
+    sensors: Sensors = ()
+    """Imperfections of the measurements [-]."""
+    drives: Drives = ()
+    """Imperfections of the drives [-]."""
+    seed: Count = 0
+    """Seed of all random numbers [-]."""
+
     @abstractmethod
-    def build(self, robot: Robot, integrator: Integrator) -> Plant:
-        """Return the plant.
+    def engine(self, robot: Robot, integrator: Integrator) -> Plant:
+        """Return the plant without its sensors and drives.
 
         Args:
-            robot: The controller's robot; the plant may change it.
-            integrator: The integrator of the simulation.
+            robot: The simulated robot, with its inertias, motors and payload.
+            integrator: The integrator of the simulation, for engines with stiction or
+                contacts that need its step; `simulate` integrates a `ContinuousPlant`.
+
+        Raises:
+            HspControlError: If a field does not fit the robot; with its key path.
         """
+
+    @property
+    def longest_step(self) -> float | None:
+        """The longest step of an engine with its own steps [s]; None: it has none."""
+        return None
+
+    @property
+    def sensor_delay(self) -> int:
+        """Delay of the measurements [control periods]."""
+        return sum(sensor.periods for sensor in self.sensors)
+
+    @property
+    def effort_delay(self) -> int:
+        """Delay of the efforts [control periods]."""
+        return sum(drive.periods for drive in self.drives)
+
+    def located(self, folder: Path) -> Self:
+        """Return it with the full path of its robot's URDF, if that is in a folder."""
+        if self.robot is None:
+            return self
+        return replace(self, robot=self.robot.located(folder))
+
+    def build(
+        self, robot: Robot, integrator: Integrator, *, access: Access = ANYWHERE
+    ) -> Plant:
+        """Return the plant, which has the controller's joints.
+
+        Args:
+            robot: The controller's robot.
+            integrator: The integrator of the simulation.
+            access: Which files may be read for a robot of its own.
+
+        Raises:
+            SimulationError: If a field does not fit the robot, or the joints differ.
+            HspControlError: If a frame does not exist, or the robot cannot be loaded.
+        """
+        plant = self.engine(self._simulated(robot, access), integrator)
+        check_plant(plant, robot)
+        sensors = [sensor for sensor in self.sensors if sensor.active]
+        drives = [drive for drive in self.drives if drive.active]
+        if not (sensors or drives):
+            return plant
+        if isinstance(plant, ContinuousPlant):
+            plant = IntegratedPlant(plant, integrator)
+        if not isinstance(plant, SampledPlant):
+            raise SimulationError(
+                f"{type(plant).__name__} is neither a continuous nor a sampled plant"
+            )
+        return ImperfectPlant(plant, sensors, drives, self.seed)
+
+    def _simulated(self, robot: Robot, access: Access) -> Robot:
+        """Return the simulated robot; the controller's object if they are the same."""
+        own = robot
+        if self.robot is not None:
+            with within("robot"):
+                own = Robot.load(_completed(self.robot, robot), access=access)
+        changes: dict[str, ModelChange] = {}
+        if self.inertias != Inertias():
+            changes["inertias"] = self.inertias
+        if np.any(self.motor_inertia):
+            changes["motor_inertia"] = MotorInertia(self.motor_inertia)
+        if self.payload is not None:
+            changes["payload"] = self.payload
+        for key, change in changes.items():
+            with within(key):
+                own = changed(own, [change], self.seed)
+        return own
+
+
+def _completed(own: RobotDescription, robot: Robot) -> RobotDescription:
+    """Return the plant's robot, with the controller's settings where it has none."""
+    given = own.changed_fields()
+    like = {"gravity": robot.model.gravity.linear}
+    if own.parts is None and robot.description is not None:
+        others = robot.description.changed_fields()
+        like = {**others, **like}
+        like.pop("parts", None)
+    return RobotDescription(**{**like, **given})
+
+
+class _OrItsName(AnyOf):
+    """The type of a field that holds a plant, or in YAML its type alone."""
+
+    def validate(self, value: Any) -> Any:
+        """Return a plant: the value itself, or what a mapping or a name declares."""
+        return super().validate({"type": value} if isinstance(value, str) else value)
+
+    def _json_schema(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> Any:
+        names = [
+            name
+            for name, member in self.members.items()
+            if not any(field.is_required() for field in _fields(member))
+        ]
+        return {"anyOf": [{"enum": names}, super()._json_schema(schema, handler)]}
+
+
+def _fields(member: type[Part]) -> list[Any]:
+    return [*member.__pydantic_fields__.values()]  # type: ignore[attr-defined]
+
+
+AnyPlant = Annotated[PlantPart, _OrItsName(PlantPart)]
+"""A plant; in YAML also its type alone: ``plant: mujoco``."""

@@ -7,22 +7,25 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.log_channel import LogChannel
-from hsp_control.simulation.plants.drives import Drive
+from hsp_control.declaration import within
+from hsp_control.simulation.plants.drives import Drive, Driving
 from hsp_control.simulation.plants.json_data import to_json_data
 from hsp_control.simulation.plants.plant import SampledPlant
-from hsp_control.simulation.plants.sensors import Sensor
+from hsp_control.simulation.plants.random_numbers import seeded_generator
+from hsp_control.simulation.plants.sensors import Sensing, Sensor
 
 
 class ImperfectPlant(SampledPlant):
     """A plant whose measurements and efforts pass through imperfect sensors and drives.
 
     The measured state and the applied effort are logged beside the true state and the
-    commanded effort.
+    commanded effort. A copy, or a pickle, must be reset before it moves on.
 
     Attributes:
         plant: The plant that moves.
         sensors: The chain from the true state to the controller, in this order.
         drives: The chain from the controller to the joints, in this order.
+        seed: Seed of the random numbers.
     """
 
     def __init__(
@@ -30,6 +33,7 @@ class ImperfectPlant(SampledPlant):
         plant: SampledPlant,
         sensors: Sequence[Sensor] = (),
         drives: Sequence[Drive] = (),
+        seed: int = 0,
     ) -> None:
         """Set the plant, and the sensors and drives between it and the controller.
 
@@ -37,36 +41,39 @@ class ImperfectPlant(SampledPlant):
             plant: The plant that moves.
             sensors: The chain from the true state to the controller, in order.
             drives: The chain from the controller to the joints, in order.
+            seed: Seed of the random numbers; each sensor and drive has its own.
+
+        Raises:
+            SimulationError: If a sensor or drive does not fit the robot.
         """
         super().__init__(plant.robot)
         self.plant = plant
         self.sensors, self.drives = tuple(sensors), tuple(drives)
+        self.seed = seed
         self._measured = plant.robot.neutral(), np.zeros(plant.robot.nv)
         self._applied: Array | None = None
+        self._begin(*self._measured)
 
     def reset(self, t: float, q: Array, v: Array) -> None:
         """Reset the plant, the sensors and the drives; see `SampledPlant.reset`."""
         self.plant.reset(t, q, v)
-        for sensor in self.sensors:
-            sensor.reset(self.robot, t, q, v)
-        for drive in self.drives:
-            drive.reset(self.robot)
+        self._begin(q, v)
         self._applied = None
 
     def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Return the output of the last sensor; see `SampledPlant.measure`."""
         q, v = self.plant.measure(t, q, v)
-        for sensor in self.sensors:
-            q, v = sensor.measure(t, q, v)
+        for sense in self._sensing:
+            q, v = sense(t, q, v)
         self._measured = q, v
         return q, v
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
         """Move on under the output of the drives; see `SampledPlant.advance`."""
         effort, delay = tau, 0.0
-        for drive in self.drives:
-            effort = drive.apply(effort)
-            delay += drive.delay()
+        for drive in self._driving:
+            effort, later = drive(effort)
+            delay += later
         arrival = min(t + delay, end)
         if self._applied is not None and arrival > t:
             state = self.plant.advance(t, arrival, self._applied)
@@ -102,4 +109,22 @@ class ImperfectPlant(SampledPlant):
             **self.plant.describe(),
             "sensors": to_json_data(self.sensors),
             "drives": to_json_data(self.drives),
+            "seed": self.seed,
         }
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy gets: all but the run under way."""
+        return {**vars(self), "_sensing": [], "_driving": []}
+
+    def _begin(self, q: Array, v: Array) -> None:
+        """Make what runs of all sensors and drives, for a start at (q, v)."""
+        self._sensing: list[Sensing] = []
+        self._driving: list[Driving] = []
+        for sensor in self.sensors:
+            with within("sensors", sensor.yaml_type or type(sensor).__name__):
+                random = seeded_generator(self.seed, type(sensor).__name__)
+                self._sensing.append(sensor.begin(self.robot, q, v, random))
+        for drive in self.drives:
+            with within("drives", drive.yaml_type or type(drive).__name__):
+                random = seeded_generator(self.seed, type(drive).__name__)
+                self._driving.append(drive.begin(self.robot, random))

@@ -1,47 +1,31 @@
 """Pushes: external wrenches of given size, frame and time."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.quantities import Number, Positive, Vector3
 from hsp_control.robot import Robot
 from hsp_control.robot.matrix_view import matrix_view
 
 
-@dataclass(frozen=True)
-class Push:
-    """A constant external wrench on a frame during an interval.
-
-    Attributes:
-        frame: The frame whose origin it acts on.
-        force: In the world's axes [N], shape (3,).
-        moment: In the world's axes [N·m], shape (3,).
-        start: When it begins [s].
-        duration: How long it lasts [s].
-    """
+class Push(Part, error=SimulationError):
+    """An external wrench on a frame, for a limited time."""
 
     frame: str
-    force: Sequence[float] = (0.0, 0.0, 0.0)
-    moment: Sequence[float] = (0.0, 0.0, 0.0)
-    start: float = 0.0
-    duration: float = 0.1
-
-    def __post_init__(self) -> None:
-        """Check that the wrench is finite and the duration positive."""
-        for name, vector in (("force", self.force), ("moment", self.moment)):
-            if np.shape(vector) != (3,) or not np.isfinite(vector).all():
-                raise SimulationError(
-                    f"push on {self.frame!r}: {name} is {vector}; needs 3 numbers"
-                )
-        if not (np.isfinite(self.start) and 0.0 < self.duration < np.inf):
-            raise SimulationError(
-                f"push on {self.frame!r}: lasts {self.duration} s from {self.start} s; "
-                "the duration must be positive"
-            )
+    """Name of the frame; the wrench acts at its origin [-]."""
+    force: Vector3 = (0.0, 0.0, 0.0)
+    """Force in world axes [N]."""
+    moment: Vector3 = (0.0, 0.0, 0.0)
+    """Moment in world axes [N·m]."""
+    start: Number = 0.0
+    """Time at which the push begins [s]."""
+    duration: Positive = 0.1
+    """Duration of the push [s]."""
 
     def is_active(self, t: float) -> bool:
         """Return whether it acts at time t [s]."""
@@ -59,7 +43,10 @@ class Pushes:
         """
         self.robot = robot
         self.pushes = tuple(pushes)
-        self._frames = {push.frame: robot.frame_id(push.frame) for push in pushes}
+        self._frames = {}
+        for k, push in enumerate(pushes):
+            with within("pushes", k, "frame"):
+                self._frames[push.frame] = robot.frame_id(push.frame)
         self._data = robot.model.createData() if pushes else None
 
     def any_active(self, t: float, end: float) -> bool:

@@ -1,5 +1,8 @@
 """Show a robot in a browser: during a run, or from a log."""
 
+from hsp_control.config.view_settings import ShownItems as ShownItems
+from hsp_control.config.view_settings import ViewSettings as ViewSettings
+
 from .comparison import ComparedRun as ComparedRun
 from .export import FilmStyle as FilmStyle
 from .export import export_film as export_film

@@ -1,9 +1,8 @@
 """The camera: as configured, or placed so that the whole scene is visible."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.robot import Robot
@@ -23,8 +22,8 @@ _MAX_POINTS = 300
 def look_at(
     robot: Robot,
     points: Array,
-    eye: Sequence[float] | None = None,
-    target: Sequence[float] | None = None,
+    eye: ArrayLike | None = None,
+    target: ArrayLike | None = None,
     *,
     fit: bool = False,
 ) -> Command:
@@ -45,7 +44,7 @@ def look_at(
     direction = viewing_direction(robot, eye, center if target is None else target)
     view: dict[str, object] = {}
     if eye is not None and not fit:
-        view["eye"] = [float(x) for x in eye]
+        view["eye"] = np.asarray(eye, float).tolist()
     else:
         stride = max(1, len(points) // _MAX_POINTS)
         view["direction"] = direction.tolist()
@@ -61,7 +60,7 @@ def look_at(
 
 
 def viewing_direction(
-    robot: Robot, eye: Sequence[float] | None, target: Array | Sequence[float] | None
+    robot: Robot, eye: ArrayLike | None, target: ArrayLike | None
 ) -> Array:
     """Return the direction from the target to the eye, shape (3,), not normalised.
 
@@ -77,7 +76,7 @@ def viewing_direction(
 
 
 def right_direction(
-    robot: Robot, eye: Sequence[float] | None, target: Sequence[float] | None
+    robot: Robot, eye: ArrayLike | None, target: ArrayLike | None
 ) -> Array:
     """Return the horizontal direction to the right in the picture, a unit vector.
 

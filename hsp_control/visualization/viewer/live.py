@@ -59,7 +59,7 @@ class LiveView:
         self._meta = preview.meta
         robot, controller = experiment.robot, experiment.controller
         motion = motion_of(robot, preview)
-        shown = viewer.view.show.model_dump()
+        shown = viewer.view.show.all_fields()
         layers = all_layers(robot, motion, controller, dark=viewer.dark)
         layers["paths"] = GrowingPaths(motion, "/paths")
         # Layers that are hidden are not computed now.

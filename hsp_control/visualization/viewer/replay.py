@@ -6,9 +6,8 @@ from os import PathLike
 from pathlib import Path
 
 from hsp_control.common.exceptions import AccessError, HspControlError, ViewerError
-from hsp_control.config.build_robot import build_robot
 from hsp_control.config.document import Document
-from hsp_control.config.experiment import build
+from hsp_control.config.experiment import build, load_robot
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
 from hsp_control.robot import Robot
@@ -50,7 +49,7 @@ def robot_of(rollout: Rollout, access: Access = ANYWHERE) -> Robot:
     """
     document = _document(rollout, access)
     try:
-        robot, _ = build_robot(document, validate(document, Scenario), Path())
+        robot = load_robot(document, validate(document, Scenario))
     except HspControlError as error:
         raise ViewerError(f"the log's robot cannot be rebuilt: {error}") from error
     return robot

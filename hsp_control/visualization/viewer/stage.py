@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.config.models.view import ViewModel
+from hsp_control.config.view_settings import ViewSettings
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.appearance import GRID, HAZE
@@ -22,7 +22,7 @@ _LIGHT_FROM = np.array([0.5, -0.45, 1.6])
 _FINE = 1e-3
 
 
-def draw_stage(points: Array, floor: float, view: ViewModel) -> Iterator[Command]:
+def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Command]:
     """Yield the background, the lights and the floor.
 
     Args:

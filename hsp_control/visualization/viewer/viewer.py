@@ -10,9 +10,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ViewerError
-from hsp_control.config.document import Document
-from hsp_control.config.models.view import ViewModel
-from hsp_control.config.validation import validate
+from hsp_control.config.view_settings import ViewSettings
 from hsp_control.control.controller import Controller
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot, RobotState
@@ -73,15 +71,16 @@ class Viewer:
             transport: A `Recorder`, to store the commands and show nothing; None: a new
                 server on the loopback address.
             port: The server's port; None: the first free one from 7000.
-            view: The keys of a configuration's ``view``, such as ``camera`` and
-                ``target`` [m], ``background``, or ``show={"ellipsoid": True}``.
+            view: Fields of `ViewSettings`, the keys of a configuration's ``view``:
+                ``camera`` and ``target`` [m], ``background``,
+                ``show={"ellipsoid": True}``, ...
 
         Raises:
-            ViewerError: If Meshcat is not installed, or the server cannot start.
-            ConfigError: If a view has no such key, or a value is not valid.
+            ViewerError: If a view has no such field, a value is not valid, Meshcat is
+                not installed, or the server cannot start.
         """
         self.robot = robot
-        self.view = validate(Document(dict(view), {}, "view"), ViewModel)
+        self.view = ViewSettings(**view)
         self.drawing = RobotDrawing(robot)
         self._data = robot.model.createData()
         self._obstacles: ObstacleDrawing | None = None
@@ -206,7 +205,7 @@ class Viewer:
         comparison = Comparison(
             self.drawing,
             runs,
-            shown=view.show.model_dump(),
+            shown=view.show.all_fields(),
             beside=right,
             dark=self.dark,
         )
@@ -296,7 +295,7 @@ class Viewer:
         _check(self.robot, rollout, controller)
         motion = motion_of(self.robot, rollout)
         layers = all_layers(self.robot, motion, controller, dark=self.dark)
-        shown = self.view.show.model_dump()
+        shown = self.view.show.all_fields()
         return RunDrawing(self.drawing, motion, layers, shown=shown)
 
     def _draw_run(

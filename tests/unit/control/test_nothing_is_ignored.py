@@ -1,6 +1,7 @@
 """Whatever is assigned, given or asked for counts, or is refused."""
 
 import threading
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -33,13 +34,19 @@ def public(thing: object) -> list[str]:
 
 def everything(controller: hsp.Controller) -> list[object]:
     """Return the controller and all that one gets from it, parts of parts included."""
-    found: list[object] = [controller]
     controller.compute(0.0, controller.robot.home(), np.zeros(controller.robot.nv))
-    waiting: list[object] = [getattr(controller, name) for name in public(controller)]
+    return [controller, *parts([getattr(controller, n) for n in public(controller)])]
+
+
+def parts(waiting: list[Any]) -> list[object]:
+    """Return the parts among some objects, and the parts of parts."""
+    found: list[object] = []
     while waiting:
         each = waiting.pop()
         if isinstance(each, tuple):
             waiting += each
+        elif isinstance(each, Mapping):
+            waiting += each.values()
         elif isinstance(each, Part):
             found.append(each)
             waiting += list(each.all_fields().values())
@@ -51,13 +58,48 @@ def everything(controller: hsp.Controller) -> list[object]:
 
 def test_no_attribute_can_be_assigned() -> None:
     """Of the controller and of all its parts; a new attribute cannot escape."""
-    parts = everything(panda(limits=hsp.Limits()))
+    all_parts = everything(panda(limits=hsp.Limits()))
     assert {"Controller", "FramePose", "Circle", "Gains", "JointCentering"} < {
-        type(part).__name__ for part in parts
+        type(part).__name__ for part in all_parts
     }
     assert {"Obstacle", "Sphere", "RobotLimits", "FieldSum"} < {
-        type(part).__name__ for part in parts
+        type(part).__name__ for part in all_parts
     }
+    check_that_assignment_is_refused(all_parts)
+
+
+def test_no_attribute_of_an_experiment_can_be_assigned() -> None:
+    """Plant, sensors, drives, compensation, live loop, view: all are values."""
+    experiment = hsp.Experiment(
+        "panda",
+        [hsp.FramePose("panda_tcp", name="hand")],
+        hsp.JointCentering(),
+        plant=hsp.plants.RigidBody(
+            friction=hsp.plants.Friction(coulomb=0.1),
+            payload=hsp.plants.Payload("panda_hand", 0.5),
+            pushes=[hsp.plants.Push("panda_hand", [1, 0, 0])],
+            sensors=[hsp.plants.Encoder(1e-4), hsp.plants.SensorDelay(1)],
+            drives=[hsp.plants.EffortDelay(1), hsp.plants.EffortNoise(0.1)],
+        ),
+        compensation=hsp.compensation.Compensation(
+            predictor=hsp.compensation.Predictor(effort_delay=1),
+            start_up_ramp=hsp.compensation.StartUpRamp(0.2),
+        ),
+        simulation={"control_period": 0.001, "check_rate": False},
+        live=hsp.live.LiveSettings(),
+        view=hsp.config.ViewSettings(),
+    )
+    found = parts([experiment.scenario])
+    assert {
+        *("Scenario", "RobotDescription", "InitialState", "SimulationSettings"),
+        *("RigidBody", "Friction", "Payload", "Push", "Encoder", "SensorDelay"),
+        *("EffortDelay", "EffortNoise", "Compensation", "Predictor", "StartUpRamp"),
+        *("LiveSettings", "ViewSettings"),
+    } < {type(part).__name__ for part in found}
+    check_that_assignment_is_refused([experiment, *found])
+
+
+def check_that_assignment_is_refused(parts: list[object]) -> None:
     for part in parts:
         names = public(part)
         assert names

@@ -38,14 +38,13 @@ from hsp_control.constraints.limits import PositionRange
 from hsp_control.control.changes import Changes
 from hsp_control.control.compensation import Command
 from hsp_control.live import (
-    EffortInterface,
     Hardware,
+    LiveSettings,
     LoopReport,
     Measurement,
     OperatorRequests,
     Phase,
     StopSettings,
-    Tolerance,
     run_loop,
 )
 from hsp_control.null_space.fields import FunctionField
@@ -132,9 +131,9 @@ def test_the_controller_receives_the_applied_effort() -> None:
             applied.append(np.array(tau))
             super().applied(tau, period)
 
-    interface = EffortInterface(compensates_gravity=True, effort_rate=50.0)
-    rig = Rig(watched(interface))
-    run_loop(Recording(law()), rig, duration=0.05, interface=interface)
+    settings = LiveSettings(compensates_gravity=True, effort_rate=50.0)
+    rig = Rig(watched(settings))
+    run_loop(Recording(law()), rig, duration=0.05, settings=settings)
     applied, sent = applied[: len(rig.sent)], np.array(rig.sent)
     # tau = sent + g(q); at the start, where it barely moves, g is the start's.
     np.testing.assert_allclose(applied[0], sent[0] + gravity(start()), atol=1e-9)
@@ -149,9 +148,9 @@ def test_the_controller_receives_the_applied_effort() -> None:
 def test_tau_less_gravity_is_the_same_motion() -> None:
     plain, compensating = Rig(), None
     run_loop(law(), plain, duration=0.3)
-    interface = EffortInterface(compensates_gravity=True)
-    compensating = Rig(watched(interface))
-    run_loop(law(), compensating, duration=0.3, interface=interface)
+    settings = LiveSettings(compensates_gravity=True)
+    compensating = Rig(watched(settings))
+    run_loop(law(), compensating, duration=0.3, settings=settings)
     for sent, relieved in zip(plain.sent[:300:50], compensating.sent[:300:50]):  # noqa: B905
         assert np.abs(sent - relieved).max() > 1.0  # gravity is not nothing
     np.testing.assert_allclose(plain.robot.q, compensating.robot.q, atol=1e-9)
@@ -164,10 +163,12 @@ def test_tau_less_gravity_is_the_same_motion() -> None:
 @pytest.mark.parametrize("compensates", [True, False])
 def test_what_is_sent_keeps_rate_and_effort(compensates: bool) -> None:
     most, rate = 60.0, 200.0
-    interface = EffortInterface(compensates, rate, most)
-    rig = Rig(watched(interface))
+    settings = LiveSettings(
+        compensates_gravity=compensates, effort_rate=rate, effort=most
+    )
+    rig = Rig(watched(settings))
     wild = law(gains=Gains(30.0 * 100.0, 20.0))  # more than such a motor can do
-    run_loop(wild, rig, duration=0.3, interface=interface)
+    run_loop(wild, rig, duration=0.3, settings=settings)
     sent = np.array(rig.sent)
     # The first step is from what holds a robot at rest: g(q), or nothing.
     at_rest = np.zeros(7) if compensates else gravity(start())
@@ -264,7 +265,7 @@ def test_without_any_state_the_model_stops_it_and_the_loop_falls_silent() -> Non
     assert report.silent
     # What the model reckoned was true: plant and model are one here, and the robot
     # had come to rest under the efforts sent blind, before its watchdog could know.
-    predicted = Tolerance().prediction_time / PERIOD
+    predicted = LiveSettings().prediction_time / PERIOD
     assert len(rig.sent) == pytest.approx(199 + predicted, abs=3)
     assert report.speed < 0.05
     assert np.abs(rig.robot.v).max() < AT_REST
@@ -455,9 +456,11 @@ def test_whatever_comes_it_ends_and_no_effort_is_beyond_limits(
     for begin, trick, count in events:
         tricks |= always(trick, begin, 1 if trick is interrupt else count)
     most, rate = 80.0, 1000.0
-    interface = EffortInterface(compensates, rate, most)
-    rig = Rig(watched(interface), tricks)
-    report = run_loop(law(), rig, duration=0.3, interface=interface)
+    settings = LiveSettings(
+        compensates_gravity=compensates, effort_rate=rate, effort=most
+    )
+    rig = Rig(watched(settings), tricks)
+    report = run_loop(law(), rig, duration=0.3, settings=settings)
     sent = np.array(rig.sent)
     assert np.isfinite(sent).all()
     at_rest = np.zeros(7) if compensates else gravity(start())
@@ -559,20 +562,16 @@ def test_a_floating_base_is_refused() -> None:
         ({"duration": 0.0}, "duration is 0.0 s; must be positive"),
         ({"log_period": 1e-4}, "log_period is 0.0001 s; must be a period, 0.001 s"),
         (
-            {"stop": StopSettings(damping=600.0)},
+            {"settings": LiveSettings(stop=StopSettings(damping=600.0))},
             "damping is 600; at a period of 0.001 s it may be 500 at most",
         ),
         (
-            {"interface": EffortInterface(effort_rate=[1.0, 2.0])},
-            r"effort_rate has shape \(2,\); needs one number or 7",
+            {"settings": LiveSettings(effort_rate=[1.0, 2.0])},
+            "effort_rate: has 2 numbers; needs one number or 7",
         ),
         (
-            {"interface": EffortInterface(effort=-1.0)},
-            "must be positive",
-        ),
-        (
-            {"interface": EffortInterface(effort_rate="fast")},
-            "effort_rate is 'fast'; needs numbers",
+            {"settings": LiveSettings(effort=[1.0, 2.0, 3.0])},
+            "effort: has 3 numbers; needs one number or 7",
         ),
     ],
 )
@@ -582,19 +581,21 @@ def test_settings_that_are_none(options: dict[str, Any], message: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "make",
+    ("make", "message"),
     [
-        lambda: Tolerance(missing=-1),
-        lambda: Tolerance(missing=1.5),  # type: ignore[arg-type]
-        lambda: Tolerance(age=0.0),
-        lambda: Tolerance(prediction_time=np.nan),
-        lambda: StopSettings(rest_speed=0.0),
-        lambda: StopSettings(hold=-1.0),
-        lambda: StopSettings(damping=np.inf),
+        (lambda: LiveSettings(missing=-1), "LiveSettings: missing: -1 is negative"),
+        (lambda: LiveSettings(missing=1.5), "missing: 1.5"),  # type: ignore[arg-type]
+        (lambda: LiveSettings(age=0.0), "age: 0"),
+        (lambda: LiveSettings(prediction_time=np.nan), "prediction_time: .nan is not"),
+        (lambda: LiveSettings(effort=-1.0), "effort: -1"),
+        (lambda: LiveSettings(effort_rate="fast"), "effort_rate: 'fast'"),
+        (lambda: StopSettings(rest_speed=0.0), "StopSettings: rest_speed: 0"),
+        (lambda: StopSettings(hold=-1.0), "hold: -1"),
+        (lambda: StopSettings(damping=np.inf), "damping: .inf is not"),
     ],
 )
-def test_numbers_that_are_none(make: Callable[[], object]) -> None:
-    with pytest.raises(LiveError):
+def test_numbers_that_are_none(make: Callable[[], object], message: str) -> None:
+    with pytest.raises(LiveError, match=message):
         make()
 
 

@@ -10,7 +10,15 @@ from hypothesis import strategies as st
 from live_rigs import PERIOD, panda, start, watched
 
 from hsp_control.common.exceptions import HardwareError, LiveError
-from hsp_control.live import Faults, Hardware, Link, Phase, UdpHardware, serve
+from hsp_control.live import (
+    Faults,
+    Hardware,
+    Link,
+    LiveSettings,
+    Phase,
+    UdpHardware,
+    serve,
+)
 from hsp_control.live.faults import FaultInjector
 from hsp_control.live.link import AgeEstimator
 from hsp_control.live.packets import Kind, Packet, decode, encode
@@ -256,7 +264,7 @@ def test_a_served_robot_runs_stops_and_says_why() -> None:
 @pytest.mark.slow
 def test_efforts_that_answer_old_states_are_nobody_s() -> None:
     """All efforts come, in order, and too late: that is silence."""
-    receiver, robot = Link(7), watched(watchdog=10)
+    receiver, robot = Link(7), watched(LiveSettings(watchdog=10))
     link = Link(7, peer=receiver.address)
     tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
     receiver.newest = 0

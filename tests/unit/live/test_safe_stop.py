@@ -1,23 +1,27 @@
 """The safe stop and what is around it: damping dissipates, hold holds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from live_rigs import PERIOD, panda, start, watched
+from live_rigs import PERIOD, Rig, law, panda, start, watched
 from numpy.typing import NDArray
 
-from hsp_control import Robot
+from hsp_control import Limits, Robot
 from hsp_control.common.exceptions import LiveError
-from hsp_control.live import EffortInterface, Phase, SafeStop, StopSettings
+from hsp_control.constraints.limits import own_limits
+from hsp_control.control.compensation import Command
+from hsp_control.live import LiveSettings, Phase, SafeStop, StopSettings, run_loop
 from hsp_control.live.dead_reckoning import DeadReckoning
 from hsp_control.live.deadlines import Deadlines
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.safe_stop import largest_scale
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
-from hsp_control.simulation.plants.model_changes import ScaledInertias, changed
+from hsp_control.simulation.plants.model_changes import Inertias, changed
 
 Array = NDArray[np.float64]
 FREE = np.full(7, np.inf)
@@ -71,7 +75,7 @@ def test_a_share_of_the_damping_brakes_where_clipped_damping_would_drive() -> No
 def test_it_stops_a_robot_that_is_not_the_model(seed: int, factor: float) -> None:
     """Wrong masses: it comes to rest, and the hold keeps it within gravity's error."""
     _, v = at_random(seed)
-    own = changed(panda(), [ScaledInertias(factor, 1.0, [0.0, 0.0, 0.0])])
+    own = changed(panda(), [Inertias(factor, 1.0, [0.0, 0.0, 0.0])])
     plant = IntegratedPlant(RigidBodyPlant(own), Rk4(PERIOD))
     stop = SafeStop(panda(), StopSettings(), LIMITED, PERIOD)
     q, t = start(), 0.0
@@ -145,8 +149,10 @@ def test_the_limiter_keeps_both_limits_where_both_can_be(
 ) -> None:
     rng = np.random.default_rng(seed)
     rate, most = 500.0, 40.0
-    interface = EffortInterface(compensates, rate, most)
-    limiter = EffortLimiter(panda(), interface, PERIOD)
+    settings = LiveSettings(
+        compensates_gravity=compensates, effort_rate=rate, effort=most
+    )
+    limiter = EffortLimiter(panda(), settings, PERIOD)
     q = start()
     limiter.reset(q)
     for _ in range(30):
@@ -164,11 +170,47 @@ def test_the_limiter_keeps_both_limits_where_both_can_be(
 
 
 def test_the_urdf_s_limits_are_the_limiter_s() -> None:
-    limiter = EffortLimiter(panda(), EffortInterface(), PERIOD)
+    limiter = EffortLimiter(panda(), LiveSettings(), PERIOD)
     np.testing.assert_array_equal(limiter.effort_limits, panda().model.effortLimit)
     endless = Robot.load("planar3r")
-    limits = EffortInterface().effort_limits(endless)
+    limits = LiveSettings().effort_limits(endless)
     assert (limits > 0.0).all()
+
+
+def test_the_limiter_follows_the_limits_of_the_controller() -> None:
+    half, most = np.full(7, 0.5), np.array([87.0] * 4 + [np.inf] * 3)
+    own = own_limits(panda())
+    first, second = replace(own, effort=half), replace(own, effort=most)
+    limiter = EffortLimiter(panda(), LiveSettings(), PERIOD, first)
+    upper = limiter.effort_limits  # what a safe stop was given
+    np.testing.assert_array_equal(upper, half)
+    limiter.follow(second)
+    np.testing.assert_array_equal(upper, most)
+    limiter.follow(None)
+    np.testing.assert_array_equal(upper, panda().model.effortLimit)
+    limited = EffortLimiter(panda(), LiveSettings(effort=3.0), PERIOD, first)
+    limited.follow(second)
+    np.testing.assert_array_equal(limited.effort_limits, np.full(7, 3.0))
+
+
+def test_a_run_s_efforts_are_limited_as_its_controller_s_are() -> None:
+    controller = law(limits=Limits(effort=45.0))
+
+    class Shaking(Command):
+        sign = 1.0
+
+        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
+            self.sign = -self.sign
+            shaking = np.array([0.0, 200.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+            return super().effort(t, q, v, period) + self.sign * shaking
+
+    controller.at(0.02).ramp(0.0).limits(Limits(effort=60.0))
+    rig = Rig()
+    report = run_loop(Shaking(controller), rig, duration=0.04)
+    assert report.ended == "completed", report.reason
+    sent = np.abs(rig.sent)[:, 1]
+    np.testing.assert_allclose(sent[:19], 45.0, rtol=1e-14)
+    np.testing.assert_allclose(sent[21:40], 60.0, rtol=1e-14)
 
 
 def test_reckoning_is_the_model_s_motion() -> None:
@@ -204,7 +246,7 @@ def test_it_waits_under_its_brakes_until_the_first_effort() -> None:
 
 
 def test_its_watchdog_counts_and_forgives() -> None:
-    robot = watched(watchdog=5)
+    robot = watched(LiveSettings(watchdog=5))
     tau = gravity(start()) + 3.0
     for _ in range(3):
         robot.advance([tau])
@@ -235,17 +277,17 @@ def test_of_several_efforts_the_last_counts_and_none_may_be_nan() -> None:
 
 
 def test_a_watchdog_needs_a_period() -> None:
-    with pytest.raises(LiveError, match="watchdog is 0"):
-        watched(watchdog=0)
+    with pytest.raises(LiveError, match="watchdog: 0 is"):
+        LiveSettings(watchdog=0)
 
 
 def test_compensation_is_of_the_robot_s_own_mass() -> None:
-    heavy = changed(panda(), [ScaledInertias(1.3, 1.0, [0.0, 0.0, 0.0])])
+    heavy = changed(panda(), [Inertias(1.3, 1.0, [0.0, 0.0, 0.0])])
     plant = IntegratedPlant(RigidBodyPlant(heavy), Rk4(PERIOD))
     from hsp_control.live import SimulatedRobot
 
-    interface = EffortInterface(compensates_gravity=True)
-    robot = SimulatedRobot(plant, start(), np.zeros(7), PERIOD, interface=interface)
+    settings = LiveSettings(compensates_gravity=True)
+    robot = SimulatedRobot(plant, start(), np.zeros(7), PERIOD, settings=settings)
     for _ in range(200):
         robot.advance([np.zeros(7)])
     g = np.array(pin.computeGeneralizedGravity(heavy.model, heavy._data, start()))

@@ -31,10 +31,10 @@ from hsp_control.null_space.fields import (
     Manipulability,
     ObstacleClearance,
     PointDistance,
+    Ramp,
     StateWeight,
     Transmission,
     Uncontrolled,
-    crossfade,
 )
 from hsp_control.null_space.fields.weight import Product, sample_weight
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric
@@ -321,13 +321,15 @@ def test_frames_obstacles_and_terms_are_placed() -> None:
 # --- fading --------------------------------------------------------------------------
 
 
-def test_a_crossfade_is_exact_at_both_ends_and_flat() -> None:
+def test_a_sum_of_ramped_fields_is_exact_at_both_ends_and_flat() -> None:
     """Before the start it is one field, after the end the other, to the last bit."""
     robot = load("panda")
     before = 0.3 * JointCentering() + swirl_field("panda", rate=True)
     slow = StateWeight(lambda s: 1.5 + np.sin(s.t))
     after = 0.7 * posture("panda") + slow * swirl_field("panda", rate=True)
-    faded = crossfade(before, after, start=1.0, duration=0.5)
+    fading = Ramp(initial=1.0, final=0.0, start=1.0, duration=0.5)
+    rising = Ramp(initial=0.0, final=1.0, start=1.0, duration=0.5)
+    faded = fading * before + rising * after
     assert len(faded.terms) == 4
     assert isinstance(faded.terms[3].weight, Product)
     for t, only in ((0.9, before), (1.0, before), (1.5, after), (1.7, after)):
@@ -340,6 +342,6 @@ def test_a_crossfade_is_exact_at_both_ends_and_flat() -> None:
         assert faded.value(state) == only.value(state)
     for wrong in (0.0, -1.0, np.inf):
         with pytest.raises(FieldError, match="Ramp: duration: "):
-            crossfade(before, after, start=0.0, duration=wrong)
+            Ramp(initial=0.0, final=1.0, start=0.0, duration=wrong)
     with pytest.raises(FieldError, match="an uncontrolled null space has no weight"):
-        crossfade(before, Uncontrolled(), start=0.0, duration=1.0)
+        rising * Uncontrolled()

@@ -37,7 +37,7 @@ from hsp_control.null_space.fields.jacobian_cost import (
     JacobianTerms,
     Rows,
 )
-from hsp_control.robot.description.loading import ToolFrame
+from hsp_control.robot import ToolFrame
 from hsp_control.robot.description.sources import example_robots
 
 pytestmark = pytest.mark.filterwarnings("error")

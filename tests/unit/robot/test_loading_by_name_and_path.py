@@ -18,6 +18,7 @@ from hsp_control.common.exceptions import (
     RobotNotFoundError,
 )
 from hsp_control.common.resources import bundled_robots
+from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.loading import load_model
 from hsp_control.robot.description.sources import example_robots, find_robot
 
@@ -98,11 +99,12 @@ def test_every_example_robot_loads_or_says_why_not(name: str, mimic: bool) -> No
     source = find_robot(name)
     if source.origin == "bundled":
         source = example_robots()[name]
+    settings = RobotDescription(name, mimic=mimic)
     if reason is not None:
         with pytest.raises(ModelError, match=reason):
-            load_model(source, mimic=mimic)
+            load_model(source, settings)
         return
-    robot = Robot(load_model(source, mimic=mimic), source)
+    robot = Robot(load_model(source, settings), source)
     plain = pin.buildModelFromUrdf(str(source.urdf), mimic=mimic)
     extra = 6 if source.root == "free_flyer" else 0
     assert robot.nv == plain.nv + extra

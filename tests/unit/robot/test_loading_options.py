@@ -21,7 +21,8 @@ from hsp_control import Robot
 from hsp_control.common.exceptions import (
     ModelError,
 )
-from hsp_control.robot.description.loading import ToolFrame, end_effector_frame
+from hsp_control.robot import ToolFrame
+from hsp_control.robot.description.loading import end_effector_frame
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from hsp_control import Controller, FramePosition, Gains, Robot, Rollout, simula
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FrameNotFoundError, SimulationError
 from hsp_control.robot.description.sources import find_robot
-from hsp_control.robot.friction import JointFriction
+from hsp_control.robot.friction import Friction, JointFriction
 from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import (
     ImperfectPlant,
@@ -24,6 +24,7 @@ from hsp_control.simulation.plants import (
 )
 from hsp_control.simulation.plants.drives import (
     Drive,
+    Driving,
     DroppedPeriods,
     EffortDelay,
     EffortNoise,
@@ -31,13 +32,13 @@ from hsp_control.simulation.plants.drives import (
     Saturation,
 )
 from hsp_control.simulation.plants.model_changes import (
+    Inertias,
     ModelChange,
     MotorInertia,
     Payload,
-    RandomInertias,
-    ScaledInertias,
     changed,
 )
+from hsp_control.simulation.plants.random_numbers import seeded_generator
 from hsp_control.simulation.plants.sensors import (
     DifferencedVelocity,
     Encoder,
@@ -83,7 +84,7 @@ def test_heavier_bodies_scale_the_mass_matrix(name: str) -> None:
     robot = load(name)
     q, _ = some_state(robot)
     M, N = mass_matrix(robot, q), gravity(robot, q)
-    heavier = changed(robot, [ScaledInertias(mass=1.2)])
+    heavier = changed(robot, [Inertias(mass_factor=1.2)])
     np.testing.assert_allclose(mass_matrix(heavier, q), 1.2 * M, rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(gravity(heavier, q), 1.2 * N, rtol=1e-12, atol=1e-12)
     np.testing.assert_array_equal(mass_matrix(robot, q), M)
@@ -93,7 +94,7 @@ def test_heavier_bodies_scale_the_mass_matrix(name: str) -> None:
 
 def test_shifted_centres_and_harder_turning() -> None:
     robot = load("panda")
-    other = changed(robot, [ScaledInertias(inertia=2.0, com=(0.01, 0.0, -0.02))])
+    other = changed(robot, [Inertias(inertia_factor=2.0, com_shift=(0.01, 0.0, -0.02))])
     for k in range(1, robot.model.njoints):
         before, after = robot.model.inertias[k], other.model.inertias[k]
         assert after.mass == before.mass
@@ -104,9 +105,9 @@ def test_shifted_centres_and_harder_turning() -> None:
 @pytest.mark.parametrize("name", ROBOTS)
 def test_random_inertias_are_possible_ones_within_their_bounds(name: str) -> None:
     robot = load(name)
-    change = RandomInertias(mass=0.2, inertia=0.5, com=0.01, seed=3)
-    other = changed(robot, [change])
-    again = changed(robot, [change])
+    change = Inertias(random_mass=0.2, random_inertia=0.5, random_com=0.01)
+    other = changed(robot, [change], seed=3)
+    again = changed(robot, [change], seed=3)
     ratios = []
     for k in range(1, robot.model.njoints):
         before, after = robot.model.inertias[k], other.model.inertias[k]
@@ -123,7 +124,7 @@ def test_random_inertias_are_possible_ones_within_their_bounds(name: str) -> Non
             assert least + middle >= greatest - 1e-12
     assert np.ptp(ratios) > 0.05
     assert 0.8 <= min(ratios) <= max(ratios) <= 1.2
-    third = changed(robot, [RandomInertias(mass=0.2, seed=4)])
+    third = changed(robot, [Inertias(random_mass=0.2)], seed=4)
     for before, after in zip(robot.model.inertias, third.model.inertias, strict=True):
         if before.mass > 0.0:  # another mass alone: another density
             density = after.mass / before.mass
@@ -286,10 +287,11 @@ def test_mujocos_friction_is_the_same() -> None:
 
 
 def shown(
-    sensor: Sensor, robot: Robot, states: Sequence[tuple[Array, Array]]
+    sensor: Sensor, robot: Robot, states: Sequence[tuple[Array, Array]], seed: int = 0
 ) -> list[tuple[Array, Array]]:
-    sensor.reset(robot, 0.0, *states[0])
-    return [sensor.measure(0.01 * k, *state) for k, state in enumerate(states)]
+    random = seeded_generator(seed, type(sensor).__name__)
+    sense = sensor.begin(robot, *states[0], random)
+    return [sense(0.01 * k, *state) for k, state in enumerate(states)]
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -316,8 +318,8 @@ def test_noise_has_its_size_and_its_seed(name: str) -> None:
     robot = load(name)
     states = [some_state(robot)] * 2000
     q, v = states[0]
-    positions = shown(PositionNoise(0.01, seed=1), robot, states)
-    velocities = shown(VelocityNoise(0.02, seed=1), robot, states)
+    positions = shown(PositionNoise(0.01), robot, states, seed=1)
+    velocities = shown(VelocityNoise(0.02), robot, states, seed=1)
     off = np.array([robot.difference(q, q_shown) for q_shown, _ in positions])
     rate = np.array([v_shown - v for _, v_shown in velocities])
     joints = slice(6 if name == "go2" else 0, None)
@@ -326,8 +328,8 @@ def test_noise_has_its_size_and_its_seed(name: str) -> None:
     assert np.abs(off[:, joints].mean(axis=0)).max() < 0.001
     alike = np.corrcoef(off[:, -1], rate[:, -1])[0, 1]
     assert abs(alike) < 0.1  # the same seed, but each kind has its own numbers
-    again = shown(PositionNoise(0.01, seed=1), robot, states)
-    other = shown(PositionNoise(0.01, seed=2), robot, states)
+    again = shown(PositionNoise(0.01), robot, states, seed=1)
+    other = shown(PositionNoise(0.01), robot, states, seed=2)
     np.testing.assert_array_equal(again[-1][0], positions[-1][0])
     assert (other[-1][0] != positions[-1][0]).any()
     if name == "go2":
@@ -365,9 +367,13 @@ def test_a_late_sensor_shows_what_was() -> None:
 # --- drives --------------------------------------------------------------------------
 
 
-def driven(drive: Drive, efforts: Sequence[Array]) -> list[Array]:
-    drive.reset(load("panda"))
-    return [drive.apply(effort) for effort in efforts]
+def begun(drive: Drive, seed: int = 0) -> Driving:
+    return drive.begin(load("panda"), seeded_generator(seed, type(drive).__name__))
+
+
+def driven(drive: Drive, efforts: Sequence[Array], seed: int = 0) -> list[Array]:
+    act = begun(drive, seed)
+    return [act(effort)[0] for effort in efforts]
 
 
 EFFORTS = [np.full(7, float(k)) for k in range(1, 9)]
@@ -387,7 +393,7 @@ def test_a_saturated_drive() -> None:
 
 
 def test_a_noisy_drive() -> None:
-    found = np.array(driven(EffortNoise(0.5, seed=1), [np.ones(7)] * 2000))
+    found = np.array(driven(EffortNoise(0.5), [np.ones(7)] * 2000, seed=1))
     np.testing.assert_allclose(found.mean(axis=0), 1.0, atol=0.06)
     np.testing.assert_allclose(found.std(axis=0), 0.5, rtol=0.1)
 
@@ -401,7 +407,7 @@ def test_a_late_drive(periods: int) -> None:
 def test_a_drive_that_loses_efforts() -> None:
     """Each is the commanded one, or what the last one was; the first is there."""
     efforts = [np.full(7, float(k)) for k in range(2000)]
-    found = [effort[0] for effort in driven(DroppedPeriods(0.3, seed=2), efforts)]
+    found = [effort[0] for effort in driven(DroppedPeriods(0.3), efforts, seed=2)]
     lost = 0
     for k, effort in enumerate(found):
         assert effort in (k, found[k - 1] if k else 0.0)
@@ -412,11 +418,11 @@ def test_a_drive_that_loses_efforts() -> None:
 def test_what_a_drive_remembers_is_its_own() -> None:
     """A controller writes into the same array at every step."""
     for drive in (DroppedPeriods(0.5), EffortDelay(1)):
-        drive.reset(load("panda"))
+        act = begun(drive)
         shared, found = np.zeros(7), []
         for k in range(20):
             shared[:] = k
-            found.append(float(drive.apply(shared)[0]))
+            found.append(float(act(shared)[0][0]))
         assert all(effort <= k for k, effort in enumerate(found))
         assert any(effort < k for k, effort in enumerate(found))
 
@@ -436,10 +442,10 @@ class Spy(SampledPlant):
         return self.robot.neutral(), np.zeros(self.robot.nv)
 
 
-def timeline(*drives: Drive) -> list[tuple[float, float, float]]:
+def timeline(*drives: Drive, seed: int = 0) -> list[tuple[float, float, float]]:
     """Return (from, to, effort) as a plant moves for 8 periods of 1 s."""
     spy = Spy(load("panda"))
-    plant = ImperfectPlant(spy, drives=drives)
+    plant = ImperfectPlant(spy, drives=drives, seed=seed)
     plant.reset(0.0, spy.robot.neutral(), np.zeros(7))
     for k, effort in enumerate(EFFORTS):
         plant.advance(float(k), k + 1.0, effort)
@@ -447,7 +453,7 @@ def timeline(*drives: Drive) -> list[tuple[float, float, float]]:
 
 
 def test_jitter_lets_the_last_effort_act_longer() -> None:
-    calls = timeline(Jitter(0.6, seed=1))
+    calls = timeline(Jitter(0.6), seed=1)
     assert calls[0] == (0.0, 1.0, 1.0)
     assert len(calls) == 15
     lateness = []
@@ -517,6 +523,7 @@ def run(
     changes: Sequence[ModelChange] = (),
     friction: JointFriction | None = None,
     duration: float = 0.5,
+    seed: int = 0,
 ) -> Rollout:
     controller = panda_controller()
     robot = changed(controller.robot, changes) if changes else controller.robot
@@ -528,7 +535,7 @@ def run(
         robot.home(),
         duration=duration,
         control_period=1e-3,
-        plant=ImperfectPlant(plant, sensors, drives),
+        plant=ImperfectPlant(plant, sensors, drives, seed),
     )
 
 
@@ -554,8 +561,10 @@ def test_without_imperfections_nothing_changes() -> None:
 
 
 ALL: dict[str, dict[str, Any]] = {
-    "masses": {"changes": [ScaledInertias(mass=1.2)]},
-    "random": {"changes": [RandomInertias(0.2, 0.2, 0.01)]},
+    "masses": {"changes": [Inertias(mass_factor=1.2)]},
+    "random": {
+        "changes": [Inertias(random_mass=0.2, random_inertia=0.2, random_com=0.01)]
+    },
     "payload": {"changes": [Payload("panda_tcp", 2.0)]},
     "motors": {"changes": [MotorInertia(0.1)]},
     "friction": {"friction": JointFriction(np.full(7, 0.5), np.full(7, 0.2))},
@@ -583,8 +592,9 @@ def test_every_imperfection_is_felt_and_repeats_itself(name: str) -> None:
 
 def test_the_log_has_the_truth_beside_what_was_measured_and_what_acted() -> None:
     rollout = run(
-        sensors=[Encoder(1e-3), VelocityNoise(0.02, seed=5)],
+        sensors=[Encoder(1e-3), VelocityNoise(0.02)],
         drives=[EffortDelay(1), Saturation(20.0)],
+        seed=5,
     )
     off = rollout["measured.q"] - rollout.q
     assert 1e-4 < np.abs(off).max() <= 0.5e-3 + 1e-12
@@ -595,8 +605,9 @@ def test_the_log_has_the_truth_beside_what_was_measured_and_what_acted() -> None
     assert np.abs(rollout["applied.tau"][1:]).max() == 20.0
     described = rollout.meta["plant"]
     assert described["type"] == "RigidBodyPlant"
-    assert described["sensors"][1] == {"type": "VelocityNoise", "std": 0.02, "seed": 5}
+    assert described["sensors"][1] == {"type": "VelocityNoise", "std": 0.02}
     assert described["drives"][0] == {"type": "EffortDelay", "periods": 1}
+    assert described["seed"] == 5
 
 
 def test_a_plant_that_differs_is_written_down() -> None:
@@ -610,50 +621,76 @@ def test_a_plant_that_differs_is_written_down() -> None:
 # --- refusals ------------------------------------------------------------------------
 
 
+def ideal_plant(name: str) -> SampledPlant:
+    return IntegratedPlant(RigidBodyPlant(load(name)), Rk4(1e-3))
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: ScaledInertias(mass=0.0), r"^mass factor is 0.0; must be positive$"),
         (
-            lambda: ScaledInertias(com=(1.0,)),
-            r"^com shift is \(1.0,\); needs 3 numbers",
+            lambda: Inertias(mass_factor=0.0),
+            r"^Inertias: mass_factor: 0.0 is too small; must be greater than 0$",
         ),
         (
-            lambda: RandomInertias(mass=1.0),
-            r"^random mass error is 1.0; must be in 0..1",
+            lambda: Inertias(com_shift=(1.0,)),
+            r"^Inertias: com_shift: \[1.0\] has 1 entry, needs 3$",
         ),
-        (lambda: RandomInertias(com=-1.0), r"^random com error is -1.0; must not be"),
+        (
+            lambda: Inertias(random_mass=1.0),
+            r"^Inertias: random_mass: 1.0 is too large; must be less than 1$",
+        ),
+        (
+            lambda: Inertias(random_com=-1.0),
+            r"^Inertias: random_com: -1.0 is negative; must be at least 0$",
+        ),
         (
             lambda: Payload("hand", -2.0),
-            r"^payload at 'hand': mass is -2.0 kg; must be",
+            r"^Payload: mass: -2.0 is negative; must be greater than 0$",
         ),
         (
             lambda: Payload("hand", 1.0, (0.0,)),
-            r"^payload at 'hand': center is \(0.0,\)",
+            r"^Payload: center: \[0.0\] has 1 entry, needs 3$",
         ),
         (
             lambda: Payload("hand", 1.0, radius=-1.0),
-            r"^payload at 'hand': radius is -1",
+            r"^Payload: radius: -1.0 is negative; must be at least 0$",
         ),
-        (lambda: SensorDelay(-1), r"^sensor delay is -1; needs a whole number"),
-        (lambda: EffortDelay(0.5), r"^effort delay is 0.5; needs a whole number"),  # type: ignore[arg-type]
-        (lambda: DroppedPeriods(1.0), r"^dropped periods: probability is 1.0; must be"),
-        (lambda: Jitter(-1.0), r"^jitter: the longest delay is -1.0 s; must not be "),
+        (
+            lambda: SensorDelay(-1),
+            r"^SensorDelay: periods: -1 is negative; must be at least 0$",
+        ),
+        (
+            lambda: EffortDelay(0.5),  # type: ignore[arg-type]
+            r"^EffortDelay: periods: 0.5 is a decimal number; expected an integer$",
+        ),
+        (
+            lambda: DroppedPeriods(1.0),
+            r"^DroppedPeriods: probability: 1.0 is too large; must be less than 1$",
+        ),
+        (
+            lambda: Jitter(-1.0),
+            r"^Jitter: longest: -1.0 is negative; must be at least 0$",
+        ),
         (
             lambda: Push("hand", (1.0, 2.0)),
-            r"^push on 'hand': force is \(1.0, 2.0\); n",
-        ),  # type: ignore[arg-type]
+            r"^Push: force: \[1.0, 2.0\] has 2 entries, needs 3$",
+        ),
         (
             lambda: Push("hand", duration=0.0),
-            r"^push on 'hand': lasts 0.0 s from 0.0 s",
+            r"^Push: duration: 0.0 is too small; must be greater than 0$",
         ),
         (
             lambda: JointFriction.of(load("panda"), [1.0, 2.0]),
-            r"^coulomb has shape \(2,\); needs one number, or one for each of the 7",
+            r"^coulomb: has shape \(2,\); needs one number, or one for each of the 7",
         ),
         (
             lambda: JointFriction.of(load("panda"), -1.0),
-            r"^coulomb is -1.0; must be finite",
+            r"^Friction: coulomb: -1.0 is negative; must be at least 0$",
+        ),
+        (
+            lambda: Friction(viscous=[0.1, np.inf]),
+            r"^Friction: viscous.1: .inf is not a finite number$",
         ),
         (
             lambda: StickingPlant(load("panda"), JointFriction.of(load("panda")), -1.0),
@@ -661,17 +698,19 @@ def test_a_plant_that_differs_is_written_down() -> None:
         ),
         (
             lambda: changed(load("panda"), [Payload("panda_link0", 1.0)]),
-            r"^payload at 'panda_link0': the frame is fixed to the world$",
+            r"^frame: 'panda_link0' is fixed to the world$",
         ),
         (
-            lambda: Saturation().reset(load("planar3r")),
-            r"^saturation: the URDF of planar3r gives no effort limits; state them$",
+            lambda: ImperfectPlant(ideal_plant("planar3r"), drives=[Saturation()]),
+            r"^drives.saturation.limit: the URDF of planar3r gives no effort limits; ",
         ),
         (
-            lambda: Encoder("fine").reset(
-                load("panda"), 0.0, load("panda").home(), np.zeros(7)
-            ),
-            r"^encoder resolution is 'fine'; needs numbers$",
+            lambda: ImperfectPlant(ideal_plant("panda"), [PositionNoise([1.0, 2.0])]),
+            r"^sensors.position_noise.std: has shape \(2,\); needs one number, or one",
+        ),
+        (
+            lambda: Encoder("fine"),
+            r"^Encoder: resolution: 'fine' is text; expected a number or a list of num",
         ),
     ],
 )
@@ -681,11 +720,8 @@ def test_imperfections_that_are_none(make: Any, message: str) -> None:
 
 
 def test_frames_that_do_not_exist() -> None:
-    with pytest.raises(
-        FrameNotFoundError, match=r"^no frame 'panda_tpc'; did you mean"
-    ):
+    message = "no frame 'panda_tpc'; did you mean"
+    with pytest.raises(FrameNotFoundError, match=rf"^frame: {message}"):
         changed(load("panda"), [Payload("panda_tpc", 1.0)])
-    with pytest.raises(
-        FrameNotFoundError, match=r"^no frame 'panda_tpc'; did you mean"
-    ):
+    with pytest.raises(FrameNotFoundError, match=rf"^pushes.0.frame: {message}"):
         RigidBodyPlant(load("panda"), [Push("panda_tpc")])

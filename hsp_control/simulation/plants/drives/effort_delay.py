@@ -1,34 +1,36 @@
 """Efforts that are delayed by whole periods."""
 
 from collections import deque
-from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.declaration.quantities import Periods
 from hsp_control.robot import Robot
-from hsp_control.simulation.plants.drives.drive import Drive
-from hsp_control.simulation.plants.periods import check_periods
+from hsp_control.simulation.plants.drives.drive import Drive, Driving
 
 
-@dataclass
-class EffortDelay(Drive):
-    """The effort commanded some periods ago; the first effort until there is one.
+class EffortDelay(Drive, type="delay"):
+    """The effort commanded some periods ago; the first effort until there is one."""
 
-    Attributes:
-        periods: Delay in control periods.
-    """
+    stage: ClassVar[float] = 20.0
 
-    periods: int
+    periods: Periods
+    """Delay of the efforts [control periods]."""
 
-    def __post_init__(self) -> None:
-        """Check the number of periods."""
-        check_periods(self.periods, "effort delay")
+    @property
+    def active(self) -> bool:
+        """Whether there is a delay."""
+        return self.periods > 0
 
-    def reset(self, robot: Robot) -> None:
-        """Empty the queue; see `Drive.reset`."""
-        self._queue: deque[Array] = deque()
+    def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
+        """Return a queue of efforts, empty at first; see `Drive.begin`."""
+        queue: deque[Array] = deque()
 
-    def apply(self, tau: Array) -> Array:
-        """Append the effort, and return the oldest one; see `Drive.apply`."""
-        while len(self._queue) <= self.periods:
-            self._queue.append(tau.copy())
-        return self._queue.popleft()
+        def drive(tau: Array) -> tuple[Array, float]:
+            while len(queue) <= self.periods:
+                queue.append(tau.copy())
+            return queue.popleft(), 0.0
+
+        return drive

@@ -1,32 +1,31 @@
 """Noise on the applied effort, such as torque ripple."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
-from hsp_control.common.arrays import Array
+import numpy as np
+
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Weights
 from hsp_control.robot import Robot
 from hsp_control.robot.per_joint import per_dof
-from hsp_control.simulation.plants.drives.drive import Drive
-from hsp_control.simulation.plants.random_numbers import seeded_generator
+from hsp_control.simulation.plants.drives.drive import Drive, Driving
 
 
-@dataclass
-class EffortNoise(Drive):
-    """Gaussian white noise on the effort, constant during a period.
+class EffortNoise(Drive, type="noise"):
+    """Gaussian white noise on the effort, constant during a period."""
 
-    Attributes:
-        std: Standard deviation [N·m or N], for all joints or of shape (nv,).
-        seed: Seed of the random numbers.
-    """
+    stage: ClassVar[float] = 40.0
 
-    std: Any
-    seed: int = 0
+    std: Weights
+    """Standard deviation of effort noise [N·m or N], one number or nv."""
 
-    def reset(self, robot: Robot) -> None:
-        """Restart the random numbers; see `Drive.reset`."""
-        self._rng = seeded_generator(self)
-        self._std = per_dof(robot, self.std, "effort noise")
+    @property
+    def active(self) -> bool:
+        """Whether there is noise."""
+        return bool(np.any(self.std))
 
-    def apply(self, tau: Array) -> Array:
-        """Add the noise to the effort; see `Drive.apply`."""
-        return tau + self._std * self._rng.standard_normal(self._std.shape)
+    def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
+        """Return what adds noise to the effort; see `Drive.begin`."""
+        with within("std"):
+            std = per_dof(robot, self.std)
+        return lambda tau: (tau + std * random.standard_normal(std.shape), 0.0)

@@ -1,44 +1,28 @@
 """Efforts that arrive with a random delay within their period."""
 
-from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.declaration.quantities import NonNegative
 from hsp_control.robot import Robot
-from hsp_control.simulation.plants.drives.drive import Drive
-from hsp_control.simulation.plants.random_numbers import seeded_generator
+from hsp_control.simulation.plants.drives.drive import Drive, Driving
 
 
-@dataclass
-class Jitter(Drive):
-    """Every effort takes effect after a uniformly random delay.
+class Jitter(Drive, type="jitter"):
+    """Every effort takes effect after a uniformly random delay."""
 
-    Attributes:
-        longest: The longest delay [s]; an effort takes effect at the end of its period
-            at the latest.
-        seed: Seed of the random numbers.
-    """
+    stage: ClassVar[float] = 30.0
 
-    longest: float
-    seed: int = 0
+    longest: NonNegative
+    """Maximum additional delay [s], drawn for each period; an effort takes effect at
+    the end of its period at the latest."""
 
-    def __post_init__(self) -> None:
-        """Check the longest delay."""
-        if not 0.0 <= self.longest < np.inf:
-            raise SimulationError(
-                f"jitter: the longest delay is {self.longest} s; must not be negative"
-            )
+    @property
+    def active(self) -> bool:
+        """Whether there is a delay."""
+        return self.longest > 0.0
 
-    def reset(self, robot: Robot) -> None:
-        """Restart the random numbers; see `Drive.reset`."""
-        self._rng = seeded_generator(self)
-
-    def apply(self, tau: Array) -> Array:
-        """Return the effort unchanged; see `Drive.apply`."""
-        return tau
-
-    def delay(self) -> float:
-        """Return a random delay [s]; see `Drive.delay`."""
-        return float(self._rng.uniform(0.0, self.longest))
+    def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
+        """Return what draws a delay for each effort; see `Drive.begin`."""
+        return lambda tau: (tau, float(random.uniform(0.0, self.longest)))

@@ -1,43 +1,46 @@
 """Effort limits of the motors."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Weights
 from hsp_control.robot import Robot
 from hsp_control.robot.per_joint import joint_dofs, per_dof
-from hsp_control.simulation.plants.drives.drive import Drive
+from hsp_control.simulation.plants.drives.drive import Drive, Driving
 
 
-@dataclass
-class Saturation(Drive):
-    """Each joint's effort is clipped at its limit.
+class Saturation(Drive, type="saturation"):
+    """Each joint's effort is clipped at its limit."""
 
-    Attributes:
-        limit: The largest effort [N·m or N], for all joints or of shape (nv,), 0 for no
-            limit; None: the model's effort limits, where it has any.
-    """
+    stage: ClassVar[float] = 50.0
 
-    limit: Any = None
+    limit: Literal["model"] | Weights = "model"
+    """Maximum effort [N·m or N], one number or nv, 0 for no limit; ``model`` takes it
+    from the URDF, where that has one."""
 
-    def reset(self, robot: Robot) -> None:
-        """Set the limits; see `Drive.reset`."""
-        if self.limit is None:
-            own = np.asarray(robot.model.upperEffortLimit, dtype=float)
-            given = joint_dofs(robot) & (own > 0.0) & np.isfinite(own)
-            if not given.any():
-                raise SimulationError(
-                    f"saturation: the URDF of {robot.name} gives no effort limits; "
-                    "state them"
-                )
-            limit = np.where(given, own, 0.0)
-        else:
-            limit = per_dof(robot, self.limit, "saturation")
-        self._limit = np.where(limit > 0.0, limit, np.inf)
+    def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
+        """Return what clips the effort; see `Drive.begin`."""
+        with within("limit"):
+            limit = self._limit(robot)
+        limit = np.where(limit > 0.0, limit, np.inf)
+        return lambda tau: (np.clip(tau, -limit, limit), 0.0)
 
-    def apply(self, tau: Array) -> Array:
-        """Return the clipped effort; see `Drive.apply`."""
-        return np.clip(tau, -self._limit, self._limit)
+    def _limit(self, robot: Robot) -> Array:
+        """Return the limits, shape (nv,), with 0 for none.
+
+        Raises:
+            SimulationError: If they do not fit the robot, or its model has none.
+        """
+        if not isinstance(self.limit, str):
+            return per_dof(robot, self.limit)
+        own = np.asarray(robot.model.upperEffortLimit, dtype=float)
+        given = joint_dofs(robot) & (own > 0.0) & np.isfinite(own)
+        if not given.any():
+            raise SimulationError(
+                f"the URDF of {robot.name} gives no effort limits; state them"
+            )
+        return np.where(given, own, 0.0)

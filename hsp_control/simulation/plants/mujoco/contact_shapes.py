@@ -2,52 +2,69 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import coal
 import numpy as np
 import pinocchio as pin
+from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
+from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import ArrayField, Vector3
+from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.geometry import link_shapes
 from hsp_control.geometry.capsule_fit import enclosing_capsule
 from hsp_control.geometry.hulls import hull_corners
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from hsp_control.robot import Robot
-from hsp_control.robot.description.combining import placement
+from hsp_control.simulation.plants.by_frame import BY_FRAME, stored
 
-_SUPPORTED = (Box, Capsule, Cylinder, Sphere)
 _MIN_HALF_HEIGHT = 1e-3
 """Half the height of the box for a flat mesh [m]; MuJoCo needs a positive one."""
 
 
-@dataclass(frozen=True)
-class ContactShape:
-    """A shape fixed to a frame that may touch the ground.
+def _supported(shape: Shape) -> Shape:
+    """Return a shape that MuJoCo has.
 
-    Attributes:
-        frame: A frame of the robot; forces are logged under its name.
-        shape: A box, sphere, capsule or cylinder; None: the collision geometry of the
-            frame's link, or if it has none, of all links fixed to it. A mesh with a
-            flat sole is replaced by its box in the frame's axes, any other mesh by its
-            capsule, because a robot chatters on the corners of a mesh.
-        position: Position of the shape in the frame [m], shape (3,).
-        rpy: Its roll, pitch and yaw in the frame [rad], shape (3,).
+    Raises:
+        ValueError: If it has none such.
+    """
+    if not isinstance(shape, Sphere | Capsule | Cylinder | Box):
+        raise ValueError(
+            f"{shape.yaml_type} is not possible here; needs a sphere, capsule, "
+            "cylinder or box"
+        )
+    return shape
+
+
+class ContactShape(Part, error=SimulationError):
+    """A shape at a frame that may touch the ground.
+
+    Without a shape it is the collision geometry of the frame's link, or if that has
+    none, of all links fixed to it. A mesh with a flat sole is replaced by its box in
+    the frame's axes, any other mesh by its capsule, because a robot chatters on the
+    corners of a mesh.
     """
 
-    frame: str
-    shape: Shape | None = None
-    position: Sequence[float] = (0.0, 0.0, 0.0)
-    rpy: Sequence[float] = (0.0, 0.0, 0.0)
+    yaml_key: ClassVar[str | None] = "frame"
 
-    def __post_init__(self) -> None:
-        """Check that MuJoCo supports the shape."""
-        if self.shape is not None and not isinstance(self.shape, _SUPPORTED):
-            raise SimulationError(
-                f"contact of {self.frame!r}: a {type(self.shape).__name__} cannot "
-                "touch the ground; choose a Box, Capsule, Cylinder or Sphere"
-            )
+    frame: str
+    """Name of the frame [-]; forces are logged under it. In YAML, its key."""
+    shape: Annotated[Shape, AfterValidator(_supported)] | None = None
+    """The shape [-]; by default made from the link's collision geometry."""
+    position: Vector3 = (0.0, 0.0, 0.0)
+    """Position of the shape in the frame [m]."""
+    rotation: Rotation = (0.0, 0.0, 0.0)
+    """Rotation of the shape in the frame: roll, pitch and yaw [rad], a quaternion
+    (x, y, z, w) [-], or a matrix [-]."""
+
+
+ContactShapes = Annotated[
+    Sequence[ContactShape], ArrayField(dict[str, ContactShape], stored), BY_FRAME
+]
+"""Shapes: a sequence in Python, a mapping by frame in YAML."""
 
 
 @dataclass(frozen=True)
@@ -75,11 +92,9 @@ def geoms_of(robot: Robot, contact: ContactShape) -> list[Geom]:
     """
     frame = robot.model.frames[robot.frame_id(contact.frame)]
     if frame.parentJoint == 0:
-        raise SimulationError(
-            f"contact of {contact.frame!r}: it is fixed to the world and never moves"
-        )
+        raise SimulationError("it is fixed to the world and never moves")
     if contact.shape is not None:
-        offset = placement(contact.position, contact.rpy)
+        offset = pin.SE3(matrix_of(contact.rotation), np.asarray(contact.position))
         return [
             _geom(contact.shape.geometry(), frame.placement * offset, frame.placement)
         ]
@@ -89,10 +104,7 @@ def geoms_of(robot: Robot, contact: ContactShape) -> list[Geom]:
     bodies = {f.name for f in robot.model.frames if f.type == pin.FrameType.BODY}
     real = [s for s in own if s.link in bodies]
     if not real:
-        raise SimulationError(
-            f"contact of {contact.frame!r}: no collision geometry is fixed to it; "
-            "give a shape"
-        )
+        raise SimulationError("no collision geometry is fixed to it; give a shape")
     return [_geom(s.geometry, s.placement, frame.placement) for s in real]
 
 

@@ -5,7 +5,6 @@ changed inertias are the same in MuJoCo.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -25,24 +24,12 @@ from hsp_control.simulation.plants.mujoco.conventions import (
     SPHERICAL,
     Joint,
 )
+from hsp_control.simulation.plants.mujoco.ground import Ground
 
 MIN_INERTIA = 1e-12
 """Smallest mass and inertia of a body [kg, kg·m²]; MuJoCo needs positive ones."""
 
 _CONTACT, _GROUND = 1, 2  # kinds of geoms; they collide only with the other kind
-
-
-@dataclass(frozen=True)
-class Ground:
-    """A horizontal ground plane.
-
-    Attributes:
-        height: Its height [m].
-        friction: Coulomb friction coefficient between it and the contacts.
-    """
-
-    height: float = 0.0
-    friction: float = 0.8
 
 
 def write_mjcf(

@@ -11,6 +11,7 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.log_channel import LogChannel
+from hsp_control.declaration import within
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import number_of_steps
@@ -19,7 +20,8 @@ from hsp_control.simulation.plants.floating_roots import FloatingRoots
 from hsp_control.simulation.plants.json_data import to_json_data
 from hsp_control.simulation.plants.mujoco.contact_shapes import ContactShape, geoms_of
 from hsp_control.simulation.plants.mujoco.conventions import Conventions, joints_of
-from hsp_control.simulation.plants.mujoco.mjcf import Ground, write_mjcf
+from hsp_control.simulation.plants.mujoco.ground import Ground
+from hsp_control.simulation.plants.mujoco.mjcf import write_mjcf
 from hsp_control.simulation.plants.plant import SampledPlant
 from hsp_control.simulation.plants.push import Push, Pushes
 
@@ -88,8 +90,10 @@ class MujocoPlant(SampledPlant):
         geoms: dict[int, list[Any]] = {}
         frame_of_geom: dict[str, str] = {}
         for contact in self.contacts:
-            joint = robot.model.frames[robot.frame_id(contact.frame)].parentJoint
-            for geom in geoms_of(robot, contact):
+            with within("contacts", contact.frame):
+                joint = robot.model.frames[robot.frame_id(contact.frame)].parentJoint
+                found = geoms_of(robot, contact)
+            for geom in found:
                 name = f"{contact.frame}/{len(frame_of_geom)}"
                 geoms.setdefault(joint, []).append((name, geom))
                 frame_of_geom[name] = contact.frame
@@ -109,12 +113,12 @@ class MujocoPlant(SampledPlant):
             raise SimulationError(f"MuJoCo rejects {robot.name}: {reason}") from error
         self.data: Any = mujoco.MjData(self.model)
         names = [name for joint in joints for name in joint.mujoco_names]
-        found = [self.model.joint(name) for name in names]
+        made = [self.model.joint(name) for name in names]
         self.conventions = Conventions(
             robot,
             joints,
-            {name: int(j.qposadr[0]) for name, j in zip(names, found, strict=True)},
-            {name: int(j.dofadr[0]) for name, j in zip(names, found, strict=True)},
+            {name: int(j.qposadr[0]) for name, j in zip(names, made, strict=True)},
+            {name: int(j.dofadr[0]) for name, j in zip(names, made, strict=True)},
         )
         self._roots = FloatingRoots(robot)
         self._geoms = {

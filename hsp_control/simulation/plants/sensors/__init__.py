@@ -3,6 +3,8 @@
 from .differenced_velocity import DifferencedVelocity as DifferencedVelocity
 from .encoder import Encoder as Encoder
 from .position_noise import PositionNoise as PositionNoise
+from .sensor import Sensing as Sensing
 from .sensor import Sensor as Sensor
+from .sensor import Sensors as Sensors
 from .sensor_delay import SensorDelay as SensorDelay
 from .velocity_noise import VelocityNoise as VelocityNoise

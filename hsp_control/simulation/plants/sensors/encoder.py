@@ -1,36 +1,43 @@
 """Encoders with a finite resolution."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Weights
 from hsp_control.robot import Robot
 from hsp_control.robot.per_joint import per_dof
-from hsp_control.simulation.plants.sensors.sensor import Sensor
+from hsp_control.simulation.plants.sensors.sensor import Sensing, Sensor
 
 
-@dataclass
-class Encoder(Sensor):
-    """Joint positions rounded to counts; a root or a joint with resolution 0 is exact.
+class Encoder(Sensor, type="encoder_resolution"):
+    """Joint positions rounded to counts; a root is exact."""
 
-    Attributes:
-        resolution: One count [rad or m], for all joints or of shape (nv,): 2π/2¹⁹ for
-            19 bits per revolution.
-    """
+    stage: ClassVar[float] = 30.0
 
-    resolution: Any
+    resolution: Weights
+    """Resolution of the encoders [rad or m], one number or nv: 2π/2¹⁹ for 19 bits per
+    revolution; 0 is exact."""
 
-    def reset(self, robot: Robot, t: float, q: Array, v: Array) -> None:
-        """Set the robot; see `Sensor.reset`."""
-        self._robot = robot
-        count = per_dof(robot, self.resolution, "encoder resolution")
-        self._rounded = count > 0.0
-        self._count = np.where(self._rounded, count, 1.0)
+    @property
+    def active(self) -> bool:
+        """Whether a joint is rounded."""
+        return bool(np.any(self.resolution))
 
-    def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Round the positions to the nearest count; see `Sensor.measure`."""
-        position = self._robot.joint_positions(q)
-        change = np.round(position / self._count) * self._count - position
-        return self._robot.integrate(q, np.where(self._rounded, change, 0.0)), v
+    def begin(
+        self, robot: Robot, q: Array, v: Array, random: np.random.Generator
+    ) -> Sensing:
+        """Return what rounds to the nearest count; see `Sensor.begin`."""
+        with within("resolution"):
+            given = per_dof(robot, self.resolution)
+        rounded = given > 0.0
+        count = np.where(rounded, given, 1.0)
+
+        def sense(t: float, q: Array, v: Array) -> tuple[Array, Array]:
+            position = robot.joint_positions(q)
+            change = np.round(position / count) * count - position
+            return robot.integrate(q, np.where(rounded, change, 0.0)), v
+
+        return sense

@@ -1,33 +1,37 @@
 """Noise on the measured configuration."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
+
+import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Weights
 from hsp_control.robot import Robot
 from hsp_control.robot.per_joint import per_dof
-from hsp_control.simulation.plants.random_numbers import seeded_generator
-from hsp_control.simulation.plants.sensors.sensor import Sensor
+from hsp_control.simulation.plants.sensors.sensor import Sensing, Sensor
 
 
-@dataclass
-class PositionNoise(Sensor):
-    """Gaussian white noise on the configuration, in its tangent space.
+class PositionNoise(Sensor, type="position_noise"):
+    """Gaussian white noise on the configuration, in its tangent space."""
 
-    Attributes:
-        std: Standard deviation [rad or m], for all joints or of shape (nv,).
-        seed: Seed of the random numbers.
-    """
+    stage: ClassVar[float] = 20.0
 
-    std: Any
-    seed: int = 0
+    std: Weights
+    """Standard deviation of position noise [rad or m], one number or nv."""
 
-    def reset(self, robot: Robot, t: float, q: Array, v: Array) -> None:
-        """Restart the random numbers; see `Sensor.reset`."""
-        self._robot, self._rng = robot, seeded_generator(self)
-        self._std = per_dof(robot, self.std, "position noise")
+    @property
+    def active(self) -> bool:
+        """Whether there is noise."""
+        return bool(np.any(self.std))
 
-    def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Move the configuration by a random tangent vector; see `Sensor.measure`."""
-        noise = self._std * self._rng.standard_normal(self._robot.nv)
-        return self._robot.integrate(q, noise), v
+    def begin(
+        self, robot: Robot, q: Array, v: Array, random: np.random.Generator
+    ) -> Sensing:
+        """Return what moves q by a random tangent vector; see `Sensor.begin`."""
+        with within("std"):
+            std = per_dof(robot, self.std)
+        return lambda t, q, v: (
+            robot.integrate(q, std * random.standard_normal(robot.nv)),
+            v,
+        )

@@ -1,34 +1,69 @@
-"""The interface of sensors."""
+"""The base class of sensors."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import Annotated, ClassVar, TypeAlias
+
+import numpy as np
+from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.declaration import Part
+from hsp_control.declaration.by_type import ByType
 from hsp_control.robot import Robot
 
+Sensing: TypeAlias = Callable[[float, Array, Array], tuple[Array, Array]]
+"""(t, q, v) from the sensor before ↦ (q, v) as measured; called once per period."""
 
-class Sensor(ABC):
-    """One imperfection of the measurement; several make a chain, in their order."""
+
+class Sensor(Part, ABC, family="sensors", error=SimulationError):
+    """One imperfection of the measurements; several make a chain.
+
+    A subclass declares its parameters as fields (see `Part`) and implements `begin`.
+    A sensor knows no robot and has no memory: `begin` makes what runs.
+
+    A plant applies its sensors in the order of their stages, whatever the order in
+    which they are given: `SensorDelay` 10, `PositionNoise` 20, `Encoder` 30,
+    `DifferencedVelocity` 40, `VelocityNoise` 50. A new sensor chooses a number between
+    its neighbours; the default is behind all of these.
+
+    Attributes:
+        stage: The place in the chain.
+    """
+
+    stage: ClassVar[float] = 100.0
+
+    @property
+    def active(self) -> bool:
+        """Whether it changes anything; a plant leaves out a sensor that does not."""
+        return True
+
+    @property
+    def periods(self) -> int:
+        """By how many control periods it delays the state, for the rate check."""
+        return 0
 
     @abstractmethod
-    def reset(self, robot: Robot, t: float, q: Array, v: Array) -> None:
-        """Begin a run, and clear all memory of the last one.
+    def begin(
+        self, robot: Robot, q: Array, v: Array, random: np.random.Generator
+    ) -> Sensing:
+        """Return what measures in one run: a function with a memory of its own.
 
         Args:
-            robot: The robot.
-            t: Start time [s].
+            robot: The simulated robot.
             q: True configuration at the start, shape (nq,).
             v: True velocity at the start, shape (nv,).
+            random: The random numbers of this sensor in this run.
 
         Raises:
-            SimulationError: If the settings do not fit the robot.
+            SimulationError: If a field does not fit the robot.
         """
 
-    @abstractmethod
-    def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Return (q, v) as measured; it is called once per control period.
 
-        Args:
-            t: Time [s].
-            q: Configuration from the sensor before, shape (nq,).
-            v: Velocity from the sensor before, shape (nv,).
-        """
+def _in_order(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
+    return tuple(sorted(sensors, key=lambda sensor: sensor.stage))
+
+
+Sensors = Annotated[Sequence[Sensor], ByType(Sensor), AfterValidator(_in_order)]
+"""A chain: a sequence in Python, a mapping by type in YAML; stored by stage."""

@@ -1,33 +1,37 @@
 """Delayed measurements."""
 
 from collections import deque
-from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.declaration.quantities import Periods
 from hsp_control.robot import Robot
-from hsp_control.simulation.plants.periods import check_periods
-from hsp_control.simulation.plants.sensors.sensor import Sensor
+from hsp_control.simulation.plants.sensors.sensor import Sensing, Sensor
 
 
-@dataclass
-class SensorDelay(Sensor):
-    """The state of some periods ago; the start state until there is one.
+class SensorDelay(Sensor, type="delay"):
+    """The state of some periods ago; the start state until there is one."""
 
-    Attributes:
-        periods: Delay in control periods.
-    """
+    stage: ClassVar[float] = 10.0
 
-    periods: int
+    periods: Periods
+    """Delay of the measurements [control periods]."""
 
-    def __post_init__(self) -> None:
-        """Check the number of periods."""
-        check_periods(self.periods, "sensor delay")
+    @property
+    def active(self) -> bool:
+        """Whether there is a delay."""
+        return self.periods > 0
 
-    def reset(self, robot: Robot, t: float, q: Array, v: Array) -> None:
-        """Fill the queue with the start state; see `Sensor.reset`."""
-        self._queue = deque([(q.copy(), v.copy())] * self.periods)
+    def begin(
+        self, robot: Robot, q: Array, v: Array, random: np.random.Generator
+    ) -> Sensing:
+        """Return a queue that is full of the start state; see `Sensor.begin`."""
+        queue = deque([(q.copy(), v.copy())] * self.periods)
 
-    def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Append the state, and return the oldest one; see `Sensor.measure`."""
-        self._queue.append((q.copy(), v.copy()))
-        return self._queue.popleft()
+        def sense(t: float, q: Array, v: Array) -> tuple[Array, Array]:
+            queue.append((q.copy(), v.copy()))
+            return queue.popleft()
+
+        return sense

@@ -1,32 +1,34 @@
 """Noise on the measured velocity."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
+
+import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Weights
 from hsp_control.robot import Robot
 from hsp_control.robot.per_joint import per_dof
-from hsp_control.simulation.plants.random_numbers import seeded_generator
-from hsp_control.simulation.plants.sensors.sensor import Sensor
+from hsp_control.simulation.plants.sensors.sensor import Sensing, Sensor
 
 
-@dataclass
-class VelocityNoise(Sensor):
-    """Gaussian white noise on the velocity.
+class VelocityNoise(Sensor, type="velocity_noise"):
+    """Gaussian white noise on the velocity."""
 
-    Attributes:
-        std: Standard deviation [rad/s or m/s], for all joints or of shape (nv,).
-        seed: Seed of the random numbers.
-    """
+    stage: ClassVar[float] = 50.0
 
-    std: Any
-    seed: int = 0
+    std: Weights
+    """Standard deviation of velocity noise [rad/s or m/s], one number or nv."""
 
-    def reset(self, robot: Robot, t: float, q: Array, v: Array) -> None:
-        """Restart the random numbers; see `Sensor.reset`."""
-        self._rng = seeded_generator(self)
-        self._std = per_dof(robot, self.std, "velocity noise")
+    @property
+    def active(self) -> bool:
+        """Whether there is noise."""
+        return bool(np.any(self.std))
 
-    def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Add the noise to the velocity; see `Sensor.measure`."""
-        return q, v + self._std * self._rng.standard_normal(self._std.shape)
+    def begin(
+        self, robot: Robot, q: Array, v: Array, random: np.random.Generator
+    ) -> Sensing:
+        """Return what adds noise to the velocity; see `Sensor.begin`."""
+        with within("std"):
+            std = per_dof(robot, self.std)
+        return lambda t, q, v: (q, v + std * random.standard_normal(std.shape))

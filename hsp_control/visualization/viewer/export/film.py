@@ -72,7 +72,6 @@ def export_film(
 
     Raises:
         ViewerError: See `export_html`.
-        ConfigError: See `export_html`.
         ExportError: If the style is not valid, if playwright, a browser or ffmpeg is
             missing or fails, or if the file cannot be written.
     """

@@ -40,9 +40,8 @@ def export_html(
         view: Settings that replace those of the log's ``view``: see `Viewer`.
 
     Raises:
-        ViewerError: If the robot cannot be rebuilt, or the run is empty or of another
-            robot.
-        ConfigError: If a view has no such key, or a value is not valid.
+        ViewerError: If the robot cannot be rebuilt, the run is empty or of another
+            robot, a view has no such field, or a value is not valid.
         ExportError: If a mesh cannot be read, the library for it is not installed, or
             the file cannot be written.
     """

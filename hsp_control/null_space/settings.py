@@ -1,14 +1,14 @@
-"""The null space: fields, metric and gain."""
+"""What a configuration says about the null space: fields, metric and gain."""
 
 from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import AfterValidator
 
-from hsp_control.common.exceptions import ConfigError, FieldError
+from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Gain, Positive
-from hsp_control.null_space.fields import NullSpaceField
+from hsp_control.null_space.fields import FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import IdentityMetric, Metric
 
 
@@ -25,7 +25,7 @@ def _summable(fields: Sequence[NullSpaceField]) -> tuple[NullSpaceField, ...]:
     return tuple(fields)
 
 
-class NullSpaceModel(Part, error=ConfigError):
+class NullSpaceSettings(Part, error=FieldError):
     """The control of self-motion."""
 
     gain: Gain = 10.0
@@ -39,3 +39,10 @@ class NullSpaceModel(Part, error=ConfigError):
     singularity_threshold: Positive = 0.03
     """Singular value of the task Jacobian below which its pseudo-inverse is damped
     [-]."""
+
+    @property
+    def field(self) -> NullSpaceField | None:
+        """The sum of the fields; None if there are none."""
+        if len(self.fields) == 1:
+            return self.fields[0]
+        return FieldSum(self.fields) if self.fields else None

@@ -8,9 +8,10 @@ from numpy.typing import ArrayLike
 from pydantic import WithJsonSchema
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.declaration.quantities import ArrayField, Number, read_only
-from hsp_control.trajectories import checks
+
+_ROUNDING = 1e-8
+"""Deviation from norm 1, or from orthonormal rows, that counts as rounding error."""
 
 
 def matrix_of(rotation: ArrayLike, name: str = "rotation") -> Array:
@@ -21,21 +22,35 @@ def matrix_of(rotation: ArrayLike, name: str = "rotation") -> Array:
         name: What messages call it.
 
     Raises:
-        TrajectoryError: If it is none: a matrix that is not orthonormal or a
+        ValueError: If it is none: a matrix that is not orthonormal or a
             reflection, a quaternion that has not norm 1, or another shape.
     """
     given = np.asarray(rotation, dtype=float)
     if given.shape == (3,):
         return np.array(pin.rpy.rpyToMatrix(*given))
     if given.shape == (4,):
-        quaternion = pin.Quaternion(checks.unit(given, f"the quaternion {name}"))
-        return np.array(quaternion.toRotationMatrix())
+        norm = float(np.linalg.norm(given))
+        if abs(norm - 1.0) > _ROUNDING:
+            raise ValueError(
+                f"the quaternion {name} must have norm 1; it has {norm:.9g}"
+            )
+        return np.array(pin.Quaternion(given).toRotationMatrix())
     if given.shape != (3, 3):
-        raise TrajectoryError(
+        raise ValueError(
             f"{name} has shape {given.shape}; needs (3,) for roll, pitch and yaw, (4,) "
             "for a quaternion, or (3, 3) for a matrix"
         )
-    return checks.rotation(given, name)
+    error = float(np.abs(given @ given.T - np.eye(3)).max())
+    if error > _ROUNDING:
+        raise ValueError(
+            f"the rows of {name} must be orthonormal; the largest entry of A Aᵀ - I "
+            f"is {error:.1e}"
+        )
+    if np.linalg.det(given) < 0.0:
+        raise ValueError(
+            f"{name} must be a rotation; it is a reflection (determinant -1)"
+        )
+    return given.copy()
 
 
 def _checked(value: object) -> Array:

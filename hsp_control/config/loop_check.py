@@ -1,0 +1,53 @@
+"""Check that the compensation fits, and that the loop is stable at its rate."""
+
+from hsp_control.common.arrays import Array
+from hsp_control.config.document import Document
+from hsp_control.config.scenario import Scenario
+from hsp_control.control.compensation import RateFinding, check_rate
+from hsp_control.control.controller import Controller
+
+
+def check_compensation(
+    document: Document, scenario: Scenario, controller: Controller
+) -> None:
+    """Check the compensation against the robot, its tasks and its limits.
+
+    Raises:
+        ConfigError: If the configuration has no control period.
+        CompensationError: If a compensator does not fit.
+        GainError: If errors would not decay with the integral action.
+    """
+    compensation = scenario.compensation
+    if compensation.names and scenario.simulation.control_period is None:
+        raise document.error(
+            ("compensation",),
+            "compensation acts once per control period: set simulation.control_period "
+            "[s], for example to 0.001",
+        )
+    with document.at("compensation"):
+        compensation.check(controller.robot, controller.tasks, controller.limits)
+
+
+def check_rates(
+    document: Document, scenario: Scenario, controller: Controller, q0: Array
+) -> tuple[RateFinding, ...]:
+    """Check that the loop is stable at its rate; return gains that are high for it.
+
+    The delays are those of the plant, whether or not a predictor compensates them.
+
+    Raises:
+        UnstableRateError: If the loop is unstable.
+    """
+    settings, plant = scenario.simulation, scenario.plant
+    if settings.control_period is None or not settings.check_rate:
+        return ()
+    with document.at():
+        found = check_rate(
+            controller,
+            q0,
+            settings.control_period,
+            scenario.compensation,
+            effort_delay=plant.effort_delay,
+            sensor_delay=plant.sensor_delay,
+        )
+    return tuple(found)

@@ -1,1 +1,0 @@
-"""The schema, one file for each part of a configuration."""

@@ -1,0 +1,128 @@
+"""What a person says about a robot: its name or file, and how to load it."""
+
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, field, replace
+from pathlib import Path
+from typing import Annotated, Self
+
+from hsp_control.common.exceptions import ModelError
+from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import (
+    READ_ONLY,
+    FileName,
+    Flag,
+    Name,
+    Number,
+    ReadOnlyDict,
+    Vector3,
+)
+from hsp_control.declaration.rotation import Rotation
+from hsp_control.robot.description.sources import Root
+
+_ZERO = (0.0, 0.0, 0.0)
+
+
+class ToolFrame(Part, error=ModelError):
+    """A frame to add to the robot, fixed to one of its frames."""
+
+    parent: str
+    """Name of the robot's frame that it is fixed to."""
+    translation: Vector3 = _ZERO
+    """Its origin in the parent frame [m]."""
+    rotation: Rotation = _ZERO
+    """Its orientation in the parent frame: roll, pitch and yaw [rad], a quaternion
+    (x, y, z, w) [-], or a matrix [-]."""
+
+
+class PlacedRobot(Part, error=ModelError):
+    """One of several robots in a workspace."""
+
+    name: FileName
+    """Name of a bundled robot or of example-robot-data, or the path of a URDF file."""
+    _: KW_ONLY
+    root: Root | None = None
+    """Connection of the root to the world; by default as the robot's source defines."""
+    locked: Annotated[Mapping[str, Number], READ_ONLY] | None = None
+    """Locked joints: position [rad or m] by name; by default as the robot's source
+    defines."""
+    tool_frames: Annotated[Mapping[Name, ToolFrame], READ_ONLY] = field(
+        default_factory=ReadOnlyDict
+    )
+    """Frames to add, by name."""
+    mimic: Flag = True
+    """Whether mimic joints follow their leading joints; if not, they move freely."""
+    position: Vector3 = _ZERO
+    """Position of its root in the world [m]."""
+    rotation: Rotation = _ZERO
+    """Orientation of its root in the world: roll, pitch and yaw [rad], a quaternion
+    (x, y, z, w) [-], or a matrix [-]."""
+
+    def located(self, folder: Path) -> Self:
+        """Return it with the full path of a URDF that is in a folder."""
+        return replace(self, name=_located(self.name, folder))
+
+
+class RobotDescription(Part, error=ModelError):
+    """A robot: one of a name or file, or several robots in one workspace.
+
+    `Robot.load` makes the robot.
+    """
+
+    name: FileName | None = None
+    """Name of a bundled robot or of example-robot-data, or the path of a URDF file."""
+    _: KW_ONLY
+    root: Root | None = None
+    """Connection of the root to the world; by default as the robot's source defines."""
+    locked: Annotated[Mapping[str, Number], READ_ONLY] | None = None
+    """Locked joints: position [rad or m] by name; by default as the robot's source
+    defines."""
+    tool_frames: Annotated[Mapping[Name, ToolFrame], READ_ONLY] = field(
+        default_factory=ReadOnlyDict
+    )
+    """Frames to add, by name."""
+    mimic: Flag = True
+    """Whether mimic joints follow their leading joints; if not, they move freely."""
+    gravity: Vector3 | None = None
+    """Gravitational acceleration in the world [m/s²]; [0, 0, -9.81] by default."""
+    parts: Annotated[Mapping[Name, PlacedRobot], READ_ONLY] | None = None
+    """Instead of `name`: several robots by name; joints and frames are called
+    ``<part>_<own name>``."""
+
+    def __post_init__(self) -> None:
+        """Check that it is one robot, or several.
+
+        Raises:
+            ModelError: If it is neither, or both.
+        """
+        if (self.name is None) == (self.parts is None):
+            raise ModelError("give one of name and parts")
+        of_one = {"root", "locked", "tool_frames", "mimic"} & {*self.changed_fields()}
+        if self.parts is not None and of_one:
+            raise ModelError(
+                f"{', '.join(sorted(of_one))}: give it for each of the parts"
+            )
+
+    def located(self, folder: Path) -> Self:
+        """Return it with the full path of each URDF that is in a folder.
+
+        A relative path is first looked up there, so that a folder with a configuration
+        and its robots can be moved.
+        """
+        if self.parts is None:
+            return replace(self, name=_located(self.name, folder))
+        parts = {name: part.located(folder) for name, part in self.parts.items()}
+        return replace(self, parts=parts)
+
+
+def _located(name: str | Path | None, folder: Path) -> str:
+    text = str(name)
+    if text.endswith((".urdf", ".xml")) and _is_file(folder / text):
+        return str(folder / text)
+    return text
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # too long for a path, or with a null character
+        return False

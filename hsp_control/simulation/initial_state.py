@@ -1,0 +1,145 @@
+"""Where a run begins: configuration and velocity at t = 0."""
+
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Literal
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ConfigurationError, ContactError
+from hsp_control.constraints.contacts import Contact
+from hsp_control.control.controller import Controller
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.quantities import READ_ONLY, Number, Vector
+from hsp_control.robot import Robot
+
+
+class InitialState(Part, error=ConfigurationError):
+    """The start: one of joints, coordinates and configuration; home by default."""
+
+    joints: Vector | Annotated[Mapping[str, Number], READ_ONLY] | None = None
+    """Joint positions [rad or m]: nv numbers, or some by name with the others at
+    home."""
+    coordinates: Vector | None = None
+    """Joint coordinates theta = A q [rad or m], where the robot's source defines A."""
+    configuration: Vector | None = None
+    """The configuration, nq numbers [rad, m, or unit quaternions]."""
+    ground: Number | None = None
+    """Height of the lowest contact [m]; a free-flyer root is moved up or down to it."""
+    velocity: Literal["rest", "flow"] | Vector = "rest"
+    """Velocity: ``rest``, ``flow`` (that of the law without errors), or nv numbers
+    [rad/s or m/s]."""
+
+    def __post_init__(self) -> None:
+        """Check that the configuration is given once.
+
+        Raises:
+            ConfigurationError: If it is given twice.
+        """
+        given = self._given()
+        if len(given) > 1:
+            raise ConfigurationError(
+                f"the start is given twice; give only one of {given[0]} and {given[1]}"
+            )
+
+    def _given(self) -> list[str]:
+        """Return the names of the fields that give the configuration."""
+        names = "joints", "coordinates", "configuration"
+        return [name for name in names if getattr(self, name) is not None]
+
+    def configuration_of(self, robot: Robot, contacts: Iterable[Contact] = ()) -> Array:
+        """Return the start configuration, shape (nq,).
+
+        Args:
+            robot: The robot.
+            contacts: Its contacts, for `ground`.
+
+        Raises:
+            ConfigurationError: If the numbers are no configuration of the robot.
+            ShapeError: If there is another number of them.
+            JointNotFoundError: If a joint does not exist.
+            ContactError: If the robot has no free-flyer root, or no contact, to put on
+                the ground.
+        """
+        with within(*self._given()):
+            q = self._configuration(robot)
+        if self.ground is None:
+            return q
+        return _put_on_ground(self.ground, list(contacts), robot, q)
+
+    def velocity_of(self, controller: Controller, q: Array) -> Array:
+        """Return the start velocity, shape (nv,).
+
+        Args:
+            controller: The controller, whose flow it may be.
+            q: The start configuration, shape (nq,).
+
+        Raises:
+            ShapeError: If there are not nv numbers.
+        """
+        robot = controller.robot
+        if isinstance(self.velocity, str):
+            flows = self.velocity == "flow"
+            return controller.flow(0.0, q) if flows else np.zeros(robot.nv)
+        with within("velocity"):
+            return robot.check_tangent(self.velocity, "v0").copy()
+
+    def _configuration(self, robot: Robot) -> Array:
+        if self.configuration is not None:
+            return robot.check_configuration(self.configuration)
+        if self.coordinates is not None:
+            A = robot.joint_coordinates
+            if A is None:
+                raise ConfigurationError(
+                    f"{robot.name} defines no joint coordinates; use joints"
+                )
+            theta = robot.check_tangent(self.coordinates, "coordinates")
+            return robot.integrate(robot.neutral(), np.linalg.solve(A, theta))
+        if isinstance(self.joints, Mapping):
+            return _moved_joints(robot, self.joints)
+        if self.joints is not None:
+            joints = robot.check_tangent(self.joints, "joints")
+            return robot.integrate(robot.neutral(), joints)
+        return robot.home()
+
+
+def _moved_joints(robot: Robot, joints: Mapping[str, float]) -> Array:
+    """Return home with some joints, by name, at other positions [rad or m]."""
+    positions = robot.joint_positions(robot.home())
+    for joint, value in joints.items():
+        with within(joint):
+            where = robot.velocity_index(joint)
+            if where.stop - where.start != 1:
+                raise ConfigurationError(
+                    f"joint {joint!r} has {where.stop - where.start} degrees of "
+                    "freedom; use configuration"
+                )
+        positions[where] = value
+    return robot.integrate(robot.neutral(), positions)
+
+
+def _put_on_ground(
+    height: float, contacts: list[Contact], robot: Robot, q: Array
+) -> Array:
+    """Return q with the root moved vertically: the lowest contact is then at a height.
+
+    Raises:
+        ContactError: If the robot has no free-flyer root, or no contact.
+        FrameNotFoundError: If the frame of a contact does not exist.
+    """
+    if not (robot.unactuated and contacts):
+        lacks = "contact" if robot.unactuated else "free-flyer root"
+        with within("ground"):
+            raise ContactError(f"{robot.name} has no {lacks} to put on the ground")
+    state = robot.state(0.0, q, np.zeros(robot.nv))
+    lowest = np.inf
+    for contact in contacts:
+        frame = state.frame(contact.frame)
+        heights = (frame.position + contact.arms(frame))[:, 2]
+        lowest = min(lowest, float(heights.min()))
+    # The displacement of a root is expressed in its own axes.
+    root = next(iter(robot.joints.values()))
+    lift = np.zeros(robot.nv)
+    up = state.data.oMi[1].rotation.T @ np.array([0.0, 0.0, height - lowest])
+    lift[root.idx_v : root.idx_v + 3] = up
+    return robot.integrate(q, lift)

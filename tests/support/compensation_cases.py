@@ -1,0 +1,54 @@
+"""A circling Panda, and one compensator of each kind."""
+
+from typing import Any
+
+import numpy as np
+
+from hsp_control import Circle, Controller, FramePosition, Gains, Robot
+from hsp_control.control.compensation import (
+    Compensation,
+    FrictionFeedForward,
+    IntegralAction,
+    MomentumObserver,
+    Predictor,
+    StartUpRamp,
+    VelocityFilter,
+)
+from hsp_control.null_space.fields import TargetPosture
+
+H = 1e-3
+PANDA = Robot.load("panda")
+Q0 = PANDA.home()
+
+
+def circle(
+    robot: Robot = PANDA, frequency: float = 20.0, away: float = 0.05
+) -> FramePosition:
+    """Return a circle of 5 cm that begins ``away`` [m] from where the hand is."""
+    start = robot.state(0.0, robot.home(), np.zeros(robot.nv)).position("panda_tcp")
+    center = start + np.array([away - 0.05, 0.0, 0.0])
+    path = Circle(0.05, 2.0, center, axes=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    return FramePosition(
+        "panda_tcp", path, gains=Gains(natural_frequency=frequency), name="hand"
+    )
+
+
+def controller(robot: Robot = PANDA, away: float = 0.05, **options: Any) -> Controller:
+    return Controller(
+        robot,
+        [circle(robot, away=away)],
+        2.0 * TargetPosture(robot.home()),
+        **options,
+    )
+
+
+EVERYTHING: dict[str, Any] = {
+    "velocity_filter": VelocityFilter(100.0),
+    "predictor": Predictor(1),
+    "momentum_observer": MomentumObserver(50.0, clip=20.0),
+    "friction_feed_forward": FrictionFeedForward(0.1, 0.1),
+    "integral_action": IntegralAction(5.0),
+    "effort_rate": 1000.0,
+    "start_up_ramp": StartUpRamp(0.1),
+}
+ALL = Compensation(**EVERYTHING)

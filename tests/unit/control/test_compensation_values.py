@@ -1,0 +1,161 @@
+"""Compensators are values: shared, compared, sent elsewhere, and checked."""
+
+import pickle
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
+from numpy.typing import NDArray
+
+from hsp_control import Limits, Robot
+from hsp_control.common.exceptions import CompensationError, ImmutableError
+from hsp_control.control.compensation import (
+    Command,
+    Compensation,
+    FrictionFeedForward,
+    IntegralAction,
+    MomentumObserver,
+    Predictor,
+    StartUpRamp,
+    VelocityFilter,
+)
+
+Array = NDArray[np.float64]
+
+
+def test_one_compensation_serves_many_commands_at_once() -> None:
+    """Two in turns, and four in threads, beside each one by itself."""
+
+    def efforts(q: Array, command: Command) -> Iterator[Array]:
+        command.restart()
+        for k in range(40):
+            v = np.full(7, 1.0 * (k > 0))
+            yield command.effort(k * H, q + 1e-3 * k, v, H).copy()
+
+    starts = [Q0 + 0.02 * k for k in range(4)]
+    alone = [np.array([*efforts(q, Command(controller(), ALL))]) for q in starts]
+    assert np.abs(alone[0] - alone[1]).max() > 0.1
+    pair = [efforts(q, Command(controller(), ALL)) for q in starts[:2]]
+    for k, both in enumerate(zip(*pair, strict=True)):
+        for tau, expected in zip(both, alone[:2], strict=True):
+            np.testing.assert_array_equal(tau, expected[k])
+    made = [Command(controller(), ALL) for _ in starts]
+    with ThreadPoolExecutor(4) as threads:
+        found = threads.map(lambda q, own: np.array([*efforts(q, own)]), starts, made)
+        for each, expected in zip(found, alone, strict=True):
+            np.testing.assert_array_equal(each, expected)
+    assert Compensation(**EVERYTHING) == ALL
+
+
+def test_compensators_are_values() -> None:
+    ki = {"hand": [400.0, 800.0, 1200.0]}
+    action = IntegralAction(2.0, ki=ki, tasks=["hand"], limit=8.0)
+    own = replace(ALL, integral_action=action, effort_rate=[1.0, np.inf])
+    same = replace(ALL, integral_action=replace(action), effort_rate=(1, None))
+    assert own == same != ALL
+    assert hash(own) == hash(same)
+    assert pickle.loads(pickle.dumps(own)) == own
+    assert action != replace(action, ki={"hand": [400.0, 800.0, 1201.0]})
+    ki["hand"][0] = 0.0
+    assert np.asarray(action.ki["hand"]).tolist() == [400.0, 800.0, 1200.0]
+    assert eval(repr(own)) == own
+    with pytest.raises(ImmutableError, match=r"Predictor\.effort_delay cannot"):
+        ALL.predictor.effort_delay = 2  # type: ignore[misc, union-attr]
+    with pytest.raises(TypeError):
+        action.ki["arm"] = 1.0  # type: ignore[index]
+    for each in (action, pickle.loads(pickle.dumps(action))):
+        with pytest.raises(ValueError, match="read-only"):
+            each.ki["hand"][0] = 1.0
+    assert replace(own, momentum_observer=None).names == tuple(
+        name for name in EVERYTHING if name != "momentum_observer"
+    )
+
+
+# ------------------------------------------------------------------ what is refused
+
+
+def walker() -> Robot:
+    pytest.importorskip("example_robot_data")
+    return Robot.load("solo12")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: MomentumObserver(0.0),
+            "MomentumObserver: bandwidth: 0.0 is too small; must be greater than 0",
+        ),
+        (
+            lambda: VelocityFilter(-1.0),
+            "VelocityFilter: cutoff: -1.0 is negative; must be greater",
+        ),
+        (lambda: VelocityFilter(10.0, 3), r"order: unknown value 3 \(allowed: 1, 2\)"),  # type: ignore[arg-type]
+        (lambda: VelocityFilter(600.0, 2).coefficients(H), "needs less than 500 Hz"),
+        (lambda: Predictor(0, 0), "a predictor needs a delay"),
+        (lambda: Predictor(-1), "effort_delay: -1 is negative; must be at least 0"),
+        (lambda: Predictor(1, 0.5), "sensor_delay: 0.5 is .*; expected an integer"),  # type: ignore[arg-type]
+        (lambda: IntegralAction(), "needs a rate"),
+        (lambda: IntegralAction(0.0), "rate: 0.0 is too small; must be"),
+        (lambda: IntegralAction(1.0, limit=-1.0), "limit: -1.0 is negative"),
+        (lambda: IntegralAction(ki={"hand": -1.0}), "ki.hand: -1.0 is negative"),
+        (lambda: StartUpRamp(0.0), "duration: 0.0 is too small; must be"),
+        (lambda: StartUpRamp(1.0, -1.0), "natural_frequency: -1.0 is negative; must"),
+        (lambda: FrictionFeedForward(1.0, smoothing=0.0), "smoothing: 0.0 is too sm"),
+        (lambda: FrictionFeedForward(viscous=-1.0), "viscous: -1.0 is negative; must"),
+        (
+            lambda: on(friction_feed_forward=FrictionFeedForward([1.0])),
+            r"^friction_feed_forward.coulomb: has shape \(1,\); needs one number",
+        ),
+        (
+            lambda: on(effort_rate=[1.0, 2.0]),
+            "^effort_rate: has 2 numbers; needs one number or 7",
+        ),
+        (lambda: on(effort_rate="fast"), "effort_rate: 'fast' is text; expected a num"),
+        (lambda: MomentumObserver(clip=[-1.0] * 7), r"clip.0: -1.0 is .* greater th"),
+        (
+            lambda: on(momentum_observer=MomentumObserver(clip=[1.0] * 6)),
+            "^momentum_observer.clip: has 6 numbers; needs one number or 7",
+        ),
+        (
+            lambda: on(integral_action=IntegralAction(1.0, tasks=["hnad"])),
+            r"^integral_action.tasks: there is no task 'hnad'; did you mean 'hand'\?",
+        ),
+        (
+            lambda: on(integral_action=IntegralAction(ki={"hnad": 1.0})),
+            r"^integral_action.ki: there is no task 'hnad'; did you mean 'hand'\?",
+        ),
+    ],
+)
+def test_settings_that_make_no_sense(make: Any, message: str) -> None:
+    with pytest.raises(CompensationError, match=message):
+        make()
+
+
+def on(**parts: Any) -> None:
+    Compensation(**parts).check(PANDA, [circle()])
+
+
+def test_two_guards_of_the_effort_rate_are_one_too_many() -> None:
+    made = controller(limits=Limits(effort_rate=500.0))
+    with pytest.raises(CompensationError, match=r"limits\.effort_rate keeps the rate"):
+        Command(made, Compensation(effort_rate=500.0))
+    Command(controller(limits=Limits()), Compensation(effort_rate=5.0))
+
+
+@pytest.mark.parametrize("name", ["momentum_observer", "predictor", "start_up_ramp"])
+def test_a_robot_that_may_fall_cannot_have_some(name: str) -> None:
+    robot = walker()
+    with pytest.raises(
+        CompensationError, match=f"{name}: solo12 has a free-flyer root"
+    ):
+        Compensation(**{name: EVERYTHING[name]}).check(robot, [])
+    Compensation(
+        velocity_filter=VelocityFilter(50.0),
+        friction_feed_forward=FrictionFeedForward(0.1),
+        effort_rate=1000.0,
+    ).check(robot, [])
