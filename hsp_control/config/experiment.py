@@ -16,6 +16,7 @@ from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.config.document import Document
 from hsp_control.config.located_scene import located_scene
 from hsp_control.config.loop_check import check_compensation, check_rates
+from hsp_control.config.named_obstacles import named_obstacles
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
 from hsp_control.config.view_settings import ViewSettings
@@ -111,7 +112,7 @@ class Experiment:
             limits: Limits on efforts and motion.
             contacts: The contacts of a floating base.
             base: What else moves a floating base.
-            scene: The obstacles.
+            scene: The obstacles; those that fields and limits hold are added.
             changes: Changes while running.
             start: Where the run begins; at home and at rest by default.
             plant: What the efforts act on; the controller's own model by default.
@@ -127,10 +128,15 @@ class Experiment:
             HspControlError: If a part is wrong, or does not fit the others; see
                 `load_experiment`.
         """
+        terms = () if field is None else tuple(terms_of(field))
+        scene, (terms, limits, changes) = named_obstacles(
+            scene if isinstance(scene, Scene) else Scene(scene),
+            (terms, limits, tuple(changes)),
+        )
         null_space = {
             "gain": null_space_gain,
             "metric": IdentityMetric() if metric is None else metric,
-            "fields": () if field is None else terms_of(field),
+            "fields": terms,
             "singularity_threshold": singularity_threshold,
         }
         given = {
@@ -149,8 +155,8 @@ class Experiment:
             "limits": limits,
             "contacts": keyed(contacts),
             "base": base,
-            "scene": scene if isinstance(scene, Scene) else Scene(scene),
-            "changes": tuple(changes),
+            "scene": scene,
+            "changes": changes,
             "plant": plant,
             **{key: part for key, part in given.items() if part is not None},
         }

@@ -11,7 +11,9 @@ import pytest
 import yaml
 
 from hsp_control import (
+    Controller,
     Experiment,
+    FramePose,
     FunctionCost,
     Gains,
     JointCentering,
@@ -21,13 +23,13 @@ from hsp_control import (
     Sphere,
     load_experiment,
 )
-from hsp_control.common.exceptions import ConfigError, HspControlError
+from hsp_control.common.exceptions import ConfigError, HspControlError, SceneError
 from hsp_control.common.resources import bundled_configs
 from hsp_control.config import json_schema
 from hsp_control.config.document import Document
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.validation import validate
-from hsp_control.constraints.limits import Scaled
+from hsp_control.constraints.limits import ObstacleDistance, Scaled
 from hsp_control.control.changes import ChangeGains
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry import Obstacle
@@ -241,3 +243,25 @@ def test_an_experiment_of_parts_goes_to_yaml_and_back(tmp_path: Path) -> None:
 def test_a_wrong_setting_is_named(settings: dict[str, Any], message: str) -> None:
     with pytest.raises(HspControlError, match=message):
         parts(**settings)
+
+
+def test_obstacles_that_parts_hold_are_in_the_scene() -> None:
+    """YAML names obstacles; what holds one in Python is written with its name."""
+    ball = Obstacle("ball", Sphere(0.1), Hold([0.6, 0.4, 0.6]))
+    field = JointCentering() + 20.0 * ObstacleClearance([ball])
+    limits = Limits(distances=[ObstacleDistance(obstacles=[ball])])
+    experiment = Experiment("panda", [FramePose("panda_tcp")], field, limits=limits)
+    assert experiment.scenario.scene == Scene([ball])
+    again = load_experiment(yaml.safe_load(experiment.to_yaml()))
+    assert again.scenario == experiment.scenario
+    q, v = experiment.q0 + 0.1, np.full(7, 0.1)
+    controller = Controller(
+        experiment.robot, experiment.controller.tasks, field, limits=limits,
+        start=experiment.q0,
+    )  # fmt: skip
+    tau = experiment.controller.compute(0.0, q, v).tau
+    np.testing.assert_array_equal(tau, again.controller.compute(0.0, q, v).tau)
+    np.testing.assert_array_equal(tau, controller.compute(0.0, q, v).tau)
+    other = Obstacle("ball", Sphere(0.2), Hold([0.6, 0.4, 0.6]))
+    with pytest.raises(SceneError, match="two obstacles have the name 'ball'"):
+        Experiment("panda", [FramePose("panda_tcp")], field, scene=[other])
