@@ -76,12 +76,12 @@ def solve_lower(L: Array, x: Array) -> None:
 def solve_lower_transposed(L: Array, x: Array) -> None:
     """Overwrite x with L⁻ᵀ x; shapes (n, n) and (n,)."""
     n = L.shape[0]
-    for j in range(n):
+    for j in range(n):  # along the rows of L, in the order of memory
         i = n - 1 - j
-        total = x[i]
-        for k in range(i + 1, n):
-            total -= L[k, i] * x[k]
-        x[i] = total / L[i, i]
+        x[i] /= L[i, i]
+        found = x[i]
+        for k in range(i):
+            x[k] -= L[i, k] * found
 
 
 @kernel

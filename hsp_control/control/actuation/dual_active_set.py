@@ -27,59 +27,62 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
-from hsp_control.common.linalg import solve_lower, solve_lower_transposed
+from hsp_control.common.linalg import (
+    multiply,
+    multiply_transposed,
+    solve_lower,
+    solve_lower_transposed,
+)
 
 SOLVED = 0
 """x is the optimum."""
 INFEASIBLE = 1
-"""The constraints contradict each other; x and the multipliers are of no use."""
+"""The constraints contradict each other, or something is NaN; x is of no use."""
 EXHAUSTED = 2
-"""The limit on iterations was reached; x and the multipliers are of no use."""
+"""The limit on iterations was reached; x is of no use."""
 
 _TOLERANCE = 1e-10
 """Distance from x to a violated constraint that is accepted, relative to 1 + max|x|. It
-does not depend on the scale of the row."""
+does not depend on the scale of the row. It grows tenfold each time that x, computed
+anew, violates a constraint: where active rows nearly depend on each other, rounding can
+let two of them take turns."""
 _DEPENDENT = 1e-12
 """A row belongs to the span of the active ones if its remainder in y is smaller than
 this, relative to ‖a‖ ‖J‖_F: rounding leaves 1e-15, the cheapest and the dearest motion
 of the law differ by 1e4."""
 _ITERATIONS = 10
-"""Limit on iterations, per constraint. Random QPs need 2 at most (benchmarks/qp.py)."""
+"""Limit on iterations, per constraint. Random QPs need 3 at most, see
+benchmarks/qp.py; Talos with all efforts at their limits 5."""
 
 
-class Factor(NamedTuple):
-    """J with H⁻¹ = J Jᵀ, by its columns.
+class Problem(NamedTuple):
+    """A QP with k rows lower ≤ A x ≤ upper; bounds on x count as k, k + 1, ...
 
     Attributes:
-        JT: Jᵀ, shape (nz, n), nz ≤ n: what its rows do not span does not move.
-        begin: First non-zero entry of each row, shape (nz,).
-        end: After the last non-zero entry of each row, shape (nz,).
+        JT: Jᵀ with J Jᵀ = H⁻¹, shape (nz, n), nz ≤ n. What its rows do not span does
+            not move.
+        first: First non-zero entry of each row of Jᵀ, shape (nz,).
+        last: After the last non-zero entry of each row of Jᵀ, shape (nz,).
+        A: Shape (k, n).
+        begin: First non-zero entry of each row of A, shape (k,).
+        end: After the last non-zero entry of each row of A, shape (k,).
+        lower: Lower bounds of the rows and then those of x, shape (k + n,).
+        upper: Upper bounds of the rows and then those of x, shape (k + n,).
+        softness: σ of each constraint, shape (k + n,), zero if it is hard; shape (0,)
+            if all are.
+        equalities: How many of the first rows are equalities, lower = upper.
     """
 
     JT: Array
-    begin: Indices
-    end: Indices
-
-
-class Constraints(NamedTuple):
-    """Rows lower ≤ A x ≤ upper, and bounds on x, which count as rows k, k + 1, ...
-
-    Attributes:
-        A: Shape (k, n).
-        begin: First non-zero entry of each row, shape (k,).
-        end: After the last non-zero entry of each row, shape (k,).
-        lower: Lower bounds and then those of x, shape (k + n,).
-        upper: Upper bounds and then those of x, shape (k + n,).
-        softness: σ of each constraint, shape (k + n,), zero if it is hard; shape (0,)
-            if all are.
-    """
-
+    first: Indices
+    last: Indices
     A: Array
     begin: Indices
     end: Indices
     lower: Array
     upper: Array
     softness: Array
+    equalities: int
 
 
 class Workspace(NamedTuple):
@@ -94,6 +97,7 @@ class Workspace(NamedTuple):
             positive at lower bounds.
         origin: x0, shape (n,).
         norms: ‖a‖ of each constraint, shape (k + n,).
+        negligible: The square of a remainder of Jᵀ a that is rounding, shape (k + n,).
         L: Shape (m, m).
         Q: Shape (m, width).
         vectors: y, a row of B, and its remainder, shape (3, width).
@@ -106,6 +110,7 @@ class Workspace(NamedTuple):
     multipliers: Array
     origin: Array
     norms: Array
+    negligible: Array
     L: Array
     Q: Array
     vectors: Array
@@ -114,14 +119,16 @@ class Workspace(NamedTuple):
     @classmethod
     def of(cls, n: int, k: int, soft: bool = False) -> Self:
         """Allocate for n unknowns and k rows; ``soft``: if any constraint may be."""
-        width = n + (k + n if soft else 0)
-        m = min(width, k + n)
+        entries = n + (k + n if soft else 0)
+        m = min(entries, k + n)
+        width = -(-entries // 8) * 8  # whole registers: a tenth faster
         return cls(
             np.zeros(k + n, dtype=np.int64),
             np.zeros(2, dtype=np.int64),
             np.zeros(m, dtype=np.int64),
             np.zeros(m),
             np.zeros(n),
+            np.zeros(k + n),
             np.zeros(k + n),
             np.zeros((m, m)),
             np.zeros((m, width)),
@@ -131,176 +138,162 @@ class Workspace(NamedTuple):
 
 
 @kernel
-def minimise(
-    factor: Factor,
-    constraints: Constraints,
-    equalities: int,
-    warm: bool,
-    x: Array,
-    work: Workspace,
-) -> int:
+def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
     """Overwrite x0 with the optimum x; return `SOLVED`, `INFEASIBLE` or `EXHAUSTED`.
 
     Args:
-        factor: The cost.
-        constraints: The constraints.
-        equalities: How many of the first rows are equalities (lower = upper).
+        problem: The QP.
         warm: Whether to begin with the active constraints of the last call.
         x: x0, shape (n,); overwritten.
         work: Memory; its active constraints, multipliers and counts are results.
     """
-    if not _prepare(factor, constraints, equalities, warm, x, work):
+    if not _prepare(problem, warm, x, work):
         return INFEASIBLE
-    reference = _square(factor.JT) * _DEPENDENT * _DEPENDENT
     for i in range(work.held.shape[0]):
         if work.held[i] != 0:
-            _append(i, factor, constraints, reference, work)
-    _settle(factor, constraints, equalities, x, work)
-    settled = True
+            _append(i, problem, work)
+    if work.counts[0] > 0:
+        _settle(problem, x, work)
+    settled, tolerance = True, _TOLERANCE
     while work.counts[1] < _ITERATIONS * work.held.shape[0]:
-        entering, violation = _most_violated(factor, constraints, x, work)
+        entering, violation = _most_violated(tolerance, problem, x, work)
         if entering >= 0:
-            if not _enter(
-                entering, violation, factor, constraints, equalities, reference, work
-            ):
+            if settled and work.counts[1] > 0:
+                tolerance *= 10.0
+            if not _enter(entering, violation, problem, work):
                 return INFEASIBLE
-            _move(factor, work.vectors[0], x, work)
+            _move(problem, x, work)
             settled = False
-        elif not settled:  # x is a sum of steps: compute it anew, and look again
-            _settle(factor, constraints, equalities, x, work)
-            settled = True
-        else:
+        elif settled:
             return SOLVED
+        else:  # x is a sum of steps: compute it anew, and look again
+            _settle(problem, x, work)
+            settled = True
     return EXHAUSTED
 
 
 @kernel
-def _prepare(
-    factor: Factor,
-    constraints: Constraints,
-    equalities: int,
-    warm: bool,
-    x: Array,
-    work: Workspace,
-) -> bool:
-    """Begin at x0, mark what to hold; return whether each lower bound is permitted."""
-    A, begin, end, lower, upper, _ = constraints
+def _prepare(problem: Problem, warm: bool, x: Array, work: Workspace) -> bool:
+    """Begin at x0, mark what to hold; return whether each constraint can be kept alone.
+
+    NaN makes each comparison false, and so the result.
+    """
+    JT, A, lower, upper = problem.JT, problem.A, problem.lower, problem.upper
     k, n = A.shape
     held, norms = work.held, work.norms
     work.counts[:] = 0
     work.vectors[0] = 0.0
-    largest = 0.0
+    size, rounding = 1.0, 0.0
     for j in range(n):
         work.origin[j] = x[j]
-        largest = max(largest, abs(x[j]))
+        size += abs(x[j])
         norms[k + j] = 1.0
+        for r in range(JT.shape[0]):
+            rounding += JT[r, j] * JT[r, j]
+    rounding *= _DEPENDENT * _DEPENDENT
     for i in range(k):
         square = 0.0
-        for j in range(begin[i], end[i]):
+        for j in range(problem.begin[i], problem.end[i]):
             square += A[i, j] * A[i, j]
-        norms[i] = np.sqrt(square) if square > 0.0 else 1.0
+        norms[i] = np.sqrt(square) if square != 0.0 else 1.0
+    possible = size + rounding < np.inf
     for i in range(k + n):
-        if lower[i] - upper[i] > _TOLERANCE * norms[i] * (1.0 + largest):
-            return False
+        work.negligible[i] = rounding * norms[i] * norms[i]
+        gap = lower[i] - upper[i]
+        possible = possible and gap <= _TOLERANCE * norms[i] * size
         bound = lower[i] if held[i] > 0 else upper[i]
-        if i < equalities:
+        if i < problem.equalities:
             held[i] = 1
         elif not (warm and np.isfinite(bound)):
             held[i] = 0
-    return True
+    return possible
 
 
 @kernel
 def _settle(
-    factor: Factor,
-    constraints: Constraints,
-    equalities: int,
+    problem: Problem,
     x: Array,
     work: Workspace,
 ) -> None:
-    """Compute y and the multipliers of the active constraints from x0.
+    """Make y and x the optimum of the active constraints, without rounding of steps.
 
-    y = Qᵀ w and Lᵀ multipliers = w with L w = b - A x0. Constraints with a multiplier of
-    the wrong sign are released, the worst first: what remains is the optimum of the
-    active constraints, where the method may begin.
+    L w = b - A x corrects the active constraints; then y = Qᵀ (Q y + w), and
+    Lᵀ multipliers = Q y. Constraints with a multiplier of the wrong sign are released,
+    the worst first: from what remains the method may begin.
     """
     y = work.vectors[0]
-    while True:
+    wrong = 0
+    while wrong >= 0:
         count = work.counts[0]
-        L = work.L[:count, :count]
-        w, residual = work.steps[0, :count], work.steps[1, :count]
-        y[:] = 0.0
-        w[:] = 0.0
-        for _ in range(2):  # the second time corrects rounding
-            _move(factor, y, x, work)
-            for c in range(count):
-                i = work.active[c]
-                bound = constraints.lower if work.held[i] > 0 else constraints.upper
-                residual[c] = bound[i] - _value(i, factor, constraints, x, y)
-            solve_lower(L, residual)
-            for c in range(count):
-                w[c] += residual[c]
-                for j in range(y.shape[0]):
-                    y[j] += residual[c] * work.Q[c, j]
-        solve_lower_transposed(L, w)
+        L, w, shares = work.L[:count, :count], work.steps[0, :count], work.multipliers
+        for c in range(count):
+            i = work.active[c]
+            bound = problem.lower if work.held[i] > 0 else problem.upper
+            w[c] = bound[i] - _value(i, problem, x, y)
+        solve_lower(L, w)
+        multiply(work.Q[:count], y, shares)
+        for c in range(count):
+            shares[c] += w[c]
+        multiply_transposed(work.Q[:count], shares, y)
+        solve_lower_transposed(L, shares[:count])
         wrong, least = -1, 0.0
         for c in range(count):
-            work.multipliers[c] = w[c]
             i = work.active[c]
-            if i >= equalities and work.held[i] * w[c] < least:
-                wrong, least = c, work.held[i] * w[c]
-        if wrong < 0:
-            break
-        _release(wrong, work)
-    _move(factor, y, x, work)
+            if i >= problem.equalities and work.held[i] * shares[c] < least:
+                wrong, least = c, work.held[i] * shares[c]
+        if wrong >= 0:
+            _release(wrong, work)
+        _move(problem, x, work)
 
 
 @kernel
-def _move(factor: Factor, y: Array, x: Array, work: Workspace) -> None:
+def _move(problem: Problem, x: Array, work: Workspace) -> None:
     """Write x = x0 + J y."""
-    JT, begin, end = factor
+    JT, y = problem.JT, work.vectors[0]
     for j in range(x.shape[0]):
         x[j] = work.origin[j]
     for r in range(JT.shape[0]):
-        for j in range(begin[r], end[r]):
+        for j in range(problem.first[r], problem.last[r]):
             x[j] += y[r] * JT[r, j]
 
 
 @kernel
-def _value(i: int, factor: Factor, constraints: Constraints, x: Array, y: Array) -> float:
+def _value(i: int, problem: Problem, x: Array, y: Array) -> float:
     """Return a_i·x, and the slack if constraint i is soft."""
-    A, begin, end, _, _, softness = constraints
-    k = A.shape[0]
+    A, softness, k = problem.A, problem.softness, problem.A.shape[0]
     total = 0.0
     if i >= k:
         total = x[i - k]
     else:
-        for j in range(begin[i], end[i]):
+        for j in range(problem.begin[i], problem.end[i]):
             total += A[i, j] * x[j]
     if softness.shape[0] > 0:
-        total += softness[i] * y[factor.JT.shape[0] + i]
+        total += softness[i] * y[problem.JT.shape[0] + i]
     return total
 
 
 @kernel
 def _most_violated(
-    factor: Factor, constraints: Constraints, x: Array, work: Workspace
+    tolerance: float,
+    problem: Problem,
+    x: Array,
+    work: Workspace,
 ) -> tuple[int, float]:
     """Return the constraint that x is farthest from, marked as held, and its violation.
 
     It is -1 if x satisfies all. The distance is the violation divided by the length of
     the row.
     """
-    lower, upper = constraints.lower, constraints.upper
+    lower, upper = problem.lower, problem.upper
     largest = 0.0
     for j in range(x.shape[0]):
         largest = max(largest, abs(x[j]))
-    farthest = _TOLERANCE * (1.0 + largest)
+    farthest = tolerance * (1.0 + largest)
     entering, side, violation = -1, 0, 0.0
     for i in range(work.held.shape[0]):
         if work.held[i] != 0:
             continue
-        value = _value(i, factor, constraints, x, work.vectors[0])
+        value = _value(i, problem, x, work.vectors[0])
         below, above = lower[i] - value, value - upper[i]
         beyond = max(below, above)
         if beyond > farthest * work.norms[i]:
@@ -315,25 +308,23 @@ def _most_violated(
 def _enter(
     entering: int,
     violation: float,
-    factor: Factor,
-    constraints: Constraints,
-    equalities: int,
-    reference: float,
+    problem: Problem,
     work: Workspace,
 ) -> bool:
     """Make a violated constraint active; return False if that is impossible.
 
     Steps 2 and 3 of the method. Its multiplier grows from zero and y moves with it,
-    until the constraint holds; an active one whose multiplier vanishes first is released.
+    until the constraint holds. An active one whose multiplier vanishes first is
+    released.
     """
     y, remainder = work.vectors[0], work.vectors[2]
     side, multiplier = work.held[entering], 0.0
-    _row(entering, factor, constraints, work)
+    _row(entering, problem, work)
+    square = _remainder(work.counts[0], work)
     while True:
         work.counts[1] += 1
         count = work.counts[0]
-        square = _remainder(count, work)
-        independent = square > reference * work.norms[entering] * work.norms[entering]
+        independent = square > work.negligible[entering]
         rate = work.steps[1, :count]  # of the multipliers, Lᵀ rate = Q b
         for c in range(count):
             rate[c] = work.steps[0, c]
@@ -342,7 +333,7 @@ def _enter(
         for c in range(count):
             i = work.active[c]
             decrease = side * work.held[i] * rate[c]
-            if i >= equalities and decrease > 0.0:
+            if i >= problem.equalities and decrease > 0.0:
                 limit = work.held[i] * work.multipliers[c] / decrease
                 if limit < step:
                     step, leaving = limit, c
@@ -360,38 +351,38 @@ def _enter(
             work.multipliers[count] = multiplier
             return True
         _release(leaving, work)
+        square = _regain(work)
 
 
 @kernel
-def _append(
-    i: int, factor: Factor, constraints: Constraints, reference: float, work: Workspace
-) -> None:
+def _append(i: int, problem: Problem, work: Workspace) -> None:
     """Make constraint i active if it does not depend on those that are."""
-    _row(i, factor, constraints, work)
+    _row(i, problem, work)
     square = _remainder(work.counts[0], work)
-    if square > reference * work.norms[i] * work.norms[i]:
+    if square > work.negligible[i]:
         _extend(i, square, work)
     else:
         work.held[i] = 0
 
 
 @kernel
-def _row(i: int, factor: Factor, constraints: Constraints, work: Workspace) -> None:
+def _row(i: int, problem: Problem, work: Workspace) -> None:
     """Write the row b = Jᵀ a of constraint i, with its softness."""
-    A, begin, end, _, _, softness = constraints
-    b, (JT, first, last) = work.vectors[1], factor
+    JT, A, b = problem.JT, problem.A, work.vectors[1]
     nz, k = JT.shape[0], A.shape[0]
     b[:] = 0.0
     for r in range(nz):
         if i < k:
+            begin = max(problem.begin[i], problem.first[r])
+            end = min(problem.end[i], problem.last[r])
             total = 0.0
-            for j in range(max(begin[i], first[r]), min(end[i], last[r])):
+            for j in range(begin, end):
                 total += JT[r, j] * A[i, j]
             b[r] = total
         else:
             b[r] = JT[r, i - k]
-    if softness.shape[0] > 0:
-        b[nz + i] = softness[i]
+    if problem.softness.shape[0] > 0:
+        b[nz + i] = problem.softness[i]
 
 
 @kernel
@@ -425,6 +416,18 @@ def _remainder(count: int, work: Workspace) -> float:
 
 
 @kernel
+def _regain(work: Workspace) -> float:
+    """Add the direction that was freed to the remainder of b; return its square."""
+    remainder, freed = work.vectors[2], work.Q[work.counts[0]]
+    component = work.steps[0, work.counts[0]]
+    square = 0.0
+    for j in range(remainder.shape[0]):
+        remainder[j] += component * freed[j]
+        square += remainder[j] * remainder[j]
+    return square
+
+
+@kernel
 def _extend(i: int, square: float, work: Workspace) -> None:
     """Add constraint i to the active ones: one more row of L and of Q."""
     count = work.counts[0]
@@ -440,8 +443,12 @@ def _extend(i: int, square: float, work: Workspace) -> None:
 
 @kernel
 def _release(leaving: int, work: Workspace) -> None:
-    """Remove an active constraint: rotations make L lower triangular again."""
-    L, Q, count = work.L, work.Q, work.counts[0] - 1
+    """Remove an active constraint: rotations make L lower triangular again.
+
+    They leave the direction that is freed in the row of Q after the last, and rotate
+    the components Q b too.
+    """
+    L, Q, components, count = work.L, work.Q, work.steps[0], work.counts[0] - 1
     work.held[work.active[leaving]] = 0
     work.counts[0] = count
     for r in range(leaving, count):
@@ -455,16 +462,8 @@ def _release(leaving: int, work: Workspace) -> None:
         for i in range(r, count):
             a, b = L[i, r], L[i, r + 1]
             L[i, r], L[i, r + 1] = cosine * a + sine * b, cosine * b - sine * a
+        a, b = components[r], components[r + 1]
+        components[r], components[r + 1] = cosine * a + sine * b, cosine * b - sine * a
         for j in range(Q.shape[1]):
             a, b = Q[r, j], Q[r + 1, j]
             Q[r, j], Q[r + 1, j] = cosine * a + sine * b, cosine * b - sine * a
-
-
-@kernel
-def _square(A: Array) -> float:
-    """Return ‖A‖²."""
-    total = 0.0
-    for i in range(A.shape[0]):
-        for j in range(A.shape[1]):
-            total += A[i, j] * A[i, j]
-    return total

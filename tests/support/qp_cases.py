@@ -1,0 +1,383 @@
+"""Random QPs of many kinds, their solution by other solvers, what proves an optimum.
+
+The oracles solve in y, x = x0 + J y, with rows of length 1: there the cost is ½ ‖y‖²,
+so that they suffer least from the scales of the cost and of the rows.
+"""
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import NamedTuple
+
+import daqp
+import numpy as np
+import quadprog
+from numpy.typing import NDArray
+
+from hsp_control.control.actuation.dual_active_set import (
+    Problem,
+    Workspace,
+    minimise,
+)
+
+Array = NDArray[np.float64]
+Generator = np.random.Generator
+
+
+class Case(NamedTuple):
+    """A QP: minimise ½ ‖y‖² over x = x0 + J y, lower ≤ (A x, x) ≤ upper."""
+
+    JT: Array
+    A: Array
+    lower: Array
+    upper: Array
+    equalities: int
+    x0: Array
+    feasible: bool = True
+
+    @property
+    def rows(self) -> Array:
+        """All constraints as rows on x."""
+        return np.vstack([self.A, np.eye(len(self.x0))])
+
+
+class Answer(NamedTuple):
+    """What the kernel returned."""
+
+    code: int
+    x: Array
+    active: NDArray[np.int64]
+    sides: NDArray[np.int64]
+    multipliers: Array
+    iterations: int
+
+
+# --- kinds ---------------------------------------------------------------------------
+
+
+def dense(rng: Generator) -> Case:
+    n, k = int(rng.integers(1, 13)), int(rng.integers(1, 21))
+    return around(rng, factor(rng, n, n), rng.standard_normal((k, n)))
+
+
+def prioritised(rng: Generator) -> Case:
+    """Costs of motions that differ by 1e8, as those of a law with three levels."""
+    n, k = int(rng.integers(3, 13)), int(rng.integers(1, 13))
+    Q = np.linalg.qr(rng.standard_normal((n, n)))[0]
+    JT = Q * (10.0 ** (2.0 * rng.integers(0, 3, n)))[:, None]
+    return around(rng, JT, rng.standard_normal((k, n)))
+
+
+def equalities(rng: Generator) -> Case:
+    n, k = int(rng.integers(2, 13)), int(rng.integers(2, 16))
+    count = int(rng.integers(1, min(n, k) + 1))
+    return around(rng, factor(rng, n, n), rng.standard_normal((k, n)), count)
+
+
+def degenerate(rng: Generator) -> Case:
+    """More rows through one point than unknowns; repeated, parallel, opposite rows."""
+    n = int(rng.integers(1, 9))
+    A = rng.standard_normal((2 * n, n))
+    again = rng.choice([-3.0, -1.0, 0.1, 1.0, 1e3], 2 * n)[:, None] * A
+    A = np.vstack([A, again, np.round(rng.standard_normal((n, n)))])
+    case = around(rng, factor(rng, n, n), A)
+    corner = case.x0 + case.JT.T @ rng.standard_normal(len(case.JT))
+    at = case.rows @ corner
+    side = rng.random(len(at)) < 0.5
+    width = rng.uniform(0.0, 3.0, len(at))
+    lower = np.where(side, at, at - width)
+    return case._replace(lower=lower, upper=np.where(side, at + width, at))
+
+
+def badly_scaled(rng: Generator) -> Case:
+    case = dense(rng)
+    k = len(case.A)
+    scale = 10.0 ** rng.uniform(-4.0, 4.0, k)
+    lower, upper = case.lower.copy(), case.upper.copy()
+    lower[:k] *= scale
+    upper[:k] *= scale
+    return case._replace(A=scale[:, None] * case.A, lower=lower, upper=upper)
+
+
+def pinned(rng: Generator) -> Case:
+    """Rows with lower = upper that nobody declared to be equalities."""
+    n, k = int(rng.integers(2, 11)), int(rng.integers(2, 11))
+    return around(
+        rng, factor(rng, n, n), rng.standard_normal((k, n)), min(n - 1, k)
+    )._replace(equalities=0)
+
+
+def bounds_only(rng: Generator) -> Case:
+    n = int(rng.integers(1, 15))
+    return around(rng, factor(rng, n, n), np.zeros((0, n)))
+
+
+def unspanned(rng: Generator) -> Case:
+    """Some motions are not allowed: J has fewer columns than rows."""
+    n = int(rng.integers(2, 13))
+    nz = int(rng.integers(1, n))
+    k = int(rng.integers(1, 13))
+    return around(rng, factor(rng, nz, n), rng.standard_normal((k, n)), nz // 3)
+
+
+def with_zeros(rng: Generator) -> Case:
+    """Rows of zeros, and rows and columns with zeros at their ends."""
+    n, k = int(rng.integers(2, 13)), int(rng.integers(2, 13))
+    A, JT = rng.standard_normal((k, n)), factor(rng, n, n)
+    for row in (*A, *JT[: n // 2]):
+        begin, end = np.sort(rng.integers(0, n + 1, 2))
+        row[:begin] = row[end:] = 0.0
+    return around(rng, JT, A)
+
+
+def redundant(rng: Generator) -> Case:
+    """Equalities that follow from others."""
+    case = equalities(rng)
+    count, extra = case.equalities, int(rng.integers(1, 4))
+    mix = rng.standard_normal((extra, count))
+    return case._replace(
+        A=np.vstack([mix @ case.A[:count], case.A]),
+        lower=np.concatenate([mix @ case.lower[:count], case.lower]),
+        upper=np.concatenate([mix @ case.upper[:count], case.upper]),
+        equalities=count + extra,
+    )
+
+
+def infeasible(rng: Generator) -> Case:
+    """A combination of rows is bounded away from what the rows permit."""
+    case = (dense, equalities, unspanned, badly_scaled)[rng.integers(4)](rng)
+    rows, part = case.rows, rng.standard_normal(len(case.rows))
+    part[rng.random(len(rows)) < 0.5] = 0.0
+    part[~np.isfinite(case.lower) | ~np.isfinite(case.upper)] = 0.0
+    part /= norms(rows)
+    used = part != 0.0
+    ends = part[used] * np.array([case.lower[used], case.upper[used]])
+    most = ends.max(axis=0).sum()
+    row = part @ rows
+    size = max(np.linalg.norm(row), 1.0)
+    margin = size * 10.0 ** rng.uniform(-3.0, 0.0)
+    k = len(case.A)
+    return case._replace(
+        A=np.vstack([case.A, row]),
+        lower=np.insert(case.lower, k, most + margin),
+        upper=np.insert(case.upper, k, np.inf),
+        feasible=False,
+    )
+
+
+KINDS: dict[str, Callable[[Generator], Case]] = {
+    kind.__name__: kind
+    for kind in (
+        dense,
+        prioritised,
+        equalities,
+        degenerate,
+        badly_scaled,
+        pinned,
+        bounds_only,
+        unspanned,
+        with_zeros,
+        redundant,
+        infeasible,
+    )
+}
+
+
+def factor(rng: Generator, nz: int, n: int) -> Array:
+    """Return Jᵀ with singular values from 0.1 to 10."""
+    U = np.linalg.qr(rng.standard_normal((nz, nz)))[0]
+    V = np.linalg.qr(rng.standard_normal((n, nz)))[0]
+    return np.asarray((U * 10.0 ** rng.uniform(-1.0, 1.0, nz)) @ V.T)
+
+
+def around(rng: Generator, JT: Array, A: Array, count: int = 0) -> Case:
+    """Return constraints that a random point satisfies; the first are equalities."""
+    (nz, n), k = JT.shape, len(A)
+    x0 = rng.standard_normal(n)
+    rows = np.vstack([A, np.eye(n)])
+    inside = rows @ (x0 + JT.T @ rng.standard_normal(nz))
+    size = np.linalg.norm(rows, axis=1)
+    below, above = size * rng.uniform(0.0, 2.0, (2, k + n))
+    below[rng.random(k + n) < 0.2] = np.inf
+    above[rng.random(k + n) < 0.2] = np.inf
+    below[:count] = above[:count] = 0.0
+    return Case(JT, A, inside - below, inside + above, count, x0)
+
+
+# --- solutions -----------------------------------------------------------------------
+
+
+def spans(A: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return where the non-zero entries of each row begin and end."""
+    begin, end = np.zeros((2, len(A)), dtype=np.int64)
+    for i, row in enumerate(A):
+        filled = np.flatnonzero(row)
+        if len(filled):
+            begin[i], end[i] = filled[0], filled[-1] + 1
+    return begin, end
+
+
+def packed(case: Case, softness: Array | None = None) -> Problem:
+    """Return the kernel's argument."""
+    soft = np.zeros(0) if softness is None else softness
+    JT, A = np.ascontiguousarray(case.JT), np.ascontiguousarray(case.A)
+    ends = case.lower, case.upper, soft, case.equalities
+    return Problem(JT, *spans(JT), A, *spans(A), *ends)
+
+
+def answer(
+    case: Case, softness: Array | None = None, work: Workspace | None = None
+) -> Answer:
+    """Return the kernel's solution; ``work``: a workspace to begin warm with."""
+    x, warm = case.x0.copy(), work is not None
+    if work is None:
+        work = Workspace.of(len(x), len(case.A), softness is not None)
+    code = minimise(packed(case, softness), warm, x, work)
+    active = work.active[: work.counts[0]].copy()
+    return Answer(
+        int(code),
+        x,
+        active,
+        work.held[active],
+        work.multipliers[: len(active)].copy(),
+        int(work.counts[1]),
+    )
+
+
+def _in_y(case: Case) -> tuple[Array, Array, Array] | None:
+    """Return the constraints as rows of length 1 on y.
+
+    Rows of zeros are left out; None if one of them is violated.
+    """
+    rows, offset = case.rows @ case.JT.T, case.rows @ case.x0
+    lower, upper, size = case.lower - offset, case.upper - offset, norms(rows)
+    some = size > 1e-12 * norms(case.rows)
+    if (lower[~some] > 1e-9).any() or (upper[~some] < -1e-9).any():
+        return None
+    size = size[some]
+    return rows[some] / size[:, None], lower[some] / size, upper[some] / size
+
+
+def norms(rows: Array) -> Array:
+    """Return the length of each row."""
+    return np.asarray(np.linalg.norm(rows, axis=1))
+
+
+def by_daqp(case: Case) -> Array | None:
+    """Return x by DAQP, or None."""
+    constraints, nz = _in_y(case), len(case.JT)
+    if constraints is None:
+        return None
+    C, lower, upper = constraints
+    sense = np.where(upper - lower < 1e-12, 5, 0).astype(np.int32)
+    y, _, flag, _ = daqp.solve(
+        np.eye(nz), np.zeros(nz), C, upper, lower, sense, primal_tol=1e-11
+    )
+    return case.x0 + case.JT.T @ y if flag >= 1 else None
+
+
+def by_quadprog(case: Case) -> Array | None:
+    """Return x by quadprog, or None. It declares redundant equalities inconsistent."""
+    constraints, nz = _in_y(case), len(case.JT)
+    if constraints is None:
+        return None
+    C, lower, upper = constraints
+    same = upper - lower < 1e-12
+    G = np.vstack([C[same], C[~same], -C[~same]])
+    b = np.concatenate([lower[same], lower[~same], -upper[~same]])
+    some, equal = np.isfinite(b), int(same.sum())
+    if not some.any():
+        return case.x0
+    try:
+        y = quadprog.solve_qp(np.eye(nz), np.zeros(nz), G[some].T, b[some], equal)[0]
+    except ValueError:
+        return None
+    return np.asarray(case.x0 + case.JT.T @ y)
+
+
+# --- what proves an optimum ----------------------------------------------------------
+
+
+def cost(case: Case, x: Array) -> float:
+    """Return ½ ‖y‖² of the least y with x = x0 + J y."""
+    y = np.linalg.lstsq(case.JT.T, x - case.x0, rcond=None)[0]
+    return float(0.5 * y @ y)
+
+
+def residual(case: Case, x: Array) -> float:
+    """Return the distance from x to the worst constraint, relative to 1 + |x|."""
+    value, size = case.rows @ x, norms(case.rows)
+    beyond = np.maximum(case.lower - value, value - case.upper)
+    size = np.where(size > 0.0, size, 1.0)
+    return float(max((beyond / size).max(), 0.0) / (1.0 + np.abs(x).max()))
+
+
+def defect(case: Case, found: Answer) -> float:
+    """Return how far an answer is from the conditions of Karush, Kuhn and Tucker.
+
+    The largest of: the residual; what x differs from x0 + J Bᵀ u, relative to 1 + |x|;
+    the relative gap between the primal and the dual cost. Multipliers of a wrong sign
+    give inf.
+    """
+    u, active = found.multipliers, found.active
+    free = active >= case.equalities
+    if (found.sides[free] * u[free] < 0.0).any():
+        return np.inf
+    B = case.rows[active] @ case.JT.T
+    y = B.T @ u
+    bound = np.where(found.sides > 0, case.lower[active], case.upper[active])
+    dual = u @ (bound - case.rows[active] @ case.x0) - 0.5 * y @ y
+    primal = 0.5 * y @ y
+    moved = np.abs(case.x0 + case.JT.T @ y - found.x).max()
+    return float(
+        max(
+            residual(case, found.x),
+            moved / (1.0 + np.abs(found.x).max()),
+            abs(primal - dual) / max(1.0, primal),
+        )
+    )
+
+
+def exact_cost(case: Case, found: Answer) -> float | None:
+    """Return the cost of the active set's optimum, in rational numbers.
+
+    None if it is not the optimum of the QP: its constraints depend on each other, a
+    multiplier has the wrong sign, or it is more than 1e-9 beyond a constraint.
+    """
+    exact = np.vectorize(Fraction, otypes=[object])
+    JT, rows, x0 = exact(case.JT), exact(case.rows), exact(case.x0)
+    active = found.active
+    B = rows[active] @ JT.T
+    bound = np.where(found.sides > 0, case.lower[active], case.upper[active])
+    u = _solved(B @ B.T, exact(bound) - rows[active] @ x0) if len(active) else B[:, 0]
+    if u is None:
+        return None
+    y = B.T @ u
+    wrong = [
+        side * each < 0
+        for side, each, i in zip(found.sides, u, active, strict=True)
+        if i >= case.equalities
+    ]
+    x = (x0 + JT.T @ y).astype(float)
+    if any(wrong) or residual(case, x) > 1e-9:
+        return None
+    return float(sum(each * each for each in y) / 2)
+
+
+def _solved(
+    G: NDArray[np.object_], b: NDArray[np.object_]
+) -> NDArray[np.object_] | None:
+    """Return G⁻¹ b by Gauss' elimination, None if G is singular."""
+    G, b = G.copy(), b.copy()
+    n = len(b)
+    for i in range(n):
+        pivot = next((r for r in range(i, n) if G[r, i] != 0), None)
+        if pivot is None:
+            return None
+        G[[i, pivot]], b[[i, pivot]] = G[[pivot, i]], b[[pivot, i]]
+        for r in range(i + 1, n):
+            ratio = G[r, i] / G[i, i]
+            G[r] -= ratio * G[i]
+            b[r] -= ratio * b[i]
+    for i in reversed(range(n)):
+        b[i] = (b[i] - G[i, i + 1 :] @ b[i + 1 :]) / G[i, i]
+    return b
