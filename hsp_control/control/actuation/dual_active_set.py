@@ -100,7 +100,7 @@ class Workspace(NamedTuple):
         negligible: The square of a remainder of Jᵀ a that is rounding, shape (k + n,).
         L: Shape (m, m).
         Q: Shape (m, width).
-        vectors: y, a row of B, and its remainder, shape (3, width).
+        vectors: y, and the remainder of a row of B, shape (2, width).
         steps: Two vectors of the active constraints, shape (2, m).
     """
 
@@ -132,7 +132,7 @@ class Workspace(NamedTuple):
             np.zeros(k + n),
             np.zeros((m, m)),
             np.zeros((m, width)),
-            np.zeros((3, width)),
+            np.zeros((2, width)),
             np.zeros((2, m)),
         )
 
@@ -151,7 +151,11 @@ def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
         return INFEASIBLE
     for i in range(work.held.shape[0]):
         if work.held[i] != 0:
-            _append(i, problem, work)
+            square = _remainder(i, problem, work)
+            if square > work.negligible[i]:
+                _extend(i, square, work)
+            else:
+                work.held[i] = 0
     if work.counts[0] > 0:
         _settle(problem, x, work)
     settled, tolerance = True, _TOLERANCE
@@ -222,8 +226,7 @@ def _settle(
     the worst first: from what remains the method may begin.
     """
     y = work.vectors[0]
-    wrong = 0
-    while wrong >= 0:
+    while True:
         count = work.counts[0]
         L, w, shares = work.L[:count, :count], work.steps[0, :count], work.multipliers
         for c in range(count):
@@ -236,14 +239,16 @@ def _settle(
             shares[c] += w[c]
         multiply_transposed(work.Q[:count], shares, y)
         solve_lower_transposed(L, shares[:count])
-        wrong, least = -1, 0.0
+        wrong, least = count, 0.0
         for c in range(count):
             i = work.active[c]
             if i >= problem.equalities and work.held[i] * shares[c] < least:
                 wrong, least = c, work.held[i] * shares[c]
-        if wrong >= 0:
+        if wrong < count:
             _release(wrong, work)
         _move(problem, x, work)
+        if wrong == count:
+            return
 
 
 @kernel
@@ -317,10 +322,9 @@ def _enter(
     until the constraint holds. An active one whose multiplier vanishes first is
     released.
     """
-    y, remainder = work.vectors[0], work.vectors[2]
+    y, remainder = work.vectors[0], work.vectors[1]
     side, multiplier = work.held[entering], 0.0
-    _row(entering, problem, work)
-    square = _remainder(work.counts[0], work)
+    square = _remainder(entering, problem, work)
     while True:
         work.counts[1] += 1
         count = work.counts[0]
@@ -351,80 +355,50 @@ def _enter(
             work.multipliers[count] = multiplier
             return True
         _release(leaving, work)
-        square = _regain(work)
+        count, square = work.counts[0], 0.0  # the remainder gains what is freed
+        for j in range(y.shape[0]):
+            remainder[j] += work.steps[0, count] * work.Q[count, j]
+            square += remainder[j] * remainder[j]
 
 
 @kernel
-def _append(i: int, problem: Problem, work: Workspace) -> None:
-    """Make constraint i active if it does not depend on those that are."""
-    _row(i, problem, work)
-    square = _remainder(work.counts[0], work)
-    if square > work.negligible[i]:
-        _extend(i, square, work)
-    else:
-        work.held[i] = 0
-
-
-@kernel
-def _row(i: int, problem: Problem, work: Workspace) -> None:
-    """Write the row b = Jᵀ a of constraint i, with its softness."""
-    JT, A, b = problem.JT, problem.A, work.vectors[1]
-    nz, k = JT.shape[0], A.shape[0]
-    b[:] = 0.0
-    for r in range(nz):
-        if i < k:
-            begin = max(problem.begin[i], problem.first[r])
-            end = min(problem.end[i], problem.last[r])
-            total = 0.0
-            for j in range(begin, end):
-                total += JT[r, j] * A[i, j]
-            b[r] = total
-        else:
-            b[r] = JT[r, i - k]
-    if problem.softness.shape[0] > 0:
-        b[nz + i] = problem.softness[i]
-
-
-@kernel
-def _remainder(count: int, work: Workspace) -> float:
-    """Write Q b, and what remains of b without these components; return its square.
+def _remainder(i: int, problem: Problem, work: Workspace) -> float:
+    """Write b = Jᵀ a of constraint i, Q b, and what remains of b; return its square.
 
     If nine tenths of the length cancel, the components are subtracted a second time
     ("twice is enough", Giraud et al. 2005).
     """
-    b, remainder, components = work.vectors[1], work.vectors[2], work.steps[0]
-    before = 0.0
-    for j in range(b.shape[0]):
-        remainder[j] = b[j]
-        before += b[j] * b[j]
+    JT, A, nz = problem.JT, problem.A, problem.JT.shape[0]
+    remainder, components, count = work.vectors[1], work.steps[0], work.counts[0]
+    remainder[:] = 0.0
     components[:count] = 0.0
-    after = before
+    for r in range(nz):
+        if i < A.shape[0]:
+            begin = max(problem.begin[i], problem.first[r])
+            end = min(problem.end[i], problem.last[r])
+            for j in range(begin, end):
+                remainder[r] += JT[r, j] * A[i, j]
+        else:
+            remainder[r] = JT[r, i - A.shape[0]]
+    if problem.softness.shape[0] > 0:
+        remainder[nz + i] = problem.softness[i]
+    before = after = 0.0
+    for j in range(remainder.shape[0]):
+        before += remainder[j] * remainder[j]
     for _ in range(2):
         for c in range(count):
             q, component = work.Q[c], 0.0
-            for j in range(b.shape[0]):
+            for j in range(remainder.shape[0]):
                 component += q[j] * remainder[j]
-            for j in range(b.shape[0]):
+            for j in range(remainder.shape[0]):
                 remainder[j] -= component * q[j]
             components[c] += component
         after = 0.0
-        for j in range(b.shape[0]):
+        for j in range(remainder.shape[0]):
             after += remainder[j] * remainder[j]
         if after > 0.01 * before:
             break
     return after
-
-
-@kernel
-def _regain(work: Workspace) -> float:
-    """Add the direction that was freed to the remainder of b; return its square."""
-    remainder, freed = work.vectors[2], work.Q[work.counts[0]]
-    component = work.steps[0, work.counts[0]]
-    square = 0.0
-    for j in range(remainder.shape[0]):
-        remainder[j] += component * freed[j]
-        square += remainder[j] * remainder[j]
-    return square
 
 
 @kernel
@@ -436,7 +410,7 @@ def _extend(i: int, square: float, work: Workspace) -> None:
         work.L[count, c] = work.steps[0, c]
     work.L[count, count] = size
     for j in range(work.Q.shape[1]):
-        work.Q[count, j] = work.vectors[2, j] / size
+        work.Q[count, j] = work.vectors[1, j] / size
     work.active[count] = i
     work.counts[0] = count + 1
 
