@@ -214,11 +214,7 @@ def _prepare(problem: Problem, warm: bool, x: Array, work: Workspace) -> bool:
 
 
 @kernel
-def _settle(
-    problem: Problem,
-    x: Array,
-    work: Workspace,
-) -> None:
+def _settle(problem: Problem, x: Array, work: Workspace) -> None:
     """Make y and x the optimum of the active constraints, without rounding of steps.
 
     L w = b - A x corrects the active constraints; then y = Qᵀ (Q y + w), and
@@ -310,12 +306,7 @@ def _most_violated(
 
 
 @kernel
-def _enter(
-    entering: int,
-    violation: float,
-    problem: Problem,
-    work: Workspace,
-) -> bool:
+def _enter(entering: int, violation: float, problem: Problem, work: Workspace) -> bool:
     """Make a violated constraint active; return False if that is impossible.
 
     Steps 2 and 3 of the method. Its multiplier grows from zero and y moves with it,
