@@ -167,6 +167,18 @@ class _KernelCacheImpl(CompileResultCacheImpl):
 class _KernelCache(Cache):
     _impl_class: Any = _KernelCacheImpl
 
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return kept code, None if there is none that can be read.
+
+        What is kept names the records that a kernel takes: after an upgrade one may no
+        longer exist, and a file may be damaged. Then the code is compiled anew.
+        """
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except Exception:  # whatever unpickling raises
+            self.flush()  # type: ignore[no-untyped-call]
+            return None
+
 
 @cache
 def _warn_of_no_cache() -> None:

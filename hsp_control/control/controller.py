@@ -20,6 +20,7 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation
+from hsp_control.control.actuation.status import RELAXED
 from hsp_control.control.changes import Change, Changes
 from hsp_control.control.composition import (
     Base,
@@ -350,7 +351,8 @@ class Controller:
             tau, a, forces, status, relaxation = self._actuation.deliver(
                 state, a, active.resolution, active.support, offset
             )
-            if (status or offset is not None) and not isfinite(tau @ tau):
+            # The kernel of limited steps has looked at all efforts already.
+            if (status == RELAXED or offset is not None) and not isfinite(tau @ tau):
                 self._explain_non_finite()
             # By name, and without a call of nine arguments, which costs 1 µs.
             if out is None:

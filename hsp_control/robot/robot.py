@@ -356,6 +356,8 @@ class RobotState:
         self._inverse_dynamics = partial(
             pin.rnea, robot.model, self.data, self.q, self.v
         )
+        self._compute_mass_matrix = partial(pin.crba, robot.model, self.data, self.q)
+        self._mass_matrix = matrix_view(self.data.M)
         self._world: WorldKinematics | None = None
         self._unit_blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
         self._frames: dict[str, FrameKinematics] = {}
@@ -443,10 +445,11 @@ class RobotState:
     @property
     def mass_matrix(self) -> Array:
         """M(q), shape (nv, nv) (CRBA)."""
-        if self._mass_matrix_stamp != self.stamp:
-            pin.crba(self.robot.model, self.data, self.q)
-            self._mass_matrix_stamp = self.stamp
-        return matrix_view(self.data.M)
+        stamp = self.stamp
+        if self._mass_matrix_stamp != stamp:
+            self._compute_mass_matrix()
+            self._mass_matrix_stamp = stamp
+        return self._mass_matrix
 
     @property
     def coriolis_matrix(self) -> Array:

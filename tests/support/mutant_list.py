@@ -45,6 +45,8 @@ ON_ROBOTS = UNIT + "law/test_law_on_robots.py -k "
 OF_LEVELS = UNIT + "law/test_hierarchy.py -k "
 OF_CONTACTS = UNIT + "constraints/test_contacts.py -k "
 OF_LIMITS = UNIT + "control/test_limits.py -k "
+OF_STEPS = UNIT + "control/test_limited_step.py -k "
+OF_QP = UNIT + "control/test_dual_active_set.py -k "
 OF_COMPENSATION = UNIT + "control/test_compensation.py -k "
 OF_IMPERFECTIONS = UNIT + "simulation/test_imperfections.py -k "
 
@@ -438,10 +440,31 @@ MUTANTS = (
     ),
     Mutant(
         "distances give way before motion",
-        ACTUATION + "actuation.py",
+        ACTUATION + "limited_step.py",
         '"distances": 30.0',
         '"distances": 0.03',
-        OF_LIMITS + "relaxed",
+        OF_STEPS + "distances_are_relaxed_less",
+    ),
+    Mutant(
+        "deviation: null space as dear as the task",
+        ACTUATION + "deviation_cost.py",
+        "steps[-1] = 1.0",
+        "steps[-1] = 0.0",
+        OF_STEPS + "optimum",
+    ),
+    Mutant(
+        "limited step: contacts may move",
+        ACTUATION + "step_qp.py",
+        "1 if contacts_held else 0",
+        "0",
+        OF_STEPS + "optimum",
+    ),
+    Mutant(
+        "QP: a multiplier of the wrong sign stays",
+        ACTUATION + "dual_active_set.py",
+        "if i >= problem.equalities and work.held[i] * shares[c] < least:",
+        "if i < problem.equalities and work.held[i] * shares[c] < least:",
+        OF_QP + "any_warm_start",
     ),
     Mutant(
         "friction cone with 2μ",

@@ -1,6 +1,6 @@
 """Cost of deviations from the law's acceleration; bound on their null-space part."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -9,10 +9,9 @@ from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
     orthogonalise_rows,
     orthonormalise_rows,
+    solve_lower_transposed,
     solve_rows,
-    solve_rows_transposed,
 )
-from hsp_control.control.actuation.qp import Rows
 from hsp_control.law import Resolution
 from hsp_control.law.pseudo_inverse import whiten
 from hsp_control.null_space.metrics.metric import IDENTITY
@@ -23,139 +22,209 @@ and for several. The smaller it is, the stricter the priorities; at 1e-6 an erro
 1e-3 m/s² remains in the task (docs/limits.md)."""
 
 
-class DeviationCost(NamedTuple):
-    """The cost ½ δᵀH δ of a deviation δ from the law's acceleration.
+class Directions(NamedTuple):
+    """The directions of the law's levels and of the null space, and what they are from.
+
+    The cost of a deviation δ is ½ δᵀH δ with H = Σ ρ_k (Lᵀδ·n_k)², over directions n_k
+    that are orthonormal in whitened coordinates Lᵀδ. So H⁻¹ = J Jᵀ, with the columns
+    L⁻ᵀ n_k / √ρ_k in J: no matrix is factorised.
 
     Attributes:
-        metric: H, shape (nv, nv).
-        projector: P, shape (nv, nv): P δ is the part of δ in the null space of all
-            tasks.
-    """
-
-    metric: Array
-    projector: Array
-
-
-def deviation_cost(
-    resolution: Resolution, supported: bool, weight: float | None = None
-) -> DeviationCost:
-    """Return the cost of deviations from the law's acceleration.
-
-    Args:
-        resolution: The resolved law, with its levels and its metric.
-        supported: Whether the first level is that of the contacts, whose rows are kept
-            by constraints and not by cost.
-        weight: Cost of null-space deviation relative to the first level; None: the
-            default, `_ONE_LEVEL` or `_SEVERAL_LEVELS`.
-    """
-    J = resolution.problem.task.jacobian
-    L, form = resolution.problem.metric.L, resolution.form
-    m, n = J.shape
-    N, of_level = np.empty((n, n)), np.empty(n, dtype=np.int64)
-    count = _directions(
-        *(J, L, form, resolution.ends, resolution.threshold),
-        *(np.empty((2, m, n)), np.empty((m, m)), N, of_level),
-    )
-    N, of_level = N[:count], of_level[:count]
-    levels = len(resolution.ends) - supported
-    whole = weight or (_ONE_LEVEL if levels <= 1 else _SEVERAL_LEVELS)
-    ratio = whole ** (1.0 / max(levels, 1))
-    costs = ratio ** np.maximum(of_level - supported, 0)
-    one = np.eye(n)
-    H = whole * one + (N.T * (costs - whole)) @ N
-    if form == IDENTITY:
-        return DeviationCost(H, one - N.T @ N)
-    raised = N.copy()
-    solve_rows_transposed(L, raised)
-    return DeviationCost(np.asarray(L @ H @ L.T), one - raised.T @ (N @ L.T))
-
-
-@kernel
-def _directions(
-    J: Array,
-    L: Array,
-    form: int,
-    ends: Indices,
-    threshold: float,
-    wide: Array,
-    X: Array,
-    N: Array,
-    of_level: Indices,
-) -> int:
-    """Write the directions of all levels, orthonormal rows in whitened coordinates.
-
-    Args:
-        J: Jacobian of all tasks, level after level, shape (m, nv).
+        jacobian: Jacobian of all tasks, level after level, shape (m, nv).
         L: Cholesky factor of the metric, shape (nv, nv).
         form: The metric's form.
         ends: Where each level's rows end in the stack.
         threshold: Singular value below which a direction belongs to no level.
         wide: Scratch, shape (2, m, nv).
-        X: Scratch, shape (m, m).
-        N: Written: the directions, shape (nv, nv).
-        of_level: Written: the level of each direction, shape (nv,).
-
-    Returns:
-        The number of directions.
+        square: Scratch, shape (m, m).
+        remainders: Scratch, shape (nv,).
+        N: The directions n_k as rows, shape (nv, nv).
+        level: The level of each, the number of levels for the null space, shape (nv,).
+        roots: 1/√ρ of each level and of the null space.
     """
-    n = J.shape[1]
+
+    jacobian: Array
+    L: Array
+    form: int
+    ends: Indices
+    threshold: float
+    wide: Array
+    square: Array
+    remainders: Array
+    N: Array
+    level: Indices
+    roots: Array
+
+    @classmethod
+    def of(
+        cls, resolution: Resolution, supported: bool, weight: float | None = None
+    ) -> Self:
+        """Allocate for a law.
+
+        Args:
+            resolution: The law, with its levels and its metric.
+            supported: Whether the first level is that of the contacts; it costs as much
+                as the one below, where it may move at all.
+            weight: Cost of null-space deviation relative to the first level; None: the
+                default, `_ONE_LEVEL` or `_SEVERAL_LEVELS`.
+        """
+        J = resolution.problem.task.jacobian
+        m, n = J.shape
+        every = len(resolution.ends)
+        levels = every - supported
+        whole = weight or (_ONE_LEVEL if levels <= 1 else _SEVERAL_LEVELS)
+        steps = np.maximum(np.arange(every + 1) - supported, 0) / max(levels, 1)
+        steps[-1] = 1.0
+        return cls(
+            J,
+            resolution.problem.metric.L,
+            resolution.form,
+            resolution.ends,
+            resolution.threshold,
+            np.empty((2, m, n)),
+            np.empty((m, m)),
+            np.empty(n),
+            np.empty((n, n)),
+            np.empty(n, dtype=np.int64),
+            whole ** (-0.5 * steps),
+        )
+
+
+@kernel
+def write_directions(directions: Directions) -> None:
+    """Write the directions of all levels, and then those of the null space."""
+    J, L, form, ends, threshold, wide, square, remainders, N, level, _ = directions
+    n = N.shape[0]
     count = start = 0
     whiten(J, L, form, wide[0])
-    for level in range(ends.shape[0]):
-        end = ends[level]
+    for k in range(ends.shape[0]):
+        end = ends[k]
         B, Q, U = (
             wide[0, start:end],
             wide[1, start:end],
-            X[: end - start, : end - start],
+            square[: end - start, : end - start],
         )
-        taken = count
-        for k in range(end - start):
-            for d in range(taken):
-                share = 0.0
-                for i in range(n):
-                    share += N[d, i] * B[k, i]
-                for i in range(n):
-                    B[k, i] -= share * N[d, i]
+        for r in range(end - start):
+            _project_out(N[:count], B[r])
         # If no singular value is small, any orthonormal rows will do, at a tenth of the
         # cost.
         regular = orthonormalise_rows(B, Q, U) >= threshold
         if not regular:
             orthogonalise_rows(B, U[:, :0])
-        for k in range(end - start):
-            square = 0.0
-            for i in range(n):
-                square += B[k, i] * B[k, i]
-            size = np.sqrt(square)
+        for r in range(end - start):
+            size = 1.0 if regular else np.sqrt(_squared_norm(B[r]))
             if count == n or not (regular or size > threshold):
                 continue
             for i in range(n):
-                N[count, i] = Q[k, i] if regular else B[k, i] / size
-            of_level[count] = level
+                N[count, i] = Q[r, i] if regular else B[r, i] / size
+            level[count] = k
             count += 1
         start = end
-    return count
+    _complete(N, count, remainders)
+    for k in range(count, n):
+        level[k] = ends.shape[0]
 
 
-def null_space_rows(
-    resolution: Resolution, projector: Array, speed: Array, width: int
-) -> Rows:
-    """Return the rows |(P δ)_j| ≤ λ s_j on x = (δ, f), which keep e_N bounded.
+@kernel
+def _complete(N: Array, count: int, remainders: Array) -> None:
+    """Complete the first rows of N to an orthonormal basis.
 
-    e_N' = -K_N e_N - P δ, up to terms that the law's correction cancels, so that
-    d/dt ‖e_N‖_W ≤ -λ ‖e_N‖_W + ‖P δ‖_W. δ = 0 always satisfies the rows.
+    Each new row is what the others leave of the unit vector of which they leave most.
+    """
+    n = N.shape[0]
+    for i in range(n):
+        remainders[i] = 1.0
+        for k in range(count):
+            remainders[i] -= N[k, i] * N[k, i]
+    for new in range(count, n):
+        best = 0
+        for i in range(n):
+            N[new, i] = 0.0
+            if remainders[i] > remainders[best]:
+                best = i
+        N[new, best] = 1.0
+        for _ in range(2):  # "twice is enough" (Giraud et al. 2005)
+            _project_out(N[:new], N[new])
+        size = np.sqrt(_squared_norm(N[new]))
+        for i in range(n):
+            N[new, i] /= size
+            remainders[i] -= N[new, i] * N[new, i]
+
+
+@kernel
+def _project_out(N: Array, x: Array) -> None:
+    """Subtract from x its components along orthonormal rows."""
+    for k in range(N.shape[0]):
+        share = 0.0
+        for i in range(x.shape[0]):
+            share += N[k, i] * x[i]
+        for i in range(x.shape[0]):
+            x[i] -= share * N[k, i]
+
+
+@kernel
+def _squared_norm(x: Array) -> float:
+    total = 0.0
+    for i in range(x.shape[0]):
+        total += x[i] * x[i]
+    return total
+
+
+@kernel
+def write_inverse_root(directions: Directions, first: int, JT: Array) -> int:
+    """Write Jᵀ, J Jᵀ = H⁻¹, without the levels before the first that may move.
 
     Args:
-        resolution: The resolved law, with its gain and its metric.
-        projector: P, shape (nv, nv).
-        speed: s, shape (nv,) [rad/s or m/s].
-        width: Length of x.
+        directions: The directions, which `write_directions` wrote.
+        first: The first level that may move.
+        JT: Written: Jᵀ, shape (nv, at least nv).
+
+    Returns:
+        The number of its rows.
     """
-    bounded = np.flatnonzero(np.isfinite(speed))
-    A = np.zeros((len(bounded), width))
-    A[:, : len(speed)] = projector[bounded]
-    rate = decay_rate(resolution.problem.gain, resolution.problem.metric.L)
-    limit = rate * speed[bounded]
-    return Rows(A, -limit, limit)
+    _, L, form, _, _, _, _, _, N, level, roots = directions
+    n = N.shape[0]
+    rows = 0
+    for k in range(n):
+        if level[k] < first:
+            continue
+        for i in range(n):
+            JT[rows, i] = roots[level[k]] * N[k, i]
+        if form != IDENTITY:
+            solve_lower_transposed(L, JT[rows, :n])
+        rows += 1
+    return rows
+
+
+@kernel
+def write_null_space_rows(directions: Directions, A: Array) -> None:
+    """Write P, the projector on the null space of all tasks, into A (nv, at least nv).
+
+    e_N' = -K_N e_N - P δ, up to terms that the law's correction cancels, so that
+    d/dt ‖e_N‖_W ≤ -λ ‖e_N‖_W + ‖P δ‖_W: rows |(P δ)_j| ≤ λ s_j keep e_N bounded, and
+    δ = 0 always satisfies them. With m the columns of L⁻ᵀ N, P = Σ m_k (L n_k)ᵀ over
+    the directions of the null space.
+    """
+    _, L, form, ends, _, _, _, raised, N, level, _ = directions
+    n = N.shape[0]
+    for i in range(n):
+        for j in range(n):
+            A[i, j] = 0.0
+    for k in range(n):
+        if level[k] < ends.shape[0]:
+            continue
+        for i in range(n):
+            raised[i] = N[k, i]
+        if form != IDENTITY:
+            solve_lower_transposed(L, raised)
+        for j in range(n):
+            lowered = N[k, j]
+            if form != IDENTITY:
+                lowered = 0.0
+                for i in range(j + 1):
+                    lowered += L[j, i] * N[k, i]
+            for i in range(n):
+                A[i, j] += raised[i] * lowered
 
 
 def decay_rate(gain: Array, L: Array) -> float:

@@ -142,6 +142,10 @@ class Workspace(NamedTuple):
 def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
     """Overwrite x0 with the optimum x; return `SOLVED`, `INFEASIBLE` or `EXHAUSTED`.
 
+    The last thing computed is the optimum of the active constraints in their order, so
+    that x does not depend on the way there, not even in its last bit: a step is the
+    same whether it began with the active constraints of the last one or not.
+
     Args:
         problem: The QP.
         warm: Whether to begin with the active constraints of the last call.
@@ -150,16 +154,8 @@ def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
     """
     if not _prepare(problem, warm, x, work):
         return INFEASIBLE
-    for i in range(work.held.shape[0]):
-        if work.held[i] != 0:
-            square = _remainder(i, problem, work)
-            if square > work.negligible[i]:
-                _extend(i, square, work)
-            else:
-                work.held[i] = 0
-    if work.counts[0] > 0:
-        _settle(problem, x, work)
-    settled, tolerance = True, _TOLERANCE
+    in_order = settled = _begin(problem, x, work)
+    tolerance = _TOLERANCE
     limit = _ITERATIONS * work.held.shape[0]
     while work.counts[1] < limit and tolerance < _LOOSEST:
         entering, violation = _most_violated(tolerance, problem, x, work)
@@ -169,13 +165,36 @@ def minimise(problem: Problem, warm: bool, x: Array, work: Workspace) -> int:
             if not _enter(entering, violation, problem, work):
                 return INFEASIBLE
             _move(problem, x, work)
-            settled = False
-        elif settled:
+            in_order = settled = False
+        elif in_order:
             return SOLVED
         else:  # x is a sum of steps: compute it anew, and look again
-            _settle(problem, x, work)
+            in_order = _begin(problem, x, work)
             settled = True
     return EXHAUSTED
+
+
+@kernel
+def _begin(problem: Problem, x: Array, work: Workspace) -> bool:
+    """Hold the marked constraints, in their order, and make x their optimum.
+
+    Returns:
+        Whether all could be held: none depends on others, none has the wrong sign.
+    """
+    count = 0
+    work.counts[0] = 0
+    for i in range(work.held.shape[0]):
+        if work.held[i] != 0:
+            count += 1
+            square = _remainder(i, problem, work)
+            if square > work.negligible[i]:
+                work.multipliers[work.counts[0]] = 0.0
+                _extend(i, square, work)
+            else:
+                work.held[i] = 0
+    if count > 0:
+        _settle(problem, x, work)
+    return bool(work.counts[0] == count)
 
 
 @kernel

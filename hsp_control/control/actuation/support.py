@@ -36,6 +36,7 @@ class Support:
         supporting_dofs: Degrees of freedom between the root and a contact, whose
             efforts depend on the forces.
         inverse_cost: e, shape (size,): the closed form minimises Σ f²/e.
+        forces: What `minimum_norm_forces` wrote last, shape (size,) [N].
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class Support:
             self.inverse_cost[columns] = full
             positions, part = self.positions[where], self.map[:, columns]
             self._parts.append((planned, positions, part, columns, full))
-        self._tau, self._forces = np.zeros(nv), np.zeros(self.size)
+        self._tau, self.forces = np.zeros(nv), np.zeros(self.size)
         self._scratch = IdentityCache(self._allocate)
 
     def update(self, state: RobotState) -> None:
@@ -113,10 +114,10 @@ class Support:
             self.inverse_cost,
             wanted,
             *self._scratch.get(base),
-            self._forces,
+            self.forces,
             self._tau,
         )
-        return self._forces, self._tau
+        return self.forces, self._tau
 
     def _allocate(self, base: Indices) -> tuple[Array, Array, Array, Array]:
         n, zeros = len(base), np.zeros

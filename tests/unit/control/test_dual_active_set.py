@@ -133,6 +133,8 @@ def test_any_warm_start_gives_the_same(kind: str, seed: int) -> None:
     work.held[:] = rng.integers(-1, 2, len(work.held))
     warm = answer(case, work=work)
     assert warm.code == SOLVED
+    if set(warm.active) == set(cold.active):  # the same to the last bit
+        np.testing.assert_array_equal(warm.x, cold.x)
     tolerance = 1e-8 * (1.0 + np.abs(cold.x).max())
     np.testing.assert_allclose(warm.x, cold.x, rtol=0, atol=tolerance)
     assert defect(case, warm) < 1e-8

@@ -1,11 +1,10 @@
-"""Limits: the QP gives the law where none binds, and keeps them where one does."""
+"""Limits: the step is the law's where none binds, and keeps them where one does."""
 
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
-import quadprog
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -29,9 +28,6 @@ from hsp_control import (
 from hsp_control.constraints.limits import ObstacleDistance, RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import acceleration_bounds
 from hsp_control.control.actuation import Status
-from hsp_control.control.actuation.actuation import _relax
-from hsp_control.control.actuation.deviation_cost import deviation_cost
-from hsp_control.control.actuation.qp import Rows, solve
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
 from hsp_control.robot.integrators import Rk4
@@ -120,44 +116,13 @@ def test_bounds_never_cross(seed: int) -> None:
     assert (a_lower <= a_upper).all()
 
 
-# --- the QP --------------------------------------------------------------------------
-
-
-def oracle(H: Array, f: Array, rows: Rows) -> Array:
-    """Return the solution of the same QP by quadprog."""
-    same = rows.upper - rows.lower < 1e-12
-    C = np.vstack([rows.A[same], rows.A[~same], -rows.A[~same]])
-    b = np.concatenate([rows.lower[same], rows.lower[~same], -rows.upper[~same]])
-    finite = np.isfinite(b)
-    return quadprog.solve_qp(H, -f, C[finite].T, b[finite], int(same.sum()))[0]
-
-
-@given(seeds)
-def test_solver_agrees_with_another(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    n, k = 9, 12
-    root = rng.standard_normal((n, n))
-    H = root @ root.T + 0.1 * np.eye(n)
-    f, inside = 10.0 * rng.standard_normal(n), rng.standard_normal(n)
-    A = rng.standard_normal((k, n))
-    width = rng.uniform(0.0, 1.0, k)
-    width[:2] = 0.0  # equalities
-    rows = Rows(A, A @ inside - width, A @ inside + width)
-    x = solve(H, f, rows)
-    assert x is not None
-    np.testing.assert_allclose(x, oracle(H, f, rows), rtol=0, atol=1e-6)
-
-
-def test_solver_says_when_there_is_nothing() -> None:
-    A = np.array([[1.0, 0.0], [1.0, 0.0]])
-    rows = Rows(A, np.array([1.0, -np.inf]), np.array([np.inf, -1.0]))
-    assert solve(np.eye(2), np.zeros(2), rows) is None
+# --- the step ------------------------------------------------------------------------
 
 
 @given(seeds)
 @settings(max_examples=50)
 def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
-    """Wide limits: the optimum is δ = 0, solved or not; to 1e-8 over random states."""
+    """Wide limits: the step is the law's, to the last bit, over random states."""
     robot, rng = panda(), np.random.default_rng(seed)
     q, v = robot.random_configuration(rng), 0.3 * rng.standard_normal(7)
     field = JointCentering()
@@ -168,19 +133,6 @@ def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
     out, same = free.compute(state), limited.compute(state)
     assert same.status == Status.EXACT
     np.testing.assert_array_equal(same.tau, out.tau)
-    # And solving it all the same gives nothing else.
-    H = deviation_cost(free.active_stack.resolution, supported=False).metric
-    M, a = state.mass_matrix, out.acceleration
-    tau = state.inverse_dynamics(a)
-    rows = Rows(np.vstack([M, np.eye(7)]), *np.split(np.full(28, 0.0), 2))
-    rows = Rows(
-        rows.A,
-        np.concatenate([-1e6 - tau, np.full(7, -1e6)]),
-        np.concatenate([1e6 - tau, np.full(7, 1e6)]),
-    )
-    delta = solve(H, np.zeros(7), rows)
-    assert delta is not None
-    np.testing.assert_allclose(delta, 0.0, atol=1e-8)
 
 
 def test_null_space_gives_way_first_then_the_lower_task() -> None:
@@ -302,52 +254,6 @@ def test_contradiction_is_relaxed_and_told() -> None:
     assert (np.abs(out.tau) <= 1.0).all()
     assert out.status > Status.LIMITED
     assert 0.0 < out.relaxation < np.inf
-
-
-def test_least_violation_is_the_least() -> None:
-    """However far the law's acceleration is: against the same QP, solved alone."""
-    rng = np.random.default_rng(3)
-    effort = rng.standard_normal((3, 5))
-    hard = Rows(effort, np.full(3, -1.0), np.full(3, 1.0))
-    for far in (1.0, 1e4):
-        center = far * rng.standard_normal(5)
-        soft = Rows(np.eye(5), center - 0.1, center + 0.1)
-        _, x, relaxation = _relax(hard, {"motion": soft})
-        assert x is not None
-        H = np.diag(np.concatenate([np.full(5, 1e-9), np.ones(5)]))
-        rows = Rows(
-            np.block([[effort, np.zeros((3, 5))], [np.eye(5), np.eye(5)]]),
-            np.concatenate([hard.lower, soft.lower]),
-            np.concatenate([hard.upper, soft.upper]),
-        )
-        least = np.abs(oracle(H, np.zeros(10), rows)[5:]).max()
-        assert relaxation == pytest.approx(least, rel=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("kept", "relaxed"),
-    [
-        ("contacts", "distances"),
-        ("contacts", "motion"),
-        ("distances", "motion"),
-        ("motion", "holding"),
-    ],
-)
-def test_what_is_dearer_is_relaxed_less(kept: str, relaxed: str) -> None:
-    """One asks for x = 1, the other for x = -1: contacts, distances, motion, holding.
-
-    The violations of a quadratic cost are in inverse proportion to the costs.
-    """
-    hard = Rows(np.eye(1), np.full(1, -9.0), np.full(1, 9.0))
-    soft = {
-        kept: Rows(np.eye(1), np.ones(1), np.ones(1)),
-        relaxed: Rows(np.eye(1), -np.ones(1), -np.ones(1)),
-    }
-    for order in (soft, dict(reversed(soft.items()))):
-        _, x, relaxation = _relax(hard, order)
-        assert x is not None
-        assert abs(x[0] - 1.0) < 0.11 * abs(x[0] + 1.0)
-        assert relaxation == pytest.approx(abs(x[0] + 1.0), rel=1e-6)
 
 
 def test_effort_rate_needs_to_know_what_went_out() -> None:

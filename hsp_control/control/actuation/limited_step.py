@@ -1,0 +1,280 @@
+"""Steps within limits: the nearest to what the law wants, or the least violation."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.native import bind
+from hsp_control.constraints.limits.acceleration_bounds import Bounds
+from hsp_control.control.actuation.deviation_cost import Directions
+from hsp_control.control.actuation.dual_active_set import Problem, Workspace
+from hsp_control.control.actuation.status import Status
+from hsp_control.control.actuation.step_qp import (
+    FORCES,
+    LEAST_VIOLATION,
+    NEAREST,
+    NEAREST_AGAIN,
+    UNSOLVED,
+    Forces,
+    Places,
+    Programmes,
+    Result,
+    Wanted,
+    solve_step,
+)
+from hsp_control.control.actuation.support import Support
+from hsp_control.law import Resolution
+
+_RELAXATION_COST = {
+    "contacts": 1e3,
+    "distances": 30.0,
+    "motion": 1.0,
+    "null space": 1.0,
+    "holding": 0.1,
+}
+"""Cost of a violation, where limits contradict each other: the most expensive kind is
+relaxed last. The bound of the null space is relaxed by itself, before all others."""
+_REGULARISATION, _ROUNDS = 1e-6, 4
+"""Cost of all other unknowns while the violation is minimised, and the number of
+rounds. Each round penalises the difference from the result of the round before, so that
+this cost fades. Otherwise 1e3 rad/s², which a far target requires, would outweigh a
+violation."""
+
+_STATUS = tuple(Status)  # by index: a call of `Status` takes 0.3 µs
+
+Barriers = Mapping[str, tuple[Array, Array]]
+"""Rows A a ≥ b by kind, ``distances`` or ``holding``: A, shape (k, nv), and b, (k,)."""
+
+
+class LimitedStep:
+    """The QP of one set of contacts and one stack of tasks, and what relaxes it.
+
+    Attributes:
+        result: Effort, acceleration and forces of the last step.
+        capacity: How many rows of barriers there is room for.
+    """
+
+    def __init__(
+        self,
+        wanted: Wanted,
+        resolution: Resolution,
+        support: Support,
+        bounds: Bounds,
+        base: Indices,
+        limited: Indices,
+        weight: float,
+        null_space_weight: float | None,
+        speed: Array,
+        capacity: int,
+    ) -> None:
+        """Allocate.
+
+        Args:
+            wanted: What the law wants; each step reads these arrays.
+            resolution: The law, with its levels in order of priority.
+            support: The forces of the active contacts.
+            bounds: The bounds on acceleration and effort; each step reads these arrays.
+            base: Indices of the degrees of freedom without a motor.
+            limited: Those with a limit on their effort.
+            weight: The robot's weight [N].
+            null_space_weight: Cost of null-space deviation, see `Directions.of`.
+            speed: λ s of the null space, shape (nv,), read by each step; shape (0,):
+                there is no such bound.
+            capacity: How many rows of barriers there is room for.
+        """
+        n, p = len(wanted.acceleration), support.size
+        held = sum(contact.rows for contact in support.contacts)
+        self.capacity = capacity
+        counts = [len(base) + len(limited), len(support.cone), len(speed), capacity]
+        ends = np.cumsum([0, *counts, held])
+        cones, null_space, barriers, contacts, k = map(int, ends[1:])
+        self._barriers, self._used = barriers, 0
+        self._null_space = np.arange(null_space, null_space + len(speed))
+        self._motion = np.arange(k, k + n)
+        self._contacts = np.arange(contacts, k)
+        self._J = resolution.problem.task.jacobian[:held]
+        self._accelerations = wanted.acceleration
+        width = n + p
+
+        A, zeros = np.zeros((k, width)), np.zeros
+        begin, end = np.zeros((2, k), dtype=np.int64)
+        lower, upper = np.full((2, k + width), -np.inf)
+        upper[:] = np.inf
+        supporting = np.isin([*base, *limited], [*base, *support.supporting_dofs])
+        end[:cones] = np.where(supporting, width, n)
+        force_begin, force_end = zeros((2, k), dtype=np.int64)
+        force_begin[:cones][supporting], force_end[:cones][supporting] = n, width
+        A[cones:null_space, n:] = support.cone
+        lower[cones:null_space] = 0.0
+        for r in range(cones, null_space):
+            point = (r - cones) // 4
+            begin[r] = force_begin[r] = n + 3 * point
+            end[r] = force_end[r] = n + 3 * point + 3
+        end[self._null_space] = n
+        alike = _REGULARISATION**-0.5 * np.eye(width)
+        self._soft, none = zeros(k + width), zeros(0)
+        self._rows = _problem(
+            zeros((width, width)), A, begin, end, lower, upper, none, len(base)
+        )
+        programmes = Programmes(
+            forces=_problem(
+                zeros((width, width)),
+                *(A, force_begin, force_end, lower, upper, none, len(base)),
+            ),
+            nearest=self._rows,
+            soft=_problem(alike, A, begin, end, lower, upper, self._soft, len(base)),
+            x=zeros(width),
+            force_memory=Workspace.of(width, k),
+            memory=Workspace.of(width, k),
+            soft_memory=Workspace.of(width, k, soft=True),
+        )
+        self._x = programmes.x
+        self.result = Result(zeros(n), zeros(n), zeros(p))
+        arguments = (
+            wanted,
+            Forces(
+                support.map,
+                support.forces,
+                support.lower,
+                support.upper,
+                support.inverse_cost,
+                weight,
+            ),
+            Directions.of(resolution, p > 0, null_space_weight),
+            bounds,
+            speed,
+            Places(
+                np.array([*base, *limited], dtype=np.int64),
+                len(base),
+                null_space,
+                contacts,
+            ),
+            programmes,
+            self.result,
+        )
+        self._nearest_by_forces = bind(solve_step, FORCES, *arguments)
+        self._nearest = bind(solve_step, NEAREST, *arguments)
+        self._again = bind(solve_step, NEAREST_AGAIN, *arguments)
+        self._least_violation = bind(solve_step, LEAST_VIOLATION, *arguments)
+
+    def solve(
+        self, redistribute: bool, barriers: Barriers
+    ) -> tuple[Status | None, float]:
+        """Write the nearest to what the law wants to `result`.
+
+        Args:
+            redistribute: Whether forces alone can be enough.
+            barriers: The rows of the barriers.
+
+        Returns:
+            The status, None if the solver found nothing; and the largest violation of a
+            relaxed limit [rad/s² or m/s²].
+        """
+        rows = self._write_barriers(barriers) if barriers or self._used else {}
+        code = self._nearest_by_forces() if redistribute else self._nearest()
+        if code != UNSOLVED:
+            return _STATUS[int(code)], 0.0
+        return self._relax(rows)
+
+    def _write_barriers(self, barriers: Barriers) -> dict[str, Indices]:
+        """Write the rows of the barriers; return where they are, by kind."""
+        A, end, lower = self._rows.A, self._rows.end, self._rows.lower
+        n, r, where = len(self._accelerations), self._barriers, {}
+        for kind, (rows, least) in barriers.items():
+            place = np.arange(r, r + len(least))
+            A[place, :n] = rows
+            end[place] = n
+            lower[place] = least - rows @ self._accelerations
+            where[kind] = place
+            r += len(least)
+        unused = slice(r, self._barriers + self._used)
+        end[unused], lower[unused] = 0, -np.inf
+        self._used = r - self._barriers
+        return where
+
+    def _relax(self, barriers: dict[str, Indices]) -> tuple[Status | None, float]:
+        """Relax the limits as little as possible, and solve again.
+
+        The bound of the null space is relaxed by itself first. If that is not enough,
+        contacts are kept longest, then distances, then joint motion, see
+        `_RELAXATION_COST`.
+        """
+        A, end = self._rows.A, self._rows.end
+        lower, upper = self._rows.lower, self._rows.upper
+        contacts, null_space = self._contacts, self._null_space
+        A[contacts, : self._J.shape[1]] = self._J
+        end[contacts] = self._J.shape[1]
+        lower[contacts] = upper[contacts] = 0.0
+        bound = lower[null_space].copy(), upper[null_space].copy()
+        status, relaxation = Status.LIMITED, 0.0
+
+        def nearest() -> bool:
+            return bool(self._again() != UNSOLVED)
+
+        def without_bound() -> bool:
+            lower[null_space], upper[null_space] = -np.inf, np.inf
+            return nearest()
+
+        try:
+            if not (len(null_space) and without_bound()):
+                soft = {"contacts": contacts, "motion": self._motion, **barriers}
+                relaxation = self._loosen(soft)
+                if not np.isfinite(relaxation):
+                    return None, np.inf
+                # If rounding leaves no room within the relaxed limits, the result is
+                # what violates them least.
+                status = Status.RELAXED
+                nearest()
+            if len(null_space):
+                lower[null_space], upper[null_space] = bound
+                if not nearest():
+                    self._loosen({"null space": null_space})
+                    if not nearest():
+                        without_bound()
+            return status, relaxation
+        finally:
+            end[contacts] = 0
+            lower[contacts], upper[contacts] = -np.inf, np.inf
+
+    def _loosen(self, soft: Mapping[str, Indices]) -> float:
+        """Widen soft rows as little as the others permit; return the largest violation.
+
+        It is inf if the solver finds none.
+        """
+        A, lower, upper = self._rows.A, self._rows.lower, self._rows.upper
+        self._soft[:] = 0.0
+        for kind, rows in soft.items():
+            self._soft[rows] = _RELAXATION_COST[kind] ** -0.5
+        self._x[:] = 0.0
+        found = np.full_like(self._x, np.nan)
+        for _ in range(_ROUNDS):
+            if self._least_violation() == UNSOLVED:
+                break
+            found[:] = self._x
+        if not np.isfinite(found).all():
+            return np.inf
+        where = np.concatenate([*soft.values()])
+        reached = np.concatenate([A @ found, found])[where]
+        low, high = lower[where], upper[where]
+        slack = 1e-7 * (1.0 + np.abs(reached))
+        lower[where] = np.minimum(low, reached - slack)
+        upper[where] = np.maximum(high, reached + slack)
+        beyond = np.maximum(low - reached, reached - high)
+        return float(np.maximum(beyond, 0.0).max(initial=0.0))
+
+
+def _problem(
+    JT: Array,
+    A: Array,
+    begin: Indices,
+    end: Indices,
+    lower: Array,
+    upper: Array,
+    softness: Array,
+    equalities: int,
+) -> Problem:
+    """Return a QP; the non-zero entries of Jᵀ are on its diagonal, until others say."""
+    size = len(JT)
+    first, last = np.arange(size), np.arange(1, size + 1)
+    return Problem(JT, first, last, A, begin, end, lower, upper, softness, equalities)

@@ -1,0 +1,319 @@
+"""The QP of a step within limits: kernels that assemble it and solve it.
+
+The unknowns are x = (δ, g): δ the deviation from the law's acceleration, and g the
+contact forces in robot weights. The rows, in this order:
+
+    base        (M a + N - F f)_base = 0                          no motor acts there
+    effort      bounds on M a + N - F f, within the rate limit of the last effort
+    cones       friction cones of f
+    null space  |P δ| ≤ λ s, see `write_null_space_rows`
+    barriers    ∇d·a and ∇G·a from `MinimumDistance` and `StaticEffort`
+    contacts    J_c δ = 0, only where limits contradict each other: else it holds
+                because no direction of the contacts is among those that may move
+
+and the bounds of x: those on a from position, velocity and acceleration limits, and
+those of f.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.kernels import kernel
+from hsp_control.constraints.limits.acceleration_bounds import Bounds
+from hsp_control.control.actuation.deviation_cost import (
+    Directions,
+    write_directions,
+    write_inverse_root,
+    write_null_space_rows,
+)
+from hsp_control.control.actuation.dual_active_set import (
+    SOLVED,
+    Problem,
+    Workspace,
+    minimise,
+)
+from hsp_control.control.actuation.status import Status
+
+_FORCE_COST = 1e-6
+"""Cost of squared forces, in robot weights, relative to accelerations. It makes the
+forces unique, and is small beside the cost of any deviation."""
+_LEAST_INVERSE_COST = 1e-6
+"""While a contact fades its forces become dear, but not infinitely so."""
+UNSOLVED = -1
+"""The constraints contradict each other, or the solver gave up."""
+FORCES, NEAREST, NEAREST_AGAIN, LEAST_VIOLATION = 0, 1, 2, 3
+"""What to find: forces for the law's acceleration, and if there are none the nearest
+acceleration; this acceleration at once; it again, with the rows as they are, those of
+the contacts too; or the least violation of the soft rows."""
+
+
+class Wanted(NamedTuple):
+    """What the law wants.
+
+    Attributes:
+        mass_matrix: M, shape (nv, nv).
+        acceleration: a, shape (nv,).
+        effort: M a + N and friction, without contact forces, shape (nv,) [N·m or N].
+    """
+
+    mass_matrix: Array
+    acceleration: Array
+    effort: Array
+
+
+class Forces(NamedTuple):
+    """The contact forces f that are possible, see `Support`; size 0: none.
+
+    Attributes:
+        map: F, shape (nv, p).
+        first: The forces of minimum norm, shape (p,) [N].
+        lower: Lower bounds, shape (p,) [N].
+        upper: Upper bounds, shape (p,) [N].
+        inverse_cost: e, shape (p,): the cost is Σ f²/e.
+        weight: The robot's weight [N].
+    """
+
+    map: Array
+    first: Array
+    lower: Array
+    upper: Array
+    inverse_cost: Array
+    weight: float
+
+
+class Places(NamedTuple):
+    """Where the rows are.
+
+    Attributes:
+        dofs: Degrees of freedom of the first rows: those without a motor, then those
+            with a limit on their effort.
+        base: How many have no motor.
+        null_space: The first row of the null space.
+        contacts: The first row of the contacts.
+    """
+
+    dofs: Indices
+    base: int
+    null_space: int
+    contacts: int
+
+
+class Programmes(NamedTuple):
+    """The QPs of a step, on the same rows and unknowns, and their memories.
+
+    Attributes:
+        forces: Of the forces alone.
+        nearest: Of deviation and forces, at the law's cost.
+        soft: Of deviation and forces, all at the same cost, with soft rows.
+        x: The unknowns, shape (nv + p,).
+        force_memory: Of the first.
+        memory: Of the second.
+        soft_memory: Of the third.
+    """
+
+    forces: Problem
+    nearest: Problem
+    soft: Problem
+    x: Array
+    force_memory: Workspace
+    memory: Workspace
+    soft_memory: Workspace
+
+
+class Result(NamedTuple):
+    """What is delivered: effort and acceleration, shape (nv,), forces, shape (p,)."""
+
+    effort: Array
+    acceleration: Array
+    forces: Array
+
+
+@kernel
+def solve_step(
+    what: int,
+    wanted: Wanted,
+    forces: Forces,
+    directions: Directions,
+    bounds: Bounds,
+    speed: Array,
+    places: Places,
+    programmes: Programmes,
+    result: Result,
+) -> int:
+    """Assemble the QP, solve it, and write what is delivered.
+
+    Args:
+        what: What to find.
+        wanted: What the law wants.
+        forces: The possible contact forces.
+        directions: The directions of the law's levels.
+        bounds: Bounds on acceleration and effort.
+        speed: λ s of the null space, shape (nv,), or (0,) without such a bound.
+        places: Where the rows are.
+        programmes: The QPs.
+        result: Written.
+
+    Returns:
+        A `Status`, or `UNSOLVED`, and then nothing is written to ``result``.
+    """
+    qp, x = programmes, programmes.x
+    if what == LEAST_VIOLATION:
+        code = minimise(qp.soft, False, x, qp.soft_memory)
+        if code == SOLVED and _write_result(wanted, forces, bounds, places, x, result):
+            return Status.RELAXED
+        return UNSOLVED
+    if what != NEAREST_AGAIN:
+        _write_rows(wanted, forces, bounds, places, qp.nearest)
+        if what == FORCES:
+            _start(forces, x)
+            count = _write_force_factor(forces, 0, 1.0, qp.forces)
+            code = minimise(_moving(qp.forces, count), True, x, qp.force_memory)
+            if code == SOLVED and _write_result(
+                wanted, forces, bounds, places, x, result
+            ):
+                return Status.REDISTRIBUTED
+        write_directions(directions)
+        _write_null_space_bound(directions, speed, places, qp.nearest)
+    _start(forces, x)
+    contacts_held = what != NEAREST_AGAIN and forces.first.shape[0] > 0
+    count = _write_law_factor(directions, contacts_held, qp.nearest)
+    count = _write_force_factor(forces, count, _FORCE_COST, qp.nearest)
+    warm = what != NEAREST_AGAIN
+    code = minimise(_moving(qp.nearest, count), warm, x, qp.memory)
+    if code == SOLVED and _write_result(wanted, forces, bounds, places, x, result):
+        return Status.LIMITED
+    return UNSOLVED
+
+
+@kernel
+def _start(forces: Forces, x: Array) -> None:
+    """Write the unconstrained optimum: no deviation, and forces of minimum norm."""
+    n = x.shape[0] - forces.first.shape[0]
+    for i in range(n):
+        x[i] = 0.0
+    for j in range(forces.first.shape[0]):
+        x[n + j] = forces.first[j] / forces.weight
+
+
+@kernel
+def _write_law_factor(
+    directions: Directions, contacts_held: bool, problem: Problem
+) -> int:
+    """Write the rows of Jᵀ of the directions that may move; return their number."""
+    JT, n = problem.JT, directions.N.shape[0]
+    count = write_inverse_root(directions, 1 if contacts_held else 0, JT)
+    for k in range(count):
+        problem.first[k], problem.last[k] = 0, n
+        for j in range(n, JT.shape[1]):
+            JT[k, j] = 0.0
+    return count
+
+
+@kernel
+def _write_force_factor(
+    forces: Forces, count: int, cost: float, problem: Problem
+) -> int:
+    """Write the rows of Jᵀ of the forces after others; return the number of all."""
+    JT, size = problem.JT, forces.first.shape[0]
+    n = JT.shape[1] - size
+    for j in range(size):
+        row, column = count + j, n + j
+        for i in range(JT.shape[1]):
+            JT[row, i] = 0.0
+        inverse_cost = max(forces.inverse_cost[j], _LEAST_INVERSE_COST)
+        JT[row, column] = np.sqrt(inverse_cost / cost)
+        problem.first[row], problem.last[row] = column, column + 1
+    return int(count + size)
+
+
+@kernel
+def _moving(problem: Problem, count: int) -> Problem:
+    """Return a QP in which only the first rows of Jᵀ move."""
+    JT, first, last, A, begin, end, lower, upper, softness, equalities = problem
+    return Problem(
+        JT[:count],
+        first[:count],
+        last[:count],
+        A,
+        begin,
+        end,
+        lower,
+        upper,
+        softness,
+        equalities,
+    )
+
+
+@kernel
+def _write_rows(
+    wanted: Wanted, forces: Forces, bounds: Bounds, places: Places, rows: Problem
+) -> None:
+    """Write the rows of base and efforts, and the bounds of x."""
+    M, a, effort = wanted
+    F, _, f_lower, f_upper, _, weight = forces
+    A, lower, upper = rows.A, rows.lower, rows.upper
+    n, p = F.shape
+    for r in range(places.dofs.shape[0]):
+        i = places.dofs[r]
+        for j in range(n):
+            A[r, j] = M[i, j]
+        for j in range(p):
+            A[r, n + j] = -F[i, j] * weight
+        no_motor = r < places.base
+        lower[r] = (0.0 if no_motor else bounds.tau_lower[i]) - effort[i]
+        upper[r] = (0.0 if no_motor else bounds.tau_upper[i]) - effort[i]
+    k = A.shape[0]
+    for i in range(n):
+        lower[k + i] = bounds.a_lower[i] - a[i]
+        upper[k + i] = bounds.a_upper[i] - a[i]
+    for j in range(p):
+        lower[k + n + j], upper[k + n + j] = f_lower[j] / weight, f_upper[j] / weight
+
+
+@kernel
+def _write_null_space_bound(
+    directions: Directions, speed: Array, places: Places, rows: Problem
+) -> None:
+    """Write the rows |P δ| ≤ λ s, if there is such a bound."""
+    if speed.shape[0] == 0:
+        return
+    first = places.null_space
+    write_null_space_rows(directions, rows.A[first : first + speed.shape[0]])
+    for i in range(speed.shape[0]):
+        rows.lower[first + i], rows.upper[first + i] = -speed[i], speed[i]
+
+
+@kernel
+def _write_result(
+    wanted: Wanted,
+    forces: Forces,
+    bounds: Bounds,
+    places: Places,
+    x: Array,
+    result: Result,
+) -> bool:
+    """Write efforts, accelerations and forces, without the solver's violations.
+
+    Returns:
+        Whether the efforts are finite.
+    """
+    M, a, effort = wanted
+    F, _, f_lower, f_upper, _, weight = forces
+    n, p = F.shape
+    for j in range(p):
+        result.forces[j] = min(max(x[n + j] * weight, f_lower[j]), f_upper[j])
+    sum_of_efforts = 0.0
+    for i in range(n):
+        total = effort[i]
+        for j in range(n):
+            total += M[i, j] * x[j]
+        for j in range(p):
+            total -= F[i, j] * result.forces[j]
+        result.effort[i] = min(max(total, bounds.tau_lower[i]), bounds.tau_upper[i])
+        result.acceleration[i] = a[i] + x[i]
+        sum_of_efforts += total
+    for r in range(places.base):
+        result.effort[places.dofs[r]] = 0.0
+    return bool(np.isfinite(sum_of_efforts))

@@ -1,0 +1,147 @@
+"""The QP of a limited step, assembled with NumPy and solved by DAQP: an oracle.
+
+It shares no code with the kernels: the cost is a dense matrix, the contacts are rows.
+"""
+
+from typing import NamedTuple
+
+import daqp
+import numpy as np
+from numpy.typing import NDArray
+
+from hsp_control.control.actuation.support import Support
+from hsp_control.law import Resolution
+
+Array = NDArray[np.float64]
+
+_EQUALITY, _INEQUALITY = 5, 0
+_FORCE_COST = 1e-6
+
+
+class Rows(NamedTuple):
+    """Rows lower ≤ A x ≤ upper: A (k, n), lower and upper (k,)."""
+
+    A: Array
+    lower: Array
+    upper: Array
+
+
+def solve(H: Array, f: Array, rows: Rows) -> Array | None:
+    """Minimise ½ xᵀH x + fᵀx within rows; None if the solver finds no solution."""
+    lower, upper = rows.lower, rows.upper
+    sense = np.where(upper - lower < 1e-12, _EQUALITY, _INEQUALITY).astype(np.int32)
+    arrays = [np.ascontiguousarray(each) for each in (H, f, rows.A)]
+    x, _, flag, _ = daqp.solve(*arrays, upper, lower, sense, primal_tol=1e-9)
+    if flag < 1 or not np.isfinite(x).all():
+        return None
+    return np.asarray(x)
+
+
+def stacked(*rows: Rows) -> Rows:
+    """Return all rows in one `Rows`."""
+    return Rows(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
+
+
+def level_directions(resolution: Resolution) -> list[Array]:
+    """Return orthonormal rows for each level in whitened coordinates, by SVD."""
+    J, L = resolution.problem.task.jacobian, resolution.problem.metric.L
+    whitened = np.linalg.solve(L, J.T).T
+    found = np.zeros((0, J.shape[1]))
+    levels, start = [], 0
+    for end in resolution.ends:
+        rest = whitened[start:end] - whitened[start:end] @ found.T @ found
+        _, sizes, V = np.linalg.svd(rest, full_matrices=False)
+        own = V[sizes > resolution.threshold]
+        levels.append(own)
+        found = np.vstack([found, own])
+        start = end
+    return levels
+
+
+def deviation_cost(
+    resolution: Resolution, supported: bool, weight: float | None = None
+) -> Array:
+    """Return H = L (Σ ρ_k N_kᵀN_k + ρ_N P) Lᵀ, shape (nv, nv)."""
+    L = resolution.problem.metric.L
+    found = level_directions(resolution)
+    levels = len(found) - supported
+    whole = weight or (1e-6 if levels <= 1 else 1e-8)
+    H = whole * np.eye(len(L))
+    for k, N in enumerate(found):
+        cost = whole ** (max(k - supported, 0) / max(levels, 1))
+        H += (cost - whole) * N.T @ N
+    return np.asarray(L @ H @ L.T)
+
+
+def null_space_projector(resolution: Resolution) -> Array:
+    """Return P = 1 - L⁻ᵀ Nᵀ N Lᵀ, shape (nv, nv)."""
+    L = resolution.problem.metric.L
+    N = np.vstack(level_directions(resolution))
+    return np.asarray(np.eye(len(L)) - np.linalg.solve(L.T, N.T @ N @ L.T))
+
+
+class Step(NamedTuple):
+    """A limited step: H, f and rows of the unknowns (δ, forces in robot weights)."""
+
+    H: Array
+    f: Array
+    rows: Rows
+
+
+def limited_step(
+    M: Array,
+    a: Array,
+    wanted: Array,
+    tau: tuple[Array, Array],
+    motion: tuple[Array, Array],
+    resolution: Resolution,
+    support: Support,
+    base: NDArray[np.int64],
+    weight: float,
+    null_space_weight: float | None = None,
+) -> Step:
+    """Return the QP of efforts within bounds, motion within bounds, and cones.
+
+    Args:
+        M: Mass matrix.
+        a: The law's acceleration.
+        wanted: M a + N.
+        tau: Bounds on the effort.
+        motion: Bounds on the acceleration.
+        resolution: The resolved law.
+        support: The active contacts, with forces of minimum norm.
+        base: Degrees of freedom without a motor.
+        weight: The robot's weight [N].
+        null_space_weight: Cost of null-space deviation.
+    """
+    n, p = len(a), support.size
+    H = np.zeros((n + p, n + p))
+    H[:n, :n] = deviation_cost(resolution, p > 0, null_space_weight)
+    cost = _FORCE_COST / np.maximum(support.inverse_cost, 1e-6)
+    H[range(n, n + p), range(n, n + p)] = cost
+    f = np.zeros(n + p)
+    f[n:] = -cost * support.forces / weight
+    effort = np.hstack([M, -support.map * weight])
+    motors = np.setdiff1d(np.arange(n), base)
+    mass = weight / 9.81
+    held = sum(contact.rows for contact in support.contacts)
+    J = np.zeros((held, n + p))
+    J[:, :n] = resolution.problem.task.jacobian[:held]
+    cone = np.zeros((len(support.cone), n + p))
+    cone[:, n:] = support.cone
+    rows = [
+        Rows(effort[base] / mass, -wanted[base] / mass, -wanted[base] / mass),
+        Rows(
+            effort[motors],
+            tau[0][motors] - wanted[motors],
+            tau[1][motors] - wanted[motors],
+        ),
+        Rows(J, np.zeros(held), np.zeros(held)),
+        Rows(cone, np.zeros(len(cone)), np.full(len(cone), np.inf)),
+        Rows(
+            np.eye(n + p),
+            np.concatenate([motion[0] - a, support.lower / weight]),
+            np.concatenate([motion[1] - a, support.upper / weight]),
+        ),
+    ]
+    return Step(H, f, stacked(*rows))

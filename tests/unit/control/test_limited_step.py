@@ -1,0 +1,224 @@
+"""Steps within limits: the optimum of a QP, and where there is none what is relaxed."""
+
+from functools import cache
+from typing import Any
+
+import limit_oracle
+import numpy as np
+import pytest
+import quadprog
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+import hsp_control as hsp
+from hsp_control.constraints.limits import Scaled
+from hsp_control.control.actuation import Delivered, Status
+from hsp_control.control.actuation.limited_step import Barriers
+
+Array = NDArray[np.float64]
+seeds = st.integers(0, 2**32 - 1)
+
+
+@cache
+def panda() -> hsp.Robot:
+    return hsp.Robot.load("panda")
+
+
+def arm(**options: Any) -> hsp.Controller:
+    """Return a weak arm whose posture is less important than its hand."""
+    path = hsp.Circle(0.2, 4.0, [0.45, 0.0, 0.45], normal=[0.0, 0.0, 1.0])
+    gains = hsp.Gains(natural_frequency=10.0)
+    hand = hsp.FramePosition("panda_tcp", path, gains=gains, name="hand")
+    elbow = hsp.JointPosture(
+        panda().home(), gains=gains, joints=["panda_joint1"], name="j1", priority=2
+    )
+    field = 20.0 * hsp.JointCentering()
+    limits = hsp.Limits(effort=Scaled(0.5))
+    return hsp.Controller(panda(), [hand, elbow], field, limits=limits, **options)
+
+
+@cache
+def controller(name: str) -> tuple[hsp.Controller, Array]:
+    """Return a controller, and the configuration around which it is tried."""
+    if name == "mass matrix":
+        metric = hsp.metrics.MassMatrixMetric()
+        return arm(metric=metric), panda().home()
+    if name == "arm":
+        return arm(), panda().home()
+    loaded = hsp.load_experiment(name)
+    return loaded.controller, loaded.q0
+
+
+def drawn(name: str, seed: int, spread: float) -> hsp.Controller:
+    """Return a controller after a step at a random state."""
+    made, q0 = controller(name)
+    rng = np.random.default_rng(seed)
+    q = made.robot.integrate(q0, spread * rng.standard_normal(made.robot.nv))
+    made.compute(0.3, q, 3.0 * spread * rng.standard_normal(made.robot.nv))
+    return made
+
+
+def repeated(made: hsp.Controller, barriers: Barriers | None = None) -> Delivered:
+    """Return the nearest step at the controller's state, with rows of barriers."""
+    stack, state, actuation = made.active_stack, made.state, made._actuation
+    a = stack.resolution.acceleration
+    wanted = state.inverse_dynamics(a)
+    if stack.support.size:
+        stack.support.update(state)
+        stack.support.minimum_norm_forces(actuation.base, wanted)
+    return actuation._limit(
+        *(state, wanted, a, False, stack.resolution, stack.support, barriers or {})
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "spread"),
+    [
+        ("arm", 0.5),
+        ("mass matrix", 0.5),
+        ("whole_body/solo12_trunk", 0.05),
+        ("whole_body/talos_circle", 0.01),
+    ],
+)
+@given(seeds)
+@settings(max_examples=25)
+def test_it_is_the_optimum(name: str, spread: float, seed: int) -> None:
+    """Within all rows, and not dearer than what DAQP finds for the same QP."""
+    made = drawn(name, seed, spread)
+    _, a, forces, status, _ = repeated(made)
+    if status != Status.LIMITED:
+        return
+    stack, state, actuation = made.active_stack, made.state, made._actuation
+    law = stack.resolution.acceleration
+    limits, bounds = made.limits, actuation._bounds
+    qp = limit_oracle.limited_step(
+        state.mass_matrix,
+        law,
+        state.inverse_dynamics(law),
+        (bounds.tau_lower, bounds.tau_upper),
+        (bounds.a_lower, bounds.a_upper),
+        stack.resolution,
+        stack.support,
+        actuation.base,
+        actuation._weight,
+        None if limits is None else limits.null_space_weight,
+    )
+    x = np.concatenate([a - law, forces / actuation._weight])
+    scale = np.linalg.norm(qp.rows.A, axis=1) * (1.0 + np.abs(x).max())
+    value = qp.rows.A @ x
+    beyond = np.maximum(qp.rows.lower - value, value - qp.rows.upper) / scale
+    assert beyond.max() < 1e-7
+    other = limit_oracle.solve(*qp)
+    if other is None:  # the oracle gives up on some that can be solved
+        return
+    cost, least = (0.5 * each @ qp.H @ each + qp.f @ each for each in (x, other))
+    assert cost <= least + 1e-6 * (1.0 + abs(least))
+
+
+@given(seeds)
+@settings(max_examples=25)
+def test_the_bound_of_the_null_space_is_kept_or_relaxed_alone(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    q = panda().home() + 0.5 * rng.standard_normal(7)
+    v = rng.standard_normal(7)
+    out = []
+    for speed in (None, 0.05):
+        limits = hsp.Limits(effort=Scaled(0.5), null_space_speed=speed)
+        made = arm() if speed is None else None
+        task = hsp.FramePosition("panda_tcp", gains=hsp.Gains(natural_frequency=10.0))
+        made = hsp.Controller(panda(), [task], null_space_gain=4.0, limits=limits)
+        result = made.compute(0.0, q, v)
+        out.append(result)
+        law = made.active_stack.resolution
+        P = limit_oracle.null_space_projector(law)
+        given_up = np.abs(P @ (result.acceleration - law.acceleration)).max()
+    free, bounded = out
+    assert bounded.status == free.status
+    assert bounded.relaxation == pytest.approx(free.relaxation, rel=1e-5, abs=1e-6)
+    if free.status == Status.EXACT:
+        np.testing.assert_array_equal(free.tau, bounded.tau)
+        assert given_up < 1e-12
+
+
+# --- where limits contradict each other ----------------------------------------------
+
+
+@given(seeds)
+@settings(max_examples=25)
+def test_least_violation_is_the_least(seed: int) -> None:
+    """Weak motors, joints near their limits and fast: the same QP by quadprog."""
+    rng = np.random.default_rng(seed)
+    _, upper = panda().position_limits()
+    q, v = panda().home(), np.zeros(7)
+    joint = int(rng.integers(7))
+    q[joint], v[joint] = upper[joint] - 0.02, rng.uniform(1.0, 2.0)
+    task = hsp.FramePosition("panda_tcp", gains=hsp.Gains(natural_frequency=10.0))
+    limits = hsp.Limits(effort=2.0, velocity=None)
+    made = hsp.Controller(panda(), [task], limits=limits)
+    out = made.compute(0.0, q, v)
+    if out.status != Status.RELAXED:
+        return
+    assert (np.abs(out.tau) <= 2.0).all()
+    M, bounds = made.state.mass_matrix, made._actuation._bounds
+    a = made.active_stack.resolution.acceleration
+    tau = made.state.inverse_dynamics(a)
+    H = np.diag(np.concatenate([np.full(7, 1e-9), np.ones(7)]))
+    effort, motion = np.hstack([M, 0.0 * M]), np.hstack([np.eye(7), np.eye(7)])
+    C = np.vstack([effort, -effort, motion, -motion])
+    b = np.concatenate([-2.0 - tau, tau - 2.0, bounds.a_lower - a, a - bounds.a_upper])
+    x = quadprog.solve_qp(H, np.zeros(14), C.T, b)[0]
+    assert out.relaxation == pytest.approx(np.abs(x[7:]).max(), rel=1e-4)
+
+
+def row(direction: Array, least: float) -> tuple[Array, Array]:
+    return direction[None, :], np.array([least])
+
+
+def test_distances_are_relaxed_less_than_motion_and_motion_less_than_holding() -> None:
+    """The violations of a quadratic cost are in inverse proportion to the costs."""
+    made = arm()
+    made.compute(0.0, panda().home(), np.zeros(7))
+    bounds, first = made._actuation._bounds, np.eye(7)[5]
+    made._actuation._tau_lower[:], made._actuation._tau_upper[:] = -np.inf, np.inf
+    for kind, cost in (("distances", 30.0), ("holding", 0.1)):
+        bounds.a_upper[5], bounds.a_lower[5] = 1.0, -np.inf
+        _, a, _, status, relaxation = repeated(made, {kind: row(first, 5.0)})
+        assert status == Status.RELAXED
+        assert (a[5] - 1.0) / (5.0 - a[5]) == pytest.approx(cost, rel=1e-3)
+        assert relaxation == pytest.approx(max(a[5] - 1.0, 5.0 - a[5]), rel=1e-4)
+    both = {"distances": row(first, 5.0), "holding": row(-first, 5.0)}
+    bounds.a_upper[5] = np.inf
+    a = repeated(made, both)[1]
+    assert (a[5] + 5.0) / (5.0 - a[5]) == pytest.approx(300.0, rel=1e-2)
+
+
+def test_contacts_are_relaxed_less_than_distances() -> None:
+    made = drawn("whole_body/solo12_trunk", 1, 0.0)
+    stack = made.active_stack
+    rise = stack.resolution.problem.task.jacobian[2]
+    a = stack.resolution.acceleration
+    asked = row(rise, float(rise @ a) + 4.0)
+    _, found, _, status, _ = repeated(made, {"distances": asked})
+    assert status == Status.RELAXED
+    moved = float(rise @ (found - a))
+    assert moved / (4.0 - moved) == pytest.approx(30.0 / 1e3, rel=0.05)
+    # And the next step, without the contradiction, is as if nothing had been.
+    _, found, _, status, _ = repeated(made)
+    assert status == Status.LIMITED
+    np.testing.assert_allclose(found, a, atol=1e-7)
+
+
+def test_rows_that_come_and_go_find_room() -> None:
+    made = arm()
+    made.compute(0.0, panda().home(), np.zeros(7))
+    made._actuation._tau_lower[:], made._actuation._tau_upper[:] = -np.inf, np.inf
+    plain = repeated(made)[1].copy()
+    inert = np.zeros((37, 7)), np.full(37, -1.0)
+    one = row(np.eye(7)[6], plain[6] + 1.0)
+    for barriers in ({"distances": inert}, {}, {"holding": one}, {"distances": inert}):
+        a = repeated(made, barriers)[1]
+        if "holding" in barriers:
+            assert a[6] == pytest.approx(plain[6] + 1.0)
+        else:
+            np.testing.assert_allclose(a, plain, atol=1e-8)
