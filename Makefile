@@ -5,6 +5,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
+.NOTPARALLEL:
 
 export OPENBLAS_NUM_THREADS := 1# the matrices are small: more threads only wait
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -12,7 +13,8 @@ export PIP_CONSTRAINT := constraints.txt
 export PIP_BUILD_CONSTRAINT := constraints.txt
 
 BIN := .venv/bin
-STAMP := .venv/.stamp
+USE := .venv/.stamp-use# hsp_control and what it needs are installed
+STAMP := .venv/.stamp# what tests and development need, too
 WORKERS ?= 2# processes that `make test` uses
 ARGS ?=# further arguments of pytest, as in `make test ARGS="-k spline"`
 
@@ -21,7 +23,11 @@ help: ## list the targets
 	@awk 'BEGIN { FS = ":.*## " } /^##@ / { printf "\n%s\n", substr($$0, 5) } \
 	  /^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 
-demo: $(STAMP) ## run the paper's moving obstacle, plot it, say where it is
+# The bytecode of what the demo imports is written, whatever the shell says: without it
+# each later start would take seconds more.
+demo: export PYTHONDONTWRITEBYTECODE :=
+demo: $(USE) ## run the paper's moving obstacle, plot it, say where it is
+	@echo "Running paper/4_moving_obstacle; the first run compiles its kernels, once ..."
 	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo --no-view
 	@$(BIN)/hsp plot out/demo/4_moving_obstacle.npz --out out/demo
 	@echo "The log and the figures are in out/demo:" && ls out/demo
@@ -96,7 +102,7 @@ constraints: ## refresh constraints.txt with the newest version of everything
 	unset PIP_CONSTRAINT PIP_BUILD_CONSTRAINT; \
 	echo "Resolving with $$python, without constraints ..."; \
 	$(call new-venv,"$$python","$$dir"); \
-	"$$dir/bin/python" -m pip install --quiet '.[test,dev]' hatchling editables; \
+	"$$dir/bin/python" -m pip install --quiet '.[test,dev]' hatchling editables uv; \
 	sed '/^[^#]/d' constraints.txt > "$$dir/new"; \
 	"$$dir/bin/python" -m pip list --format=freeze --exclude hsp_control --exclude pip \
 	  --exclude setuptools --exclude wheel >> "$$dir/new"; \
@@ -110,17 +116,18 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 
 # ------------------------------------------------------------------- the environment
 
-# One environment for everything. Made anew where it is missing or broken, brought up to
-# date where pyproject.toml or constraints.txt is newer than it.
-$(STAMP): pyproject.toml constraints.txt
-	@if ! $(BIN)/python -m pip --version > /dev/null 2>&1; then \
-	  $(find-python); \
-	  echo "Creating .venv with $$python ($$("$$python" --version)) ..."; \
-	  $(call new-venv,"$$python",.venv); \
-	fi
-	@echo "Installing hsp_control and its tools into .venv (a minute or two, once) ..."
-	@$(BIN)/python -m pip install --quiet --editable '.[test,dev]'
+# One environment for everything, with two stamps: the demo needs the package alone. Made
+# anew where it is missing or broken, brought up to date where pyproject.toml or
+# constraints.txt is newer than the stamp.
+$(USE): pyproject.toml constraints.txt
+	@echo "Installing hsp_control into .venv (0.9 GB, once) ..."
+	@$(find-python); "$$python" tools/install.py .venv --editable .
 	@touch $@
+
+$(STAMP): pyproject.toml constraints.txt
+	@echo "Installing hsp_control, test and development tools into .venv (2.0 GB, once) ..."
+	@$(find-python); "$$python" tools/install.py .venv --editable '.[test,dev]'
+	@touch $(USE) $@
 
 # Sets the shell variable `python`: PYTHON if given, else the newest one that will do. A
 # candidate is asked, not trusted: some are shims of versions that are not installed.
