@@ -2,15 +2,14 @@
 
     .venv/bin/python benchmarks/limit_rollouts.py [--rollouts N] [--pushes N]
 
-All numbers are computed from the log: positions, velocities and efforts of every step
-of 1 ms, and the differences of efforts. The tables are written into docs/limits.md.
+All numbers are computed from the log: positions, velocities and efforts of every
+period, and the differences of efforts. The tables are written into docs/limits.md.
 """
 
 import argparse
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
-from time import process_time
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -18,13 +17,14 @@ from marked_sections import DOCS, replace_section
 from rich.progress import track
 
 import hsp_control as hsp
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.control.actuation import Status
 from hsp_control.robot.integrators import Rk4
 
 T = TypeVar("T")
-PERIOD = 1e-3  # [s]
+STEP = 1e-3  # of the integrator [s]
+PERIODS = (1e-3, 2e-3, 5e-3, 10e-3)  # for which an effort is held [s]
 ROUNDING = 1e-9  # excess over a limit that is not counted as a violation
 EXCESS = ("effort [N·m]", "effort rate [N·m/s]", "velocity [rad/s]", "position [rad]")
 
@@ -44,8 +44,6 @@ class Arm(NamedTuple):
         limited: Number of steps at which limits changed the law's acceleration.
         relaxed: Number of steps at which limits contradicted each other.
         relaxation: Largest relaxation of a barrier [rad/s²].
-        exact_step: Median processor time of a step of the law [s].
-        limited_step: Median processor time of a limited step [s].
     """
 
     completed: bool
@@ -56,8 +54,6 @@ class Arm(NamedTuple):
     limited: int
     relaxed: int
     relaxation: float
-    exact_step: float
-    limited_step: float
 
 
 @cache
@@ -97,95 +93,84 @@ def draw(seed: int) -> tuple[hsp.Controller, RobotLimits, Array]:
     return controller, controller.limits, q0
 
 
-def roll_out(seed: int) -> Arm:
-    """Run one random rollout of 0.8 s, and measure it."""
+def roll_out(item: tuple[float, int]) -> Arm:
+    """Run one random rollout of 0.8 s with a period, and measure it."""
+    period, seed = item
     controller, limits, q0 = draw(seed)
     rollout = hsp.simulate(
         controller,
         q0,
         duration=0.8,
-        control_period=PERIOD,
-        log_period=PERIOD,
-        integrator=Rk4(PERIOD),
+        control_period=period,
+        log_period=period,
+        integrator=Rk4(STEP),
     )
-    excess = beyond(rollout, limits)
+    excess = beyond(rollout, limits, period)
     status = rollout["status"]
-    exact, limited = (np.flatnonzero(status == s) for s in (0, Status.LIMITED))
     return Arm(
         completed=rollout.meta["status"] == "completed",
         rows=len(rollout),
         violated=np.array([(each > ROUNDING).any(axis=1).sum() for each in excess]),
         excess=np.array([each.max() for each in excess]),
-        used=np.array([ratio.max() for ratio in limit_ratios(rollout, limits)]),
+        used=np.array([ratio.max() for ratio in limit_ratios(rollout, limits, period)]),
         limited=int((status == Status.LIMITED).sum()),
         relaxed=int((status == Status.RELAXED).sum()),
         relaxation=float(rollout["relaxation"].max()),
-        exact_step=step_time(controller, rollout, exact),
-        limited_step=step_time(controller, rollout, limited),
     )
 
 
-def beyond(rollout: hsp.Rollout, limits: RobotLimits) -> tuple[Array, ...]:
+def beyond(
+    rollout: hsp.Rollout, limits: RobotLimits, period: float
+) -> tuple[Array, ...]:
     """Return by how much each limit is exceeded, step by step and joint by joint."""
     q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
     return (
         np.abs(tau) - limits.effort,
-        np.abs(np.diff(tau, axis=0)) / PERIOD - limits.effort_rate,
+        np.abs(np.diff(tau, axis=0)) / period - limits.effort_rate,
         np.abs(v) - limits.velocity,
         np.maximum(q - limits.upper, limits.lower - q),
     )
 
 
-def limit_ratios(rollout: hsp.Rollout, limits: RobotLimits) -> tuple[Array, ...]:
+def limit_ratios(
+    rollout: hsp.Rollout, limits: RobotLimits, period: float
+) -> tuple[Array, ...]:
     """Return the ratio of each value to its limit; positions count from mid-range."""
     q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
     middle, half = 0.5 * (limits.upper + limits.lower), limits.upper - limits.lower
     return (
         np.abs(tau) / limits.effort,
-        np.abs(np.diff(tau, axis=0)) / PERIOD / limits.effort_rate,
+        np.abs(np.diff(tau, axis=0)) / period / limits.effort_rate,
         np.abs(v) / limits.velocity,
         np.abs(q - middle) / (0.5 * half),
     )
 
 
-def step_time(controller: hsp.Controller, rollout: hsp.Rollout, rows: Indices) -> float:
-    """Compute up to 40 of the steps again; return the median time [s], NaN if none."""
-    rows, times = rows[rows > 0][:40], []
-    for k in rows:
-        controller.applied(rollout["tau"][k - 1], PERIOD)
-        step = rollout.t[k], rollout["q"][k], rollout["v"][k]
-        before = process_time()
-        controller.compute(*step)
-        times.append(process_time() - before)
-    return float(np.median(times)) if times else float("nan")
-
-
-def arm_table(runs: list[Arm]) -> str:
-    """Return the table of all rollouts of the arm."""
-    rows = sum(run.rows for run in runs)
-    violated = np.sum([run.violated for run in runs], axis=0)
-    excess = np.max([run.excess for run in runs], axis=0)
-    used = np.array([run.used for run in runs])
-    lines = "| limit | violations (steps) | largest excess (negative: margin) | "
-    lines += "99 % of it used in |\n|---|--:|--:|--:|\n"
-    for k, name in enumerate(EXCESS):
-        share = 100.0 * (used[:, k] > 0.99).mean()
-        largest = f"{excess[k] + 0.0:.2g}" if abs(excess[k]) > ROUNDING else "0"
-        lines += f"| {name} | {violated[k]} | {largest} | {share:.0f} % of runs |\n"
-    limited = sum(run.limited for run in runs) / rows
-    relaxed = sum(run.relaxed for run in runs)
-    with_relaxed = sum(run.relaxed > 0 for run in runs)
-    active = sum(run.limited + run.relaxed > 0 for run in runs)
-    ratio = np.nanmedian([run.limited_step / run.exact_step for run in runs])
-    return lines + (
-        f"\n{len(runs)} rollouts of 0.8 s, {rows} steps, "
-        f"{sum(run.completed for run in runs)} completed. Limits were active in "
-        f"{active} of them: {100 * limited:.1f} % of all steps are limited (status 2), "
-        f"{relaxed} steps in {with_relaxed} rollouts relaxed (status 3: barriers that "
-        "the efforts cannot keep; the largest relaxation was "
-        f"{max(run.relaxation for run in runs):.3g} rad/s²). A limited step takes "
-        f"{ratio:.1f} times as long as an exact one, median over the rollouts.\n"
+def arm_table(runs: dict[float, list[Arm]]) -> str:
+    """Return the table of all rollouts of the arm, a row for each period."""
+    names = ", ".join(EXCESS)
+    lines = (
+        f"| period | steps | violations: {names} | largest excess (negative: margin) | "
+        "runs that use 97 % of a speed | limited steps | relaxed steps (runs), and the "
+        "largest relaxation [rad/s²] |\n|--:|--:|--:|--:|--:|--:|--:|\n"
     )
+    for period, arms in runs.items():
+        rows = sum(run.rows for run in arms)
+        violated = np.sum([run.violated for run in arms], axis=0)
+        excess = np.max([run.excess for run in arms], axis=0)
+        excess[np.abs(excess) <= ROUNDING] = 0.0
+        used = np.array([run.used for run in arms])
+        limited = sum(run.limited for run in arms) / rows
+        lines += (
+            f"| {1e3 * period:g} ms | {rows} | {', '.join(map(str, violated))} | "
+            f"{', '.join(f'{each:.2g}' for each in excess)} | "
+            f"{100.0 * (used[:, 2] > 0.97).mean():.0f} % | {100.0 * limited:.1f} % | "
+            f"{sum(run.relaxed for run in arms)} "
+            f"({sum(run.relaxed > 0 for run in arms)}), "
+            f"{max(run.relaxation for run in arms):.2g} |\n"
+        )
+        assert all(run.completed for run in arms)
+    return lines
 
 
 # ---------------------------------------------------------------------- the legs
@@ -269,7 +254,7 @@ def push(legs: Legs, seed: int) -> Pushed:
         *legs.overrides,
         f"plant.pushes=[{setting}]",
         f"simulation.duration={DURATION}",
-        f"simulation.log_period={PERIOD}",
+        f"simulation.log_period={STEP}",
     ).run()
     columns = rollout.columns
     names = [c.split(".")[1] for c in columns if c.endswith("friction_used")]
@@ -356,11 +341,19 @@ def main() -> None:
     options = parser.parse_args()
     tables = {}
     if options.rollouts:
-        runs = run_parallel(roll_out, range(options.rollouts), "arm")
+        runs = {
+            period: run_parallel(
+                roll_out,
+                ((period, seed) for seed in range(options.rollouts)),
+                f"arm, {1e3 * period:g} ms",
+            )
+            for period in PERIODS
+        }
         tables["limit_rollouts"] = arm_table(runs)
-        for seed, run in enumerate(runs):
-            if run.violated.any() or run.relaxed:
-                print(f"seed {seed}: {run}")
+        for period, arms in runs.items():
+            for seed, run in enumerate(arms):
+                if run.violated.any():
+                    print(f"{period} s, seed {seed}: {run}")
     if options.pushes:
         pushed = {
             legs: run_parallel(

@@ -164,6 +164,7 @@ class Controller:
         self._lock = Lock()
         self._state = RobotState(robot)
         self._modified, self._mixed = np.zeros((2, robot.nv))
+        self._delivered: Array = np.zeros(robot.nv)
         self._gain = np.zeros((robot.nv, robot.nv))
         self._feedback: dict[int, Feedback] = {}
         self._by_key: dict[int, Task] = {}
@@ -351,6 +352,7 @@ class Controller:
             tau, a, forces, status, relaxation = self._actuation.deliver(
                 state, a, active.resolution, active.support, offset
             )
+            self._delivered = a
             # The kernel of limited steps has looked at all efforts already.
             if (status == RELAXED or offset is not None) and not isfinite(tau @ tau):
                 self._explain_non_finite()
@@ -385,9 +387,11 @@ class Controller:
         self._state.update(state.t, state.q, state.v)
 
     def applied(self, tau: ArrayLike, period: float) -> None:
-        """Store the effort that was sent to the robot, for the limit on its rate.
+        """Store the effort that was sent to the robot.
 
-        Without such a limit it has no effect.
+        It counts for the limit on the effort's rate, and for the margin of speed
+        limits, which covers what the robot does while the effort is held. Without
+        limits it has no effect.
 
         Args:
             tau: Effort, shape (nv,) [N·m or N].
@@ -403,7 +407,7 @@ class Controller:
             raise NonFiniteError(f"period is {period}; needs a finite number")
         if not period > 0.0:
             raise ControllerError(f"period is {period} s; must be positive")
-        self._actuation.applied(effort, period)
+        self._actuation.applied(self._state, self._delivered, effort, period)
 
     def restart(self) -> None:
         """Begin anew: forget the last effort, the offsets of tasks, and where it began.

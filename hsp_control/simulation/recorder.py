@@ -12,6 +12,7 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError, SimulationError
 from hsp_control.common.version import __version__
+from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
@@ -207,6 +208,8 @@ class Recorder:
             placement = pin.SE3ToXYZQUAT(obstacle.placement(state.t))
             columns[f"obstacle.{obstacle.name}"][i] = placement[:3]
             columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
+        if self._controller.limits is not None:
+            self._record_excess(self._controller.limits, state)
         if output is not None:
             self._record_law(state, output)
         for name, channel in log_channels.items():
@@ -215,6 +218,27 @@ class Recorder:
             )
             columns[name][i] = channel.value
         self._rows += 1
+
+    def _record_excess(self, limits: RobotLimits, state: RobotState) -> None:
+        """Record how far the robot is beyond its limits, whatever the status says.
+
+        The law keeps them for its model: a push that it does not know of, or a plant
+        that differs, can take the robot further than any effort could bring it back.
+        """
+        unit = self._descriptions["joint_positions"]["unit"]
+        shape = (state.robot.nv,)
+        for name, of, its in (
+            ("position", "position", ""),
+            ("velocity", "speed", "/s"),
+        ):
+            meaning = f"how far beyond its {of} limit"
+            self._add_column(f"{name}_excess", shape, unit + its, meaning)
+        positions = self._columns["joint_positions"][self._rows]
+        beyond = np.maximum(positions - limits.upper, limits.lower - positions)
+        # A joint without a coordinate of its own has no position, and no limit.
+        self._columns["position_excess"][self._rows] = np.fmax(beyond, 0.0)
+        fast = np.abs(state.v) - limits.velocity
+        self._columns["velocity_excess"][self._rows] = np.maximum(fast, 0.0)
 
     def _record_law(self, state: RobotState, output: ControlOutput) -> None:
         i, columns, controller = self._rows, self._columns, self._controller

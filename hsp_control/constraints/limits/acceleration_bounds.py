@@ -8,9 +8,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 
 _STEEPER = 4.0
-"""How much steeper the velocity barrier is beyond the guarded speed. While efforts that
-are held for 1 ms change at 1000 N·m/s, the acceleration has an error of M⁻¹·0.5 N·m,
-half a rad/s² on a Panda. The margin must cover this error."""
+"""How much steeper the velocity barrier is beyond the guarded speed."""
 
 
 MOTION, EFFORT = 1, 2
@@ -57,6 +55,7 @@ def acceleration_bounds(
     v: Array,
     where: Indices,
     limits: MotionLimits,
+    error: Array,
     a_lower: Array,
     a_upper: Array,
 ) -> None:
@@ -72,6 +71,8 @@ def acceleration_bounds(
         where: Index in q of the coordinate of each degree of freedom, -1 for none,
             shape (nv,).
         limits: What the barriers keep.
+        error: Error that the acceleration is expected to have, shape (nv,); the margin
+            of the speed covers it, up to half the speed.
         a_lower: Written: lower bound on the acceleration, shape (nv,).
         a_upper: Written: upper bound on the acceleration, shape (nv,).
     """
@@ -84,8 +85,10 @@ def acceleration_bounds(
             damping = 2.0 * bandwidth * v[i]
             low = -bandwidth * bandwidth * (position - lower[i]) - damping
             high = bandwidth * bandwidth * (upper[i] - position) - damping
-        slowing = 2.0 * bandwidth * (-velocity[i] - v[i])
-        rising = 2.0 * bandwidth * (velocity[i] - v[i])
+        speed = velocity[i] - error[i] / (2.0 * bandwidth * _STEEPER)
+        speed = max(speed, 0.5 * velocity[i])
+        slowing = 2.0 * bandwidth * (-speed - v[i])
+        rising = 2.0 * bandwidth * (speed - v[i])
         if slowing > 0.0:
             slowing *= _STEEPER
             rising = max(rising, slowing)
@@ -105,6 +108,7 @@ def violated_limits(
     tau: Array,
     where: Indices,
     limits: MotionLimits,
+    error: Array,
     bounds: Bounds,
 ) -> int:
     """Write the acceleration bounds, and return which bounds a and tau violate.
@@ -114,7 +118,7 @@ def violated_limits(
     Returns:
         0 for none, `MOTION`, `EFFORT`, or the sum of both.
     """
-    acceleration_bounds(q, v, where, limits, bounds.a_lower, bounds.a_upper)
+    acceleration_bounds(q, v, where, limits, error, bounds.a_lower, bounds.a_upper)
     violated = 0 if within(a, bounds.a_lower, bounds.a_upper) else MOTION
     effort_ok = within(tau, bounds.tau_lower, bounds.tau_upper)
     return violated if effort_ok else violated + EFFORT

@@ -30,6 +30,7 @@ from hsp_control.constraints.limits.acceleration_bounds import (
     within,
 )
 from hsp_control.control.actuation.deviation_cost import decay_rate
+from hsp_control.control.actuation.held_effort import HeldEffort
 from hsp_control.control.actuation.limited_step import Barriers, LimitedStep
 from hsp_control.control.actuation.status import EXACT, Status
 from hsp_control.control.actuation.step_qp import Wanted
@@ -51,8 +52,8 @@ m/s²]."""
 class Actuation:
     """Computes efforts and contact forces for accelerations, within limits.
 
-    Its only memory is the last effort, used where the effort rate is limited: see
-    `applied`.
+    Its only memory is of the last efforts, used where the effort rate or the speed is
+    limited: see `applied`.
 
     Attributes:
         limits: The limits in force, if any.
@@ -84,10 +85,11 @@ class Actuation:
         self._steps: WeakKeyDictionary[Resolution, LimitedStep] = WeakKeyDictionary()
         self._resolution: Resolution | None = None
         self._step: LimitedStep | None = None
+        self._held = HeldEffort(nv)
         self._no_forces = np.zeros(0)
         self._no_support = Support((), robot, self._weight)
         self.plan(planned, -np.inf)
-        self.forget()
+        self._forget_effort()
 
     def plan(self, planned: PlannedLimits, t: float) -> None:
         """Keep other limits from now on; t is the present time [s]."""
@@ -100,7 +102,7 @@ class Actuation:
         self._speed = np.zeros(self._robot.nv if bounded else 0)
         self._slacks = planned.slacks(t)
         if self.limits is not None and not np.isfinite(self.limits.effort_rate).any():
-            self.forget()
+            self._forget_effort()
         self._only_box_limits = not (
             self._floating
             or planned.distances
@@ -125,7 +127,7 @@ class Actuation:
         )
         self._slacks = self._planned.slacks(t)
         if not np.isfinite(now.effort_rate).any():
-            self.forget()
+            self._forget_effort()
 
     def support(self, contacts: Sequence[PlannedContact]) -> Support:
         """Return the forces that these contacts can exert; with no contacts, none."""
@@ -133,14 +135,19 @@ class Actuation:
             return self._no_support
         return Support(contacts, self._robot, self._weight)
 
-    def applied(self, tau: Array, period: float) -> None:
-        """Record the effort that is sent now, for the limit on the effort rate.
+    def applied(self, state: RobotState, a: Array, tau: Array, period: float) -> None:
+        """Record the effort that is sent now, for the limits on effort rate and speed.
 
         Args:
+            state: The state at which it was computed.
+            a: The acceleration that was computed, shape (nv,).
             tau: Effort, shape (nv,) [N·m or N].
             period: Time until the next effort [s].
         """
-        if self.limits is None or not np.isfinite(self.limits.effort_rate).any():
+        if self.limits is None:
+            return
+        self._held.sent(state.t, state.v, a, period)
+        if not np.isfinite(self.limits.effort_rate).any():
             return
         step = self.limits.effort_rate * period
         np.maximum(-self.limits.effort, tau - step, out=self._tau_lower)
@@ -150,18 +157,23 @@ class Actuation:
         np.maximum(self._tau_upper, -self.limits.effort, out=self._tau_upper)
 
     def forget(self) -> None:
-        """Forget the last effort: the rate limit does not apply to the next one."""
+        """Forget the last efforts: the rate limit does not apply to the next one."""
+        self._held.forget()
+        self._forget_effort()
+
+    def _forget_effort(self) -> None:
         if self.limits is not None:
             self._tau_lower[:] = -self.limits.effort
             self._tau_upper[:] = self.limits.effort
 
-    def memory(self) -> tuple[Array, Array]:
+    def memory(self) -> tuple[Array, ...]:
         """Return a copy of the memory of the last effort."""
-        return self._tau_lower.copy(), self._tau_upper.copy()
+        return self._tau_lower.copy(), self._tau_upper.copy(), *self._held.memory()
 
-    def remember(self, memory: tuple[Array, Array]) -> None:
+    def remember(self, memory: tuple[Array, ...]) -> None:
         """Set the memory that `memory` returned."""
-        self._tau_lower[:], self._tau_upper[:] = memory
+        self._tau_lower[:], self._tau_upper[:] = memory[:2]
+        self._held.remember(memory[2:])
 
     def deliver(
         self,
@@ -182,7 +194,10 @@ class Actuation:
                 [N·m or N]; None: none. The limits hold for the sum.
         """
         wanted = state.inverse_dynamics(a)  # M a + N
-        violated = 0.0 if self.limits is None else self._check.get(state, a)()
+        violated = 0.0
+        if self.limits is not None:
+            self._held.observe(state.t, state.v)
+            violated = self._check.get(state, a)()
         if offset is None and self._only_box_limits:
             if not violated:
                 return wanted, a, self._no_forces, EXACT, 0.0
@@ -222,6 +237,7 @@ class Actuation:
             state.data.tau,
             self._robot.dof_indices,
             self.limits.motion,
+            self._held.error,
             self._bounds,
         )
 

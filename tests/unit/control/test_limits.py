@@ -28,6 +28,7 @@ from hsp_control import (
 from hsp_control.constraints.limits import ObstacleDistance, RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import acceleration_bounds
 from hsp_control.control.actuation import Status
+from hsp_control.control.actuation.held_effort import HeldEffort
 from hsp_control.geometry import Scene
 from hsp_control.geometry.start import Start
 from hsp_control.robot.integrators import Rk4
@@ -61,10 +62,12 @@ def at_home(robot: Robot, *scene: Obstacle) -> Start:
     return Start(robot.state(0.0, robot.home(), np.zeros(robot.nv)), Scene(scene))
 
 
-def bounds(limits: RobotLimits, q: Array, v: Array) -> tuple[Array, Array]:
+def bounds(
+    limits: RobotLimits, q: Array, v: Array, error: float = 0.0
+) -> tuple[Array, Array]:
     a_lower, a_upper = np.zeros(7), np.zeros(7)
-    where = limits.robot.dof_indices
-    acceleration_bounds(q, v, where, limits.motion, a_lower, a_upper)
+    where, errors = limits.robot.dof_indices, np.full(7, error)
+    acceleration_bounds(q, v, where, limits.motion, errors, a_lower, a_upper)
     return a_lower, a_upper
 
 
@@ -103,6 +106,15 @@ def test_too_fast_is_slowed_down_more_steeply() -> None:
         np.testing.assert_allclose(a_upper, -slope * excess, rtol=1e-12)
         a_lower, _ = bounds(limits, panda().home(), np.full(7, -guarded - excess))
         np.testing.assert_allclose(a_lower, slope * excess, rtol=1e-12)
+
+
+def test_the_margin_of_the_speed_covers_an_error_up_to_half_the_speed() -> None:
+    limits = of(panda(), velocity=1.0, position=None, bandwidth=8.0)
+    guarded, v = limits.guarded_velocity[0], np.full(7, 0.4)
+    for error, speed in ((3.2, guarded - 0.05), (1e3, 0.5 * guarded)):
+        a_lower, a_upper = bounds(limits, panda().home(), v, error)
+        np.testing.assert_allclose(a_upper, 16.0 * (speed - v), rtol=1e-12)
+        np.testing.assert_allclose(a_lower, 16.0 * (-speed - v), rtol=1e-12)
 
 
 @given(seeds)
@@ -197,10 +209,8 @@ def violations(rollout: Rollout, limits: RobotLimits) -> dict[str, float]:
     }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
-def test_no_limit_is_violated(seed: int) -> None:
-    """Limit-rich rollouts; benchmarks/limit_rollouts.py runs a thousand of them."""
+def limit_rich(seed: int) -> tuple[Controller, RobotLimits, Array]:
+    """Return a random controller whose limits become active, its limits and a start."""
     robot, rng = panda(), np.random.default_rng(seed)
     lower, upper = robot.position_limits()
     q0 = 0.5 * (lower + upper) + 0.35 * (upper - lower) * rng.uniform(-1.0, 1.0, 7)
@@ -218,11 +228,56 @@ def test_no_limit_is_violated(seed: int) -> None:
     )
     controller = Controller(robot, [task], JointCentering(), limits=limits)
     assert controller.limits is not None
+    return controller, controller.limits, q0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(6))
+def test_no_limit_is_violated(seed: int) -> None:
+    """Limit-rich rollouts; benchmarks/limit_rollouts.py runs a thousand of them."""
+    controller, limits, q0 = limit_rich(seed)
     rollout = run(controller, q0, 0.8)
     assert rollout.meta["status"] == "completed"
     assert (rollout["status"] == Status.LIMITED).any()  # limits did bind
-    worst = violations(rollout, controller.limits)
+    worst = violations(rollout, limits)
     assert max(worst.values()) <= 1e-8, worst
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("period", [0.002, 0.005, 0.01])
+@pytest.mark.parametrize("seed", [14, 30])
+def test_speed_limits_are_kept_at_any_period(seed: int, period: float) -> None:
+    """Seeds that exceed them by 0.6 and 2.7 % with a constant margin."""
+    controller, limits, q0 = limit_rich(seed)
+    rollout = simulate(
+        controller,
+        q0,
+        duration=0.8,
+        control_period=period,
+        log_period=period,
+        integrator=Rk4(1e-3),
+    )
+    used = np.abs(rollout["v"]) / limits.velocity
+    assert used.max() <= 1.0
+    assert used.max() > 0.9
+
+
+def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
+    held, v, a = HeldEffort(2), np.array([0.1, 0.2]), np.array([1.0, -1.0])
+    for k in range(100):
+        held.sent(0.001 * k, v, a, 0.001)
+        v = v + 0.001 * (a + np.array([3.0, 0.0]))
+        held.observe(0.001 * k + 0.0005, 9.0 * v)  # not the end of the period
+        held.observe(0.001 * (k + 1), v)
+    np.testing.assert_allclose(held.error, [3.0, 0.0], rtol=1e-3, atol=1e-9)
+    held.sent(0.1, v, a, 0.02)  # a longer period counts alone
+    held.observe(0.12, v + 0.02 * (a - 8.0))
+    np.testing.assert_allclose(held.error, [8.0, 8.0], rtol=1e-9)
+    memory = held.memory()
+    held.forget()
+    assert not held.error.any()
+    held.remember(memory)
+    np.testing.assert_allclose(held.error, [8.0, 8.0], rtol=1e-9)
 
 
 @pytest.mark.slow

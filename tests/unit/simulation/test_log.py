@@ -20,8 +20,10 @@ from hsp_control import (
     JointPosture,
     Obstacle,
     Rollout,
+    load_experiment,
     simulate,
 )
+from hsp_control.cli import main
 from hsp_control.common.exceptions import (
     LogError,
     ShapeError,
@@ -429,3 +431,39 @@ def test_saving_over_a_log_replaces_it(
     whole = path.with_name("whole.npz")
     planar_run.save(whole)
     assert len(Rollout.load(whole)) == 51
+
+
+def test_the_log_says_how_far_the_robot_is_beyond_its_limits(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A push that the law does not know of; without it, nothing is beyond."""
+    push = {"frame": "panda_hand", "force": [0, 0, 700], "start": 0.05, "duration": 0.1}
+    config = {
+        "robot": {"name": "panda"},
+        "tasks": {
+            "hand": {
+                "type": "frame_position",
+                "frame": "panda_tcp",
+                "trajectory": {"type": "hold"},
+            }
+        },
+        "limits": {"effort": "none"},
+        "simulation": {"duration": 0.2, "control_period": 0.002},
+    }
+    quiet = load_experiment(config).run()
+    assert not quiet["position_excess"].any()
+    assert not quiet["velocity_excess"].any()
+    file = tmp_path / "pushed.yaml"
+    plant = {"type": "rigid_body", "pushes": [push]}
+    file.write_text(json.dumps({**config, "plant": plant}))
+    assert main(["run", str(file), "--no-view", "--out", str(tmp_path)]) == 0
+    rollout = Rollout.load(tmp_path / "pushed.npz")
+    limits = load_experiment(config).controller.limits
+    assert limits is not None
+    beyond = np.maximum(np.abs(rollout.v) - limits.velocity, 0.0)
+    np.testing.assert_allclose(rollout["velocity_excess"], beyond, atol=1e-12)
+    assert beyond.max() > 0.1
+    row, dof = np.unravel_index(beyond.argmax(), beyond.shape)
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"panda_joint{dof + 1} is {beyond.max():.3g} rad/s beyond its speed" in said
+    assert f"at {rollout.t[row]:g} s" in said

@@ -1,0 +1,100 @@
+"""What holding an effort for a period adds to the acceleration, as it is observed."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.identity_cache import IdentityCache
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
+
+_WINDOW = 0.01
+"""The acceleration is observed over this time, or over one period if that is longer
+[s]: over 1 ms noise of 0.02 rad/s would be 28 rad/s², over 10 ms it is 3."""
+_MEMORY = 0.1
+"""An error counts less after this time [s]."""
+
+
+class HeldEffort:
+    """The error of the acceleration while an effort is held for a period.
+
+    The law's acceleration is that of the beginning of a period; while the effort is
+    held the robot moves on, and the acceleration changes. The barriers of `Limits` look
+    at the beginning of each period, so that a speed limit is exceeded by the error over
+    the barrier's bandwidth, unless the margin grows by as much. The error is
+    observed: it is the difference between the speed at the end of a period and what was
+    expected. So it includes whatever else the model lacks.
+
+    Attributes:
+        error: The largest error of late, shape (nv,) [rad/s² or m/s²].
+    """
+
+    def __init__(self, nv: int) -> None:
+        """Begin without an error."""
+        self.error: Array = np.zeros(nv)
+        self._expected, self._stray = np.zeros(nv), np.zeros(nv)
+        self._timing = np.full(2, np.nan)  # when the period ends, and its length
+        self._observe = IdentityCache(self._compile)
+
+    def sent(self, t: float, v: Array, a: Array, period: float) -> None:
+        """Record that the effort of an acceleration is held from now on.
+
+        Args:
+            t: The time [s].
+            v: The velocity, shape (nv,).
+            a: The acceleration, shape (nv,).
+            period: How long the effort is held [s].
+        """
+        self._timing[0], self._timing[1] = t + period, period
+        np.multiply(a, period, out=self._expected)
+        self._expected += v
+
+    def observe(self, t: float, v: Array) -> None:
+        """Look at the velocity (nv,) at time t [s]; it counts at a period's end."""
+        end, period = self._timing
+        if abs(t - end) < 0.01 * period:
+            self._observe.get(v)()
+            self._timing[0] = np.nan  # once
+
+    def _compile(self, v: Array) -> Callable[[], float]:
+        return bind(_observe, v, self._timing, self._expected, self._stray, self.error)
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self.error[:] = 0.0
+        self._stray[:] = 0.0
+        self._timing[:] = np.nan
+
+    def memory(self) -> tuple[Array, ...]:
+        """Return a copy of what it remembers."""
+        own = self.error, self._stray, self._expected, self._timing
+        return tuple(each.copy() for each in own)
+
+    def remember(self, memory: tuple[Array, ...]) -> None:
+        """Set what `memory` returned."""
+        own = self.error, self._stray, self._expected, self._timing
+        for each, value in zip(own, memory, strict=True):
+            each[:] = value
+
+
+@kernel
+def _observe(
+    v: Array, timing: Array, expected: Array, stray: Array, error: Array
+) -> None:
+    """Add a period to the differences of velocity, and update the largest error.
+
+    Args:
+        v: Velocity at the end of the period, shape (nv,).
+        timing: When the period ends, and its length [s].
+        expected: What was expected, shape (nv,).
+        stray: Differences, summed over about `_WINDOW`, shape (nv,); updated.
+        error: The largest error of late, shape (nv,); updated.
+    """
+    period = timing[1]
+    fresh = min(period / _WINDOW, 1.0)
+    fading = np.exp(-period / _MEMORY)
+    for i in range(v.shape[0]):
+        stray[i] = (1.0 - fresh) * stray[i] + v[i] - expected[i]
+        present = abs(stray[i]) / max(period, _WINDOW)
+        error[i] = max(fading * error[i], present)
