@@ -402,12 +402,19 @@ class Controller:
             NonFiniteError: If the effort or the period contains NaN or inf.
             ControllerError: If the period is not positive.
         """
-        effort = self._robot.check_tangent(tau, "effort tau")
-        if not np.isfinite(period):
+        own = self._delivered  # an array of the same kind needs no conversion
+        if (
+            type(tau) is not np.ndarray
+            or tau.shape != own.shape
+            or tau.dtype != own.dtype
+            or not isfinite(tau @ tau)
+        ):
+            tau = self._robot.check_tangent(tau, "effort tau")
+        if not isfinite(period):
             raise NonFiniteError(f"period is {period}; needs a finite number")
         if not period > 0.0:
             raise ControllerError(f"period is {period} s; must be positive")
-        self._actuation.applied(self._state, self._delivered, effort, period)
+        self._actuation.applied(self._state, own, tau, period)
 
     def restart(self) -> None:
         """Begin anew: forget the last effort, the offsets of tasks, and where it began.

@@ -334,9 +334,16 @@ MUTANTS = (
     Mutant(
         "velocity limit ignored",
         LIMITS + "acceleration_bounds.py",
-        "rising = 2.0 * bandwidth * (velocity[i] - v[i])",
+        "rising = 2.0 * bandwidth * (speed - v[i])",
         "rising = np.inf",
         OF_LIMITS + "bounds_are_the_barriers",
+    ),
+    Mutant(
+        "speed margin: error not covered",
+        LIMITS + "acceleration_bounds.py",
+        "speed = velocity[i] - error[i] / (2.0 * bandwidth * _STEEPER)",
+        "speed = velocity[i]",
+        OF_LIMITS + "margin_of_the_speed",
     ),
     Mutant(
         "position barrier: damping drives",
@@ -433,9 +440,9 @@ MUTANTS = (
     ),
     Mutant(
         "effort rate ignored",
-        ACTUATION + "actuation.py",
-        "step = self.limits.effort_rate * period",
-        "step = self.limits.effort_rate * np.inf",
+        ACTUATION + "held_effort.py",
+        "min(max(sent[i] - rate[i] * period,",
+        "min(max(sent[i] - np.inf,",
         OF_LIMITS + "effort_rate_needs",
     ),
     Mutant(

@@ -30,7 +30,7 @@ from hsp_control.constraints.limits.acceleration_bounds import (
     within,
 )
 from hsp_control.control.actuation.deviation_cost import decay_rate
-from hsp_control.control.actuation.held_effort import HeldEffort
+from hsp_control.control.actuation.held_effort import HeldEffort, effort_window
 from hsp_control.control.actuation.limited_step import Barriers, LimitedStep
 from hsp_control.control.actuation.status import EXACT, Status
 from hsp_control.control.actuation.step_qp import Wanted
@@ -86,6 +86,8 @@ class Actuation:
         self._resolution: Resolution | None = None
         self._step: LimitedStep | None = None
         self._held = HeldEffort(nv)
+        self._sent = np.zeros(nv + 1)  # the last effort, and how long it is held
+        self._write_window = IdentityCache(self._compile_window)
         self._no_forces = np.zeros(0)
         self._no_support = Support((), robot, self._weight)
         self.plan(planned, -np.inf)
@@ -101,8 +103,7 @@ class Actuation:
         bounded = self.limits is not None and self.limits.null_space_speed is not None
         self._speed = np.zeros(self._robot.nv if bounded else 0)
         self._slacks = planned.slacks(t)
-        if self.limits is not None and not np.isfinite(self.limits.effort_rate).any():
-            self._forget_effort()
+        self._find_rate()
         self._only_box_limits = not (
             self._floating
             or planned.distances
@@ -126,7 +127,15 @@ class Actuation:
             null_space_speed=now.null_space_speed,
         )
         self._slacks = self._planned.slacks(t)
-        if not np.isfinite(now.effort_rate).any():
+        self._find_rate()
+
+    def _find_rate(self) -> None:
+        """Find out whether the effort's rate is limited."""
+        limits = self.limits
+        self._rate_limited = limits is not None and bool(
+            np.isfinite(limits.effort_rate).any()
+        )
+        if not self._rate_limited:
             self._forget_effort()
 
     def support(self, contacts: Sequence[PlannedContact]) -> Support:
@@ -147,14 +156,14 @@ class Actuation:
         if self.limits is None:
             return
         self._held.sent(state.t, state.v, a, period)
-        if not np.isfinite(self.limits.effort_rate).any():
-            return
-        step = self.limits.effort_rate * period
-        np.maximum(-self.limits.effort, tau - step, out=self._tau_lower)
-        np.minimum(self.limits.effort, tau + step, out=self._tau_upper)
-        # An earlier effort may lie outside the limits: then move towards them.
-        np.minimum(self._tau_lower, self.limits.effort, out=self._tau_lower)
-        np.maximum(self._tau_upper, -self.limits.effort, out=self._tau_upper)
+        if self._rate_limited:
+            self._sent[:-1], self._sent[-1] = tau, period
+            self._write_window.get(self.limits.effort, self.limits.effort_rate)()
+
+    def _compile_window(self, effort: Array, rate: Array) -> Callable[[], float]:
+        return bind(
+            effort_window, self._sent, effort, rate, self._tau_lower, self._tau_upper
+        )
 
     def forget(self) -> None:
         """Forget the last efforts: the rate limit does not apply to the next one."""

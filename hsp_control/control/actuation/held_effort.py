@@ -35,7 +35,8 @@ class HeldEffort:
         self.error: Array = np.zeros(nv)
         self._expected, self._stray = np.zeros(nv), np.zeros(nv)
         self._timing = np.full(2, np.nan)  # when the period ends, and its length
-        self._observe = IdentityCache(self._compile)
+        self._expect = IdentityCache(self._compile_expect)
+        self._observe = IdentityCache(self._compile_observe)
 
     def sent(self, t: float, v: Array, a: Array, period: float) -> None:
         """Record that the effort of an acceleration is held from now on.
@@ -47,8 +48,7 @@ class HeldEffort:
             period: How long the effort is held [s].
         """
         self._timing[0], self._timing[1] = t + period, period
-        np.multiply(a, period, out=self._expected)
-        self._expected += v
+        self._expect.get(v, a)()
 
     def observe(self, t: float, v: Array) -> None:
         """Look at the velocity (nv,) at time t [s]; it counts at a period's end."""
@@ -57,7 +57,10 @@ class HeldEffort:
             self._observe.get(v)()
             self._timing[0] = np.nan  # once
 
-    def _compile(self, v: Array) -> Callable[[], float]:
+    def _compile_expect(self, v: Array, a: Array) -> Callable[[], float]:
+        return bind(_expect, v, a, self._timing, self._expected)
+
+    def _compile_observe(self, v: Array) -> Callable[[], float]:
         return bind(_observe, v, self._timing, self._expected, self._stray, self.error)
 
     def forget(self) -> None:
@@ -76,6 +79,13 @@ class HeldEffort:
         own = self.error, self._stray, self._expected, self._timing
         for each, value in zip(own, memory, strict=True):
             each[:] = value
+
+
+@kernel
+def _expect(v: Array, a: Array, timing: Array, expected: Array) -> None:
+    """Write the velocity at the end of a period."""
+    for i in range(v.shape[0]):
+        expected[i] = v[i] + timing[1] * a[i]
 
 
 @kernel
@@ -98,3 +108,23 @@ def _observe(
         stray[i] = (1.0 - fresh) * stray[i] + v[i] - expected[i]
         present = abs(stray[i]) / max(period, _WINDOW)
         error[i] = max(fading * error[i], present)
+
+
+@kernel
+def effort_window(
+    sent: Array, effort: Array, rate: Array, lower: Array, upper: Array
+) -> None:
+    """Write the range of the next effort, where the effort's rate is limited.
+
+    Args:
+        sent: The last effort, and then how long it is held [s], shape (nv + 1,).
+        effort: Maximum effort, shape (nv,).
+        rate: Maximum rate of the effort, shape (nv,).
+        lower: Written: lower bound, shape (nv,).
+        upper: Written: upper bound, shape (nv,).
+    """
+    period = sent[effort.shape[0]]
+    for i in range(effort.shape[0]):
+        # The last effort may lie outside the limits: then move towards them.
+        lower[i] = min(max(sent[i] - rate[i] * period, -effort[i]), effort[i])
+        upper[i] = max(min(sent[i] + rate[i] * period, effort[i]), -effort[i])
