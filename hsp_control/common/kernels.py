@@ -40,9 +40,13 @@ def kernel(function: Function) -> Function:
     import numba
 
     from hsp_control.common.kernel_cache import kept
+    from hsp_control.common.linked_kernels import linked
 
     compiled = cast("Any", numba.jit(**_OPTIONS)(function))
     compiled._cache = kept(function)
+    inner = linked(function, _OPTIONS)
+    compiled.get_call_template = inner.get_call_template
+    compiled.get_overload = inner.get_overload
     return cast("Function", compiled)
 
 

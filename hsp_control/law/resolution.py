@@ -118,20 +118,16 @@ class Resolution:
             controls: False for φ_N = 0.
         """
         problem = self.problem
+        m, n = problem.task.jacobian.shape
+        # A conflict takes two levels, or more rows than degrees of freedom. Its kernel
+        # is the largest of all: only who needs it compiles it.
+        alone = len(self.ends) == 1 and m <= n
         return bind(
-            _resolve,
-            problem.task,
-            problem.field,
-            problem.metric,
-            self.form,
-            v,
-            problem.gain,
-            self.threshold,
-            controls,
-            self.ends,
-            self._scratch,
-            self.null_space_error,
-            self.acceleration,
+            _resolve_at_once if alone else _resolve_levels,
+            *(problem.task, problem.field, problem.metric, self.form),
+            *(v, problem.gain, self.threshold, controls),
+            *(() if alone else (self.ends,)),
+            *(self._scratch, self.null_space_error, self.acceleration),
         )
 
     def spectrum(self, first: int = 0) -> tuple[Array, float]:
@@ -156,7 +152,42 @@ class Resolution:
 
 
 @kernel
-def _resolve(
+def _resolve_at_once(
+    task: TaskSample,
+    field: FieldSample,
+    metric: MetricSample,
+    form: int,
+    v: Array,
+    K_N: Array,
+    threshold: float,
+    controls: bool,
+    scratch: Scratch,
+    e_N: Array,
+    a: Array,
+) -> int:
+    """Write e_N and a of all tasks at once; return what `outcome_of` takes.
+
+    If the tasks of several levels are exact together, they are exact one after the
+    other: this is the same then.
+    """
+    n = task.jacobian.shape[1]
+    Q, X, rows = scratch.wide[1], scratch.square[1], scratch.rows
+    u = rows[6, :n]
+    damped = int(
+        weighted_pseudo_inverse(
+            task.jacobian, metric.L, form, threshold, scratch.wide[0], Q, X
+        )
+    )
+    null_space_command(task, field, metric, form, Q, X, v, K_N, rows, e_N, u)
+    if not controls:
+        for i in range(n):
+            u[i] = 0.0
+    acceleration(task, metric.L, form, Q, X, v, u, rows, a)
+    return damped if _all_finite(a) else BEYOND_ANY_LEVEL
+
+
+@kernel
+def _resolve_levels(
     task: TaskSample,
     field: FieldSample,
     metric: MetricSample,
@@ -170,39 +201,30 @@ def _resolve(
     e_N: Array,
     a: Array,
 ) -> int:
-    """Write e_N and a; return what `outcome_of` takes."""
-    m, n = task.jacobian.shape
-    Q, X, rows = scratch.wide[1], scratch.square[1], scratch.rows
-    u = rows[6, :n]
-
-    conflicting = m > n
-    damped = 0
-    if not conflicting:
-        damped = int(
-            weighted_pseudo_inverse(
-                task.jacobian, metric.L, form, threshold, scratch.wide[0], Q, X
-            )
+    """Write e_N and a: of all levels at once, or level by level if they conflict."""
+    damped = 1
+    if task.jacobian.shape[0] <= task.jacobian.shape[1]:
+        damped = _resolve_at_once(
+            task, field, metric, form, v, K_N, threshold, controls, scratch, e_N, a
         )
-        conflicting = damped > 0 and ends.shape[0] > 1
-    if conflicting:
+    if damped > 0:
         levels = LevelScratch(
-            scratch.inner, scratch.tall, scratch.square[2], scratch.square, rows
+            scratch.inner, scratch.tall, scratch.square[2], scratch.square, scratch.rows
         )
         damped = resolve_levels(
             task, field, metric, form, v, K_N, threshold, controls, ends, levels, e_N, a
         )
-    else:
-        null_space_command(task, field, metric, form, Q, X, v, K_N, rows, e_N, u)
-        if not controls:
-            for i in range(n):
-                u[i] = 0.0
-        acceleration(task, metric.L, form, Q, X, v, u, rows, a)
-    total = 0.0
-    for i in range(n):
-        total += a[i]
-    if not np.isfinite(total):
-        return BEYOND_ANY_LEVEL
+        if not _all_finite(a):
+            damped = BEYOND_ANY_LEVEL
     return damped
+
+
+@kernel
+def _all_finite(a: Array) -> bool:
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += a[i]
+    return bool(np.isfinite(total))
 
 
 @kernel
