@@ -15,21 +15,20 @@ import subprocess
 import sys
 import tempfile
 
+CONFIGS = ("paper/4_moving_obstacle", "panda_obstacle", "limits/panda_half_strength")
+
 START = """
 import sys
 from time import process_time
-begin = process_time()
 import hsp_control as hsp
-imported = process_time()
 experiment = hsp.load_experiment(sys.argv[1])
 experiment.controller.compute(0.0, experiment.q0, experiment.v0)
-done = process_time()
-print(imported - begin, done - imported, done)
+print(process_time())
 """
 
 
-def start(config: str, cache: str) -> tuple[float, float, float]:
-    """Return the times of import, first effort and the whole start [s]."""
+def start(config: str, cache: str) -> float:
+    """Return the time of a start, to the first effort [s]."""
     done = subprocess.run(
         [sys.executable, "-c", START, config],
         env={**os.environ, "NUMBA_CACHE_DIR": cache},
@@ -37,8 +36,7 @@ def start(config: str, cache: str) -> tuple[float, float, float]:
         text=True,
         check=True,
     )
-    imported, effort, whole = map(float, done.stdout.split())
-    return imported, effort, whole
+    return float(done.stdout)
 
 
 def main() -> None:
@@ -47,23 +45,19 @@ def main() -> None:
     parser.add_argument("configs", nargs="*", metavar="CONFIG")
     parser.add_argument("--rounds", type=int, default=3)
     options = parser.parse_args()
-    configs = options.configs or ["paper/4_moving_obstacle", "panda_obstacle"]
-    print("| configuration | start | import | first effort | total |")
-    print("|---|---|--:|--:|--:|")
+    configs = options.configs or [*CONFIGS]
+    print("| configuration | start | to the first effort |")
+    print("|---|---|--:|")
     for config in configs:
-        times: dict[str, list[tuple[float, float, float]]] = {"cold": [], "cached": []}
+        times: dict[str, list[float]] = {"cold": [], "cached": []}
         for _ in range(options.rounds):
             with tempfile.TemporaryDirectory() as cache:
                 for kind in times:
                     times[kind].append(start(config, cache))
         for kind, rounds in times.items():
-            columns = list(zip(*rounds, strict=True))
-            cells = " | ".join(
-                f"{statistics.median(column):.1f} s ({min(column):.1f} to "
-                f"{max(column):.1f})"
-                for column in columns
-            )
-            print(f"| `{config}` | {kind} | {cells} |")
+            median, least, most = statistics.median(rounds), min(rounds), max(rounds)
+            cell = f"{median:.1f} s ({least:.1f} to {most:.1f})"
+            print(f"| `{config}` | {kind} | {cell} |")
 
 
 if __name__ == "__main__":

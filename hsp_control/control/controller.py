@@ -486,7 +486,7 @@ class Controller:
         # By identity: to compare values would cost more than the step.
         key = (*map(id, bearing), -1, *on, id(self._field))
         if key not in self._stacks:
-            self._stacks[key] = ActiveStack(
+            stack = ActiveStack(
                 self._state,
                 self._actuation.support(bearing),
                 [[each for each in level if each.key in on] for level in self._levels],
@@ -497,6 +497,8 @@ class Controller:
                 self._gain,
                 self._threshold,
             )
+            self._actuation.prepare(self._state, stack.resolution, stack.support)
+            self._stacks[key] = stack
         return self._stacks[key]
 
     # -- changes while running --------------------------------------------------------
@@ -533,7 +535,9 @@ class Controller:
             made = placed if self._begun else change
             self._changes = (*self._changes, made)
             if self._begun:  # compile now, not in a step
-                self._stack_without(now, set()).prepare()
+                stack = self._stack_without(now, set())
+                stack.prepare()
+                self._actuation.prepare(self._state, stack.resolution, stack.support)
 
     # -- what it is made of -----------------------------------------------------------
 

@@ -14,7 +14,6 @@ Contacts and floating bases, and Limits.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -26,6 +25,7 @@ from hsp_control.constraints.limits.acceleration_bounds import (
     EFFORT,
     MOTION,
     Bounds,
+    MotionLimits,
     violated_limits,
     within,
 )
@@ -87,7 +87,14 @@ class Actuation:
         self._step: LimitedStep | None = None
         self._held = HeldEffort(nv)
         self._sent = np.zeros(nv + 1)  # the last effort, and how long it is held
-        self._write_window = IdentityCache(self._compile_window)
+        # Kernels read these copies, which stay where they are when limits change.
+        self._efforts = np.full((2, nv), np.inf)
+        zeros = np.zeros
+        self._motion = MotionLimits(
+            zeros(nv), zeros(nv), zeros(nv), zeros(nv), zeros(1)
+        )
+        self._check = IdentityCache(self._compile_check)
+        self._window: Callable[[], float] | None = None
         self._no_forces = np.zeros(0)
         self._no_support = Support((), robot, self._weight)
         self.plan(planned, -np.inf)
@@ -97,13 +104,18 @@ class Actuation:
         """Keep other limits from now on; t is the present time [s]."""
         self._planned = planned
         self.limits = planned.at(t, self._robot)
-        self._check = IdentityCache(self._compile_check)  # it reads their arrays
+        self._write_numbers()
         self._steps.clear()
         self._resolution = None
         bounded = self.limits is not None and self.limits.null_space_speed is not None
         self._speed = np.zeros(self._robot.nv if bounded else 0)
         self._slacks = planned.slacks(t)
         self._find_rate()
+        if self.limits is not None and self._window is None:
+            self._window = bind(
+                effort_window,
+                *(self._sent, *self._efforts, self._tau_lower, self._tau_upper),
+            )
         self._only_box_limits = not (
             self._floating
             or planned.distances
@@ -114,20 +126,18 @@ class Actuation:
         """Compute the limits in force at time t [s], if they change."""
         if self._planned.numbers.constant:
             return
-        now, memory = self._planned.at(t, self._robot), self.limits
-        assert now is not None
-        assert memory is not None
-        for name in ("effort", "effort_rate", "velocity", "lower", "upper"):
-            np.copyto(getattr(memory, name), getattr(now, name))
-        for old, new in zip(memory.motion, now.motion, strict=True):
-            np.copyto(old, new)
-        self.limits = replace(
-            memory,
-            static_effort=now.static_effort,
-            null_space_speed=now.null_space_speed,
-        )
+        self.limits = self._planned.at(t, self._robot)
+        self._write_numbers()
         self._slacks = self._planned.slacks(t)
         self._find_rate()
+
+    def _write_numbers(self) -> None:
+        """Copy the numbers to where the kernels read them."""
+        if self.limits is None:
+            return
+        self._efforts[0], self._efforts[1] = self.limits.effort, self.limits.effort_rate
+        for own, new in zip(self._motion, self.limits.motion, strict=True):
+            own[:] = new
 
     def _find_rate(self) -> None:
         """Find out whether the effort's rate is limited."""
@@ -144,6 +154,16 @@ class Actuation:
             return self._no_support
         return Support(contacts, self._robot, self._weight)
 
+    def prepare(
+        self, state: RobotState, resolution: Resolution, support: Support
+    ) -> None:
+        """Compile what a limited step calls, now instead of where a limit binds."""
+        limited = self.limits is not None or support.size
+        if limited and resolution not in self._steps:
+            self._limited_step(state, resolution, support, 0)
+        if self.limits is not None:
+            self._held.prepare(state.v, resolution.acceleration)
+
     def applied(self, state: RobotState, a: Array, tau: Array, period: float) -> None:
         """Record the effort that is sent now, for the limits on effort rate and speed.
 
@@ -158,12 +178,8 @@ class Actuation:
         self._held.sent(state.t, state.v, a, period)
         if self._rate_limited:
             self._sent[:-1], self._sent[-1] = tau, period
-            self._write_window.get(self.limits.effort, self.limits.effort_rate)()
-
-    def _compile_window(self, effort: Array, rate: Array) -> Callable[[], float]:
-        return bind(
-            effort_window, self._sent, effort, rate, self._tau_lower, self._tau_upper
-        )
+            assert self._window is not None
+            self._window()
 
     def forget(self) -> None:
         """Forget the last efforts: the rate limit does not apply to the next one."""
@@ -237,7 +253,6 @@ class Actuation:
         It returns 0, `MOTION` if a violates its bounds, `EFFORT` if the effort without
         contacts does (read from Pinocchio's data), or the sum of both.
         """
-        assert self.limits is not None
         return bind(
             violated_limits,
             state.q,
@@ -245,7 +260,7 @@ class Actuation:
             a,
             state.data.tau,
             self._robot.dof_indices,
-            self.limits.motion,
+            self._motion,
             self._held.error,
             self._bounds,
         )
@@ -327,6 +342,7 @@ class Actuation:
         """Return the QP of a stack of tasks, with room for so many rows of barriers."""
         motors = self._motors
         some = np.isfinite(self._tau_lower) | np.isfinite(self._tau_upper)
+        some |= not self._planned.numbers.constant  # a limit that comes is still inf
         weight = None if self.limits is None else self.limits.null_space_weight
         self._steps[resolution] = LimitedStep(
             Wanted(state.mass_matrix, self._wanted, self._effort),

@@ -63,6 +63,11 @@ class HeldEffort:
     def _compile_observe(self, v: Array) -> Callable[[], float]:
         return bind(_observe, v, self._timing, self._expected, self._stray, self.error)
 
+    def prepare(self, v: Array, a: Array) -> None:
+        """Compile what `sent` and `observe` call, for these arrays."""
+        self._expect.get(v, a)
+        self._observe.get(v)
+
     def forget(self) -> None:
         """Begin anew."""
         self.error[:] = 0.0

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import hsp_control as hsp
+from hsp_control.common.kernels import PLAIN
 from hsp_control.constraints.limits import Scaled
 from hsp_control.control.actuation import Delivered, Status
 from hsp_control.control.actuation.limited_step import Barriers
@@ -222,3 +223,25 @@ def test_rows_that_come_and_go_find_room() -> None:
             assert a[6] == pytest.approx(plain[6] + 1.0)
         else:
             np.testing.assert_allclose(a, plain, atol=1e-8)
+
+
+@pytest.mark.skipif(PLAIN, reason="about what Numba compiles")
+def test_nothing_is_compiled_where_a_limit_binds() -> None:
+    """Neither in the first limited step, nor in a relaxed one, nor after a change."""
+    from hsp_control.common import adapters
+
+    home, rest, near = panda().home(), np.zeros(7), panda().home()
+    near[3] = panda().position_limits()[1][3] - 0.02
+    fast = 2.0 * np.eye(7)[3]
+    tight = hsp.Limits(effort=1.0)
+    made = arm()
+    changed = hsp.Controller(panda(), [hsp.FramePosition("panda_tcp")])
+    changed.compute(0.0, home, rest)
+    tau = made.compute(0.0, home, rest).tau
+    known = len(adapters._codes)
+    made.applied(tau, 0.001)
+    assert made.compute(0.001, near, fast).status >= Status.LIMITED
+    changed.at(0.0).limits(tight)
+    changed.applied(tau, 0.001)
+    assert changed.compute(1.0, near, fast).status == Status.RELAXED
+    assert len(adapters._codes) == known
