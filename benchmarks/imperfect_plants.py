@@ -52,7 +52,7 @@ plant:
 simulation: {duration: 5, control_period: 0.001}
 ```
 
-Sensors and drives act in the order in which `hsp schema` lists them. The log contains
+Sensors and drives act in a fixed order, whatever their order in the file. The log contains
 the true state in `q` and `v`, the measured one in `measured.q` and `measured.v`, the
 commanded effort in `tau` and the applied one in `applied.tau`; errors are those of the
 true state. The inertias of the plant's bodies are in the log's `meta`, key `plant`.

@@ -39,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.environ["NUMBA_DISABLE_JIT"] = "1"
     # Commands are imported only when needed, so that `hsp --help` answers at once.
     from hsp_control.cli import commands, consoles
+    from hsp_control.cli.compiling import compiling_shown
 
     try:
         # With other commands Ctrl-C ends the process at once, as during start-up: there
@@ -47,7 +48,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options.command in _OWN_INTERRUPTS or getattr(options, "view", False)
         ) and signal.getsignal(signal.SIGINT) is end_quietly:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        return int(getattr(commands, options.command)(options))
+        with compiling_shown(consoles.errors):
+            return int(getattr(commands, options.command)(options))
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
     except ArithmeticError:

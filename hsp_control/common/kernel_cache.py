@@ -29,8 +29,11 @@ from numba.core.caching import (
 _COMPILERS = ("llvmlite", "math", "numba", "numpy")
 """Packages whose modules stand for themselves: Numba checks its own version."""
 
-_HOW = Path(__file__).with_name("kernels.py").read_bytes()
-"""The file that says with which options kernels are compiled."""
+_HOW = b"".join(
+    Path(__file__).with_name(file).read_bytes()
+    for file in ("kernels.py", "linked_kernels.py")
+)
+"""The files that say how kernels are compiled."""
 
 
 def kept(function: Callable[..., Any]) -> Any:

@@ -8,6 +8,8 @@ debugging and coverage, and Numba is not even imported.
 
 import os
 from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack
+from functools import partial
 from typing import Any, TypeVar, cast
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -69,5 +71,21 @@ def callback(signature: Any, function: Callable[..., Any]) -> Any:
     arguments = signature.args, signature.return_type
     compiled = cast("Any", CFunc)(function, arguments, locals={}, options=_OPTIONS)
     compiled._cache = kept(function)
+    compiled._compile_uncached = partial(_watched, compiled._compile_uncached)
     compiled.compile()
     return compiled
+
+
+_watchers: list[Callable[[], AbstractContextManager[None]]] = []
+
+
+def watch(watcher: Callable[[], AbstractContextManager[None]] | None) -> None:
+    """Enter a context around each compilation that is not found on disk; None: none."""
+    _watchers[:] = [] if watcher is None else [watcher]
+
+
+def _watched(compile_it: Callable[[], Any]) -> Any:
+    with ExitStack() as stack:
+        for watcher in _watchers:
+            stack.enter_context(watcher())
+        return compile_it()

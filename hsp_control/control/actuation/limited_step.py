@@ -148,7 +148,6 @@ class LimitedStep:
                 np.array([*base, *limited], dtype=np.int64),
                 len(base),
                 null_space,
-                contacts,
             ),
             programmes,
             self.result,

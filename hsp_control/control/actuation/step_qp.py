@@ -91,13 +91,11 @@ class Places(NamedTuple):
             with a limit on their effort.
         base: How many have no motor.
         null_space: The first row of the null space.
-        contacts: The first row of the contacts.
     """
 
     dofs: Indices
     base: int
     null_space: int
-    contacts: int
 
 
 class Programmes(NamedTuple):
