@@ -453,6 +453,13 @@ MUTANTS = (
         OF_STEPS + "distances_are_relaxed_less",
     ),
     Mutant(
+        "limits that come have no rows yet",
+        ACTUATION + "actuation.py",
+        "some |= not self._planned.numbers.constant",
+        "some |= False",
+        OF_STEPS + "nothing_is_compiled",
+    ),
+    Mutant(
         "deviation: null space as dear as the task",
         ACTUATION + "deviation_cost.py",
         "steps[-1] = 1.0",
