@@ -58,6 +58,7 @@ class Actuation:
     Attributes:
         limits: The limits in force, if any.
         base: Indices of the degrees of freedom without a motor.
+        delivered: The acceleration of the last step, shape (nv,).
     """
 
     def __init__(
@@ -85,6 +86,7 @@ class Actuation:
         self._steps: WeakKeyDictionary[Resolution, LimitedStep] = WeakKeyDictionary()
         self._resolution: Resolution | None = None
         self._step: LimitedStep | None = None
+        self.delivered: Array = np.zeros(nv)
         self._held = HeldEffort(nv)
         self._sent = np.zeros(nv + 1)  # the last effort, and how long it is held
         # Kernels read these copies, which stay where they are when limits change.
@@ -164,18 +166,17 @@ class Actuation:
         if self.limits is not None:
             self._held.prepare(state.v, resolution.acceleration)
 
-    def applied(self, state: RobotState, a: Array, tau: Array, period: float) -> None:
+    def applied(self, state: RobotState, tau: Array, period: float) -> None:
         """Record the effort that is sent now, for the limits on effort rate and speed.
 
         Args:
             state: The state at which it was computed.
-            a: The acceleration that was computed, shape (nv,).
             tau: Effort, shape (nv,) [N·m or N].
             period: Time until the next effort [s].
         """
         if self.limits is None:
             return
-        self._held.sent(state.t, state.v, a, period)
+        self._held.sent(state.t, state.v, self.delivered, period)
         if self._rate_limited:
             self._sent[:-1], self._sent[-1] = tau, period
             assert self._window is not None
