@@ -123,6 +123,7 @@ class Actuation:
             or planned.distances
             or any(each.static_effort for each in planned.sets if each is not None)
         )
+        self._free = self.limits is None and self._only_box_limits
 
     def update_limits(self, t: float) -> None:
         """Compute the limits in force at time t [s], if they change."""
@@ -220,6 +221,8 @@ class Actuation:
                 [N·m or N]; None: none. The limits hold for the sum.
         """
         wanted = state.inverse_dynamics(a)  # M a + N
+        if self._free and offset is None:
+            return wanted, a, self._no_forces, EXACT, 0.0
         violated = 0.0
         if self.limits is not None:
             self._held.observe(state.t, state.v)
