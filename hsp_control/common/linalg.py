@@ -165,7 +165,7 @@ def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
             X[j, i] = 1.0 if i == j else 0.0
     cancelled = False
     for j in range(m):
-        cancelled = _project_out_row(Q, X, j) < 0.01 * _square(J[j]) or cancelled
+        cancelled = _project_out_row(Q, X, j) < 0.01 * squared_norm(J[j]) or cancelled
     if cancelled:
         for j in range(m):
             _project_out_row(Q, X, j)
@@ -173,7 +173,7 @@ def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
     for j in range(m):
         if X[j, j] == 0.0:
             return 0.0
-        total += _square(X[j, : j + 1])
+        total += squared_norm(X[j, : j + 1])
     return float(1.0 / np.sqrt(total))
 
 
@@ -181,7 +181,7 @@ def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
 def _project_out_row(Q: Array, X: Array, j: int) -> float:
     """Normalise row j, subtract its component from later rows; return its square."""
     m, n = Q.shape
-    square = _square(Q[j])
+    square = squared_norm(Q[j])
     scale = 1.0 / np.sqrt(square) if square > 0.0 else 0.0
     for i in range(n):
         Q[j, i] *= scale
@@ -199,8 +199,8 @@ def _project_out_row(Q: Array, X: Array, j: int) -> float:
 
 
 @kernel
-def _square(x: Array) -> float:
-    """Return x·x."""
+def squared_norm(x: Array) -> float:
+    """Return x·x, shape (n,)."""
     total = 0.0
     for i in range(x.shape[0]):
         total += x[i] * x[i]

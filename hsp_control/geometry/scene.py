@@ -12,7 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SceneError, TrajectoryError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import Part
-from hsp_control.declaration.named import is_plain, with_name
+from hsp_control.declaration.named import BY_NAME, stored
 from hsp_control.declaration.quantities import ArrayField, Name
 from hsp_control.geometry.shapes import Shape
 from hsp_control.trajectories import (
@@ -87,41 +87,6 @@ class Obstacle(Part, error=SceneError):
         return follow_all(self.center.follow(center), self.orientation.follow(turn))
 
 
-def _keyed(obstacles: Any) -> Any:
-    """Return obstacles as a mapping by name; data of YAML with their keys as names.
-
-    Raises:
-        SceneError: If two have the same name.
-        ConfigError: If data give a name beside the key.
-    """
-    if isinstance(obstacles, Mapping):
-        return {key: with_name(key, each) for key, each in obstacles.items()}
-    if isinstance(obstacles, str) or not isinstance(obstacles, Iterable):
-        return obstacles
-    if obstacles and is_plain(obstacles):
-        return obstacles
-    keyed: dict[Any, Any] = {}
-    for each in obstacles:
-        if not isinstance(each, Obstacle):
-            raise SceneError(f"{each!r:.60} is not an obstacle")
-        if each.name in keyed:
-            raise SceneError(f"two obstacles have the name {each.name!r}")
-        keyed[each.name] = each
-    return keyed
-
-
-def _stored(obstacles: Mapping[str, Obstacle]) -> tuple[Obstacle, ...]:
-    """Return the obstacles of a mapping.
-
-    Raises:
-        SceneError: If an obstacle's name is not its key.
-    """
-    for key, each in obstacles.items():
-        if each.name != key:
-            raise SceneError(f"obstacle {key!r} has another name, {each.name!r}")
-    return tuple(obstacles.values())
-
-
 class Scene(Part, Mapping[str, Obstacle], error=SceneError):
     """The obstacles of a world, a mapping by name; a value.
 
@@ -130,8 +95,8 @@ class Scene(Part, Mapping[str, Obstacle], error=SceneError):
 
     obstacles: Annotated[
         Iterable[Obstacle],
-        ArrayField(Annotated[dict[Name, Obstacle], Field(max_length=1000)], _stored),
-        BeforeValidator(_keyed),
+        ArrayField(Annotated[dict[Name, Obstacle], Field(max_length=1000)], stored),
+        BY_NAME,
     ] = ()
     """The obstacles, in the order of the log [-]; no two have the same name."""
 

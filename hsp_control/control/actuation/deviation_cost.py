@@ -11,6 +11,7 @@ from hsp_control.common.linalg import (
     orthonormalise_rows,
     solve_lower_transposed,
     solve_rows,
+    squared_norm,
 )
 from hsp_control.law import Resolution
 from hsp_control.law.pseudo_inverse import whiten
@@ -112,7 +113,7 @@ def write_directions(directions: Directions) -> None:
         if not regular:
             orthogonalise_rows(B, U[:, :0])
         for r in range(end - start):
-            size = 1.0 if regular else np.sqrt(_squared_norm(B[r]))
+            size = 1.0 if regular else np.sqrt(squared_norm(B[r]))
             if count == n or not (regular or size > threshold):
                 continue
             for i in range(n):
@@ -145,7 +146,7 @@ def _complete(N: Array, count: int, remainders: Array) -> None:
         N[new, best] = 1.0
         for _ in range(2):  # "twice is enough" (Giraud et al. 2005)
             _project_out(N[:new], N[new])
-        size = np.sqrt(_squared_norm(N[new]))
+        size = np.sqrt(squared_norm(N[new]))
         for i in range(n):
             N[new, i] /= size
             remainders[i] -= N[new, i] * N[new, i]
@@ -160,14 +161,6 @@ def _project_out(N: Array, x: Array) -> None:
             share += N[k, i] * x[i]
         for i in range(x.shape[0]):
             x[i] -= share * N[k, i]
-
-
-@kernel
-def _squared_norm(x: Array) -> float:
-    total = 0.0
-    for i in range(x.shape[0]):
-        total += x[i] * x[i]
-    return total
 
 
 @kernel

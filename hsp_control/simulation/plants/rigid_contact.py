@@ -8,8 +8,8 @@ from pydantic import Field
 
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.declaration import Part, within
+from hsp_control.declaration.named import BY_FRAME, stored_by_frame
 from hsp_control.declaration.quantities import ArrayField
-from hsp_control.simulation.plants.by_frame import BY_FRAME, stored
 from hsp_control.trajectories.schedule import Intervals, Schedule
 
 ContactKind = Literal["point", "surface"]
@@ -51,7 +51,9 @@ class RigidContact(Part, error=SimulationError):
 
 RigidContactsByFrame = Annotated[
     Sequence[RigidContact],
-    ArrayField(Annotated[dict[str, RigidContact], Field(min_length=1)], stored),
+    ArrayField(
+        Annotated[dict[str, RigidContact], Field(min_length=1)], stored_by_frame
+    ),
     BY_FRAME,
 ]
 """Contacts: a sequence in Python, a mapping by frame in YAML; at least one."""

@@ -352,7 +352,7 @@ def arguments(name: str) -> tuple[Any, ...]:
         "norm": (spd, normal(17, 6)),
         "orthonormalise_rows": (independent, np.zeros((5, 7)), np.zeros((5, 5))),
         "_project_out_row": (independent.copy(), triangular(5), 2),
-        "_square": (sample[0],),
+        "squared_norm": (sample[0],),
         "smallest_singular_value_bound": (triangular(6),),
         "orthogonalise_rows": (deficient.copy(), np.zeros((5, 5))),
         "acceleration": (

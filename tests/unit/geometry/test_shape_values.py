@@ -327,7 +327,7 @@ def test_unknown_obstacles_are_named() -> None:
 
 
 def test_two_obstacles_with_one_name() -> None:
-    with pytest.raises(SceneError, match="two obstacles have the name 'ball'"):
+    with pytest.raises(SceneError, match="two have the name 'ball'"):
         Scene([BALL, CRATE, replace(CRATE, name="ball")])
 
 

@@ -12,6 +12,7 @@ from pydantic import AfterValidator
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.declaration import Part
+from hsp_control.declaration.named import BY_FRAME, stored_by_frame
 from hsp_control.declaration.quantities import ArrayField, Vector3
 from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.geometry import link_shapes
@@ -19,7 +20,6 @@ from hsp_control.geometry.capsule_fit import enclosing_capsule
 from hsp_control.geometry.hulls import hull_corners
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from hsp_control.robot import Robot
-from hsp_control.simulation.plants.by_frame import BY_FRAME, stored
 
 _MIN_HALF_HEIGHT = 1e-3
 """Half the height of the box for a flat mesh [m]; MuJoCo needs a positive one."""
@@ -62,7 +62,9 @@ class ContactShape(Part, error=SimulationError):
 
 
 ContactShapes = Annotated[
-    Sequence[ContactShape], ArrayField(dict[str, ContactShape], stored), BY_FRAME
+    Sequence[ContactShape],
+    ArrayField(dict[str, ContactShape], stored_by_frame),
+    BY_FRAME,
 ]
 """Shapes: a sequence in Python, a mapping by frame in YAML."""
 
