@@ -91,11 +91,15 @@ HEADER = """\
 
 
 def without_field(name: str) -> tuple[Experiment, str]:
-    """Return a configuration without its first field, and that field's type."""
+    """Return a configuration without its first field, and that field's type.
+
+    It has no limits either, which would do some of what the field does.
+    """
     text = bundled_configs()[name].read_text(encoding="utf-8")
     first, *others = yaml.safe_load(text)["null_space"]["fields"]
     rest = json.dumps(others)
-    return load_experiment(name, f"null_space.fields={rest}"), first["type"]
+    other = load_experiment(name, "limits=none", f"null_space.fields={rest}")
+    return other, first["type"]
 
 
 def run_metrics(name: str, experiment: Experiment, rollout: Rollout) -> RunMetrics:

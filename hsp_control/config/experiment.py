@@ -84,7 +84,7 @@ class Experiment:
         null_space_gain: ArrayLike = 10.0,
         metric: Metric | None = None,
         singularity_threshold: float = 0.03,
-        limits: Limits | None = None,
+        limits: Limits | None = Limits(),
         contacts: Sequence[Contact] = (),
         base: Base | None = None,
         scene: Scene | Iterable[Obstacle] = (),
@@ -109,7 +109,7 @@ class Experiment:
             null_space_gain: K_N [1/s].
             metric: The joint-space metric.
             singularity_threshold: Singular value below which the inverse is bounded.
-            limits: Limits on efforts and motion.
+            limits: Limits on efforts and motion; None: no limits.
             contacts: The contacts of a floating base.
             base: What else moves a floating base.
             scene: The obstacles; those that fields and limits hold are added.

@@ -14,7 +14,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.constraints.contacts import Contact
-from hsp_control.constraints.limits import Limits
+from hsp_control.constraints.limits import Limits, LimitsOrNone
 from hsp_control.control.changes import Change
 from hsp_control.control.compensation import Compensation
 from hsp_control.declaration import Part
@@ -56,8 +56,9 @@ class Scenario(Part, error=ConfigError):
     base: Literal["flying", "driven"] | None = None
     """For a free-flyer root without contacts: ``flying`` if nothing holds it,
     ``driven`` if something outside the controller moves it."""
-    limits: Limits | None = None
-    """Limits on efforts and motion that the controller keeps; no limits by default."""
+    limits: LimitsOrNone = Limits()
+    """Limits on efforts and motion that the controller keeps: the robot's own by
+    default; ``none``: no limits."""
     null_space: NullSpaceSettings = NullSpaceSettings()
     """The control of self-motion: fields, metric and gain."""
     changes: Annotated[Sequence[Change], AfterValidator(tuple)] = ()

@@ -10,7 +10,7 @@ from pydantic import AfterValidator
 
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.constraints.limits import Limits
+from hsp_control.constraints.limits import Limits, LimitsOrNone
 from hsp_control.control.composition import check_tasks, checked_gain
 from hsp_control.control.evolution import ABSENT
 from hsp_control.control.setup import (
@@ -323,8 +323,8 @@ def _exchanged(part: Holder, old: Obstacle, new: Obstacle) -> Holder:
 class ChangeLimits(Change, type="limits"):
     """The limits change to other ones; each number goes there smoothly."""
 
-    limits: Limits
-    """The new limits."""
+    limits: LimitsOrNone
+    """The new limits; none: the old ones go."""
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the limits; see `Change.apply`.
@@ -334,7 +334,8 @@ class ChangeLimits(Change, type="limits"):
         """
         robot = setup.start.state.robot
         with within("limits"):
-            numbers = self.limits.placed(setup.start)
+            new = self.limits
+            numbers = None if new is None else new.placed(setup.start)
             limits = setup.limits.then(self.at, self.ramp, numbers, robot)
         return replace(setup, limits=limits)
 
@@ -390,7 +391,7 @@ class Changes:
         """Move an obstacle on another trajectory; see `MoveObstacle`."""
         return self._do(MoveObstacle(obstacle, center, at=self._at, ramp=self._ramp))
 
-    def limits(self, limits: Limits) -> Self:
+    def limits(self, limits: Limits | None) -> Self:
         """Change the limits; see `ChangeLimits`."""
         return self._do(ChangeLimits(limits, at=self._at, ramp=self._ramp))
 

@@ -90,7 +90,7 @@ class Controller:
         null_space_gain: ArrayLike = 10.0,
         metric: Metric | None = None,
         singularity_threshold: float = 0.03,
-        limits: Limits | None = None,
+        limits: Limits | None = Limits(),
         contacts: Sequence[Contact] = (),
         base: Base | None = None,
         scene: Scene | Iterable[Obstacle] = (),
@@ -110,7 +110,8 @@ class Controller:
                 metric) below which its inverse is bounded instead of exact. For
                 position tasks choose about 3 % of the arm's reach [m]. Near a
                 singularity the efforts grow with the inverse cube of this value.
-            limits: Limits on efforts and motion; None: no limits.
+            limits: Limits on efforts and motion, by default those of the robot's
+                URDF; None: no limits.
             contacts: The contacts that may support a robot with a free-flyer root.
             base: What moves the free-flyer root besides contacts. ``flying``: nothing;
                 ``driven``: something outside, for example a simulator.

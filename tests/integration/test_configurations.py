@@ -28,11 +28,16 @@ TRACKING = 1e-3
 
 
 def run_both(name: str) -> tuple[Experiment, Rollout, Rollout]:
-    """Return a configuration, its run, and the run without its first field."""
+    """Return a configuration, its run, and the run without its first field.
+
+    The other has no limits either, which would do some of what the field does.
+    """
     text = bundled_configs()[name].read_text(encoding="utf-8")
     others = json.dumps(yaml.safe_load(text)["null_space"]["fields"][1:])
     experiment = load_experiment(name, *COARSE)
-    without = load_experiment(name, *COARSE, f"null_space.fields={others}")
+    without = load_experiment(
+        name, *COARSE, "limits=none", f"null_space.fields={others}"
+    )
     return experiment, experiment.run(), without.run()
 
 

@@ -177,7 +177,7 @@ def hold_and_centre(robot: Robot, kind: str) -> float:
     pull: NullSpaceField = TargetPosture(robot.integrate(q0, off(0.5)))
     if np.isfinite(robot.position_limits()[0]).any() and (high - low < 6.28).any():
         pull = pull + JointCentering(weights=reach**2)
-    controller = Controller(robot, [task], pull, null_space_gain=FREQUENCY)
+    controller = Controller(robot, [task], pull, null_space_gain=FREQUENCY, limits=None)
     rollout = simulate(
         controller, q0, off(0.3), duration=1.0, log_period=0.1, integrator=Rk4(STEP)
     )

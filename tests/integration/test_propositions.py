@@ -289,7 +289,9 @@ def tracked(which: str) -> tuple[Controller, Rollout]:
     start = plain(case.robot).placement(q0, FRAMES[case.robot])
     field = TargetPosture(robot.integrate(q0, np.full(robot.nv, 0.2)))
     metric = METRICS[case.metric][0](robot.nv)
-    controller = Controller(robot, case.build(robot, start), field, metric=metric)
+    controller = Controller(
+        robot, case.build(robot, start), field, metric=metric, limits=None
+    )
     v0 = 0.3 * np.sin(2.0 + np.arange(robot.nv))
     rollout = simulate(
         controller, q0, v0, duration=1.0, log_period=LOG_PERIOD, integrator=PRECISE
@@ -442,6 +444,7 @@ def self_motion(run: Run) -> Rollout:
         moving(robot, run.robot),
         null_space_gain=run.K_N,
         metric=METRICS[run.metric][0](robot.nv),
+        limits=None,
     )
     v0 = 0.5 * np.sin(1.0 + 2.0 * np.arange(robot.nv))
     rollout = simulate(
@@ -521,7 +524,12 @@ def test_the_law_integrates_in_fourth_order(metric: str) -> None:
     )
     field = moving(robot, "panda")
     controller = Controller(
-        robot, [task], field, null_space_gain=6.0, metric=METRICS[metric][0](7)
+        robot,
+        [task],
+        field,
+        null_space_gain=6.0,
+        metric=METRICS[metric][0](7),
+        limits=None,
     )
     v0 = self_motion(run).v[0]
     # The mass matrix makes light wrists fast: -M⁻¹∇f has rates of up to 1e3 1/s.
@@ -663,6 +671,7 @@ def settled(which: str, metric: str) -> Rollout:
         case.weight * case.field(robot),
         null_space_gain=20.0,
         metric=METRICS[metric][0](robot.nv),
+        limits=None,
     )
     return simulate(
         controller,

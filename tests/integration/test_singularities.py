@@ -100,6 +100,7 @@ class Passage:
             TargetPosture(self.start),
             null_space_gain=FREQUENCY,
             singularity_threshold=threshold,
+            limits=None,
         )
 
     def run(self, threshold: float, control_period: float | None = None) -> Rollout:
@@ -330,6 +331,7 @@ def test_a_target_out_of_reach_is_pointed_at(threshold: float) -> None:
         [task],
         TargetPosture(robot.home()),
         singularity_threshold=threshold,
+        limits=None,
     )
     rollout = simulate(
         controller,
@@ -419,7 +421,9 @@ def test_random_starts(name: str) -> None:
     rng = np.random.default_rng(sum(map(ord, name)))
     target = Target(robot, ROBOTS[name])
     field = TargetPosture(robot.random_configuration(rng))
-    controller = Controller(robot, [target.task], field, null_space_gain=FREQUENCY)
+    controller = Controller(
+        robot, [target.task], field, null_space_gain=FREQUENCY, limits=None
+    )
     state = RobotState(robot)
     singular = 0
     for _ in range(STARTS):
@@ -454,7 +458,9 @@ def test_rollouts_from_singular_starts(name: str) -> None:
     rng = np.random.default_rng(5)
     target = Target(robot, ROBOTS[name])
     field = TargetPosture(robot.home())
-    controller = Controller(robot, [target.task], field, null_space_gain=FREQUENCY)
+    controller = Controller(
+        robot, [target.task], field, null_space_gain=FREQUENCY, limits=None
+    )
     state, runs = RobotState(robot), 0
     while runs < 12:
         q, v = random_start(robot, rng), 0.3 * rng.normal(size=robot.nv)

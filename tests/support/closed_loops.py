@@ -59,7 +59,7 @@ def planar_controller(gain: float = 10.0) -> Controller:
         "ball", Sphere(0.1), Lissajous([0, 0.7, 0], [1, 3, 1], center=[-1, 1.7, 0])
     )
     field = TargetPosture(planar_start()) + PointDistance(["link3"], ball)
-    return Controller(robot, [task], field, null_space_gain=gain)
+    return Controller(robot, [task], field, null_space_gain=gain, limits=None)
 
 
 def planar_start() -> Array:
@@ -76,4 +76,4 @@ def panda_controller() -> Controller:
         Lissajous([0.1, 0.1, 0.05], [3.0, 4.0, 5.0], center=x),
         gains=Gains(natural_frequency=10.0),
     )
-    return Controller(robot, [task], TargetPosture(robot.home() + 0.2))
+    return Controller(robot, [task], TargetPosture(robot.home() + 0.2), limits=None)

@@ -38,7 +38,7 @@ def controller(robot: Robot = PANDA, away: float = 0.05, **options: Any) -> Cont
         robot,
         [circle(robot, away=away)],
         2.0 * TargetPosture(robot.home()),
-        **options,
+        **({"limits": None} | options),
     )
 
 

@@ -74,7 +74,9 @@ class Arm:
 
     def run(self, *tasks: Task, scene: Scene | None = None, **settings: Any) -> Rollout:
         posture = TargetPosture(self.q0 + 0.1)
-        controller = Controller(self.robot, tasks, posture, **settings)
+        controller = Controller(
+            self.robot, tasks, posture, **({"limits": None} | settings)
+        )
         return simulate(controller, self.q0, duration=0.5, scene=scene)
 
 

@@ -1,6 +1,7 @@
 """Limits of motors, joints and distances."""
 
 from .limits import Limits as Limits
+from .limits import LimitsOrNone as LimitsOrNone
 from .limits import own_limits as own_limits
 from .maximum import Scaled as Scaled
 from .minimum_distance import MinimumDistance as MinimumDistance

@@ -18,6 +18,7 @@ from hsp_control.constraints.limits.robot_limits import RobotLimits
 from hsp_control.constraints.limits.static_effort import StaticEffort
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
+    ArrayField,
     Fraction,
     NonNegative,
     Positive,
@@ -75,9 +76,10 @@ class Limits(Part, error=LimitError):
         BeforeValidator(none_for_nothing),
     ] = "robot"
     """Joint position limits [rad or m]: the robot's own, none, or numbers."""
-    position_margin: NonNegative = 0.005
-    """Margin inside the position limits [rad or m]. With efforts held for a period, a
-    barrier may be crossed by the error of the acceleration over α²."""
+    position_margin: NonNegative | None = None
+    """Margin inside the position limits [rad or m]: 0.005 by default, at most a tenth
+    of a joint's range. With efforts held for a period, a barrier may be crossed by the
+    error of the acceleration over α²."""
     velocity_margin: Share = 0.02
     """Margin inside the speed limits, as a fraction of the limit [-]."""
     distances: Annotated[Sequence[MinimumDistance], AfterValidator(tuple)] = ()
@@ -113,7 +115,7 @@ class Limits(Part, error=LimitError):
         with within("velocity"):
             velocity = maximum(self.velocity, robot.model.velocityLimit, robot)
         with within("position"):
-            lower, upper = self._positions(robot)
+            lower, upper, margin = self._positions(robot)
         distances = []
         for k, each in enumerate(self.distances):
             with within("distances", k):
@@ -133,8 +135,8 @@ class Limits(Part, error=LimitError):
             lower=read_only(lower),
             upper=read_only(upper),
             motion=MotionLimits(
-                read_only(lower + self.position_margin),
-                read_only(upper - self.position_margin),
+                read_only(lower + margin),
+                read_only(upper - margin),
                 read_only((1.0 - self.velocity_margin) * velocity),
                 self._numbers("acceleration", robot),
                 read_only([self.bandwidth]),
@@ -153,8 +155,8 @@ class Limits(Part, error=LimitError):
             given = getattr(self, field)
             return read_only(by_dof(np.inf if given is None else given, robot.nv))
 
-    def _positions(self, robot: Robot) -> tuple[Array, Array]:
-        """Return lower and upper joint positions, shape (nv,).
+    def _positions(self, robot: Robot) -> tuple[Array, Array, Array]:
+        """Return lower and upper joint positions and their margin, shape (nv,).
 
         Raises:
             LimitError: If the limits do not fit the robot, or leave no room.
@@ -165,15 +167,28 @@ class Limits(Part, error=LimitError):
             lower, upper = robot.position_limits()
         else:
             lower, upper = np.full(robot.nv, -np.inf), np.full(robot.nv, np.inf)
-        margin = self.position_margin
+        margin = np.full(robot.nv, self.position_margin or 0.0)
+        if self.position_margin is None:
+            margin[:] = np.minimum(0.005, 0.1 * (upper - lower))
         crossed = np.flatnonzero(~(lower + margin < upper - margin))
         if crossed.size:
             i = crossed[0]
             raise LimitError(
                 f"the limits of {robot.dof_names[i]} leave no room: {lower[i]:.6g} to "
-                f"{upper[i]:.6g} with a margin of {margin:g}"
+                f"{upper[i]:.6g} with a margin of {margin[i]:g}; give a smaller "
+                "position_margin, or position: none"
             )
-        return lower, upper
+        return lower, upper, margin
+
+
+LimitsOrNone = Annotated[
+    Limits | None,
+    ArrayField(
+        Limits | Literal["none"] | None,
+        lambda limits: None if limits == "none" else limits,
+    ),
+]
+"""Limits, or none: in YAML the word, or nothing."""
 
 
 def own_limits(robot: Robot) -> RobotLimits:

@@ -440,7 +440,12 @@ def step_results() -> dict[str, list[float]]:
     results = {}
     for name, metric in METRICS.items():
         controller = Controller(
-            panda, tasks, field, metric=metric(7), singularity_threshold=0.01
+            panda,
+            tasks,
+            field,
+            metric=metric(7),
+            singularity_threshold=0.01,
+            limits=None,
         )
         for where, q in (("general", home), ("singular", SINGULAR)):
             state = panda.state(0.2, q, v)

@@ -119,6 +119,24 @@ def test_a_configuration_becomes_the_objects_it_names() -> None:
     np.testing.assert_allclose(experiment.run()["task.pen.error"][0], 0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("word", ["none", None])
+def test_limits_are_the_robot_s_own_unless_there_are_to_be_none(
+    word: str | None, tmp_path: Path
+) -> None:
+    own = load_experiment(PANDA)
+    numbers = own.controller.limits
+    assert numbers is not None
+    np.testing.assert_array_equal(numbers.effort, own.robot.model.effortLimit)
+    np.testing.assert_array_equal(numbers.velocity, own.robot.model.velocityLimit)
+    np.testing.assert_array_equal(numbers.lower, own.robot.position_limits()[0])
+    assert "limits" not in yaml.safe_load(own.to_yaml())
+
+    free = load_experiment(changed("limits", word))
+    assert free.controller.limits is None
+    for again in (yaml.safe_load(free.to_yaml()), free.run().save(tmp_path / "a.npz")):
+        assert load_experiment(again).controller.limits is None
+
+
 def test_the_same_run_from_yaml_and_from_python(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(yaml.safe_dump(PANDA))

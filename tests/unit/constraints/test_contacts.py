@@ -227,7 +227,7 @@ def standing(**options: Any) -> Controller:
         TargetPosture("home"),
         null_space_gain=6.0,
         contacts=contacts,
-        **options,
+        **({"limits": None} | options),
     )
 
 
@@ -283,7 +283,7 @@ def test_the_log_says_how_much_friction_is_used() -> None:
     state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
     aside = state.centroidal.position + np.array([0.002, 0.005, 0.0])
     controller = Controller(
-        robot, [CenterOfMass(Hold(aside), gains=GAINS)], contacts=contacts
+        robot, [CenterOfMass(Hold(aside), gains=GAINS)], contacts=contacts, limits=None
     )
     log = simulate(
         controller,
@@ -363,7 +363,7 @@ def test_in_the_air_only_what_is_possible_is_asked() -> None:
     posture = JointPosture(
         robot.integrate(robot.home(), 0.1 * np.ones(robot.nv)), gains=GAINS
     )
-    controller = Controller(robot, [posture], base="flying")
+    controller = Controller(robot, [posture], base="flying", limits=None)
     state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
     out = controller.compute(state)
     assert not out.tau[:6].any()
@@ -389,6 +389,7 @@ def test_forces_are_redistributed_before_the_law_is_touched() -> None:
         robot,
         [task],
         contacts=[sole(frame, friction=0.12) for frame in SOLES],
+        limits=None,
     )
     out = controller.compute(state)
     assert out.status in (Status.EXACT, Status.REDISTRIBUTED)
@@ -420,7 +421,7 @@ def test_a_contact_is_released_without_a_jump() -> None:
         sole(SOLES[1]),
         sole(SOLES[0], schedule=Schedule([(-np.inf, 1.0)], ramp=0.4)),
     ]
-    controller = Controller(robot, tasks, contacts=contacts)
+    controller = Controller(robot, tasks, contacts=contacts, limits=None)
     # Over the right sole already: the left one bears little.
     q = robot.home()
     for _ in range(50):  # a Newton walk of the centre of mass, feet still
@@ -454,7 +455,7 @@ def test_tasks_come_and_go_without_a_jump() -> None:
     wrist = JointPosture(
         robot.integrate(q, 0.3 * np.ones(7)), gains=GAINS, joints=["panda_joint7"]
     )
-    controller = Controller(robot, [hand])
+    controller = Controller(robot, [hand], limits=None)
     controller.compute(robot.state(0.0, q, v))
     controller.at(1.0).ramp(0.5).add(wrist)
     assert controller.priority_of("posture") == 1
@@ -508,6 +509,7 @@ def test_a_floating_base_needs_support() -> None:
             [task],
             base="driven",
             contacts=[BallContact(FEET[0], radius=0.016)],
+            limits=None,
         )
     foot = BallContact(FEET[0], radius=0.016)
     with pytest.raises(ContactError, match="two contacts are called 'FL_FOOT'"):

@@ -99,6 +99,14 @@ def test_none_is_no_limit() -> None:
         assert (each == np.inf).all()
 
 
+def test_a_joint_that_hardly_moves_has_a_small_margin() -> None:
+    """0.005, and a tenth of a range that is small: a suspension has 10 mm in all."""
+    upper = [0.004, *np.arange(1.0, 7.0)]
+    limits = of(panda(), position=PositionRange(-0.006, upper))
+    np.testing.assert_allclose(upper - limits.guarded_upper, [1e-3] + 6 * [0.005])
+    np.testing.assert_allclose(limits.guarded_lower + 0.006, [1e-3] + 6 * [0.005])
+
+
 def test_one_number_or_one_for_each() -> None:
     numbers = np.arange(1.0, 8.0)
     some = [1.0, None, np.inf, 4.0, 5.0, 6.0, 7.0]

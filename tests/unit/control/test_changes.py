@@ -42,7 +42,9 @@ class Line:
         hand = hsp.FramePosition(self.frame, axes=axes, name="hand")
         field = hsp.TargetPosture("home", name="joint_centering")
         start = self.center
-        return hsp.Controller(self.robot, [hand], field, start=start, changes=changes)
+        return hsp.Controller(
+            self.robot, [hand], field, start=start, changes=changes, limits=None
+        )
 
     def motion(self, t: float) -> tuple[Array, Array]:
         q = self.robot.integrate(self.center, self.swing * np.sin(3.0 * t))
@@ -148,6 +150,7 @@ def test_in_the_end_it_is_as_if_built_that_way(name: str, seed: int) -> None:
         tasks,
         changed.field,
         null_space_gain=changed.null_space_gain,
+        limits=None,
     )
     assert sorted(task.name for task in tasks) == sorted(line.there)
     times = np.linspace(SPAN + 3.0, SPAN + 4.0, 7)
@@ -224,7 +227,9 @@ class Trial:
         self.q, self.v = self.robot.home(), np.zeros(7)
         point = self.robot.state(0.0, self.q, self.v).position("panda_tcp")
         hand = hsp.FramePosition("panda_tcp", hsp.Hold(point + 0.02), name="hand")
-        self.controller = hsp.Controller(self.robot, [hand], **options)
+        self.controller = hsp.Controller(
+            self.robot, [hand], **({"limits": None} | options)
+        )
 
     def largest_step(self, act: Callable[[int], object], duration: float) -> float:
         """Return the largest step of effort in a millisecond [N·m]."""
@@ -254,6 +259,15 @@ def test_a_change_of_gains_that_ends_before_an_older_one(panda: Trial) -> None:
     assert panda.largest_step(act, 1.3) < 0.2
     Kp = panda.controller.feedback("hand").Kp
     np.testing.assert_allclose(Kp, 25.0 * np.eye(3), atol=1e-12)
+
+
+def test_limits_that_go() -> None:
+    controller = Trial(limits=hsp.Limits()).controller
+    controller.at(0.1).ramp(0.2).limits(None)
+    robot = controller.robot
+    for t in (0.0, 0.2, 0.31, 1.5):
+        controller.compute(t, robot.home(), np.zeros(robot.nv))
+    assert controller.limits is None
 
 
 def test_changes_of_gains_that_are_made_in_reverse(panda: Trial) -> None:
@@ -348,7 +362,9 @@ def test_a_contact_that_is_lifted_equals_one_whose_schedule_ends() -> None:
     def standing(**lifted: Any) -> hsp.Controller:
         contacts = [hsp.contacts.PointContact(foot) for foot in feet]
         contacts[0] = replace(contacts[0], **lifted)
-        return hsp.Controller(robot, [trunk], contacts=contacts, start=robot.home())
+        return hsp.Controller(
+            robot, [trunk], contacts=contacts, start=robot.home(), limits=None
+        )
 
     changed = standing()
     changed.at(0.5).ramp(0.4).contact(feet[0], bears=False)

@@ -102,7 +102,12 @@ def controller(
     **options: Any,
 ) -> Controller:
     options = {"null_space_gain": K_N, "metric": metric, **options}
-    return Controller(panda(), [hand(), *more], field or JointCentering(), **options)
+    return Controller(
+        panda(),
+        [hand(), *more],
+        field or JointCentering(),
+        **({"limits": None} | options),
+    )
 
 
 def run(law: Controller, duration: float = 0.8, **options: Any) -> Rollout:
@@ -233,7 +238,9 @@ def far() -> FramePosition:
 
 def test_the_error_equation_holds_while_gains_change() -> None:
     """Of two changes that overlap, by coupled gains, beside an integrated solution."""
-    law = Controller(panda(), [far()], JointCentering(), null_space_gain=K_N)
+    law = Controller(
+        panda(), [far()], JointCentering(), null_space_gain=K_N, limits=None
+    )
     law.at(START).ramp(RAMP).gains("hand", COUPLED)
     law.at(START + 0.1).ramp(0.15).gains("hand", Gains([9.0, 16.0, 25.0], 9.0))
 
@@ -263,7 +270,9 @@ def test_the_error_equation_holds_while_gains_change() -> None:
 def test_the_error_equation_holds_while_references_change() -> None:
     """Of a position and an orientation, whose error counts from what is in between."""
     turned = replace(TURNED, priority=1)
-    law = Controller(panda(), [far(), turned], JointCentering(), null_space_gain=K_N)
+    law = Controller(
+        panda(), [far(), turned], JointCentering(), null_space_gain=K_N, limits=None
+    )
     law.at(START).ramp(RAMP).reference("hand", Hold([0.5, 0.0, 0.4]))
     law.at(START + 0.1).ramp(0.4).reference("turned", Spin([0, 0, 1], 0.5))
     law.at(START + 0.2).ramp(RAMP).reference("hand", hand().trajectory)
@@ -283,7 +292,9 @@ def test_the_error_equation_holds_while_references_change() -> None:
 def test_the_error_equation_of_other_tasks_holds_while_one_comes_and_goes(
     priority: int,
 ) -> None:
-    law = Controller(panda(), [far()], JointCentering(), null_space_gain=K_N)
+    law = Controller(
+        panda(), [far()], JointCentering(), null_space_gain=K_N, limits=None
+    )
     law.at(0.1).ramp(0.2).add(replace(TURNED, priority=priority))
     law.at(0.4).ramp(0.3).remove("turned").weight("joint_centering", 0.1)
     log = run(law)
@@ -312,7 +323,9 @@ def still(*more: Task, **options: Any) -> Controller:
     """Return a controller whose effort changes with the state alone."""
     task = FramePosition("panda_tcp", Hold([0.5, 0.1, 0.4]), gains=GAINS, name="hand")
     options = {"null_space_gain": K_N, **options}
-    return Controller(panda(), [task, *more], JointCentering(), **options)
+    return Controller(
+        panda(), [task, *more], JointCentering(), **({"limits": None} | options)
+    )
 
 
 FINAL: dict[str, tuple[Callable[[], Controller], Any, Callable[[], Controller]]] = {
@@ -324,6 +337,7 @@ FINAL: dict[str, tuple[Callable[[], Controller], Any, Callable[[], Controller]]]
             [replace(still().tasks[0], gains=COUPLED)],
             JointCentering(),
             null_space_gain=K_N,
+            limits=None,
         ),
     ),
     "null-space gain": (

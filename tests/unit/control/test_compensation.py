@@ -286,7 +286,7 @@ def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
         2: [circle(), second],
         3: [circle(), second, third],  # nine rows on seven freedoms
     }[levels]
-    made = Controller(robot, tasks, TargetPosture(np.zeros(7) + Q0 * 0.9))
+    made = Controller(robot, tasks, TargetPosture(np.zeros(7) + Q0 * 0.9), limits=None)
     q = robot.integrate(Q0, rng.uniform(-0.3, 0.3, 7))
     flow = made.flow(0.4, q)
     for _ in range(5):
@@ -371,7 +371,7 @@ def test_a_lasting_error_dies_and_the_null_space_keeps_its_own() -> None:
     point = circle().trajectory.sample(0.0).position
     gains = Gains(natural_frequency=20.0)
     hold = FramePosition("panda_tcp", Hold(point), gains=gains, name="hand")
-    made = Controller(PANDA, [hold])
+    made = Controller(PANDA, [hold], limits=None)
     options = {"plant": plant, "duration": 1.5}
     alone = run(made, **options)
     mended = run(made, Compensation(integral_action=IntegralAction(10.0)), **options)
@@ -413,7 +413,8 @@ def test_a_payload_s_error_dies_as_the_linear_equation_says(
         [-400.0 * B - D, -40.0 * B, -400.0 * rate * B, weight(Q0)[:, None]]
     )
     log = run(
-        Controller(PANDA, [task]), Compensation(integral_action=IntegralAction(rate)),
+        Controller(PANDA, [task], limits=None),
+        Compensation(integral_action=IntegralAction(rate)),
         plant=RigidBodyPlant(loaded), duration=2.0, log_period=0.02,
     )  # fmt: skip
     expected = np.array([expm(A * t)[:7, 21] for t in log.t])
@@ -431,7 +432,7 @@ def test_too_much_integral_action_is_lost_with_a_payload() -> None:
     hold = FramePosition(
         "panda_tcp", Hold(point), gains=Gains(natural_frequency=20.0), name="hand"
     )
-    made = Controller(PANDA, [hold], 2.0 * TargetPosture(Q0))
+    made = Controller(PANDA, [hold], 2.0 * TargetPosture(Q0), limits=None)
     largest = {}
     for rate in (5.0, 12.0):
         compensation = Compensation(integral_action=IntegralAction(rate))

@@ -34,7 +34,9 @@ from hsp_control.null_space.metrics import (
 def test_effort_is_m_a_plus_n(kind: str) -> None:
     """Equation (7), with M and N by plain Pinocchio."""
     field = TargetPosture(panda().home())
-    controller = Controller(panda(), [track()], field, metric=METRICS[kind](7))
+    controller = Controller(
+        panda(), [track()], field, metric=METRICS[kind](7), limits=None
+    )
     model, data = panda().model, panda().model.createData()
     for t, q, v in states(5):
         out = controller.compute(panda().state(t, q, v))
@@ -51,7 +53,7 @@ def test_effort_is_m_a_plus_n(kind: str) -> None:
 
 def test_tasks_are_stacked_in_order() -> None:
     tasks = [hold_orientation(), track(axes="xyz", name="origin")]
-    controller = Controller(panda(), tasks, singularity_threshold=EXACT)
+    controller = Controller(panda(), tasks, singularity_threshold=EXACT, limits=None)
     t, q, v = states(1)[0]
     state = panda().state(t, q, v)
     out = controller.compute(state)
@@ -73,8 +75,8 @@ def test_tasks_are_stacked_in_order() -> None:
 def test_order_of_tasks_does_not_matter() -> None:
     """One level: the same law whichever comes first."""
     field = TargetPosture(panda().home())
-    first = Controller(panda(), [track(), hold_orientation()], field)
-    second = Controller(panda(), [hold_orientation(), track()], field)
+    first = Controller(panda(), [track(), hold_orientation()], field, limits=None)
+    second = Controller(panda(), [hold_orientation(), track()], field, limits=None)
     for t, q, v in states(5):
         state = panda().state(t, q, v)
         a, b = first.compute(state), second.compute(state)
@@ -87,9 +89,14 @@ def test_order_of_tasks_does_not_matter() -> None:
 
 
 def test_defaults_are_rest_the_identity_and_ten() -> None:
-    plain = Controller(panda(), [track()])
+    plain = Controller(panda(), [track()], limits=None)
     said = Controller(
-        panda(), [track()], Rest(), metric=IdentityMetric(), null_space_gain=10.0
+        panda(),
+        [track()],
+        Rest(),
+        metric=IdentityMetric(),
+        null_space_gain=10.0,
+        limits=None,
     )
     state = panda().state(*states(1)[0])
     assert_same(contents(plain.compute(state)), contents(said.compute(state)))
@@ -99,7 +106,11 @@ def test_defaults_are_rest_the_identity_and_ten() -> None:
 def test_gain_as_number_list_and_matrix() -> None:
     state = panda().state(*states(1)[0])
     outputs = [
-        contents(Controller(panda(), [track()], null_space_gain=gain).compute(state))
+        contents(
+            Controller(panda(), [track()], null_space_gain=gain, limits=None).compute(
+                state
+            )
+        )
         for gain in (6.0, 7 * [6.0], 6.0 * np.eye(7))
     ]
     assert_same(outputs[0], outputs[1])
@@ -116,6 +127,7 @@ def test_uncontrolled_leaves_self_motion_alone(kind: str) -> None:
         Uncontrolled(),
         metric=metric,
         singularity_threshold=EXACT,
+        limits=None,
     )
     for t, q, v in states(5):
         state = panda().state(t, q, v)
@@ -138,7 +150,7 @@ def test_diagnosis(kind: str) -> None:
     metric = METRICS[kind](7)
     field = TargetPosture(panda().home(), weights=2.0)
     controller = Controller(
-        panda(), [track(), hold_orientation()], field, metric=metric
+        panda(), [track(), hold_orientation()], field, metric=metric, limits=None
     )
     for t, q, v in states(3, seed=1):
         state = panda().state(t, q, v)
@@ -168,7 +180,7 @@ def test_diagnosis(kind: str) -> None:
 
 def test_a_state_may_be_given_in_any_form() -> None:
     """To the last bit; values that a float32 can hold, in that one, too."""
-    controller = Controller(panda(), [track()], TargetPosture("home"))
+    controller = Controller(panda(), [track()], TargetPosture("home"), limits=None)
     t, q, v = states(1)[0]
     q, v = q.astype(np.float32).astype(float), v.astype(np.float32).astype(float)
     expected = contents(controller.compute(panda().state(t, q, v)))
@@ -189,7 +201,9 @@ def test_a_state_may_be_given_in_any_form() -> None:
 
 def test_an_output_belongs_to_the_caller() -> None:
     """Later steps do not write into it, unless it is given to them."""
-    controller = Controller(panda(), [track(), hold_orientation()], TargetPosture())
+    controller = Controller(
+        panda(), [track(), hold_orientation()], TargetPosture(), limits=None
+    )
     first, second, third = states(3)
     out = controller.compute(*first)
     before = deepcopy(contents(out))
@@ -209,8 +223,8 @@ def test_same_state_same_effort(kind: str) -> None:
     """Whatever was computed before: elsewhere, near a singularity, or an error."""
     tasks = [track(), hold_orientation()]
     field = TargetPosture(panda().home())
-    controller = Controller(panda(), tasks, field, metric=METRICS[kind](7))
-    fresh = Controller(panda(), tasks, field, metric=METRICS[kind](7))
+    controller = Controller(panda(), tasks, field, metric=METRICS[kind](7), limits=None)
+    fresh = Controller(panda(), tasks, field, metric=METRICS[kind](7), limits=None)
     somewhere, *others = states(6, seed=2)
     state = panda().state(*somewhere)
     expected = contents(controller.compute(state))
@@ -230,7 +244,9 @@ def test_same_state_same_effort(kind: str) -> None:
 def test_states_take_turns() -> None:
     """Two robots of one kind, one controller: each state gets its own effort."""
     field = TargetPosture(panda().home())
-    controller = Controller(panda(), [track()], field, metric=MassMatrixMetric())
+    controller = Controller(
+        panda(), [track()], field, metric=MassMatrixMetric(), limits=None
+    )
     first, second = (panda().state(*where) for where in states(2, seed=3))
     a, b = contents(controller.compute(first)), contents(controller.compute(second))
     for _ in range(3):
@@ -254,6 +270,7 @@ def test_singular_posture_gives_a_bounded_effort(kind: str) -> None:
         field,
         metric=METRICS[kind](7),
         singularity_threshold=threshold,
+        limits=None,
     )
     v = 0.1 * np.ones(7)
     direction = np.random.default_rng(4).standard_normal(7)
@@ -274,6 +291,7 @@ def test_singular_posture_gives_a_bounded_effort(kind: str) -> None:
         Uncontrolled(),
         metric=METRICS[kind](7),
         singularity_threshold=threshold,
+        limits=None,
     )
     a = uncontrolled.compute(state).acceleration
     bound = 1.09 / threshold * np.linalg.norm(wanted)

@@ -90,7 +90,7 @@ def test_the_bound_leaves_the_law_alone(metric: str, seed: int) -> None:
     wide = {"effort": 1e6, "velocity": None, "position": None}
     limits = Limits(**wide, null_space_speed=1e-3)
     state = robot.state(0.3, q, v)
-    free = Controller(robot, [hand()], field, **options)
+    free = Controller(robot, [hand()], field, **({"limits": None} | options))
     bounded = Controller(robot, [hand()], field, limits=limits, **options)
     law, out = free.compute(state), bounded.compute(state)
     assert out.status == Status.EXACT
@@ -104,7 +104,9 @@ def test_the_projector_is_the_law_s(metric: str, seed: int) -> None:
     """P(g - v) is the law's own null-space error, to rounding."""
     robot, rng = panda(), np.random.default_rng(seed)
     state = robot.state(0.1, robot.random_configuration(rng), rng.standard_normal(7))
-    controller = Controller(robot, [hand()], JointCentering(), metric=METRICS[metric])
+    controller = Controller(
+        robot, [hand()], JointCentering(), metric=METRICS[metric], limits=None
+    )
     out = controller.compute(state)
     if out.damped:  # then e_N keeps a part of the direction that is being lost
         return
@@ -121,7 +123,9 @@ def test_the_root_of_the_inverse_cost_is_that(metric: str, seed: int) -> None:
     robot, rng = panda(), np.random.default_rng(seed)
     posture = JointPosture(robot.home(), joints=["panda_joint2"], priority=2)
     tasks = [hand(), posture]
-    controller = Controller(robot, tasks, JointCentering(), metric=METRICS[metric])
+    controller = Controller(
+        robot, tasks, JointCentering(), metric=METRICS[metric], limits=None
+    )
     state = robot.state(0.1, robot.random_configuration(rng), rng.standard_normal(7))
     if controller.compute(state).damped:  # a direction is between two levels
         return
@@ -191,7 +195,7 @@ def test_null_space_error_stays_bounded(seed: int) -> None:
     norm = rollout["null_space_norm"]
     most = max(SPEED * np.sqrt(7.0), norm[0])
     assert norm.max() <= 1.005 * most
-    free = Controller(panda(), [controller.tasks[0]], controller.field)
+    free = Controller(panda(), [controller.tasks[0]], controller.field, limits=None)
     state, binds = RobotState(panda()), False
     for k in np.flatnonzero(rollout["status"] == Status.LIMITED)[::10]:
         state.update(rollout.t[k], rollout["q"][k], rollout["v"][k])

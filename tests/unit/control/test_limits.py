@@ -138,13 +138,28 @@ def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
     robot, rng = panda(), np.random.default_rng(seed)
     q, v = robot.random_configuration(rng), 0.3 * rng.standard_normal(7)
     field = JointCentering()
-    free = Controller(robot, [hand()], field)
+    free = Controller(robot, [hand()], field, limits=None)
     wide = Limits(effort=1e6, velocity=None, position=None)
     limited = Controller(robot, [hand()], field, limits=wide)
     state = robot.state(0.3, q, v)
     out, same = free.compute(state), limited.compute(state)
     assert same.status == Status.EXACT
     np.testing.assert_array_equal(same.tau, out.tau)
+
+
+def test_a_controller_keeps_the_robot_s_own_limits_unless_told_otherwise() -> None:
+    """Also an effort that is asked for beside a singularity."""
+    robot = panda()
+    far = FramePosition("panda_tcp", Hold([3.0, 0.0, 0.5]), name="hand")
+    own = Controller(robot, [far])
+    free = Controller(robot, [far], limits=None)
+    most = robot.model.effortLimit
+    assert own.limits is not None
+    assert free.limits is None
+    np.testing.assert_array_equal(own.limits.effort, most)
+    there = 0.0, robot.home(), np.zeros(7)
+    assert (np.abs(own.compute(*there).tau) <= most).all()
+    assert (np.abs(free.compute(*there).tau) > most).any()
 
 
 def test_null_space_gives_way_first_then_the_lower_task() -> None:
@@ -160,7 +175,7 @@ def test_null_space_gives_way_first_then_the_lower_task() -> None:
     )
     tasks = [hand(), posture]
     field = 20.0 * JointCentering()
-    free = Controller(robot, tasks, field)
+    free = Controller(robot, tasks, field, limits=None)
     state = robot.state(0.3, q, v)
     wanted = free.compute(state)
     tau, a = wanted.tau.copy(), wanted.acceleration.copy()

@@ -161,7 +161,7 @@ def test_the_linear_loop_is_the_chain_link_by_link(
     robot = Robot.load(str(file))
     h, frequency = 0.01, 12.0
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=frequency))
-    made, parts = Controller(robot, [task]), Compensation(**compensation)
+    made, parts = Controller(robot, [task], limits=None), Compensation(**compensation)
     plant = ImperfectPlant(
         IntegratedPlant(RigidBodyPlant(changed(robot, [Inertias(heavy)])), Rk4(h)),
         [SensorDelay(delays[1])],
@@ -191,7 +191,7 @@ def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
     """The weightless arm agrees: 10 % beside what is told its motion dies or grows."""
     robot = Robot.load("panda", gravity=[0.0, 0.0, 0.0])
     task = JointPosture(Q0, gains=Gains(natural_frequency=20.0))
-    made = Controller(robot, [task])
+    made = Controller(robot, [task], limits=None)
     for observer in (None, MomentumObserver(20.0)):
         strong = Compensation(
             integral_action=IntegralAction(12.0), momentum_observer=observer
@@ -237,7 +237,9 @@ def holding(
     gains = Gains(natural_frequency=frequency)
     hand = FramePosition("panda_tcp", Hold(position), gains=gains, name="hand")
     field = stiffness * TargetPosture(TARGET)
-    return Controller(PANDA, [hand], field, null_space_gain=gain, **more)
+    return Controller(
+        PANDA, [hand], field, null_space_gain=gain, **({"limits": None} | more)
+    )
 
 
 @pytest.mark.parametrize(
@@ -384,7 +386,7 @@ def test_a_field_s_slope_is_taken_in_the_null_space_and_the_metric() -> None:
         hand = FramePosition(
             "panda_tcp", Hold([0.4, 0.0, 0.5]), gains=Gains(natural_frequency=10.0)
         )
-        K, A = null_space_rates(Controller(PANDA, [hand], field), state)
+        K, A = null_space_rates(Controller(PANDA, [hand], field, limits=None), state)
         assert np.allclose(A, 0.0)
         assert len(K) == (4 if field.controls else 0)
 

@@ -194,6 +194,7 @@ def conflicting(kind: str) -> Controller:
         2.0 * JointCentering(),
         null_space_gain=4.0,
         metric=metric_of(kind),
+        limits=None,
     )
 
 
@@ -235,14 +236,14 @@ def test_levels_are_the_tasks_of_one_priority() -> None:
     assert [controller.priority_of(n) for n in ("hand", "wrist", "rival")] == [1, 2, 2]
     hand, wrist, rival = controller.tasks
     spread = [replace(rival, priority=70), replace(hand, priority=3), wrist]
-    levels = Controller(panda(), spread).levels
+    levels = Controller(panda(), spread, limits=None).levels
     assert [task.name for (task,) in levels] == ["wrist", "hand", "rival"]
 
 
 def test_nested_lists_are_refused() -> None:
     hand, *others = conflicting("identity").tasks
     with pytest.raises(ControllerError, match="lists; write the level as priority="):
-        Controller(panda(), [hand, others])  # type: ignore[list-item]
+        Controller(panda(), [hand, others], limits=None)  # type: ignore[list-item]
 
 
 def test_propositions_hold_for_two_arms() -> None:
@@ -267,7 +268,9 @@ def test_propositions_hold_for_two_arms() -> None:
         FramePosition("right_gripper", Hold(right + 0.05), **second),
         FramePosition("left_gripper", Hold([0.3]), axes="x", name="rival", **second),
     ]
-    controller = Controller(robot, tasks, JointCentering(), null_space_gain=4.0)
+    controller = Controller(
+        robot, tasks, JointCentering(), null_space_gain=4.0, limits=None
+    )
     v0 = 0.2 * np.cos(np.arange(robot.nv))
     rollout = simulate(
         controller,

@@ -175,6 +175,7 @@ def controller(c: Case, metric: Metric, gain: Any) -> Controller:
         # small by itself.
         singularity_threshold=1e-4,
         base="driven" if c.robot.unactuated else None,
+        limits=None,
     )
 
 

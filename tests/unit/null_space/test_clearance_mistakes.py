@@ -120,7 +120,7 @@ MISTAKES: list[tuple[Callable[[Path], Any], type[HspControlError], str]] = [
      "HeightField: heights.1.1: .inf is not a finite number"),
     (lambda _: Obstacle("it", Sphere(0.1), center=Hold([0.0, 0.0])), SceneError,
      "Obstacle: center: its dimension is 2; needs 3 (x, y, z)"),
-    (lambda _: Scene([BALL, BALL]), SceneError, "two obstacles have the name 'ball'"),
+    (lambda _: Scene([BALL, BALL]), SceneError, "two have the name 'ball'"),
     (lambda _: Scene([BALL])["bell"], SceneError,
      "no obstacle 'bell'; did you mean 'ball'? (the scene has ball)"),
 ]  # fmt: skip

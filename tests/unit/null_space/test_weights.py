@@ -324,7 +324,7 @@ def test_the_log_tells_who_moves_the_arm() -> None:
     )
     hold = FramePosition("panda_tcp", Hold(), gains=Gains(100, 20))
     rollout = simulate(
-        Controller(robot, [hold], field),
+        Controller(robot, [hold], field, limits=None),
         robot.home(),
         duration=0.1,
         integrator=Rk4(0.005),
@@ -532,7 +532,7 @@ def test_the_field_keeps_a_pushed_joint_off_its_limit() -> None:
     ends = {}
     for name, field in (("with", push + 0.05 * LimitBarrier()), ("without", push)):
         rollout = simulate(
-            Controller(robot, [height], field),
+            Controller(robot, [height], field, limits=None),
             start,
             duration=6.0,
             log_period=0.1,
