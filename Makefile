@@ -69,17 +69,24 @@ fuzz: $(STAMP) ## random states, mutated files, faults, soak: hours; writes docs
 mutants: $(STAMP) ## break the code on purpose, report what no test notices
 	@PYTHONPATH=tests/support $(BIN)/python tests/mutants.py $(ARGS)
 
-wheel-test: $(STAMP) ## build the wheel, install it elsewhere, use it from there
+wheel: $(STAMP) ## build the wheel into dist/, with machine code for every configuration
+	@echo "Compiling what the bundled configurations use (some minutes) ..."
+	@$(BIN)/python tools/machine_code.py
+	@rm -rf dist; $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+	@ls dist
+
+wheel-test: wheel ## build the wheel, install it elsewhere, use it from there
 	@dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; mkdir "$$dir/cwd"; \
-	echo "Building the wheel and installing it into a fresh environment ..."; \
-	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir "$$dir" .; \
+	echo "Installing the wheel into a fresh environment ..."; \
 	$(call new-venv,$(BIN)/python,"$$dir/venv"); \
-	"$$dir/venv/bin/python" -m pip install --quiet "$$dir"/*.whl; \
+	"$$dir/venv/bin/python" -m pip install --quiet dist/*.whl; \
 	cd "$$dir/cwd"; export PATH="$$dir/venv/bin:$$PATH"; unset PYTHONPATH; \
 	hsp robots; \
 	hsp check paper/4_moving_obstacle; \
 	hsp run paper/4_moving_obstacle --set simulation.duration=1 --out out --no-view; \
 	hsp export out/4_moving_obstacle.npz --html out/page.html; \
+	compiled=$$(find "$$dir/venv" -path '*/hsp_control/*/__pycache__/*.nbc'); \
+	if [ -n "$$compiled" ]; then echo "Compiled, though the wheel has code: $$compiled"; exit 1; fi; \
 	echo "The wheel works."
 
 ##@ Keep
@@ -109,10 +116,10 @@ constraints: ## refresh constraints.txt with the newest version of everything
 	cp "$$dir/new" constraints.txt; echo "Wrote constraints.txt; now: make lint test"
 
 clean: ## remove caches, builds and the demo's output; .venv stays
-	@rm -rf build dist out/demo .coverage .*_cache .hypothesis
+	@rm -rf build dist machine_code out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help figures screenshots animations demo quick test thorough lint coverage fuzz mutants wheel-test format constraints clean
+.PHONY: help figures screenshots animations demo quick test thorough lint coverage fuzz mutants wheel wheel-test format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

@@ -4,6 +4,10 @@ Numba takes kept code for fresh while the text of the function's own file is the
 That is too strict, since a comment recompiles, and too lax, since the code of kernels
 in other files is compiled into it. Here kept code is fresh while the *bytecode* of the
 function and the value of everything that it reads, kernels included, are the same.
+
+A wheel brings machine code with it, for a processor that all others contain
+(`tools/machine_code.py`). It is used where no other is kept, under the same conditions:
+the same version of Numba, and the same bytecode.
 """
 
 import hashlib
@@ -12,19 +16,23 @@ import warnings
 from collections.abc import Callable, Iterator
 from functools import cache, cached_property
 from pathlib import Path
+from platform import machine
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
+import llvmlite.binding
 import numpy as np
 from numba.core import types
 from numba.core.caching import (
     Cache,
     CompileResultCacheImpl,
     InTreeCacheLocator,
-    NullCache,
     UserProvidedCacheLocator,
     UserWideCacheLocator,
+    _CacheLocator,
 )
+
+from hsp_control.common.resources import bundled
 
 _COMPILERS = ("llvmlite", "math", "numba", "numpy")
 """Packages whose modules stand for themselves: Numba checks its own version."""
@@ -36,20 +44,50 @@ _HOW = b"".join(
 """The files that say how kernels are compiled."""
 
 
-def kept(function: Callable[..., Any]) -> Any:
-    """Return where the machine code of a function is kept.
+def shipped_processor() -> tuple[str, tuple[str, ...]]:
+    """Return the processor that shipped code is for, and what it must be capable of."""
+    if machine() in ("x86_64", "AMD64"):
+        return "x86-64-v3", ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+    return "generic", ()
+
+
+class Kept:
+    """Where the machine code of a function is kept, as Numba's dispatchers use it.
 
     Beside the package's files, or where these are read-only in the user's cache
     folder; the environment variable ``NUMBA_CACHE_DIR`` names another. Where nothing
     can be written, nothing is kept, and a warning says so.
     """
-    try:
-        return _KernelCache(function)  # type: ignore[no-untyped-call]
-    except RuntimeError as error:  # Numba found no folder to keep the code in
-        if "cannot cache" not in str(error):
-            raise
-        _warn_of_no_cache()
-        return NullCache()
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        """Find the place."""
+        self._function = function
+        try:
+            self._own: Any = _KernelCache(function)  # type: ignore[no-untyped-call]
+        except RuntimeError as error:  # Numba found no folder to keep the code in
+            if "cannot cache" not in str(error):
+                raise
+            self._own = None
+
+    @property
+    def cache_path(self) -> str | None:
+        """The folder, for Numba's statistics."""
+        return self._own and str(self._own.cache_path)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the code for a signature, None if there is none that can be read."""
+        found = self._own and self._own.load_overload(sig, target_context)
+        if found is None and _shipped_code_runs_here():
+            shipped: Any = _ShippedCache(self._function)  # type: ignore[no-untyped-call]
+            found = shipped.load_overload(sig, target_context)
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep code that was compiled."""
+        if self._own is None:
+            _warn_of_no_cache()
+        else:
+            self._own.save_overload(sig, data)
 
 
 class Stamp:
@@ -167,6 +205,24 @@ class _KernelCacheImpl(CompileResultCacheImpl):
     ]
 
 
+class _Shipped(_ByContent, _CacheLocator):
+    """Places shipped code in one folder, wherever the function's file is."""
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        self._function = function
+
+    def get_cache_path(self) -> str:
+        return str(bundled("machine_code"))
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> "_Shipped":
+        return cls(function, file)
+
+
+class _ShippedImpl(CompileResultCacheImpl):
+    _locator_classes = [_Shipped]  # noqa: RUF012 (as Numba has it)
+
+
 class _KernelCache(Cache):
     _impl_class: Any = _KernelCacheImpl
 
@@ -175,12 +231,32 @@ class _KernelCache(Cache):
 
         What is kept names the records that a kernel takes: after an upgrade one may no
         longer exist, and a file may be damaged. Then the code is compiled anew.
+        Numba's own method loads what compiling needs first, SciPy too: half of a start.
         """
         try:
-            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # whatever unpickling raises
             self.flush()  # type: ignore[no-untyped-call]
             return None
+
+
+class _ShippedCache(_KernelCache):
+    _impl_class = _ShippedImpl
+
+    def flush(self) -> None:
+        """Leave what is shipped as it is."""
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        sig, (triple, *_), code = super()._index_key(sig, codegen)  # type: ignore[no-untyped-call]
+        return sig, (triple, shipped_processor()[0], ""), code
+
+
+@cache
+def _shipped_code_runs_here() -> bool:
+    """Say whether there is shipped code, and this processor can run it."""
+    features: Any = llvmlite.binding.get_host_cpu_features()
+    needed = shipped_processor()[1]
+    return bundled("machine_code").is_dir() and all(map(features.get, needed))
 
 
 @cache

@@ -41,11 +41,11 @@ def kernel(function: Function) -> Function:
         return function
     import numba
 
-    from hsp_control.common.kernel_cache import kept
+    from hsp_control.common.kernel_cache import Kept
     from hsp_control.common.linked_kernels import linked
 
     compiled = cast("Any", numba.jit(**_OPTIONS)(function))
-    compiled._cache = kept(function)
+    compiled._cache = Kept(function)
     inner = linked(function, _OPTIONS)
     compiled.get_call_template = inner.get_call_template
     compiled.get_overload = inner.get_overload
@@ -66,12 +66,14 @@ def callback(signature: Any, function: Callable[..., Any]) -> Any:
     """
     from numba.core.ccallback import CFunc
 
-    from hsp_control.common.kernel_cache import kept
+    from hsp_control.common.kernel_cache import Kept
+    from hsp_control.common.linked_kernels import compile_callable
 
     arguments = signature.args, signature.return_type
     compiled = cast("Any", CFunc)(function, arguments, locals={}, options=_OPTIONS)
-    compiled._cache = kept(function)
-    compiled._compile_uncached = partial(_watched, compiled._compile_uncached)
+    compiled._cache = Kept(function)
+    compile_it = partial(compile_callable, compiled._compiler, function, *arguments)
+    compiled._compile_uncached = partial(_watched, compile_it)
     compiled.compile()
     return compiled
 

@@ -64,8 +64,8 @@ def cholesky(A: Array, L: Array) -> bool:
 
 @kernel
 def solve_lower(L: Array, x: Array) -> None:
-    """Overwrite x with L⁻¹ x; shapes (n, n) and (n,)."""
-    for i in range(L.shape[0]):
+    """Overwrite x with L⁻¹ x; shapes (n, n) or larger, and (n,)."""
+    for i in range(x.shape[0]):
         total = x[i]
         for k in range(i):
             total -= L[i, k] * x[k]
@@ -74,8 +74,8 @@ def solve_lower(L: Array, x: Array) -> None:
 
 @kernel
 def solve_lower_transposed(L: Array, x: Array) -> None:
-    """Overwrite x with L⁻ᵀ x; shapes (n, n) and (n,)."""
-    n = L.shape[0]
+    """Overwrite x with L⁻ᵀ x; shapes (n, n) or larger, and (n,)."""
+    n = x.shape[0]
     for j in range(n):  # along the rows of L, in the order of memory
         i = n - 1 - j
         x[i] /= L[i, i]
@@ -151,7 +151,7 @@ def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
     Args:
         J: Shape (m, n).
         Q: Shape (m, n).
-        X: Shape (m, m).
+        X: Shape (m, m) or larger.
 
     Returns:
         1/‖X‖_F, a lower bound of J's smallest singular value, too small by a factor of
@@ -234,11 +234,11 @@ def orthogonalise_rows(Y: Array, U: Array) -> None:
 
     Args:
         Y: Shape (m, n).
-        U: Shape (m, m); shape (m, 0) if only the singular values are needed.
+        U: Shape (m, m); shape (0, m) if only the singular values are needed.
     """
     m, n = Y.shape
     for i in range(m):
-        for j in range(U.shape[1]):
+        for j in range(U.shape[0]):
             U[i, j] = 1.0 if i == j else 0.0
     for _ in range(30):  # sweeps; about six are needed
         rotated = False
@@ -261,7 +261,7 @@ def orthogonalise_rows(Y: Array, U: Array) -> None:
                     y = Y[p, i]
                     Y[p, i] = c * y - s * Y[q, i]
                     Y[q, i] = s * y + c * Y[q, i]
-                for i in range(U.shape[1]):
+                for i in range(U.shape[0]):
                     y = U[p, i]
                     U[p, i] = c * y - s * U[q, i]
                     U[q, i] = s * y + c * U[q, i]

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any, cast
 
 import numba
-from numba.core import codegen, compiler, registry
+from numba.core import codegen, compiler, registry, types
 
 _target = cast("Any", registry).cpu_target
 _Library = cast("Any", codegen).JITCodeLibrary
@@ -23,16 +23,101 @@ class _LinkedLibrary(_Library):  # type: ignore[misc,valid-type]
         """Leave that to the code that it is linked into."""
         module.data_layout = self._codegen._data_layout
 
-    def _optimize_final_module(self) -> None:
-        """Leave that, too."""
-
-    def _finalize_final_module(self) -> None:
+    def finalize(self) -> None:
         """Make it ready for linking, and not for the machine."""
         self._finalized = True
+        self._whole: Any = None
+
+    def _get_module_for_linking(self) -> Any:
+        """Return it with all that it calls: once, for code that is no part of other."""
+        if self._whole is None:
+            self._whole = self.own_module().clone()
+            seen = {self}
+            waiting = [*self._linking_libraries]
+            while waiting:
+                library = waiting.pop()
+                if library in seen:
+                    continue
+                seen.add(library)
+                if isinstance(library, _LinkedLibrary):
+                    waiting += library._linking_libraries
+                    module = library.own_module()
+                else:
+                    module = library._get_module_for_linking()
+                self._whole.link_in(module, preserve=True)
+        return self._whole
+
+    def own_module(self) -> Any:
+        """Return it without what it calls."""
+        return super()._get_module_for_linking()
+
+
+class _CallableLibrary(_Library):  # type: ignore[misc,valid-type]
+    """Code that others call by its address."""
+
+    def _optimize_final_module(self) -> None:
+        """Optimise once; Numba does so twice, to remove counts that kernels lack."""
+        passes, options = self._codegen._module_pass_manager()
+        passes.run(self._final_module, options)
+
+
+class _Flags(cast("Any", compiler).Flags):  # type: ignore[misc]
+    """Options of a compilation that do not change: known by identity.
+
+    Numba looks up what a call means by the options' values, of which there are thirty,
+    and gathers them anew each time: a tenth of a cold start.
+    """
+
+    __slots__ = ()
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    def copy(self) -> Any:
+        return self
 
 
 class _Entry:
     """Stands for a kernel's address, which it does not have."""
+
+
+_all_flags: list[_Flags] = []
+
+
+def _flags(dispatcher: Any) -> _Flags:
+    """Return the options, the same object for all linked kernels."""
+    if not _all_flags:
+        flags = _Flags()
+        own = dispatcher._compiler
+        own.targetdescr.options.parse_as_flags(flags, own.targetoptions)
+        flags.no_compile = True
+        _all_flags.append(flags)
+    return _all_flags[0]
+
+
+def compile_callable(own: Any, function: Callable[..., Any], args: Any, to: Any) -> Any:
+    """Return what Numba makes of a function that is called by its address.
+
+    Args:
+        own: Numba's compiler of the function.
+        function: The function.
+        args: The types of its arguments.
+        to: The type that it returns.
+    """
+    flags = cast("Any", compiler).Flags()
+    own.targetdescr.options.parse_as_flags(flags, own.targetoptions)
+    target = _target.target_context
+    library = _CallableLibrary(target.codegen(), function.__qualname__)
+    library.enable_object_caching()  # its machine code is kept
+    return cast("Any", compiler).compile_extra(
+        _target.typing_context,
+        target,
+        function,
+        args=args,
+        return_type=to,
+        flags=own._customize_flags(flags),
+        locals={},
+        library=library,
+    )
 
 
 def linked(function: Callable[..., Any], options: dict[str, Any]) -> Any:
@@ -46,12 +131,10 @@ def linked(function: Callable[..., Any], options: dict[str, Any]) -> Any:
         **options, no_cpython_wrapper=True, no_cfunc_wrapper=True
     )(function)
     own = dispatcher._compiler
+    flags = _flags(dispatcher)
 
     def compile_core(args: Any, return_type: Any) -> Any:
         target = _target.target_context
-        flags = cast("Any", compiler).Flags()
-        own.targetdescr.options.parse_as_flags(flags, own.targetoptions)
-        flags.no_compile = True
         result = cast("Any", compiler).compile_extra(
             _target.typing_context,
             target,
@@ -70,6 +153,13 @@ def linked(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     def add_overload(result: Any) -> None:
         dispatcher.overloads[tuple(result.signature.args)] = result
 
+    def get_call_template(args: Any, kws: Any) -> Any:
+        # A number that is written in a call would be a type of its own.
+        return with_types([unliteral(each) for each in args], kws)
+
+    unliteral: Callable[[Any], Any] = types.unliteral
+    with_types = dispatcher.get_call_template
     own._compile_core = compile_core
+    dispatcher.get_call_template = get_call_template
     dispatcher.add_overload = add_overload
     return dispatcher

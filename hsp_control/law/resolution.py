@@ -248,7 +248,7 @@ def _singular_values(
         for i in range(m):
             for k in range(m):
                 B[i, k] = T[i, k]
-    orthogonalise_rows(B[:, :width], U[:, :0])
+    orthogonalise_rows(B[:, :width], U[:0])
     squares = small[2, 0, :m]
     for k in range(m):
         squares[k] = 0.0

@@ -8,7 +8,6 @@ geometry, derivatives of gravity, plants with models of their own, and the viewe
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
-from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar, cast
 
@@ -568,15 +567,19 @@ class WorldKinematics(NamedTuple):
 
 @cache
 def _compile_once() -> None:
-    """Compile `_copy_valid` for packed doubles, and for nothing else, ever."""
+    """Compile `_copy_valid` for packed doubles, and for nothing else, ever.
+
+    Numba takes an array that may be written for one that may not, but looks it up for
+    longer; so there is a version for both.
+    """
     if is_compiled(_copy_valid):
         from numba import types
 
         own, kernel = types.float64[::1], cast("Any", _copy_valid)
         given = own, types.Array(types.float64, 1, "C", readonly=True)
         rest = own, own, types.int64[:, ::1], types.int64[::1]
-        for q, v in product(given, given):
-            kernel.compile((types.float64, q, v, *rest))
+        for each in given:
+            kernel.compile((types.float64, each, each, *rest))
         kernel.disable_compile()
 
 

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import multiply
 from hsp_control.common.native import bind
 from hsp_control.common.rotations import (
     compose_back,
@@ -84,17 +85,12 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
         """
         R_d, omega_d, omega_d_dot = self.trajectory.sample(self.start_time)
         R, omega = self._start, np.asarray(self.start_angular_velocity)
-        E, y = np.empty((3, 3)), np.empty(3)
-        compose_back(R_d, R, E)
-        log3(E, y)
-        J_log, J_exp_dot = np.empty((3, 3)), np.empty((3, 3))
-        jlog3(y, J_log)
         w = R.T @ (omega - omega_d)
         omega_dot = np.asarray(self.start_angular_acceleration)
         w_dot = R.T @ (omega_dot - omega_d_dot - np.cross(omega, R @ w))
-        y_dot = J_log @ w
-        jexp3_dot(y, y_dot, J_exp_dot)
-        return y, y_dot, J_log @ (w_dot - J_exp_dot @ y_dot)
+        y, y_dot, y_ddot = np.empty((3, 3))
+        bind(_offset, R_d, R, w, w_dot, np.empty((3, 3)), y, y_dot, y_ddot)()
+        return y, y_dot, y_ddot
 
     def sample(
         self, t: float, out: OrientationSample | None = None
@@ -117,6 +113,30 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
     def _parameters(self) -> tuple[float, float, Array, Array, Array]:
         work = np.empty((11, 3))
         return self.start_time, self.duration, self._start, self._coefficients, work
+
+
+@kernel
+def _offset(
+    R_d: Array,
+    R: Array,
+    w: Array,
+    w_dot: Array,
+    work: Array,
+    y: Array,
+    y_dot: Array,
+    y_ddot: Array,
+) -> None:
+    """Write y = log(R_dᵀ R) and its derivatives, with w = Jexp(y) y' and w'."""
+    compose_back(R_d, R, work)
+    log3(work, y)
+    jlog3(y, work)
+    multiply(work, w, y_dot)
+    jexp3_dot(y, y_dot, work)
+    multiply(work, y_dot, y_ddot)
+    for i in range(3):
+        w_dot[i] -= y_ddot[i]
+    jlog3(y, work)
+    multiply(work, w_dot, y_ddot)
 
 
 @kernel

@@ -59,18 +59,24 @@ def follow_blended(
     """
     target: Follower = trajectory.follow(out)
     if target is stay:  # the blend changes ``out``, so it must be written every time
-        parts = (bind(_restore, part.copy(), part, timed=True) for part in out)
-        target = CallSequence(*parts)
+        target = CallSequence(*map(_restorer, out))
     return CallSequence(
         TimeWindow(target, start, np.inf), TimeWindow(blend, -np.inf, end)
     )
 
 
+def _restorer(out: Array) -> Follower:
+    """Return what writes the present values into ``out``, of any shape, at any time."""
+    flat = out.view()
+    flat.shape = (-1,)  # of the same memory, or it raises
+    return bind(_restore, flat.copy(), flat, timed=True)
+
+
 @kernel
 def _restore(constant: Array, out: Array, t: float) -> None:
     """Write the constant values into ``out``, at any time."""
-    for i in range(out.size):
-        out.flat[i] = constant.flat[i]
+    for i in range(out.shape[0]):
+        out[i] = constant[i]
 
 
 class Compiled(ABC):

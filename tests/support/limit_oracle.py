@@ -73,6 +73,36 @@ def deviation_cost(
     return np.asarray(L @ H @ L.T)
 
 
+def second_weight(
+    resolution: Resolution, supported: bool, H: Array, deviation: Array
+) -> float:
+    """Return the cost of the null space after a first optimum.
+
+    It is the first one's, or where the tasks miss by more a twentieth of what that
+    costs, divided by the square of the null space's motion.
+    """
+    n = len(resolution.problem.metric.L)
+    L, delta = resolution.problem.metric.L, deviation[:n]
+    N = np.vstack(level_directions(resolution))
+    left = L.T @ delta - N.T @ (N @ L.T @ delta)
+    moved = float(left @ left)
+    first = 1e-6 if len(resolution.ends) - supported <= 1 else 1e-8
+    missed = float(delta @ H[:n, :n] @ delta) - first * moved
+    return max(first, min(0.05 * missed / moved, 1.0)) if moved > 0.0 else first
+
+
+def with_null_space_cost(
+    H: Array, resolution: Resolution, old: float, new: float
+) -> Array:
+    """Return a cost of deviations with another cost of the null space."""
+    L = resolution.problem.metric.L
+    n = len(L)
+    N = np.vstack(level_directions(resolution))
+    changed = H.copy()
+    changed[:n, :n] += (new - old) * L @ (np.eye(n) - N.T @ N) @ L.T
+    return changed
+
+
 def null_space_projector(resolution: Resolution) -> Array:
     """Return P = 1 - L⁻ᵀ Nᵀ N Lᵀ, shape (nv, nv)."""
     L = resolution.problem.metric.L

@@ -22,6 +22,9 @@ _ONE_LEVEL, _SEVERAL_LEVELS = 1e-6, 1e-8
 and for several. The smaller it is, the stricter the priorities; at 1e-6 an error of
 1e-3 m/s² remains in the task (docs/limits.md)."""
 
+_SHARE = 0.05
+"""What the null space may cost where tasks must miss, of what the tasks cost [-]."""
+
 
 class Directions(NamedTuple):
     """The directions of the law's levels and of the null space, and what they are from.
@@ -100,18 +103,14 @@ def write_directions(directions: Directions) -> None:
     whiten(J, L, form, wide[0])
     for k in range(ends.shape[0]):
         end = ends[k]
-        B, Q, U = (
-            wide[0, start:end],
-            wide[1, start:end],
-            square[: end - start, : end - start],
-        )
+        B, Q = wide[0, start:end], wide[1, start:end]
         for r in range(end - start):
             _project_out(N[:count], B[r])
         # If no singular value is small, any orthonormal rows will do, at a tenth of the
         # cost.
-        regular = orthonormalise_rows(B, Q, U) >= threshold
+        regular = orthonormalise_rows(B, Q, square) >= threshold
         if not regular:
-            orthogonalise_rows(B, U[:, :0])
+            orthogonalise_rows(B, square[:0])
         for r in range(end - start):
             size = 1.0 if regular else np.sqrt(squared_norm(B[r]))
             if count == n or not (regular or size > threshold):
@@ -187,6 +186,45 @@ def write_inverse_root(directions: Directions, first: int, JT: Array) -> int:
             solve_lower_transposed(L, JT[rows, :n])
         rows += 1
     return rows
+
+
+@kernel
+def null_space_scale(directions: Directions, deviation: Array) -> float:
+    """Return by how much 1/√ρ of the null space shrinks after a first optimum.
+
+    Where limits let no motion keep the tasks, an optimum with a tiny ρ moves the null
+    space as far as it can for the last bit of a task: from one bound of the efforts to
+    the other between two periods. So the optimum is computed again, with ρ such that
+    the null space costs the share `_SHARE` of what the tasks cost, D². Since
+
+        D² + ρ N² ≤ D₁² + ρ N₁²      with ρ N₁² = share D₁²
+
+    the tasks then miss by (1 + share)^½ of the least that they must, at most. Where
+    they need not miss, D₁ = 0 and nothing changes.
+
+    Args:
+        directions: The directions.
+        deviation: The first optimum, shape (at least nv,).
+    """
+    _, L, form, ends, _, _, _, _, N, level, roots = directions
+    n = N.shape[0]
+    missed = moved = 0.0
+    for k in range(n):
+        along = 0.0
+        for j in range(n):
+            if form == IDENTITY:
+                along += N[k, j] * deviation[j]
+            else:
+                for i in range(j, n):
+                    along += N[k, j] * L[i, j] * deviation[i]
+        if level[k] < ends.shape[0]:
+            missed += (along / roots[level[k]]) ** 2
+        else:
+            moved += along * along
+    weight = roots[ends.shape[0]] ** -2.0
+    if _SHARE * missed <= weight * moved or moved == 0.0:
+        return 1.0
+    return float(np.sqrt(weight / min(_SHARE * missed / moved, 1.0)))
 
 
 @kernel

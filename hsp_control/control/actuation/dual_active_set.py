@@ -246,7 +246,7 @@ def _settle(problem: Problem, x: Array, work: Workspace) -> None:
     y, shares = work.vectors[0], work.multipliers
     while True:
         count = work.counts[0]
-        L, w = work.L[:count, :count], work.steps[0, :count]
+        L, w = work.L, work.steps[0, :count]
         for _ in range(2):
             _gather(problem, x, work)
             _move(problem, x, work)
@@ -369,7 +369,7 @@ def _enter(entering: int, violation: float, problem: Problem, work: Workspace) -
         rate = work.steps[1, :count]  # of the multipliers, Lᵀ rate = Q b
         for c in range(count):
             rate[c] = work.steps[0, c]
-        solve_lower_transposed(work.L[:count, :count], rate)
+        solve_lower_transposed(work.L, rate)
         step, leaving = violation / square if independent else np.inf, -1
         for c in range(count):
             i = work.active[c]

@@ -24,6 +24,7 @@ from hsp_control.common.kernels import kernel
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
+    null_space_scale,
     write_directions,
     write_inverse_root,
     write_null_space_rows,
@@ -178,11 +179,22 @@ def solve_step(
     contacts_held = what != NEAREST_AGAIN and forces.first.shape[0] > 0
     count = _write_law_factor(directions, contacts_held, qp.nearest)
     count = _write_force_factor(forces, count, _FORCE_COST, qp.nearest)
-    warm = what != NEAREST_AGAIN
-    code = minimise(_moving(qp.nearest, count), warm, x, qp.memory)
-    if code == SOLVED and _write_result(wanted, forces, bounds, places, x, result):
-        return Status.LIMITED
-    return UNSOLVED
+    warm, status = what != NEAREST_AGAIN, UNSOLVED
+    while True:
+        code = minimise(_moving(qp.nearest, count), warm, x, qp.memory)
+        if code != SOLVED or not _write_result(
+            wanted, forces, bounds, places, x, result
+        ):
+            return status
+        if status == Status.LIMITED:
+            return status
+        status = Status.LIMITED
+        scale = null_space_scale(directions, x)
+        if scale == 1.0:
+            return status
+        _scale_null_space(directions, scale, count - forces.first.shape[0], qp.nearest)
+        _start(forces, x)
+        warm = True
 
 
 @kernel
@@ -207,6 +219,19 @@ def _write_law_factor(
         for j in range(n, JT.shape[1]):
             JT[k, j] = 0.0
     return count
+
+
+@kernel
+def _scale_null_space(
+    directions: Directions, scale: float, count: int, problem: Problem
+) -> None:
+    """Scale the rows of Jᵀ of the null space: the last of the law's."""
+    null_space = directions.ends.shape[0]
+    for k in range(directions.level.shape[0]):
+        if directions.level[k] == null_space:
+            count -= 1
+            for j in range(problem.JT.shape[1]):
+                problem.JT[count, j] *= scale
 
 
 @kernel

@@ -8,8 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from llvmlite.binding import get_host_cpu_features
 
 import hsp_control as hsp
+from hsp_control.common.kernel_cache import shipped_processor
 
 pytestmark = pytest.mark.process
 
@@ -146,6 +148,30 @@ def test_a_folder_of_one_s_own(read_only: Path, tmp_path: Path) -> None:
     cache = str(tmp_path / "cache")
     assert run(read_only, NUMBA_CACHE_DIR=cache).stdout.strip() == "0"
     assert run(read_only, NUMBA_CACHE_DIR=cache).stdout.strip() == "1"
+
+
+def test_the_machine_code_of_a_wheel(installed: Path, tmp_path: Path) -> None:
+    """It is used where nothing else is kept, and only for what it was made of."""
+    name, needed = shipped_processor()
+    if not all(map(get_host_cpu_features().get, needed)):
+        pytest.skip("this processor lacks what wheels expect")
+    made = tmp_path / "made"
+    processor = {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""}
+    run(installed, KERNELS, NUMBA_CACHE_DIR=str(made), **processor)
+    shipped = installed / "machine_code"
+    shipped.mkdir()
+    for file in made.rglob("*.nb?"):
+        shutil.copy(file, shipped)
+    before = sorted(shipped.iterdir())
+
+    def without_other_code(folder: str) -> str:
+        return run(installed, KERNELS, NUMBA_CACHE_DIR=str(tmp_path / folder)).stdout
+
+    assert without_other_code("empty").strip() == LOADED
+    linalg = installed / "hsp_control" / "common" / "linalg.py"
+    edit(linalg, "out[i] = total", "out[i] = total + 0.0")
+    assert without_other_code("still empty").strip() == COMPILED
+    assert sorted(shipped.iterdir()) == before
 
 
 def test_where_nothing_can_be_written_it_still_runs_and_says_so(

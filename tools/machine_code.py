@@ -1,0 +1,59 @@
+"""Compile what the bundled configurations use, for a wheel: ``make wheel``.
+
+Writes ``machine_code/`` beside the package, for a processor that all of the last ten
+years contain. ``hsp_control/common/kernel_cache.py`` says where it is used.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from hsp_control.common.kernel_cache import shipped_processor
+from hsp_control.common.resources import bundled_configs
+
+FOLDER = Path(__file__).resolve().parents[1] / "machine_code"
+
+USE = """
+import sys
+
+import hsp_control as hsp
+
+log, name = sys.argv[1:]
+experiment = hsp.load_experiment(name, "simulation.duration=0.02")
+controller = experiment.controller
+controller.compute(0.0, experiment.q0, experiment.v0)
+controller.diagnose()
+experiment.run().save(log)
+"""
+"""Whatever a run of a configuration calls."""
+
+
+def main() -> None:
+    """Run each configuration in a process of its own, and gather what was compiled."""
+    names = sys.argv[1:] or sorted(bundled_configs())
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {
+            **os.environ,
+            "NUMBA_CACHE_DIR": folder,
+            "NUMBA_CPU_NAME": shipped_processor()[0],
+            "NUMBA_CPU_FEATURES": "",
+        }
+        for k, name in enumerate(names):
+            print(f"[{k + 1}/{len(names)}] {name}", flush=True)
+            log = f"{folder}/log.npz"
+            python = [sys.executable, "-c", USE, log, name]
+            subprocess.run(python, check=True, env=environment)
+        shutil.rmtree(FOLDER, ignore_errors=True)
+        FOLDER.mkdir()
+        for file in Path(folder).rglob("*.nb?"):
+            shutil.copy(file, FOLDER)
+    files = list(FOLDER.iterdir())
+    size = sum(file.stat().st_size for file in files) / 1e6
+    print(f"{FOLDER.name}: {len(files)} files, {size:.1f} MB")
+
+
+if __name__ == "__main__":
+    main()
