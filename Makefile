@@ -16,6 +16,7 @@ BIN := .venv/bin
 USE := .venv/.stamp-use# hsp_control and what it needs are installed
 STAMP := .venv/.stamp# what tests and development need, too
 WORKERS ?= 2# processes that `make test` uses
+CONFIGS ?=# whose machine code `make wheel` compiles; by default that of all
 ARGS ?=# further arguments of pytest, as in `make test ARGS="-k spline"`
 
 ##@ Use
@@ -71,7 +72,7 @@ mutants: $(STAMP) ## break the code on purpose, report what no test notices
 
 wheel: $(STAMP) ## build the wheel into dist/, with machine code for every configuration
 	@echo "Compiling what the bundled configurations use (some minutes) ..."
-	@$(BIN)/python tools/machine_code.py
+	@$(BIN)/python tools/machine_code.py $(CONFIGS)
 	@rm -rf dist; $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 	@ls dist
 

@@ -361,6 +361,7 @@ class Controller:
             if out is None:
                 out = ControlOutput()
                 out.tau, out._memory = tau.copy(), active.memory.copy()
+                out._views = None
             else:
                 out.tau[:] = tau
                 out._keep(active.memory)

@@ -35,6 +35,7 @@ class ControlOutput:
         "_acceleration",
         "_memory",
         "_rows",
+        "_views",
         "damped",
         "forces",
         "relaxation",
@@ -50,6 +51,7 @@ class ControlOutput:
     _acceleration: Array | None  # None: the law's own
     _memory: Array
     _rows: int
+    _views: Record | None  # of the memory, once they were asked for
 
     @property
     def acceleration(self) -> Array:
@@ -81,7 +83,11 @@ class ControlOutput:
 
     @property
     def _record(self) -> Record:
-        return Record.over(self._memory, self._rows, len(self.tau))
+        views = self._views
+        if views is None or views.memory is not self._memory:
+            views = Record.over(self._memory, self._rows, len(self.tau))
+            self._views = views
+        return views
 
 
 class Diagnostics(NamedTuple):

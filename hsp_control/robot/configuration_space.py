@@ -33,6 +33,7 @@ class ConfigurationSpace:
         unit_blocks: (start, size) of every quaternion and (cos, sin) pair in q.
         flat: Whether every joint has one degree of freedom, so that δ' = v holds
             globally for q = base ⊕ δ.
+        linear: Whether moreover q is a vector, so that q = base + δ.
         mimics: Whether some joints mimic others.
         unactuated: Indices in v that have no motor: those of a free-flyer root.
         dof_indices: Index in q of each degree of freedom's coordinate, shape (nv,); -1
@@ -64,6 +65,7 @@ class ConfigurationSpace:
         ).reshape(-1, 3)
         self.unit_blocks: tuple[tuple[int, int], ...] = _unit_blocks(self.joints)
         self.flat: bool = all(joint.nv == 1 for joint in self.joints.values())
+        self.linear: bool = self.flat and self.nq == self.nv
         self.mimics: bool = model.nvExtended != model.nv
         self.unactuated: tuple[int, ...] = tuple(
             joint.idx_v + k

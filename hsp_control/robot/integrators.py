@@ -6,12 +6,15 @@ with δ' = v for single-dof joints and δ' = J_r(δ)⁻¹ v for a root.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, SimulationError
+from hsp_control.common.kernels import kernel
+from hsp_control.common.native import bind
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
 from hsp_control.robot.robot import Robot
@@ -46,14 +49,21 @@ class Chart:
             SimulationError: If δ is at the singularity of the chart.
         """
         nv = self.robot.nv
-        delta, v = y[:nv], y[nv:]
+        return np.concatenate([self.velocity(y[:nv], y[nv:]), a])
+
+    def velocity(self, delta: Array, v: Array) -> Array:
+        """Return δ' for the velocity v, both of shape (nv,).
+
+        Raises:
+            SimulationError: If δ is at the singularity of the chart.
+        """
         if self.robot.flat:
-            return np.concatenate([v, a])
+            return v
         J_r = pin.dIntegrate(
             self.robot.model, self.base, delta, pin.ArgumentPosition.ARG1
         )
         try:
-            return np.concatenate([np.linalg.solve(J_r, v), a])
+            return np.asarray(np.linalg.solve(J_r, v))
         except np.linalg.LinAlgError:
             raise SimulationError(
                 "the motion diverged: the root rotates by a full turn within one "
@@ -70,14 +80,30 @@ class Chart:
         return not self.robot.flat and largest > CHART_RADIUS
 
 
+Bind = Callable[[Array, Array], Callable[[float], Array]]
+"""(q, v) ↦ (t ↦ v'): what computes the acceleration for the values that these two
+arrays have when it is called."""
+
+Advance = Callable[[float, float, Array, Array], tuple[Array, Array]]
+"""(t, end, q, v) ↦ (q, v) at the end, in new arrays."""
+
+
 class Integrator(Part, ABC, family="integrators", error=SimulationError):
     """Integrates the motion from one time to another."""
 
     @abstractmethod
+    def begin(self, robot: Robot, bind_dynamics: Bind) -> Advance:
+        """Return what integrates the motion of a robot, in memory of its own.
+
+        Args:
+            robot: The robot.
+            bind_dynamics: Makes t ↦ v', shape (nv,), of the arrays q and v.
+        """
+
     def advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
     ) -> tuple[Array, Array]:
-        """Return (q, v) at time ``end`` [s].
+        """Return (q, v) at time ``end`` [s]; `begin` is faster where there is more.
 
         Args:
             robot: The robot.
@@ -87,11 +113,17 @@ class Integrator(Part, ABC, family="integrators", error=SimulationError):
             q: Configuration at the start, shape (nq,).
             v: Velocity at the start, shape (nv,).
         """
+        return self.begin(robot, bound(dynamics))(t, end, q, v)
 
     @property
     def longest_step(self) -> float | None:
         """The longest step [s]; None: it adapts its steps."""
         return None
+
+
+def bound(dynamics: Dynamics) -> Bind:
+    """Return dynamics as integrators call them: of arrays that stay the same."""
+    return lambda q, v: lambda t: dynamics(t, q, v)
 
 
 class FixedStep(Integrator):
@@ -110,42 +142,169 @@ class FixedStep(Integrator):
 class Rk4(FixedStep, type="rk4"):
     """The classical fourth-order Runge-Kutta step, with a new chart in each step."""
 
-    def advance(
-        self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
-    ) -> tuple[Array, Array]:
-        """Return (q, v) at ``end``; see `Integrator.advance`."""
-        steps = number_of_steps(end - t, self.step)
-        h = (end - t) / steps
-        for k in range(steps):
-            q, v = self._advance_one(robot, dynamics, t + k * h, h, q, v)
-        return q, v
-
-    def _advance_one(
-        self, robot: Robot, dynamics: Dynamics, t: float, h: float, q: Array, v: Array
-    ) -> tuple[Array, Array]:
-        chart = Chart(robot, q)
-        slope = chart.equation(dynamics)
-        y = np.concatenate([np.zeros(robot.nv), v])
-        k1 = slope(t, y)
-        k2 = slope(t + h / 2, y + h / 2 * k1)
-        k3 = slope(t + h / 2, y + h / 2 * k2)
-        k4 = slope(t + h, y + h * k3)
-        return chart.point(y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+    def begin(self, robot: Robot, bind_dynamics: Bind) -> Advance:
+        """Return what integrates; see `Integrator.begin`."""
+        return _Rk4(robot, bind_dynamics, self.step).advance
 
 
 class SemiImplicitEuler(FixedStep, type="semi_implicit_euler"):
     """The semi-implicit Euler step, of first order: v ← v + h v', q ← q ⊕ h v."""
 
-    def advance(
-        self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
-    ) -> tuple[Array, Array]:
+    def begin(self, robot: Robot, bind_dynamics: Bind) -> Advance:
+        """Return what integrates; see `Integrator.begin`."""
+        return _SemiImplicitEuler(robot, bind_dynamics, self.step).advance
+
+
+class _Steps(ABC):
+    """Takes steps of equal length: the memory of a `FixedStep`.
+
+    Attributes:
+        q: Configuration where v' is computed, shape (nq,).
+        v: Velocity there, shape (nv,).
+        acceleration: t ↦ v' there.
+        h: The step [s], shape (1,).
+    """
+
+    def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
+        self.robot, self._longest = robot, longest
+        self.q, self.v = robot.neutral(), np.zeros(robot.nv)
+        self.acceleration = bind_dynamics(self.q, self.v)
+        self.h = np.zeros(1)
+
+    def advance(self, t: float, end: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Return (q, v) at ``end``; see `Integrator.advance`."""
-        steps = number_of_steps(end - t, self.step)
-        h = (end - t) / steps
+        steps = number_of_steps(end - t, self._longest)
+        h = self.h[0] = (end - t) / steps
+        self.q[:], self.v[:] = q, v
         for k in range(steps):
-            v = v + h * dynamics(t + k * h, q, v)
-            q = robot.integrate(q, h * v)
-        return q, v
+            self.step(t + k * h, h)
+        return self.q.copy(), self.v.copy()
+
+    @abstractmethod
+    def step(self, t: float, h: float) -> None:
+        """Move q and v on from time t [s] by h [s]."""
+
+
+class _SemiImplicitEuler(_Steps):
+    def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
+        super().__init__(robot, bind_dynamics, longest)
+        self._a, self._moved = np.zeros((2, robot.nv))
+        q = self.q if robot.linear else np.zeros(0)
+        self._move = bind(_euler, self.h, self._a, q, self.v, self._moved)
+
+    def step(self, t: float, h: float) -> None:
+        self._a[:] = self.acceleration(t)
+        self._move()
+        if not self.robot.linear:
+            self.q[:] = self.robot.integrate(self.q, self._moved)
+
+
+class _Rk4(_Steps):
+    """The four stages of a step, in the chart q = base ⊕ δ.
+
+    The slopes are those of (δ, v): the rows of D and A.
+    """
+
+    def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
+        super().__init__(robot, bind_dynamics, longest)
+        self._D, self._A = np.zeros((2, 4, robot.nv))
+        self._base, self._v0 = self.q.copy(), self.v.copy()
+        self._delta = np.zeros(robot.nv)
+        self._chart = Chart(robot, self._base)
+        self._base = self._chart.base
+        linear = robot.linear
+        slopes = self.h, self._D, self._A
+        base = self._base if linear else np.zeros(0)
+        point = self._delta, self.q if linear else np.zeros(0), self.v
+        self._stages = [
+            (i, c, bind(_next_stage, i, c, *slopes, base, self._v0, *point))
+            for i, c in enumerate((0.5, 0.5, 1.0))
+        ]
+        self._finish = bind(_weighted_step, *slopes, base, self._v0, *point)
+
+    def step(self, t: float, h: float) -> None:
+        q, v, A = self.q, self.v, self._A
+        self._base[:], self._v0[:], self._D[0] = q, v, v
+        A[0] = self.acceleration(t)
+        for i, fraction, move in self._stages:
+            move()
+            self._place(i + 1)
+            A[i + 1] = self.acceleration(t + fraction * h)
+        self._finish()
+        self._place(None)
+
+    def _place(self, stage: int | None) -> None:
+        """Compute what the chart of a robot that is not linear needs."""
+        if self.robot.linear:
+            return
+        self.q[:] = self.robot.integrate(self._base, self._delta)
+        if stage is not None and not self.robot.flat:
+            self._D[stage] = self._chart.velocity(self._delta, self.v)
+
+
+@kernel
+def _euler(h: Array, a: Array, q: Array, v: Array, moved: Array) -> None:
+    """Write v + h a and h times that, and add the latter to q, unless it is empty."""
+    for i in range(v.shape[0]):
+        v[i] += h[0] * a[i]
+        moved[i] = h[0] * v[i]
+    for i in range(q.shape[0]):
+        q[i] += moved[i]
+
+
+@kernel
+def _next_stage(
+    stage: int,
+    fraction: float,
+    h: Array,
+    D: Array,
+    A: Array,
+    base: Array,
+    v0: Array,
+    delta: Array,
+    q: Array,
+    v: Array,
+) -> None:
+    """Write the point that the slopes of a stage lead to, and its slope of δ.
+
+    Args:
+        stage: Which slopes, from 0.
+        fraction: For how much of the step.
+        h: The step [s], shape (1,).
+        D: Slopes of δ, shape (4, nv).
+        A: Slopes of v, shape (4, nv).
+        base: q where δ = 0, shape (nq,); empty if q is no vector.
+        v0: v at the beginning, shape (nv,).
+        delta: Written, shape (nv,).
+        q: Written, shape (nq,), unless it is empty.
+        v: Written, shape (nv,).
+    """
+    for i in range(v.shape[0]):
+        delta[i] = fraction * h[0] * D[stage, i]
+        v[i] = v0[i] + fraction * h[0] * A[stage, i]
+        D[stage + 1, i] = v[i]
+    for i in range(q.shape[0]):
+        q[i] = base[i] + delta[i]
+
+
+@kernel
+def _weighted_step(
+    h: Array,
+    D: Array,
+    A: Array,
+    base: Array,
+    v0: Array,
+    delta: Array,
+    q: Array,
+    v: Array,
+) -> None:
+    """Write the end of a step, by all slopes; the arguments are `_next_stage`'s."""
+    for i in range(v.shape[0]):
+        delta[i] = h[0] / 6.0 * (D[0, i] + 2.0 * D[1, i] + 2.0 * D[2, i] + D[3, i])
+        slopes = A[0, i] + 2.0 * A[1, i] + 2.0 * A[2, i] + A[3, i]
+        v[i] = v0[i] + h[0] / 6.0 * slopes
+    for i in range(q.shape[0]):
+        q[i] = base[i] + delta[i]
 
 
 class Dop853(Integrator, type="dop853"):
@@ -160,15 +319,17 @@ class Dop853(Integrator, type="dop853"):
     atol: Positive = 1e-9
     """Absolute tolerance of a step [rad, m, rad/s or m/s]."""
 
-    def advance(
+    def begin(self, robot: Robot, bind_dynamics: Bind) -> Advance:
+        """Return what integrates; see `Integrator.begin`.
+
+        It raises a SimulationError if no step, however small, meets the tolerance, and
+        what the dynamics raise if they do so at every step size.
+        """
+        return partial(self._advance, robot, _of_new_arrays(robot, bind_dynamics))
+
+    def _advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
     ) -> tuple[Array, Array]:
-        """Return (q, v) at ``end``; see `Integrator.advance`.
-
-        Raises:
-            SimulationError: If no step, however small, meets the tolerance.
-            HspControlError: If the dynamics raise this error at every step size.
-        """
         from scipy.integrate import DOP853  # here: SciPy takes long to import
 
         while t < end:
@@ -199,6 +360,18 @@ class Dop853(Integrator, type="dop853"):
             t = float(solver.t)
             q, v = chart.point(solver.y)
         return q, v
+
+
+def _of_new_arrays(robot: Robot, bind_dynamics: Bind) -> Dynamics:
+    """Return dynamics that copy their arguments to where they are bound."""
+    q, v = robot.neutral(), np.zeros(robot.nv)
+    acceleration = bind_dynamics(q, v)
+
+    def dynamics(t: float, q_new: Array, v_new: Array) -> Array:
+        q[:], v[:] = q_new, v_new
+        return acceleration(t)
+
+    return dynamics
 
 
 class _Trial:

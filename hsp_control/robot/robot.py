@@ -312,6 +312,20 @@ class Robot(ConfigurationSpace):
         """
         if not self.mimics:
             return np.array(pin.aba(self.model, self._data, q, v, tau))
+        return self._forward_dynamics_of_mimics(q, v, tau)
+
+    def bind_forward_dynamics(
+        self, q: Array, v: Array, tau: Array
+    ) -> Callable[[], Array]:
+        """Return `forward_dynamics` for what these arrays hold when it is called.
+
+        The result is overwritten by the next call.
+        """
+        if not self.mimics:
+            return partial(pin.aba, self.model, self._data, q, v, tau)
+        return partial(self._forward_dynamics_of_mimics, q, v, tau)
+
+    def _forward_dynamics_of_mimics(self, q: Array, v: Array, tau: Array) -> Array:
         mass_matrix = pin.crba(self.model, self._data, q)
         effects = pin.nonLinearEffects(self.model, self._data, q, v)
         try:

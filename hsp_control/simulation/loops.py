@@ -13,7 +13,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
 from hsp_control.robot import RobotState
-from hsp_control.robot.integrators import Integrator
+from hsp_control.robot.integrators import Integrator, bound
 from hsp_control.simulation.plants import ContinuousPlant, SampledPlant
 
 RUNAWAY_SPEED = 1e4
@@ -64,9 +64,10 @@ def continuous_loop(
         tau = controller.compute(t, q, v).tau
         return plant.acceleration(t, q, v, tau)
 
+    advance = integrator.begin(plant.robot, bound(feedback))
     for k, t in enumerate(times):
         if k > 0:
-            q, v = integrator.advance(plant.robot, feedback, times[k - 1], t, q, v)
+            q, v = advance(times[k - 1], t, q, v)
             _check_divergence(t, q, v)
         output = controller.compute(t, q, v)
         yield Instant(state, output, output.tau, {})

@@ -225,14 +225,13 @@ class Recorder:
         The law keeps them for its model: a push that it does not know of, or a plant
         that differs, can take the robot further than any effort could bring it back.
         """
-        unit = self._descriptions["joint_positions"]["unit"]
-        shape = (state.robot.nv,)
-        for name, of, its in (
-            ("position", "position", ""),
-            ("velocity", "speed", "/s"),
-        ):
-            meaning = f"how far beyond its {of} limit"
-            self._add_column(f"{name}_excess", shape, unit + its, meaning)
+        if "position_excess" not in self._columns:
+            unit, shape = self._joint_unit, (state.robot.nv,)
+            beyond = "how far beyond its"
+            self._add_column("position_excess", shape, unit, f"{beyond} position limit")
+            self._add_column(
+                "velocity_excess", shape, f"{unit}/s", f"{beyond} speed limit"
+            )
         positions = self._columns["joint_positions"][self._rows]
         beyond = np.maximum(positions - limits.upper, limits.lower - positions)
         # A joint without a coordinate of its own has no position, and no limit.
@@ -243,10 +242,11 @@ class Recorder:
     def _record_law(self, state: RobotState, output: ControlOutput) -> None:
         i, columns, controller = self._rows, self._columns, self._controller
         columns["acceleration"][i] = output.acceleration
+        errors = output.task
         for task, rows in controller.task_rows.items():  # of the active tasks
             prefix = f"task.{self._log_names[task]}"
-            columns[f"{prefix}.error"][i] = output.task.error[rows]
-            columns[f"{prefix}.error_rate"][i] = output.task.error_rate[rows]
+            columns[f"{prefix}.error"][i] = errors.error[rows]
+            columns[f"{prefix}.error_rate"][i] = errors.error_rate[rows]
         diagnostics = controller.diagnose()
         columns["field.g"][i] = output.field.g
         columns["field.value"][i] = diagnostics.field_value

@@ -1,5 +1,8 @@
 """A constant orientation."""
 
+from functools import cached_property
+
+from hsp_control.common.arrays import Array
 from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.trajectories.following import Follower, stay
 from hsp_control.trajectories.orientation import (
@@ -20,11 +23,15 @@ class HoldOrientation(OrientationTrajectory, type="hold"):
     ) -> OrientationSample:
         """Return R0 and zero rates; see `OrientationTrajectory.sample`."""
         out = self._output(out)
-        assert self.rotation is not None
-        out.rotation[:] = matrix_of(self.rotation)
+        out.rotation[:] = self._matrix
         out.angular_velocity.fill(0.0)
         out.angular_acceleration.fill(0.0)
         return out
+
+    @cached_property
+    def _matrix(self) -> Array:
+        assert self.rotation is not None
+        return matrix_of(self.rotation)
 
     def follow(self, out: OrientationSample) -> Follower:
         """Write ``out`` once, and return a follower that does nothing."""

@@ -1,6 +1,7 @@
 """A rotation at constant angular velocity."""
 
 from dataclasses import KW_ONLY
+from functools import cached_property
 
 import numpy as np
 
@@ -31,6 +32,10 @@ class Spin(Compiled, OrientationTrajectory, type="spin"):
         checks.direction(self.axis, "axis")
 
     def _kernel(self) -> Kernel:
+        return self._call
+
+    @cached_property
+    def _call(self) -> Kernel:
         assert self.rotation is not None
         omega = self.rate * checks.direction(self.axis, "axis")
         return _spin, (np.asarray(omega), matrix_of(self.rotation))

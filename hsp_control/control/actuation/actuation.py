@@ -20,6 +20,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
+from hsp_control.common.kernels import kernel
 from hsp_control.common.native import bind
 from hsp_control.constraints.limits.acceleration_bounds import (
     EFFORT,
@@ -30,7 +31,12 @@ from hsp_control.constraints.limits.acceleration_bounds import (
     within,
 )
 from hsp_control.control.actuation.deviation_cost import decay_rate
-from hsp_control.control.actuation.held_effort import HeldEffort, effort_window
+from hsp_control.control.actuation.held_effort import (
+    Held,
+    HeldEffort,
+    effort_window,
+    observe,
+)
 from hsp_control.control.actuation.limited_step import Barriers, LimitedStep
 from hsp_control.control.actuation.status import EXACT, Status
 from hsp_control.control.actuation.step_qp import Wanted
@@ -225,8 +231,7 @@ class Actuation:
             return wanted, a, self._no_forces, EXACT, 0.0
         violated = 0.0
         if self.limits is not None:
-            self._held.observe(state.t, state.v)
-            violated = self._check.get(state, a)()
+            violated = self._check.get(state, a)(state.t)
         if offset is None and self._only_box_limits:
             if not violated:
                 return wanted, a, self._no_forces, EXACT, 0.0
@@ -251,22 +256,23 @@ class Actuation:
             return tau, a, forces, EXACT, 0.0
         return self._limit(state, wanted, a, motion_ok, resolution, support, barriers)
 
-    def _compile_check(self, state: RobotState, a: Array) -> Callable[[], float]:
-        """Return the call that writes the bounds on the acceleration.
+    def _compile_check(self, state: RobotState, a: Array) -> Callable[[float], float]:
+        """Return the call of the time that writes the bounds on the acceleration.
 
         It returns 0, `MOTION` if a violates its bounds, `EFFORT` if the effort without
         contacts does (read from Pinocchio's data), or the sum of both.
         """
         return bind(
-            violated_limits,
+            _check,
             state.q,
             state.v,
             a,
             state.data.tau,
             self._robot.dof_indices,
             self._motion,
-            self._held.error,
+            self._held.memory_of_kernels,
             self._bounds,
+            timed=True,
         )
 
     def _barriers(self, state: RobotState, support: Support) -> Barriers:
@@ -361,3 +367,23 @@ class Actuation:
             1 << (count - 1).bit_length() if count else 0,
         )
         return self._steps[resolution]
+
+
+@kernel
+def _check(
+    q: Array,
+    v: Array,
+    a: Array,
+    tau: Array,
+    where: Indices,
+    limits: MotionLimits,
+    held: Held,
+    bounds: Bounds,
+    t: float,
+) -> int:
+    """Observe the last period's effort, and return which limits the next violates.
+
+    See `observe` and `violated_limits`.
+    """
+    observe(v, held, t)
+    return violated_limits(q, v, a, tau, where, limits, held.error, bounds)

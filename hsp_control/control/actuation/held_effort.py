@@ -1,6 +1,7 @@
 """What holding an effort for a period adds to the acceleration, as it is observed."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,22 @@ _WINDOW = 0.01
 [s]: over 1 ms noise of 0.02 rad/s would be 28 rad/s², over 10 ms it is 3."""
 _MEMORY = 0.1
 """An error counts less after this time [s]."""
+
+
+class Held(NamedTuple):
+    """The memory of a `HeldEffort`, as kernels read it.
+
+    Attributes:
+        timing: When the period ends, NaN once that was looked at, and its length [s].
+        expected: The velocity that is expected then, shape (nv,).
+        stray: Differences from it, summed over about `_WINDOW`, shape (nv,).
+        error: The largest error of late, shape (nv,).
+    """
+
+    timing: Array
+    expected: Array
+    stray: Array
+    error: Array
 
 
 class HeldEffort:
@@ -34,9 +51,8 @@ class HeldEffort:
         """Begin without an error."""
         self.error: Array = np.zeros(nv)
         self._expected, self._stray = np.zeros(nv), np.zeros(nv)
-        self._timing = np.full(2, np.nan)  # when the period ends, and its length
+        self._timing = np.full(2, np.nan)
         self._expect = IdentityCache(self._compile_expect)
-        self._observe = IdentityCache(self._compile_observe)
 
     def sent(self, t: float, v: Array, a: Array, period: float) -> None:
         """Record that the effort of an acceleration is held from now on.
@@ -52,21 +68,19 @@ class HeldEffort:
 
     def observe(self, t: float, v: Array) -> None:
         """Look at the velocity (nv,) at time t [s]; it counts at a period's end."""
-        end, period = self._timing
-        if abs(t - end) < 0.01 * period:
-            self._observe.get(v)()
-            self._timing[0] = np.nan  # once
+        observe(v, self.memory_of_kernels, t)
 
     def _compile_expect(self, v: Array, a: Array) -> Callable[[], float]:
         return bind(_expect, v, a, self._timing, self._expected)
 
-    def _compile_observe(self, v: Array) -> Callable[[], float]:
-        return bind(_observe, v, self._timing, self._expected, self._stray, self.error)
+    @property
+    def memory_of_kernels(self) -> "Held":
+        """What `observe` reads and writes."""
+        return Held(self._timing, self._expected, self._stray, self.error)
 
     def prepare(self, v: Array, a: Array) -> None:
-        """Compile what `sent` and `observe` call, for these arrays."""
+        """Compile what `sent` calls, for these arrays."""
         self._expect.get(v, a)
-        self._observe.get(v)
 
     def forget(self) -> None:
         """Begin anew."""
@@ -94,19 +108,19 @@ def _expect(v: Array, a: Array, timing: Array, expected: Array) -> None:
 
 
 @kernel
-def _observe(
-    v: Array, timing: Array, expected: Array, stray: Array, error: Array
-) -> None:
+def observe(v: Array, held: Held, t: float) -> None:
     """Add a period to the differences of velocity, and update the largest error.
 
     Args:
-        v: Velocity at the end of the period, shape (nv,).
-        timing: When the period ends, and its length [s].
-        expected: What was expected, shape (nv,).
-        stray: Differences, summed over about `_WINDOW`, shape (nv,); updated.
-        error: The largest error of late, shape (nv,); updated.
+        v: Velocity, shape (nv,).
+        held: The memory; updated at the end of a period, once.
+        t: Time [s].
     """
+    timing, expected, stray, error = held
     period = timing[1]
+    if not abs(t - timing[0]) < 0.01 * period:
+        return
+    timing[0] = np.nan
     fresh = min(period / _WINDOW, 1.0)
     fading = np.exp(-period / _MEMORY)
     for i in range(v.shape[0]):

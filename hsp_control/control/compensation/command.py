@@ -23,7 +23,7 @@ from hsp_control.control.compensation.effort_rate import EffortRateClip
 from hsp_control.control.compensation.friction_feed_forward import FrictionFeedForward
 from hsp_control.control.compensation.integral_action import RunningIntegral
 from hsp_control.control.compensation.momentum_observer import RunningObserver
-from hsp_control.control.compensation.predictor import Predictor
+from hsp_control.control.compensation.predictor import Predictor, RunningPredictor
 from hsp_control.control.compensation.start_up_ramp import RunningRamp
 from hsp_control.control.compensation.velocity_filter import RunningFilter
 from hsp_control.control.controller import Controller
@@ -94,6 +94,7 @@ class Command:
         if own.effort_rate is not None:
             self._clip = EffortRateClip(robot, own.effort_rate)
         self._ramp: RunningRamp | None = None  # begins at the first state
+        self._predictor: RunningPredictor | None = None
         self._period = 0.0
         self._friction_sent = self._friction = self._zero
         self._shown = self.state.q.copy(), self.state.v.copy()
@@ -208,7 +209,9 @@ class Command:
         observer = self._observer
         disturbance = self._zero if observer is None else observer.disturbance
         efforts = (tau + disturbance for tau in islice(self._under_way, 1, None))
-        q, v = predictor.predict(self.controller.robot, q, v, efforts, period)
+        if self._predictor is None:
+            self._predictor = predictor.begin(self.controller.robot)
+        q, v = self._predictor.predict(q, v, efforts, period)
         return t + predictor.effort_delay * period, q, v
 
     def _law(self, state: RobotState) -> ControlOutput:

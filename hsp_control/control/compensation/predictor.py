@@ -1,6 +1,6 @@
 """Prediction of the state at which an effort will act."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -45,41 +45,38 @@ class Predictor(Part, error=CompensationError):
         """
         check_fixed_base(robot)
 
+    def begin(self, robot: Robot) -> "RunningPredictor":
+        """Return the predictor of one run."""
+        return RunningPredictor(robot)
+
+
+class RunningPredictor:
+    """Integrates the model under the efforts that are under way."""
+
+    def __init__(self, robot: Robot) -> None:
+        """Allocate."""
+        self._robot, self._period = robot, 0.0
+        self._tau = np.zeros(robot.nv)
+
     def predict(
-        self,
-        robot: Robot,
-        q: Array,
-        v: Array,
-        efforts: Iterable[Array],
-        period: float,
+        self, q: Array, v: Array, efforts: Iterable[Array], period: float
     ) -> tuple[Array, Array]:
         """Return (q, v) after the efforts have acted, each for one period.
 
         Args:
-            robot: The model.
             q: Configuration as measured, shape (nq,).
             v: Velocity as measured, shape (nv,).
             efforts: The efforts on the model in order of time, shape (nv,) each.
             period: How long each effort acts [s].
         """
-        integrator = Rk4(period)
+        if period != self._period:
+            self._period = period
+            self._advance = Rk4(period).begin(self._robot, self._bind)
         for tau in efforts:
-            q, v = integrator.advance(
-                robot,
-                _ConstantEffort(robot, tau),
-                0.0,
-                period,
-                np.asarray(q),
-                np.asarray(v),
-            )
-        return q, v
+            self._tau[:] = tau
+            q, v = self._advance(0.0, period, q, v)
+        return np.asarray(q), np.asarray(v)
 
-
-class _ConstantEffort:
-    """The model's acceleration under a constant effort."""
-
-    def __init__(self, robot: Robot, tau: Array) -> None:
-        self._robot, self._tau = robot, tau
-
-    def __call__(self, t: float, q: Array, v: Array) -> Array:
-        return self._robot.forward_dynamics(q, v, self._tau)
+    def _bind(self, q: Array, v: Array) -> Callable[[float], Array]:
+        dynamics = self._robot.bind_forward_dynamics(q, v, self._tau)
+        return lambda t: dynamics()

@@ -1,14 +1,13 @@
 """A continuous plant with an integrator, as a sampled plant."""
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.log_channel import LogChannel
-from hsp_control.robot.integrators import Integrator
+from hsp_control.robot.integrators import Advance, Integrator
 from hsp_control.simulation.plants.plant import ContinuousPlant, SampledPlant
 
 
@@ -26,6 +25,12 @@ class IntegratedPlant(SampledPlant):
         self.plant = plant
         self.integrator = integrator
         self._q, self._v = plant.robot.neutral(), np.zeros(plant.robot.nv)
+        self._tau = np.zeros(plant.robot.nv)
+        self._advance: Advance | None = None  # begun where it is needed
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy or a pickle needs: the integrator begins anew there."""
+        return vars(self) | {"_advance": None}
 
     def reset(self, t: float, q: Array, v: Array) -> None:
         """Set the state; see `SampledPlant.reset`."""
@@ -33,10 +38,12 @@ class IntegratedPlant(SampledPlant):
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
         """Integrate from t to ``end``; see `SampledPlant.advance`."""
-        dynamics = partial(_acceleration, self.plant, tau)
-        self._q, self._v = self.integrator.advance(
-            self.robot, dynamics, t, end, self._q, self._v
-        )
+        if self._advance is None:
+            self._advance = self.integrator.begin(
+                self.robot, lambda q, v: self.plant.bind(q, v, self._tau)
+            )
+        self._tau[:] = tau
+        self._q, self._v = self._advance(t, end, self._q, self._v)
         return self._q, self._v
 
     def log_channels(
@@ -48,10 +55,3 @@ class IntegratedPlant(SampledPlant):
     def describe(self) -> dict[str, Any]:
         """Return the continuous plant's description."""
         return self.plant.describe()
-
-
-def _acceleration(
-    plant: ContinuousPlant, tau: Array, t: float, q: Array, v: Array
-) -> Array:
-    """Return v' under a held effort; a function, because pickle takes no lambda."""
-    return plant.acceleration(t, q, v, tau)

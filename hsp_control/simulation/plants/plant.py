@@ -1,7 +1,7 @@
 """The interfaces of plants: simulated robots that an effort moves."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -54,7 +54,17 @@ class ContinuousPlant(Plant, ABC):
 
     @abstractmethod
     def acceleration(self, t: float, q: Array, v: Array, tau: Array) -> Array:
-        """Return v' at time t [s], shape (nv,), for an effort of shape (nv,)."""
+        """Return v' at time t [s], shape (nv,), for an effort of shape (nv,).
+
+        The arrays may be overwritten after the call: copy what is to be kept.
+        """
+
+    def bind(self, q: Array, v: Array, tau: Array) -> Callable[[float], Array]:
+        """Return t ↦ v' for what these arrays hold when it is called.
+
+        The result may be overwritten by the next call.
+        """
+        return lambda t: self.acceleration(t, q, v, tau)
 
 
 class SampledPlant(Plant, ABC):

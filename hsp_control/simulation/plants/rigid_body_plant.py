@@ -1,6 +1,6 @@
 """The ideal plant: rigid bodies without friction, by the articulated-body algorithm."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from hsp_control.common.arrays import Array
@@ -31,6 +31,14 @@ class RigidBodyPlant(ContinuousPlant):
         if self.pushes.any_active(t, t):
             tau = tau + self.pushes.effort(t, q)
         return self.robot.forward_dynamics(q, v, tau)
+
+    def bind(self, q: Array, v: Array, tau: Array) -> Callable[[float], Array]:
+        """Return t ↦ v'; see `ContinuousPlant.bind`."""
+        changed = type(self).acceleration is not RigidBodyPlant.acceleration
+        if self.pushes.pushes or changed:  # a subclass has another one
+            return super().bind(q, v, tau)
+        forward_dynamics = self.robot.bind_forward_dynamics(q, v, tau)
+        return lambda t: forward_dynamics()
 
     def describe(self) -> dict[str, Any]:
         """Return its pushes."""
