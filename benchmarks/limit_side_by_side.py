@@ -142,6 +142,7 @@ def tsid_of(experiment: Experiment, limits: RobotLimits, weight: float) -> Compu
         return np.array(problem.getActuatorForces(solution))
 
     compute.kept = (peer, hand, posture, efforts, joints)  # type: ignore[attr-defined]
+    compute.parts = (problem, solver, [hand, posture])  # type: ignore[attr-defined]
     return compute
 
 

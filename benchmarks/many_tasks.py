@@ -126,6 +126,8 @@ class Poses:
             return problem.getActuatorForces(solution)
 
         compute.kept = (robot, tasks, posture, bounds)  # type: ignore[attr-defined]
+        parts = problem, solver, [*tasks, posture]
+        compute.parts = parts  # type: ignore[attr-defined]
         return compute
 
     def run(

@@ -1,9 +1,9 @@
 """Interleaved timing, so that disturbances of the machine affect all controllers."""
 
 import gc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter_ns
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -11,8 +11,16 @@ State = tuple[float, Any, Any]
 Compute = Callable[[float, Any, Any], Any]
 
 
+@runtime_checkable
+class Timed(Protocol):
+    """Takes the steps at the states by itself, such as `tsid_in_cpp.CppSteps`."""
+
+    def elapsed(self, begin: int, end: int) -> Any:
+        """Take the steps of a part of the states; return the time of each [ns]."""
+
+
 def step_times(
-    controllers: dict[str, Compute],
+    controllers: Mapping[str, Compute | Timed],
     states: Sequence[State],
     rounds: int,
     block: int,
@@ -21,11 +29,13 @@ def step_times(
     """Return the median time of a step in each round, shape (rounds,) [s], by name.
 
     In every round each controller gets the same block of consecutive states, one after
-    the other, in an order that rotates.
+    the other, in an order that rotates. What times its own steps was made for these
+    states.
     """
     for compute in controllers.values():
-        for t, q, v in states[:warm_up]:
-            compute(t, q, v)
+        if not isinstance(compute, Timed):
+            for t, q, v in states[:warm_up]:
+                compute(t, q, v)
     names = list(controllers)
     times = {name: np.zeros(rounds) for name in names}
     gc.collect()
@@ -35,10 +45,13 @@ def step_times(
         chosen = states[begin : begin + block]
         for name in names[k % len(names) :] + names[: k % len(names)]:
             compute, elapsed = controllers[name], np.zeros(block)
-            for i, (t, q, v) in enumerate(chosen):
-                started = perf_counter_ns()
-                compute(t, q, v)
-                elapsed[i] = perf_counter_ns() - started
+            if isinstance(compute, Timed):
+                elapsed = compute.elapsed(begin, begin + block)
+            else:
+                for i, (t, q, v) in enumerate(chosen):
+                    started = perf_counter_ns()
+                    compute(t, q, v)
+                    elapsed[i] = perf_counter_ns() - started
             times[name][k] = 1e-9 * np.median(elapsed)
     gc.enable()
     return times

@@ -101,6 +101,8 @@ def make(
         return tau
 
     compute.kept = kept  # type: ignore[attr-defined]
+    tasks = [com, hand, trunk, posture]
+    compute.parts = (problem, solver, tasks)  # type: ignore[attr-defined]
     return compute, statuses
 
 

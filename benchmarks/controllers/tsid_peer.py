@@ -78,4 +78,5 @@ def make(
         return problem.getActuatorForces(solution)
 
     compute.kept = kept  # type: ignore[attr-defined]
+    compute.parts = (problem, solver, [hand, posture])  # type: ignore[attr-defined]
     return compute

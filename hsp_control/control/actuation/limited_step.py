@@ -127,6 +127,7 @@ class LimitedStep:
             x=zeros(width),
             force_memory=Workspace.of(width, k),
             memory=Workspace.of(width, k),
+            second_memory=Workspace.of(width, k),
             soft_memory=Workspace.of(width, k, soft=True),
         )
         self._x = programmes.x

@@ -109,6 +109,7 @@ class Programmes(NamedTuple):
         x: The unknowns, shape (nv + p,).
         force_memory: Of the first.
         memory: Of the second.
+        second_memory: Of the second, where its optimum is computed again.
         soft_memory: Of the third.
     """
 
@@ -118,6 +119,7 @@ class Programmes(NamedTuple):
     x: Array
     force_memory: Workspace
     memory: Workspace
+    second_memory: Workspace
     soft_memory: Workspace
 
 
@@ -179,9 +181,9 @@ def solve_step(
     contacts_held = what != NEAREST_AGAIN and forces.first.shape[0] > 0
     count = _write_law_factor(directions, contacts_held, qp.nearest)
     count = _write_force_factor(forces, count, _FORCE_COST, qp.nearest)
-    warm, status = what != NEAREST_AGAIN, UNSOLVED
+    warm, status, memory = what != NEAREST_AGAIN, UNSOLVED, qp.memory
     while True:
-        code = minimise(_moving(qp.nearest, count), warm, x, qp.memory)
+        code = minimise(_moving(qp.nearest, count), warm, x, memory)
         if code != SOLVED or not _write_result(
             wanted, forces, bounds, places, x, result
         ):
@@ -194,7 +196,7 @@ def solve_step(
             return status
         _scale_null_space(directions, scale, count - forces.first.shape[0], qp.nearest)
         _start(forces, x)
-        warm = True
+        memory = qp.second_memory
 
 
 @kernel
