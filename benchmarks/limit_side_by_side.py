@@ -9,10 +9,10 @@ omitted. Writes a table into docs/limits.md and draws docs/figures/limits.png.
 from collections.abc import Callable
 from typing import NamedTuple
 
+import beside_tsid
 import numpy as np
 from marked_sections import DOCS, replace_section
 from matplotlib.figure import Figure
-from timing import ratios, spread, step_times
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -237,22 +237,15 @@ def cost(name: str, run: Run, limits: RobotLimits) -> str:
         return controller.compute(t, q, v).tau
 
     steps = list(zip(run.t, run.q, run.v, strict=True))
-    active = [controller.compute(*step).status != Status.EXACT for step in steps]
-    peer = tsid_of(hsp.load_experiment(f"limits/{name}", "limits=null"), limits, 1e-3)
-    lines = ""
-    for label, wanted in (("none", False), ("some", True)):
-        chosen = [step for step, a in zip(steps, active, strict=True) if a == wanted]
-        times = step_times({"law": law, "TSID": peer}, chosen, rounds=25, block=40)
-        ratio = spread(ratios(times, "law", "TSID"))
-        taken = 1e6 * np.median(times["law"])
-        lines += f"| `{name}` | {label} | {len(chosen)} | {ratio} | {taken:.0f} |\n"
-    return lines
-
-
-COST = (
-    "\n| configuration | active limits | steps | this law / TSID | µs |\n"
-    "|---|---|--:|--:|--:|\n"
-)
+    limited = [controller.compute(*step).status != Status.EXACT for step in steps]
+    peer = tsid_of(hsp.load_experiment(f"limits/{name}", "limits=none"), limits, 1e-3)
+    return "".join(
+        beside_tsid.row(f"`{name}`, {what}", law, peer, steps, np.array(chosen))
+        for what, chosen in (
+            ("no limit active", ~np.array(limited)),
+            ("limits active (status 2)", np.array(limited)),
+        )
+    )
 
 
 def figure(found: dict[str, tuple[dict[str, Run], RobotLimits]]) -> Figure:
@@ -299,10 +292,12 @@ def main() -> None:
         for label, run in runs.items()
     )
     if any(label.startswith("TSID") for label in found[NAMES[0]][0]):
-        table += COST + "".join(
+        costs = beside_tsid.HEADER + "".join(
             cost(name, runs["this law, limits"], limits)
             for name, (runs, limits) in found.items()
         )
+        table += f"\n{costs}\n{beside_tsid.CPP}"
+        replace_section(DOCS.parent / "README.md", "make bench, limits", costs)
     print(table)
     replace_section(DOCS / "limits.md", "limit_side_by_side", "\n" + table + "\n")
     with styled():

@@ -59,7 +59,11 @@ class Poses:
         ]
         posture = hsp.TargetPosture(self.q0, weights=POSTURE_RATE)
         controller = hsp.Controller(
-            self.robot, tasks, posture, null_space_gain=NULL_SPACE_GAIN
+            self.robot,
+            tasks,
+            posture,
+            null_space_gain=NULL_SPACE_GAIN,
+            limits=hsp.Limits(velocity=None, position=None),  # as for TSID
         )
 
         def compute(t: float, q: Array, v: Array) -> Array:

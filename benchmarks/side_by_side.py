@@ -21,12 +21,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import beside_tsid
 import numpy as np
 import pinocchio as pin
 from cases import FRAME, Case
 from controllers import operational_space, this_law
 from many_tasks import humanoid, two_arms
+from marked_sections import replace_section
 from timing import Compute, State, ratios, spread, step_times
+from tsid_in_cpp import CppSteps
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -207,8 +210,35 @@ def case_times(
 ) -> tuple[dict[str, Array], list[State]]:
     """Return the controllers' step times [s] along the law's path, and that path."""
     path = close_loop(case, this_law.make).states
-    controllers = {name: make(case) for name, make in timed.items()}
+    controllers: dict[str, Any] = {name: make(case) for name, make in timed.items()}
+    if "TSID" in controllers:
+        controllers[CPP] = CppSteps(controllers["TSID"], path)
     return step_times(controllers, path, rounds, block), path
+
+
+def near_and_far(case: Case, say: Callable[[str], None]) -> str:
+    """Time steps with the ball within the field's influence, and outside of it.
+
+    Returns:
+        The rows.
+    """
+    law = _this_law(case, name="obstacle")
+    peer = importlib.import_module("controllers.tsid_peer").make(case)
+    states = close_loop(case, this_law.make).states
+    probe = hsp.RobotState(case.robot)
+    near = np.array(
+        [
+            case.clearance.minimum_distance(probe.update(*s)) < case.clearance.influence
+            for s in states
+        ]
+    )
+    rows = "".join(
+        beside_tsid.row(f"Panda, {'pose' if case.rows == 6 else 'position'}, {what}",
+                        law, peer, states, chosen)
+        for what, chosen in (("ball near", near), ("ball far", ~near))
+    )  # fmt: skip
+    say(rows)
+    return rows
 
 
 def timing_table(times: dict[str, Array], extra: str = "") -> str:
@@ -223,7 +253,8 @@ def timing_table(times: dict[str, Array], extra: str = "") -> str:
     return lines + extra
 
 
-REFERENCES = ("TSID", "pink (quadprog) + RNEA")
+CPP = "TSID in C++"
+REFERENCES = ("TSID", CPP, "pink (quadprog) + RNEA")
 
 
 def placo_row(
@@ -285,10 +316,13 @@ def larger_robots(rounds: int, block: int, say: Callable[[str], None]) -> list[s
         if max(errors.values()) > MAX_ERROR:
             say(f"{line} | not timed: does not track | |\n")
             continue
-        times = step_times(compute, runs["law"][1], rounds, block)
+        states = runs["law"][1]
+        compared = {**compute, CPP: CppSteps(compute["TSID"], states)}
+        times = step_times(compared, states, rounds, block)
         quartiles = ratios(times, "law", "TSID")
         say(f"{line} | {spread(quartiles)} | {1e6 * np.median(times['law']):.0f} |\n")
-        summary.append(f"| {problem.name} | {spread(quartiles)} | |\n")
+        cells = f"{spread(quartiles)} | {spread(ratios(times, 'law', CPP))}"
+        summary.append(f"| {problem.name} | {cells} | |\n")
     say("\nA pose for each frame, and a posture; settings as for the Panda.\n\n")
     return summary
 
@@ -298,7 +332,8 @@ def summarise(times: dict[int, dict[str, Array]], larger: list[str]) -> None:
     if "TSID" not in times[6]:
         return
     lines = (
-        "| one control step, this law | TSID = 1 | pink + RNEA = 1 |\n|---|--:|--:|\n"
+        "| one control step, this law | TSID through Python = 1 | TSID in C++ = 1 | "
+        "pink + RNEA = 1 |\n|---|--:|--:|--:|\n"
     )
     for rows, what in ((6, "Panda, pose"), (3, "Panda, position")):
         for name, field_name in README_ROWS.items():
@@ -319,8 +354,8 @@ def summarise(times: dict[int, dict[str, Array]], larger: list[str]) -> None:
 MARKERS = ("<!-- make bench: begin -->", "<!-- make bench: end -->")
 README_ROWS = {
     "this law": "joint centering",
+    "this law, and `diagnose`": "joint centering, `diagnose` included",
     "this law, manipulability": "manipulability",
-    "this law, one obstacle (capsules)": "one moving obstacle",
 }
 
 
@@ -399,9 +434,10 @@ def main() -> None:
         say(
             f"\nMedians of {options.rounds} interleaved rounds of {options.block} "
             "steps, one process, quartiles in brackets; each step takes (t, q, v) and "
-            "returns an effort. Default of a row: hand task, posture or centering, no "
-            "obstacle. In the row with the ball, the ball is within the field's "
-            "influence in some rounds only, which explains the upper quartile. placo "
+            "returns an effort; TSID in C++ is the same without Python, with its "
+            "references computed before. Default of a row: hand task, posture or "
+            "centering, no obstacle. In the row with the ball, the ball is within the "
+            "field's influence in some rounds only: see below. placo "
             "runs in its own environment; its ratio is the product of its ratio to the "
             "operational space there and of that controller's ratio here.\n\n"
         )
@@ -410,6 +446,15 @@ def main() -> None:
         larger = larger_robots(options.rounds, options.block, say)
     if not options.only:
         summarise(measured, larger)
+    if "tsid" not in missing and not options.only:
+        say(f"## The ball near and far\n\n{beside_tsid.HEADER}")
+        rows = "".join(
+            near_and_far(Case(rows=rows, obstacle=False, duration=span), say)
+            for rows in (6, 3)
+        )
+        say(f"\n{beside_tsid.CPP}\n")
+        readme = ROOT / "README.md"
+        replace_section(readme, "make bench, ball", beside_tsid.HEADER + rows)
     say(
         f"Python {platform.python_version()}, {os.cpu_count()} cores, hsp_control "
         f"{hsp.__version__}, numpy {np.__version__}. Only ratios are valid for other "

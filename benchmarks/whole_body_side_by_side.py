@@ -25,7 +25,9 @@ from pathlib import Path
 from time import perf_counter_ns
 from typing import Any
 
+import beside_tsid
 import numpy as np
+from marked_sections import replace_section
 from standing import COM, G1, HAND, PERIOD, TALOS, TRUNK, Body, Engine, Standing
 from timing import Compute, State, ratios, spread, step_times
 
@@ -220,6 +222,25 @@ def compare(
         f"\nMedians of {options.rounds} interleaved rounds of {options.block} steps "
         "along this law's path on MuJoCo, quartiles in brackets.\n\n"
     )
+    reference = f"TSID, posture weight {1e-3:.0e}"
+    if reference in made:
+        law, statuses = this_law(case)
+        for state in path:
+            law(*state)
+        found = np.array([each[0] for each in statuses])
+        costs = beside_tsid.HEADER + "".join(
+            beside_tsid.row(
+                f"{body.name} on two feet, {what}", law, made[reference], path, chosen
+            )
+            for what, chosen in (
+                ("exact (status 0)", found == "0"),
+                ("forces redistributed (1)", found == "1"),
+                ("limits active (2)", found == "2"),
+            )
+        )
+        say(f"By the status of this law's step:\n\n{costs}\n{beside_tsid.CPP}\n")
+        if body is TALOS:
+            replace_section(ROOT / "README.md", "make bench, Talos", costs)
     parts = parts_table(case, path[::5])
     say(
         "Times of the parts of this law's step (*deliver* contains inverse dynamics, "
