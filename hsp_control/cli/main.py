@@ -285,6 +285,12 @@ def _add_sweep(sweep: argparse.ArgumentParser) -> None:
         "--fresh", action="store_true", help="ignore what the file holds already"
     )
     sweep.add_argument(
+        "--time-limit",
+        type=float,
+        metavar="SECONDS",
+        help="the longest computation of a run; default: any",
+    )
+    sweep.add_argument(
         "--workers", type=int, metavar="N", help="processes; default: one per core"
     )
     sweep.add_argument(

@@ -65,6 +65,7 @@ def sweep(options: argparse.Namespace) -> int:
             workers=options.workers,
             scheduler=options.scheduler,
             fresh=options.fresh,
+            time_limit=options.time_limit,
             on_progress=show,
         )
     _print_summary(swept, perf_counter() - start)

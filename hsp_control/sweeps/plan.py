@@ -29,6 +29,7 @@ class Plan:
         samples: The requested number of runs; None for a grid.
         seed: Seed of the design.
         points: Each run's values, in the order of the factors.
+        time_limit: The longest computation of a run [s]; None: any.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Plan:
     samples: int | None
     seed: int
     points: Sequence[tuple[Any, ...]]
+    time_limit: float | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -46,7 +48,12 @@ class Plan:
         """Return all data that a worker needs for a run, as a JSON text."""
         # Absolute, because a worker may have another working folder.
         name = str(Path(self.name).resolve())
-        parts = {"name": name, "data": self.data, "changes": self.changes(run)}
+        parts = {
+            "name": name,
+            "data": self.data,
+            "changes": self.changes(run),
+            "time_limit": self.time_limit,
+        }
         return json.dumps(parts)
 
     def changes(self, run: int) -> list[dict[str, Any]]:

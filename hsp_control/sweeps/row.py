@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass, field
 
-CRASHED = "crashed"
-"""The worker died: this is not a result; the run is repeated when the sweep resumes."""
+CRASHED, TIMED_OUT = "crashed", "timed out"
+"""The worker died; the run took too long. Neither is a result: such runs are repeated
+when the sweep resumes."""
 
 
 @dataclass(frozen=True)
@@ -14,7 +15,7 @@ class Row:
         run: Its number in the plan.
         status: ``completed``; ``diverged``: the metrics are those until then;
             ``refused``: the configuration is wrong; ``failed``: an unexpected error;
-            ``crashed``: the worker died.
+            ``crashed``: the worker died; ``timed out``: the run took too long.
         message: The reason, if the status is not ``completed``.
         metrics: Numbers by name.
         wall_time: Computation time [s]; the only entry that depends on the machine and

@@ -1,8 +1,14 @@
 """Run one task, in any process or machine: text in, text out."""
 
 import json
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
+from threading import current_thread, main_thread
 from time import perf_counter
+
+import numpy as np
 
 from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.config.experiment import build
@@ -10,7 +16,7 @@ from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import versions
 from hsp_control.sweeps.metrics import Measure, measures
 from hsp_control.sweeps.plan import document
-from hsp_control.sweeps.row import CRASHED, Row
+from hsp_control.sweeps.row import CRASHED, TIMED_OUT, Row
 
 
 def run_task(task: str) -> str:
@@ -64,9 +70,12 @@ def read_result(run: int, text: str) -> tuple[Row, dict[str, Measure], dict[str,
 
 
 def _run(task: str) -> tuple[str, str, Rollout | None]:
+    limit = json.loads(task).get("time_limit")
     try:
-        experiment = build(document(task))
-        rollout = experiment.run()
+        with _at_most(limit) as check:
+            rollout = build(document(task)).run(on_row=check)
+    except _TooLongError:
+        return TIMED_OUT, f"took longer than {limit:g} s", None
     except SimulationError as error:
         if isinstance(error.rollout, Rollout):
             return "diverged", str(error.__cause__ or error), error.rollout
@@ -74,6 +83,37 @@ def _run(task: str) -> tuple[str, str, Rollout | None]:
     except HspControlError as error:
         return "refused", str(error), None
     return rollout.status, str(rollout.meta["message"]), rollout
+
+
+class _TooLongError(BaseException):
+    """A run took too long; no handler of other errors may keep it from ending."""
+
+
+@contextmanager
+def _at_most(seconds: float | None) -> Iterator[Callable[[object], None]]:
+    """Raise where the block takes longer, at once in a process's main thread.
+
+    In another thread, such as Dask's, it is what is yielded that raises: at each row.
+    """
+    end = np.inf if seconds is None else perf_counter() + seconds
+    timed = seconds is not None and current_thread() is main_thread()
+
+    def check(recorder: object) -> None:
+        if perf_counter() > end:
+            raise _TooLongError
+
+    def stop(signal_number: int, frame: object) -> None:
+        raise _TooLongError
+
+    before = signal.signal(signal.SIGALRM, stop) if timed else None
+    try:
+        if timed:
+            signal.setitimer(signal.ITIMER_REAL, seconds or 0.0)
+        yield check
+    finally:
+        if timed:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, before)
 
 
 @cache

@@ -11,7 +11,7 @@ from hsp_control.sweeps.metrics import Measure
 from hsp_control.sweeps.parquet import require_parquet
 from hsp_control.sweeps.plan import Plan
 from hsp_control.sweeps.results import Sweep
-from hsp_control.sweeps.row import CRASHED, Row
+from hsp_control.sweeps.row import CRASHED, TIMED_OUT, Row
 
 
 class Store:
@@ -98,9 +98,10 @@ class Store:
                 for name, entry in sweep.meta["metrics"].items()
             }
         self._described = {**self._described, **journal.described}
-        # A run whose worker died has no result; it is repeated.
         self.rows = {
-            row.run: row for row in [*earlier, *journal.rows] if row.status != CRASHED
+            row.run: row
+            for row in [*earlier, *journal.rows]
+            if row.status not in (CRASHED, TIMED_OUT)
         }
 
     def _compare(self, path: Path, identity: dict[str, Any]) -> None:

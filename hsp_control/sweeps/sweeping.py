@@ -7,6 +7,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hsp_control.common.exceptions import HspControlError, SweepError
 from hsp_control.config.experiment import build, read_document
 from hsp_control.simulation.recorder import versions
@@ -32,6 +34,7 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     fresh: bool = False,
+    time_limit: float | None = None,
     on_progress: Callable[[int, int, int], None] | None = None,
 ) -> Sweep:
     """Run an experiment many times with different values, and return the results.
@@ -55,6 +58,8 @@ def sweep(
         workers: The number of processes; None: one per core.
         scheduler: Address of a Dask scheduler, whose workers are used instead.
         fresh: Start again, and overwrite ``out``.
+        time_limit: The longest computation of a run [s]; None: any. A run that takes
+            longer has the status ``timed out``, and is repeated when the sweep resumes.
         on_progress: Called with the number of runs that are done, of all runs, and of
             runs that are done but not completed.
 
@@ -68,6 +73,8 @@ def sweep(
         HspControlError: If the configuration cannot be built with any of the first
             values. Single runs that cannot be built, diverge or crash are rows.
     """
+    if time_limit is not None and not 0.0 < time_limit < np.inf:
+        raise SweepError(f"time_limit is {time_limit} s; must be positive")
     varied = factors(over)
     form = chosen_design(design, samples)
     base = read_document(source)
@@ -81,6 +88,7 @@ def sweep(
         samples=samples,
         seed=seed,
         points=points(varied, form, samples, seed),
+        time_limit=time_limit,
     )
     try:
         first = plan.first_run()

@@ -351,6 +351,36 @@ def test_a_run_that_kills_its_workers_is_a_row_and_tried_again_another_time(
     assert found["status"].tolist() == ["completed", "completed"]
 
 
+def test_a_run_that_takes_too_long_is_a_row_and_tried_again_another_time(
+    tmp_path: Path,
+) -> None:
+    endless = [  # a quarter of an hour
+        "simulation.integrator={type: rk4, step: 0.0005}",
+        "simulation.log_period=1",
+        "simulation.duration=10000",
+    ]
+    out = tmp_path / "long.parquet"
+    done: list[int] = []
+
+    def note(runs: int, total: int, failures: int) -> None:
+        done.append(runs)
+
+    for _ in range(2):
+        found = hsp.sweep(
+            MOVING, {"null_space.gain": [1, 2]}, overrides=endless, out=out,
+            workers=1, time_limit=1.0, on_progress=note,
+        )  # fmt: skip
+        assert found["status"].tolist() == ["timed out", "timed out"]
+        assert found["message"].tolist() == 2 * ["took longer than 1 s"]
+    assert done == [0, 1, 2, 0, 1, 2]
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, np.nan])
+def test_a_time_limit_is_positive(limit: float) -> None:
+    with pytest.raises(SweepError, match=r"time_limit is .* must be positive"):
+        hsp.sweep(MOVING, {"null_space.gain": [1, 2]}, time_limit=limit)
+
+
 def test_a_worker_that_cannot_start_is_an_error(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
