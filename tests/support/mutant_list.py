@@ -543,12 +543,19 @@ MUTANTS = (
         "self.share * drives[-1]",
         UNIT + "control/test_rate_check.py -k limits_of_theory",
     ),
+    Mutant(
+        "limits: the null space swings",
+        CONTROL + "actuation/deviation_cost.py",
+        "_SHARE = 0.05",
+        "_SHARE = 0.0",
+        "tests/integration/test_limit_configurations.py -k swing",
+    ),
     # ------------------------------------------------------------------ simulation
     Mutant(
         "RK4: weights of k3 and k4 swapped",
         ROBOT + "integrators.py",
-        "(k1 + 2 * k2 + 2 * k3 + k4)",
-        "(k1 + 2 * k2 + k3 + 2 * k4)",
+        "A[0, i] + 2.0 * A[1, i] + 2.0 * A[2, i] + A[3, i]",
+        "A[0, i] + 2.0 * A[1, i] + A[2, i] + 2.0 * A[3, i]",
         UNIT + "simulation/test_integrators.py -k test_order",
     ),
     Mutant(

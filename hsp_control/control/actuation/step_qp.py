@@ -181,22 +181,22 @@ def solve_step(
     contacts_held = what != NEAREST_AGAIN and forces.first.shape[0] > 0
     count = _write_law_factor(directions, contacts_held, qp.nearest)
     count = _write_force_factor(forces, count, _FORCE_COST, qp.nearest)
-    warm, status, memory = what != NEAREST_AGAIN, UNSOLVED, qp.memory
-    while True:
-        code = minimise(_moving(qp.nearest, count), warm, x, memory)
-        if code != SOLVED or not _write_result(
+    problem, warm = _moving(qp.nearest, count), what != NEAREST_AGAIN
+    code = minimise(problem, warm, x, qp.memory)
+    if not (
+        code == SOLVED and _write_result(wanted, forces, bounds, places, x, result)
+    ):
+        return UNSOLVED
+    scale = null_space_scale(directions, x)
+    if scale < 1.0:  # the tasks miss: once more, with a dearer null space
+        _scale_null_space(directions, scale, count - forces.first.shape[0], problem)
+        _start(forces, x)
+        code = minimise(problem, warm, x, qp.second_memory)
+        if code == SOLVED and not _write_result(
             wanted, forces, bounds, places, x, result
         ):
-            return status
-        if status == Status.LIMITED:
-            return status
-        status = Status.LIMITED
-        scale = null_space_scale(directions, x)
-        if scale == 1.0:
-            return status
-        _scale_null_space(directions, scale, count - forces.first.shape[0], qp.nearest)
-        _start(forces, x)
-        memory = qp.second_memory
+            return UNSOLVED
+    return Status.LIMITED
 
 
 @kernel
