@@ -153,6 +153,7 @@ def configuration(case: Case, x: float, *, check: bool) -> dict[str, Any]:
             "gain": 0.1 / h,
             "fields": [{"type": "target_posture", "target": target, "weight": 1.0}],
         },
+        "limits": None,  # it is the law's own loop that grows or dies
         "plant": {"type": "rigid_body", "drives": {}, "sensors": {}},
         "compensation": {},
         "simulation": {

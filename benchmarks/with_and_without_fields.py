@@ -43,7 +43,8 @@ Written by `.venv/bin/python benchmarks/with_and_without_fields.py`; do not edit
 
 Each of these is a file in `configs/` that runs by name: `hsp run panda_limits`, then
 `hsp plot out/panda_limits.npz`. The second row of each table is the same run without
-the field that the first row names; other fields stay. The law tracks the task in both
+the field that the first row names, and without limits, which would do some of what it
+does; other fields stay. The law tracks the task in both
 runs; the other columns show the effect of the field.
 
 - **tracking**: root mean square of the task error over the whole run, of the worst

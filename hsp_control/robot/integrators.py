@@ -208,9 +208,8 @@ class _Rk4(_Steps):
     def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
         super().__init__(robot, bind_dynamics, longest)
         self._D, self._A = np.zeros((2, 4, robot.nv))
-        self._base, self._v0 = self.q.copy(), self.v.copy()
-        self._delta = np.zeros(robot.nv)
-        self._chart = Chart(robot, self._base)
+        self._delta, self._v0 = np.zeros((2, robot.nv))
+        self._chart = Chart(robot, self.q)
         self._base = self._chart.base
         linear = robot.linear
         slopes = self.h, self._D, self._A

@@ -1,6 +1,7 @@
 """Prediction of the state at which an effort will act."""
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 
@@ -57,6 +58,12 @@ class RunningPredictor:
         """Allocate."""
         self._robot, self._period = robot, 0.0
         self._tau = np.zeros(robot.nv)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy needs: its integrator begins anew, with its own memory."""
+        state = vars(self) | {"_period": 0.0, "_tau": self._tau.copy()}
+        state.pop("_advance", None)
+        return state
 
     def predict(
         self, q: Array, v: Array, efforts: Iterable[Array], period: float

@@ -1,6 +1,7 @@
 """Each compensator by itself, and what they are worth together."""
 
 import pickle
+from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
@@ -648,3 +649,15 @@ def test_random_bodies_and_friction_come_to_a_tenth_of_a_millimetre() -> None:
     error = np.linalg.norm(log["task.hand.error"][late], axis=1)
     assert np.sqrt(np.mean(error**2)) < 0.11e-3
     assert np.sqrt(np.mean(log["null_space_norm"][late] ** 2)) < 0.024
+
+
+def test_a_copy_of_a_running_predictor_has_memory_of_its_own() -> None:
+    robot, rng = PANDA, np.random.default_rng(0)
+    q, v = robot.home(), 0.1 * rng.standard_normal(7)
+    efforts = [10.0 * rng.standard_normal(7)]
+    first = Predictor(effort_delay=1).begin(robot)
+    expected = [each.copy() for each in first.predict(q, v, efforts, 1e-3)]
+    other = deepcopy(first)
+    first.predict(q + 0.3, -v, efforts, 1e-3)
+    for found, once in zip(other.predict(q, v, efforts, 1e-3), expected, strict=True):
+        np.testing.assert_array_equal(found, once)
