@@ -68,13 +68,16 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .trajectories import Circle as Circle
     from .trajectories import Hold as Hold
     from .trajectories import Line as Line
+    from .trajectories import Stream as Stream
+    from .trajectories import StreamOrientation as StreamOrientation
+    from .trajectories import StreamPose as StreamPose
     from .visualization import viewer as viewer
     from .visualization.viewer import Viewer as Viewer
 
 _NAMES = {
     "robot": "Robot RobotState",
     "geometry": "Obstacle Sphere",
-    "trajectories": "Circle Hold Line",
+    "trajectories": "Circle Hold Line Stream StreamOrientation StreamPose",
     "tasks": (
         "CenterOfMass FrameOrientation FramePose FramePosition Gains JointPosture "
         "Pointing Task"

@@ -79,6 +79,10 @@ class TrajectoryError(HspControlError, ValueError):
     """The parameters of a trajectory are invalid or contradict each other."""
 
 
+class StreamError(HspControlError, ValueError):
+    """A streamed target is invalid, its source cannot be opened, or it is missing."""
+
+
 class TaskError(HspControlError, ValueError):
     """The parameters of a task are invalid, or this robot cannot perform the task."""
 

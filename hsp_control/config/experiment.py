@@ -18,6 +18,7 @@ from hsp_control.config.located_scene import located_scene
 from hsp_control.config.loop_check import check_compensation, check_rates
 from hsp_control.config.named_obstacles import named_obstacles
 from hsp_control.config.scenario import Scenario
+from hsp_control.config.streams import with_messages, with_recordings
 from hsp_control.config.validation import validate
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.constraints.contacts import Contact
@@ -27,6 +28,7 @@ from hsp_control.control.compensation import Compensation, RateFinding
 from hsp_control.control.composition import Base
 from hsp_control.control.controller import Controller
 from hsp_control.declaration.named import keyed
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.live.settings import LiveSettings
@@ -41,10 +43,12 @@ from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation import Rollout, simulate
 from hsp_control.simulation.initial_state import InitialState
 from hsp_control.simulation.plants import Plant, PlantPart, SampledPlant
+from hsp_control.simulation.real_time import in_real_time
 from hsp_control.simulation.recorder import Recorder
 from hsp_control.simulation.settings import SimulationSettings
 from hsp_control.simulation.simulate import check_steps
 from hsp_control.tasks import Task
+from hsp_control.trajectories.streams.stream import Streamed
 
 
 class Experiment:
@@ -213,8 +217,13 @@ class Experiment:
         on_progress: Callable[[float], None] | None = None,
         on_row: Callable[[Recorder], None] | None = None,
     ) -> Rollout:
-        """Simulate the experiment; see `simulate` for arguments and errors."""
+        """Simulate the experiment; see `simulate` for arguments and errors.
+
+        If another process feeds a stream, the run keeps pace with real time.
+        """
         settings = self.scenario.simulation
+        if any(stream.live for stream in parts_within(self.scenario, Streamed)):
+            on_row = in_real_time(settings.log_period, on_row)
         return simulate(
             self.controller,
             self.q0,
@@ -303,7 +312,8 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
                 f"it ran that are not data: {lost}"
             )
         made = run.meta.get("changes") or []
-        return Document(run.config | {"changes": made}, {}, str(path))
+        config = with_recordings(run.config, run.meta.get("streams") or {})
+        return Document(config | {"changes": made}, {}, str(path))
     known = bundled_configs()
     if path.suffix in {".yaml", ".yml"} or _is_file(path):
         return Document.read(path)
@@ -331,6 +341,8 @@ def build(document: Document) -> Experiment:
     scenario = validate(document, Scenario)
     folder = Path(document.name).resolve().parent
     scenario = replace(scenario, robot=scenario.robot.located(folder))
+    with document.at():
+        scenario = with_messages(scenario, folder, document.access)
     robot = load_robot(document, scenario)
     contacts = tuple(scenario.contacts.values())
     for contact in contacts:

@@ -429,7 +429,7 @@ class Controller:
             self._active = None  # the next step places what is relative
             for feedback in self._feedback.values():
                 feedback.offset[:] = 0.0
-            if self._changes:
+            if self._changes or any(each.task.remembers for each in self._setup.tasks):
                 self._compose(self._start)
 
     def _mix(self) -> tuple[Array, Outcome]:

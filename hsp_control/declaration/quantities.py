@@ -204,6 +204,8 @@ Gain = Annotated[
     ArrayLike, ArrayField(Positive | list[Positive] | list[list[Number]], read_only)
 ]
 """A number, one number for each row, or a matrix."""
+PositiveNumbers = Annotated[ArrayLike, ArrayField(Positive | list[Positive], read_only)]
+"""One positive number, or one for each coordinate."""
 Weights = Annotated[ArrayLike, ArrayField(NonNegative | list[NonNegative], read_only)]
 """One number, or one for each joint."""
 Periods = Annotated[int, Strict(), Field(ge=0, le=100_000), _PLAIN]

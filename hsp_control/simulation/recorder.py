@@ -2,7 +2,8 @@
 
 import math
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -16,6 +17,7 @@ from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
+from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.shapes import shape_to_log
@@ -26,7 +28,15 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.log_file import MAX_SIZE
 from hsp_control.simulation.rollout import FORMAT, Rollout, complete_columns
 from hsp_control.tasks import Task
+from hsp_control.trajectories.streams.stream import Streamed
 
+STREAM_CHANNELS = {
+    "age": "time since the last message",
+    "taken": "messages taken",
+    "late": "of these, messages that came too late to count",
+    "rejected": "invalid messages",
+}
+"""What is logged of a stream; see `Streamed.counts`."""
 _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
 
@@ -130,6 +140,10 @@ class Recorder:
             what = " and ".join(part.name for part in parts)
             column(f"{prefix}.error", (m,), unit, f"error e: {what}")
             column(f"{prefix}.error_rate", (m,), rate_unit, "error rate e'")
+            for stream, _ in _streams_of(task, name):
+                for what, meaning in STREAM_CHANNELS.items():
+                    unit_of = "s" if what == "age" else "-"
+                    column(f"{stream}.{what}", (), unit_of, meaning)
             column(f"{prefix}.reference", (width,), unit, "desired value")
             column(f"{prefix}.actual", (width,), unit, "actual value")
 
@@ -197,6 +211,9 @@ class Recorder:
             reference, actual = task.measure(state)
             columns[f"task.{name}.reference"][i] = reference
             columns[f"task.{name}.actual"][i] = actual
+            for prefix, stream in _streams_of(task, name):
+                for what, value in stream.counts().items():
+                    columns[f"{prefix}.{what}"][i] = value
         for k, (frame, joint) in enumerate(self._points):
             columns["skeleton"][i, k] = (
                 state.position(frame) if frame else state.data.oMi[joint].translation
@@ -337,7 +354,7 @@ class Recorder:
                 name: {**_task_meta(task), "level": self._levels[name]}
                 for name, task in self._logged.items()
             },
-            **_changes(controller),
+            **repeatable(controller),
             "field": controller.field.name,
             "controls_null_space": controller.field.controls,
             "null_space_gain": controller.null_space_gain.tolist(),
@@ -347,6 +364,17 @@ class Recorder:
             "versions": versions(),
             **meta,
         }
+
+
+def _streams_of(task: Task, name: str) -> Iterator[tuple[str, Streamed]]:
+    """Yield the streams of a task that is logged by a name, with their own names."""
+    if task.remembers:
+        for k, stream in enumerate(parts_within(task, Streamed)):
+            yield f"stream.{name}" + (f"_{k + 1}" if k else ""), stream
+
+
+def _as_recorded(stream: Streamed) -> Streamed:
+    return replace(stream, source=None, messages=stream.record)
 
 
 def continuous_dofs(robot: Robot) -> list[int]:
@@ -365,10 +393,25 @@ def versions() -> dict[str, str]:
     }
 
 
+def repeatable(controller: Controller) -> dict[str, Any]:
+    """Return what came during the run, as data, so that the run can be repeated.
+
+    The changes that were made, and for each task what its streams have taken.
+    """
+    heard = {
+        task.name: [list(stream.record) for stream in parts_within(task, Streamed)]
+        for task in controller.tasks
+        if task.remembers
+    }
+    return _changes(controller) | ({"streams": heard} if heard else {})
+
+
 def _changes(controller: Controller) -> dict[str, Any]:
-    """Return the changes that were made, as data, so that the run can be repeated."""
     try:
-        changes = [plain_data(change) for change in controller.changes]
+        changes = [
+            plain_data(with_parts_replaced(change, Streamed, _as_recorded))
+            for change in controller.changes
+        ]
     except ConfigError as error:
         return {"changes": None, "changes_lost": str(error)}
     return {"changes": changes}

@@ -24,7 +24,7 @@ from hsp_control.tasks.task import (
     TaskSample,
     add_feedback,
 )
-from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
+from hsp_control.trajectories import Hold, Stream, Trajectory, TrajectorySample
 from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.following import stay
 
@@ -45,7 +45,8 @@ class JointPosture(SecondOrderTask, type="joint_posture"):
     by default."""
     displacement: Trajectory | None = None
     """Motion of the joints about the reference, one number for each of the joints [rad
-    or m]; none by default."""
+    or m]; none by default. To stream postures, stream the displacement from a reference
+    of zeros."""
 
     @property
     def error_parts(self) -> tuple[ErrorPart, ...]:
@@ -88,7 +89,11 @@ class JointPosture(SecondOrderTask, type="joint_posture"):
             placed._indices(robot)  # checks them
         if displacement is not None:
             with within("displacement"):
-                displacement = displacement.anchored(np.zeros(len(joints)))
+                begin = np.zeros(len(joints))
+                if isinstance(displacement, Stream):  # where the joints are
+                    away = robot.difference(reference, start.state.q)
+                    begin = away[placed._indices(robot)]
+                displacement = displacement.anchored(begin)
                 if displacement.dimension != len(joints):
                     raise TaskError(
                         f"the task has {len(joints)} joints; its displacement has "

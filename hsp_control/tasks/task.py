@@ -18,8 +18,10 @@ from hsp_control.declaration.quantities import PositiveCount
 from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
+from hsp_control.declaration.nested import parts_within
 from hsp_control.trajectories import Schedule
 from hsp_control.trajectories.crossfade import AnyReference
+from hsp_control.trajectories.streams.stream import Streamed
 
 
 class TaskSample(NamedTuple):
@@ -218,6 +220,11 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     def followed(self) -> AnyReference | None:
         """The trajectory that a placed task follows; None if it has none."""
         return None
+
+    @property
+    def remembers(self) -> bool:
+        """Whether its trajectory has a memory of the run, as streams have."""
+        return any(True for _ in parts_within(self, Streamed))
 
     def following(self, trajectory: AnyReference) -> Self:
         """Return the task with another trajectory.

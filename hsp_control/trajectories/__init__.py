@@ -40,6 +40,11 @@ from hsp_control.trajectories.screw_interpolation import (
 from hsp_control.trajectories.spin import Spin as Spin
 from hsp_control.trajectories.spline import Spline as Spline
 from hsp_control.trajectories.stops import Stops as Stops
+from hsp_control.trajectories.streams.stream import Stream as Stream
+from hsp_control.trajectories.streams.stream import (
+    StreamOrientation as StreamOrientation,
+)
+from hsp_control.trajectories.streams.stream import StreamPose as StreamPose
 from hsp_control.trajectories.trajectory import Trajectory as Trajectory
 from hsp_control.trajectories.trajectory import TrajectorySample as TrajectorySample
 from hsp_control.trajectories.uniform_line import UniformLine as UniformLine

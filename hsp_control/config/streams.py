@@ -1,0 +1,96 @@
+"""Streams of a configuration: recordings that it names, and those in a log."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import replace
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Any
+
+from hsp_control.common.exceptions import AccessError
+from hsp_control.config.scenario import Scenario
+from hsp_control.declaration import within
+from hsp_control.declaration.nested import with_parts_replaced
+from hsp_control.robot.description.access import Access
+from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.udp_listener import check_address
+
+
+def with_messages(scenario: Scenario, folder: Path, access: Access) -> Scenario:
+    """Return a scenario whose streams hold the messages of their recordings.
+
+    Args:
+        scenario: The scenario.
+        folder: Where relative paths begin.
+        access: Which files may be read; strict reading also refuses to listen to other
+            computers.
+
+    Raises:
+        AccessError: If a recording may not be read, or a stream would listen to others.
+        StreamError: If a recording cannot be read, or a message is invalid.
+    """
+
+    def located(stream: Streamed) -> Streamed:
+        with within("source"):
+            if stream.live:
+                _check_listening(stream, access)
+            return stream.recorded_in(folder, lambda p: access.check(p, "recording"))
+
+    tasks = {}
+    for name, task in scenario.tasks.items():
+        with within("tasks", name):
+            tasks[name] = with_parts_replaced(task, Streamed, located)
+    changes = []
+    for k, change in enumerate(scenario.changes):
+        with within("changes", k):
+            changes.append(with_parts_replaced(change, Streamed, located))
+    return replace(scenario, tasks=tasks, changes=tuple(changes))
+
+
+def _check_listening(stream: Streamed, access: Access) -> None:
+    assert stream.source is not None
+    host, _ = check_address(stream.source)
+    if not access.strict or host == "localhost" or _is_loopback(host):
+        return
+    raise AccessError(
+        f"{stream.source} listens to other computers; strict reading allows only "
+        "127.0.0.1"
+    )
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def with_recordings(
+    config: Mapping[str, Any], heard: Mapping[str, Sequence[Any]]
+) -> dict[str, Any]:
+    """Return a log's configuration in which its streams repeat what they heard.
+
+    Args:
+        config: The configuration's data.
+        heard: For each task what its streams have taken, in their order; see
+            `recorder.repeatable`.
+    """
+    repeated = deepcopy(dict(config))
+    for name, recordings in heard.items():
+        task = repeated.get("tasks", {}).get(name, {})
+        for stream, messages in zip(_streams(task), recordings, strict=False):
+            stream.pop("source", None)
+            stream["messages"] = messages
+    return repeated
+
+
+def _streams(data: Any) -> Iterator[dict[str, Any]]:
+    """Yield the streams in plain data, in order."""
+    if isinstance(data, dict):
+        if data.get("type") == "stream":
+            yield data
+        for each in data.values():
+            yield from _streams(each)
+    elif isinstance(data, list):
+        for each in data:
+            yield from _streams(each)

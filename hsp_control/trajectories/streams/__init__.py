@@ -1,0 +1,1 @@
+"""References that are streamed: messages become a C² motion within bounds."""

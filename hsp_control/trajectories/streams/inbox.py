@@ -1,0 +1,133 @@
+"""Where messages wait: any thread puts them in, the control loop takes them out."""
+
+from collections import deque
+from threading import Lock
+from typing import Any, NamedTuple
+
+from hsp_control.common.exceptions import StreamError
+from hsp_control.trajectories.streams.message import Message, Space, decoded, message_of
+
+CAPACITY = 4096
+"""Most messages that wait; where more come, the oldest are dropped."""
+
+
+class Received(NamedTuple):
+    """A message and its number; numbers increase by one.
+
+    Attributes:
+        number: The number of the message.
+        message: The message.
+    """
+
+    number: int
+    message: Message
+
+
+class Inbox:
+    """Messages of one source, for any number of readers.
+
+    A reader remembers the number of the last message that it took; so several
+    controllers may read one stream.
+
+    Attributes:
+        space: What a value is.
+        count: How many messages have arrived.
+        rejected: How many were invalid.
+        reason: Why the last invalid one was.
+        taken: The number of the last message that any reader took.
+    """
+
+    def __init__(self, space: Space) -> None:
+        """Set what a value is."""
+        self.space = space
+        self.count = self.rejected = self.taken = 0
+        self.reason = ""
+        self._waiting: deque[Received] = deque(maxlen=CAPACITY)
+        self._lock = Lock()
+
+    def put(self, **data: Any) -> None:
+        """Add a message, given by its entries; see `message_of`.
+
+        Raises:
+            StreamError: If it is not valid.
+        """
+        self._add(message_of(data, self.space))
+
+    def put_text(self, text: bytes) -> None:
+        """Add a message that came as JSON; an invalid one is counted and dropped."""
+        try:
+            self._add(decoded(text, self.space))
+        except StreamError as error:
+            self.reject(str(error))
+
+    def reject(self, reason: str) -> None:
+        """Count an invalid message."""
+        with self._lock:
+            self.rejected += 1
+            self.reason = reason
+
+    def after(self, number: int) -> list[Received]:
+        """Return the messages that wait, later than a number, in order of arrival."""
+        with self._lock:
+            self.taken = self.count
+            return [each for each in self._waiting if each.number > number]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the space alone: a copy elsewhere hears what is sent there."""
+        return {"space": self.space}
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        """Begin without messages."""
+        self.__init__(saved["space"])  # type: ignore[misc]
+
+    def _add(self, message: Message) -> None:
+        with self._lock:
+            self.count += 1
+            self._waiting.append(Received(self.count, message))
+
+
+class InboxReader:
+    """A reader of an inbox in one run; it begins with what nobody took before."""
+
+    def __init__(self, inbox: Inbox, record: list[dict[str, Any]] | None) -> None:
+        """Begin to read.
+
+        Args:
+            inbox: The inbox.
+            record: Where to write what is taken: `Message.to_dict` with the
+                controller's time ``at`` [s]; None: nowhere.
+        """
+        self._inbox, self._record = inbox, record
+        self._number = inbox.taken
+
+    def take(self, t: float) -> list[Message]:
+        """Return the messages that are there at a time [s] and were not taken."""
+        if self._inbox.count == self._number:
+            return []
+        received = self._inbox.after(self._number)
+        if received:
+            self._number = received[-1].number
+        messages = [each.message for each in received if self._fits(each.message)]
+        if self._record is not None:
+            self._record += [{"at": t, **each.to_dict()} for each in messages]
+        return messages
+
+    def copy(self) -> "InboxReader":
+        """Return a reader that goes on from here, and writes no record."""
+        other = InboxReader(self._inbox, None)
+        other._number = self._number
+        return other
+
+    def _fits(self, message: Message) -> bool:
+        """Return whether a message that was sent before the size was known fits."""
+        space = self._inbox.space
+        for array, width in (
+            (message.values, space.width),
+            (message.velocities, space.rates),
+        ):
+            if array is not None and width is not None and array.shape[1] != width:
+                self._inbox.reject(
+                    f"a message has {array.shape[1]} numbers; this stream needs {width}"
+                )
+                return False
+        return True

@@ -1,0 +1,231 @@
+"""What a sender says: one target, a velocity, or a chunk of waypoints with times."""
+
+import json
+from collections.abc import Mapping
+from typing import Any, NamedTuple, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import StreamError
+
+MOST_WAYPOINTS = 1000
+"""Most waypoints of one message."""
+LARGEST = 1e6
+"""Numbers beyond this are refused [m, rad or s]: they are mistakes, and would
+overflow."""
+_UNIT = 1e-3
+"""Deviation of a quaternion's norm from 1 that counts as a sender's rounding."""
+
+
+class Space(NamedTuple):
+    """What one value of a stream is: linear coordinates, then perhaps a quaternion.
+
+    Attributes:
+        linear: Number of linear coordinates; None: any, as nothing said it yet.
+        rotational: Whether a quaternion (x, y, z, w) follows them.
+    """
+
+    linear: int | None
+    rotational: bool
+
+    @property
+    def width(self) -> int | None:
+        """How many numbers a value has."""
+        return None if self.linear is None else self.linear + 4 * self.rotational
+
+    @property
+    def rates(self) -> int | None:
+        """How many numbers a velocity has; an angular velocity has three."""
+        return None if self.linear is None else self.linear + 3 * self.rotational
+
+    @property
+    def words(self) -> str:
+        """What a value consists of, for messages."""
+        if self == POSE:
+            return "x, y, z and a quaternion (x, y, z, w)"
+        if self.rotational:
+            return "a quaternion (x, y, z, w)"
+        return "numbers" if self.linear is None else f"{self.linear} numbers"
+
+
+POSE = Space(3, True)
+ORIENTATION = Space(0, True)
+
+
+class Message(NamedTuple):
+    """Waypoints, or a velocity alone.
+
+    Attributes:
+        t: When it was made, by the sender's clock [s]; None: unknown, now.
+        times: Times of the waypoints after ``t``, increasing, shape (k,) [s].
+        values: The waypoints, shape (k, width), quaternions of norm 1; None: the
+            message is a velocity alone.
+        velocities: Their velocities, shape (k, rates), in world axes; None: unknown.
+    """
+
+    t: float | None
+    times: Array
+    values: Array | None
+    velocities: Array | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `message_of` reads."""
+        data: dict[str, Any] = {} if self.t is None else {"t": self.t}
+        for name in ("values", "velocities"):
+            array = getattr(self, name)
+            if array is not None:
+                data[name] = array.tolist()
+        if self.values is not None:
+            data["times"] = self.times.tolist()
+        return data
+
+
+def message_of(data: Any, space: Space) -> Message:
+    """Return the message that JSON data or the arguments of `send` declare.
+
+    Args:
+        data: A mapping with some of ``value``, ``values``, ``times``, ``velocity``,
+            ``velocities`` and ``t``.
+        space: What a value is.
+
+    Raises:
+        StreamError: If it is no valid message; says which entry is wrong, and why.
+    """
+    if not isinstance(data, Mapping):
+        raise StreamError(f"a message is {_shown(data)}; needs a mapping")
+    if unknown := [key for key in data if key not in _KEYS]:
+        raise StreamError(
+            f"a message has the key {unknown[0]!r:.40}; known are {', '.join(_KEYS)}"
+        )
+    given = {key: value for key, value in data.items() if value is not None}
+    _check_alternatives(given)
+    t = None if "t" not in given else float(_numbers(given["t"], "t", 0))
+    values = _rows(given, "value", "values", space.width, space.words)
+    rates = "one velocity for each coordinate, angular velocities in world axes"
+    velocities = _rows(given, "velocity", "velocities", space.rates, rates)
+    if values is None:
+        if velocities is None or len(velocities) != 1:
+            raise StreamError("a message needs a value, values or one velocity")
+        return Message(t, np.zeros(1), None, velocities)
+    if velocities is not None and len(velocities) != len(values):
+        raise StreamError(
+            f"there are {len(velocities)} velocities for {len(values)} values"
+        )
+    if space.rotational:
+        _normalise(values)
+    return Message(t, _times(given, len(values)), values, velocities)
+
+
+def decoded(text: bytes, space: Space) -> Message:
+    """Return the message in a JSON text.
+
+    Raises:
+        StreamError: If it is no valid message.
+    """
+    try:
+        data = json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise StreamError(f"a message is not JSON: {error}") from None
+    return message_of(data, space)
+
+
+_KEYS = ("value", "values", "times", "velocity", "velocities", "t")
+
+
+def _check_alternatives(given: Mapping[str, Any]) -> None:
+    for one, several in (("value", "values"), ("velocity", "velocities")):
+        if one in given and several in given:
+            raise StreamError(f"give either {one} or {several}")
+    if "values" in given and "times" not in given:
+        raise StreamError("values need times [s], one for each")
+    if "times" in given and "values" not in given:
+        raise StreamError("times need values, one for each")
+
+
+def _rows(
+    given: Mapping[str, Any], one: str, several: str, width: int | None, words: str
+) -> Array | None:
+    """Return one row or several, shape (k, width); None if there are none."""
+    name = one if one in given else several
+    if name not in given:
+        return None
+    rows = _numbers(given[name], name, 1 if name == one else 2)
+    rows = rows[None, :] if name == one else rows
+    if not 1 <= len(rows) <= MOST_WAYPOINTS or rows.shape[1] == 0:
+        raise StreamError(f"{name} has {len(rows)} rows; needs 1 to {MOST_WAYPOINTS}")
+    if width is not None and rows.shape[1] != width:
+        raise StreamError(
+            f"{name} has {rows.shape[1]} numbers; this stream needs {width}: {words}"
+        )
+    return rows
+
+
+def _times(given: Mapping[str, Any], count: int) -> Array:
+    """Return the times of the waypoints after ``t``, shape (count,)."""
+    if "times" not in given:
+        return np.zeros(1)
+    times = _numbers(given["times"], "times", 1)
+    if len(times) != count:
+        raise StreamError(f"there are {len(times)} times for {count} values")
+    if (np.diff(times) <= 0.0).any():
+        k = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
+        raise StreamError(
+            f"times must increase; times[{k + 1}] = {times[k + 1]:g} is not later than "
+            f"times[{k}] = {times[k]:g}"
+        )
+    return times
+
+
+def _normalise(values: Array) -> None:
+    """Scale the quaternions to norm 1, in place.
+
+    Raises:
+        StreamError: If one is none.
+    """
+    norms = np.linalg.norm(values[:, -4:], axis=1)
+    worst = int(np.abs(norms - 1.0).argmax())
+    if abs(norms[worst] - 1.0) > _UNIT:
+        raise StreamError(
+            f"the quaternion {values[worst, -4:].tolist()} has norm "
+            f"{norms[worst]:.6g}; needs 1"
+        )
+    values[:, -4:] /= norms[:, None]
+
+
+def _numbers(value: Any, name: str, ndim: int) -> Array:
+    """Return an array of finite numbers, copied.
+
+    Raises:
+        StreamError: If it is not.
+    """
+    needs = ("a number", "a list of numbers", "a list of lists of numbers")[ndim]
+    try:
+        array = _as_array(value)
+    except (TypeError, ValueError, OverflowError):
+        raise StreamError(f"{name} is {_shown(value)}; needs {needs}") from None
+    if array.ndim != ndim:
+        raise StreamError(f"{name} has shape {array.shape}; needs {needs}")
+    if not (np.abs(array) <= LARGEST).all():  # NaN neither
+        bad = array[~(np.abs(array) <= LARGEST)].ravel()[0]
+        raise StreamError(
+            f"{name} contains {bad:g}; needs finite numbers of at most {LARGEST:g}"
+        )
+    return array
+
+
+def _as_array(value: ArrayLike) -> Array:
+    array = np.asarray(value)
+    if array.dtype.kind not in "fiu":
+        raise TypeError
+    return np.array(array, dtype=np.float64)
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def _refuse_constant(text: str) -> NoReturn:
+    raise ValueError(f"{text} is no number")

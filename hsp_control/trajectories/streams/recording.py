@@ -1,0 +1,107 @@
+"""Messages that were recorded: a file, or a log's, each with the time it was taken."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from hsp_control.common.exceptions import StreamError
+from hsp_control.trajectories.streams.message import Message, Space, message_of
+
+LARGEST_FILE = 100_000_000
+"""Size of the largest recording that is read [bytes]."""
+
+
+class Recording:
+    """Recorded messages as a source; the same run takes them at the same times."""
+
+    def __init__(
+        self,
+        entries: Iterable[tuple[float, Message]],
+        record: list[dict[str, Any]] | None,
+    ) -> None:
+        """Begin at the first message.
+
+        Args:
+            entries: Times [s] and messages, in order of time.
+            record: Where to write what is taken, see `InboxReader`; None: nowhere.
+        """
+        self._entries, self._record = list(entries), record
+        self._next = 0
+
+    def take(self, t: float) -> list[Message]:
+        """Return the messages up to a time [s] that were not taken."""
+        found = []
+        while self._next < len(self._entries) and self._entries[self._next][0] <= t:
+            found.append(self._entries[self._next][1])
+            self._next += 1
+        if self._record is not None:
+            self._record += [{"at": t, **each.to_dict()} for each in found]
+        return found
+
+    def copy(self) -> "Recording":
+        """Return a source that goes on from here, and writes no record."""
+        other = Recording(self._entries, None)
+        other._next = self._next
+        return other
+
+
+def recorded(
+    data: Sequence[Mapping[str, Any]], space: Space
+) -> list[tuple[float, Message]]:
+    """Return the messages of a recording, and when they were taken [s].
+
+    Args:
+        data: Messages, see `message_of`, each with a time ``at``, which never falls.
+        space: What a value is.
+
+    Raises:
+        StreamError: If one is invalid; says which.
+    """
+    entries: list[tuple[float, Message]] = []
+    for k, each in enumerate(data):
+        try:
+            if not isinstance(each, Mapping) or not _is_number(each.get("at")):
+                raise StreamError("it needs the time at which it is taken: at [s]")
+            at = float(each["at"])
+            if entries and at < entries[-1][0]:
+                raise StreamError(f"at is {at:g}, earlier than {entries[-1][0]:g}")
+            rest = {key: value for key, value in each.items() if key != "at"}
+            entries.append((at, message_of(rest, space)))
+        except StreamError as error:
+            raise StreamError(f"message {k} of the recording: {error}") from None
+    return entries
+
+
+def read_recording(path: Path) -> list[dict[str, Any]]:
+    """Return the messages in a file of JSON lines.
+
+    Raises:
+        StreamError: If it cannot be read, is too large, or a line is not JSON.
+    """
+    try:
+        if (size := path.stat().st_size) > LARGEST_FILE:
+            raise StreamError(
+                f"{path}: {size} bytes; a recording has at most {LARGEST_FILE}"
+            )
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise StreamError(f"{path}: the recording cannot be read: {error}") from None
+    found = []
+    for k, line in enumerate(lines):
+        if not line.strip():
+            continue
+        try:
+            found.append(json.loads(line, parse_constant=_refuse_constant))
+        except (ValueError, RecursionError) as error:
+            raise StreamError(f"{path}:{k + 1}: not JSON: {error}") from None
+    return found
+
+
+def _is_number(value: object) -> bool:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and abs(value) < float("inf")  # type: ignore[arg-type]
+
+
+def _refuse_constant(text: str) -> NoReturn:
+    raise ValueError(f"{text} is no number")

@@ -1,0 +1,276 @@
+"""A stream in one run: messages become a reference, piece by piece.
+
+Whenever a message arrives, the rest of the reference is planned again, from what it
+*is* (x, x', x'') and not from what was planned. A piece, once begun, never changes; so
+the reference is a C² function of time, whatever arrives and however often it is asked.
+"""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from copy import copy
+from math import inf
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import StreamError
+from hsp_control.trajectories.streams.bounds import MotionBounds
+from hsp_control.trajectories.streams.chart import Chart, State
+from hsp_control.trajectories.streams.message import Message
+from hsp_control.trajectories.streams.segments import Coast, Goal, Joiner, Segment
+from hsp_control.trajectories.streams.waypoints import Waypoints, derivatives
+
+_KEPT = 1.0
+"""Pieces are kept for this time; an integrator may ask for earlier times [s]."""
+_SAME = 1e-7
+"""States that differ by less are the same, in x, x' and x''."""
+_CONSIDERED = 32
+"""The reference joins one of the next waypoints, at most this many."""
+
+
+class Policy(NamedTuple):
+    """How messages become goals; see `Stream` for the attributes."""
+
+    name: str
+    delay: float
+    smoothing: float
+    extrapolation: float
+    hold_after: float
+    stop_after: float
+
+
+class Source(Protocol):
+    """What messages come from: an `Inbox`, or a recording."""
+
+    def take(self, t: float) -> Sequence[Message]:
+        """Return the messages that are there at a time [s] and were not taken."""
+
+    def copy(self) -> "Source":
+        """Return a source that goes on from here, without the other's knowledge."""
+
+
+class RunningStream:
+    """The reference of one run.
+
+    Attributes:
+        chart: The local coordinates.
+        taken: How many messages it has taken.
+        waypoints: The waypoints that were received.
+    """
+
+    def __init__(
+        self,
+        chart: Chart,
+        bounds: MotionBounds,
+        policy: Policy,
+        source: Source,
+        start: State,
+    ) -> None:
+        """Begin at rest.
+
+        Args:
+            chart: The local coordinates.
+            bounds: Bounds in these coordinates.
+            policy: How messages become goals.
+            source: Where they come from.
+            start: Where the reference is until the first message.
+        """
+        self.chart, self._policy, self._source = chart, policy, source
+        self._joiner = Joiner(bounds)
+        self._begin = self._now = -inf
+        self._heard = -inf
+        self._silent = False
+        self._command: Array | None = None
+        self._segments: list[Segment] = [Coast(0.0, inf, start)]
+        self._starts = [-inf]
+        self.taken = 0
+        self.waypoints = Waypoints()
+
+    @property
+    def age(self) -> float:
+        """Time since the last message, or since the run began [s]."""
+        return self._now - max(self._heard, self._begin) if self._now > -inf else 0.0
+
+    def at(self, t: float) -> State:
+        """Return the reference at a time [s]; see `Chart`.
+
+        Raises:
+            StreamError: If no message came for too long.
+        """
+        if t > self._now:
+            self._advance(t)
+        k = max(bisect_right(self._starts, t) - 1, 0)
+        return self._segments[k].state(t)
+
+    def copy(self) -> "RunningStream":
+        """Return one that goes on from here by itself."""
+        other = copy(self)
+        other._source = self._source.copy()
+        other._segments, other._starts = self._segments.copy(), self._starts.copy()
+        other.waypoints = copy(self.waypoints)
+        for name in ("times", "values", "velocities"):
+            setattr(other.waypoints, name, getattr(self.waypoints, name).copy())
+        return other
+
+    def _advance(self, t: float) -> None:
+        """Plan up to a time: first what follows by itself, then for new messages."""
+        began = self._now > -inf
+        self._now = t
+        if not began:  # what is computed at the very start is not yet the run
+            self._begin = t
+            return
+        while self._segments[-1].end <= t:
+            self._plan(self._segments[-1].end)
+        changed = False
+        for message in self._source.take(t):
+            changed = self._accept(message, t) or changed
+        policy = self._policy
+        if changed or self._falls_silent(t):
+            self._plan(t)
+        if self.age > policy.stop_after:
+            raise StreamError(
+                f"no message for {self.age:.3g} s; stop_after is {policy.stop_after:g}"
+            )
+        self._forget(t)
+
+    def _accept(self, message: Message, t: float) -> bool:
+        """Take a message; return whether it changes what lies ahead."""
+        policy = self._policy
+        self.taken += 1
+        self._heard = t
+        only_newest = policy.name == "latest"
+        if not self.waypoints.add(message, t, policy.delay, only_newest):
+            return False
+        self._command = None
+        if message.values is None:
+            assert message.velocities is not None
+            self._command = message.velocities[0]
+        return True
+
+    def _falls_silent(self, t: float) -> bool:
+        """Return whether the reference must come to rest now, for want of messages."""
+        was, self._silent = self._silent, self.age > self._policy.hold_after
+        return self._silent and not was
+
+    def _plan(self, t: float) -> None:
+        """Begin another piece at a time."""
+        state = self.chart.rebased(self._segments[-1].state(t))
+        if self._segments[-1].start == t:  # replaced before anything could see it
+            del self._segments[-1], self._starts[-1]
+        self._segments.append(self._next(t, state))
+        self._starts.append(t)
+
+    def _next(self, t: float, state: State) -> Segment:
+        policy, waypoints = self._policy, self.waypoints
+        if self._silent:
+            return self._to_rest(t, state)
+        if self._command is not None:
+            return self._follow_command(t, state, self._command)
+        if not waypoints.times:
+            return self._to_rest(t, state)
+        first = max(waypoints.ahead(t) - 3, 0)
+        used = slice(first, first + 3 + _CONSIDERED)
+        values = np.array(waypoints.values[used])
+        times = np.array(waypoints.times[used])
+        x = self.chart.local(values, state.base)
+        for k in _candidates(int(np.searchsorted(times, t, "right")), len(times)):
+            goal = self._goal(state.base, times, x, first, k)
+            if (smooth := self._joiner.smooth(t, state, goal)) is not None:
+                return smooth
+        if policy.name == "interpolate" and t < goal.time and len(times) > 1:
+            # Too late for all: catch up with the motion that the waypoints show.
+            _, rate, _ = derivatives(times, x, len(times) - 1, policy.smoothing)
+            return self._meet(t, state, goal._replace(rate=rate), goal.time)
+        return self._beyond(t, state, goal)
+
+    def _goal(self, base: Array, times: Array, x: Array, first: int, k: int) -> Goal:
+        """Return waypoint k with the derivatives that it was given, or shows."""
+        given = self.waypoints.velocities[first + k]
+        still = np.zeros_like(x[k])
+        last = first + k == len(self.waypoints.times) - 1
+        if given is not None:
+            rate = self.chart.local_rate(x[k], given, base)
+            return Goal(times[k], x[k], rate, still)
+        if len(times) == 1 or (last and self._policy.name != "extrapolate"):
+            return Goal(times[k], x[k], still, still)
+        point, rate, curve = derivatives(times, x, k, self._policy.smoothing)
+        return Goal(times[k], point, rate, still if last else curve)
+
+    def _beyond(self, t: float, state: State, goal: Goal) -> Segment:
+        """Return what follows where no waypoint can be passed in time."""
+        if not goal.rate.any():
+            if _on_line(state, goal, t):
+                return self._to_rest(t, state)
+            return self._joiner.fastest(t, state, goal)
+        end = goal.time + self._policy.extrapolation
+        if t >= end:
+            return self._to_rest(t, state)
+        return self._meet(t, state, goal, end)
+
+    def _meet(self, t: float, state: State, goal: Goal, end: float) -> Segment:
+        """Return a piece that catches up with a goal that keeps moving until ``end``.
+
+        It meets the goal in ``delay`` if the bounds permit, else as soon as they do.
+        """
+        if _on_line(state, goal, t):
+            return Coast(t, end, state)
+        soon = t + self._policy.delay
+        if soon <= end:
+            met = goal._replace(time=soon, x=goal.at(soon))
+            if (smooth := self._joiner.smooth(t, state, met)) is not None:
+                return smooth
+        meeting = self._joiner.fastest(t, state, goal)
+        meeting.end = min(meeting.end, end)  # unless a message shows how it goes on
+        return meeting
+
+    def _follow_command(self, t: float, state: State, command: Array) -> Segment:
+        """Return a piece that reaches or keeps a velocity in world axes."""
+        end, delay = self._heard + self._policy.extrapolation, self._policy.delay
+        if t >= end:
+            return self._to_rest(t, state)
+        here = self.chart.local_rate(state.x, command, state.base)
+        then = state.x + 0.5 * delay * (state.rate + here)
+        rate = self.chart.local_rate(then, command, state.base)
+        if np.abs(here - state.rate).max() < _SAME and _steady(state):
+            return Coast(t, end, state)
+        return self._joiner.to_velocity(t, state, rate, delay)
+
+    def _to_rest(self, t: float, state: State) -> Segment:
+        """Return a piece that brakes, or stays."""
+        if _steady(state) and np.abs(state.rate).max() < _SAME:
+            still = np.zeros_like(state.x)
+            return Coast(t, inf, State(state.x, still, still, state.base))
+        delay = self._policy.delay
+        return self._joiner.to_velocity(t, state, np.zeros_like(state.x), delay)
+
+    def _forget(self, t: float) -> None:
+        """Forget pieces and waypoints that lie far behind."""
+        self.waypoints.forget(t)
+        gone = bisect_right(self._starts, t - _KEPT) - 1
+        if gone > 0:
+            del self._segments[:gone], self._starts[:gone]
+
+
+def _candidates(first: int, count: int) -> list[int]:
+    """Return which waypoints to try: the next ones closely, later ones more widely."""
+    if first >= count:
+        return [count - 1]
+    found, step = [], 1
+    while first < count:
+        found.append(first)
+        first += step
+        step = len(found) // 2 + 1
+    return found
+
+
+def _steady(state: State) -> bool:
+    return bool(np.abs(state.acceleration).max() < _SAME)
+
+
+def _on_line(state: State, goal: Goal, t: float) -> bool:
+    """Return whether a state moves with a goal already."""
+    apart = np.abs(state.x - goal.at(t)).max(), np.abs(state.rate - goal.rate).max()
+    return max(apart) < _SAME and _steady(state)
+
+

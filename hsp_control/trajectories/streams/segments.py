@@ -1,0 +1,246 @@
+"""Pieces of a streamed reference: quintics where they keep the bounds, else Ruckig's.
+
+A piece is a C² function of time, given in local coordinates (`Chart`); each begins with
+the state in which the piece before it ends.
+"""
+
+from abc import ABC, abstractmethod
+from typing import NamedTuple
+
+import numpy as np
+import ruckig
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import StreamError
+from hsp_control.trajectories.polynomial import QUINTIC, horner
+from hsp_control.trajectories.streams.bounds import MotionBounds
+from hsp_control.trajectories.streams.chart import State
+
+_SHORTEST = 1e-3
+"""No motion between different states is shorter [s]."""
+
+
+class Goal(NamedTuple):
+    """Where the reference should be at a time, in local coordinates.
+
+    Attributes:
+        time: When [s].
+        x: Shape (n,).
+        rate: x', shape (n,) [1/s].
+        acceleration: x'', shape (n,) [1/s²].
+    """
+
+    time: float
+    x: Array
+    rate: Array
+    acceleration: Array
+
+    def at(self, t: float) -> Array:
+        """Return where it is at another time, at its velocity, shape (n,)."""
+        return self.x + (t - self.time) * self.rate
+
+
+class Segment(ABC):
+    """A piece of the reference, from ``start`` to ``end`` [s], about ``base``."""
+
+    def __init__(self, start: float, end: float, base: Array) -> None:
+        """Set when it begins and ends, and the orientation of its chart."""
+        self.start, self.end, self.base = start, end, base
+
+    @abstractmethod
+    def state(self, t: float) -> State:
+        """Return the state at time t [s], between start and end."""
+
+
+class Coast(Segment):
+    """x' is constant; at rest if it is zero."""
+
+    def __init__(self, start: float, end: float, state: State) -> None:
+        """Begin in a state, whose acceleration is taken to be zero."""
+        super().__init__(start, end, state.base)
+        self._x, self._rate = state.x.copy(), state.rate.copy()
+        self._still = np.zeros_like(state.x)
+
+    def state(self, t: float) -> State:
+        """Return the state at time t [s]."""
+        moved = self._x + (t - self.start) * self._rate
+        return State(moved, self._rate.copy(), self._still.copy(), self.base)
+
+
+class Quintic(Segment):
+    """x is a polynomial of fifth degree: the smoothest motion between two states."""
+
+    def __init__(self, start: float, end: float, base: Array, ends: Array) -> None:
+        """Set x, T x', T² x'' at the start, then at the end, shape (6, n)."""
+        super().__init__(start, end, base)
+        self._coefficients = QUINTIC @ ends
+
+    def state(self, t: float) -> State:
+        """Return the state at time t [s]."""
+        x, rate, acceleration = np.empty((3, self._coefficients.shape[1]))
+        width = self.end - self.start
+        u = (t - self.start) / width
+        horner(u, width, self._coefficients, x, rate, acceleration)
+        return State(x, rate, acceleration, self.base)
+
+
+class FastestTask(NamedTuple):
+    """What Ruckig is asked for, in a frame that moves with the target.
+
+    Attributes:
+        x: x at the start, counted from the target, shape (n,).
+        rate: x' at the start, in the frame, shape (n,) [1/s].
+        acceleration: x'' at the start, shape (n,) [1/s²].
+        target_rate: x' at the end, in the frame, shape (n,) [1/s].
+        drift: Velocity of the frame, shape (n,) [1/s].
+        positions: Whether the target is a position; else only a velocity.
+        duration: The motion is not shorter [s].
+    """
+
+    x: Array
+    rate: Array
+    acceleration: Array
+    target_rate: Array
+    drift: Array
+    positions: bool
+    duration: float
+
+    def solve(self, bounds: MotionBounds) -> ruckig.Trajectory:
+        """Return the fastest motion.
+
+        Raises:
+            StreamError: If Ruckig finds none.
+        """
+        for synchronization in _SYNCHRONIZATIONS:
+            task = self._input(bounds)
+            task.synchronization = synchronization
+            motion = ruckig.Trajectory(len(self.x))
+            try:
+                ruckig.Ruckig(len(self.x)).calculate(task, motion)
+            except ruckig.RuckigError as error:
+                reason = str(error)
+            else:
+                return motion
+        raise StreamError(f"no motion within the bounds was found: {reason}")
+
+    def _input(self, bounds: MotionBounds) -> ruckig.InputParameter:
+        size = len(self.x)
+        task = ruckig.InputParameter(size)
+        # Rounding errors are no distance: Ruckig fails where they are all there is.
+        task.current_position = _rounded(self.x)
+        task.current_velocity = _rounded(self.rate)
+        task.current_acceleration = _rounded(self.acceleration)
+        task.target_position = task.target_acceleration = [0.0] * size
+        task.target_velocity = _rounded(self.target_rate)
+        task.max_velocity = (bounds.speed - self.drift).tolist()
+        task.min_velocity = (-bounds.speed - self.drift).tolist()
+        task.max_acceleration = bounds.acceleration.tolist()
+        task.max_jerk = bounds.jerk.tolist()
+        if self.duration > 0.0:
+            task.minimum_duration = self.duration
+        if not self.positions:
+            task.control_interface = ruckig.ControlInterface.Velocity
+        return task
+
+
+def _rounded(x: Array) -> list[float]:
+    """Return numbers with those that are nearly zero set to zero."""
+    rounded: list[float] = np.where(np.abs(x) < 1e-12, 0.0, x).tolist()
+    return rounded
+
+
+_SYNCHRONIZATIONS = (
+    ruckig.Synchronization.Phase,  # on a straight line, where that is possible
+    ruckig.Synchronization.Time,
+    ruckig.Synchronization.No,
+)
+"""How the coordinates belong together: the next where Ruckig fails."""
+
+
+class Fastest(Segment):
+    """The fastest motion within the bounds, by Ruckig, in a frame that may move.
+
+    L. Berscheid, T. Kröger, "Jerk-limited real-time trajectory generation with
+    arbitrary target states", RSS 2021.
+    """
+
+    def __init__(
+        self,
+        start: float,
+        base: Array,
+        task: FastestTask,
+        origin: Array,
+        bounds: MotionBounds,
+    ) -> None:
+        """Solve the task, whose frame is at ``origin`` at the start, shape (n,)."""
+        self._task, self._origin, self._bounds = task, origin, bounds
+        self._motion = task.solve(bounds)
+        duration = max(self._motion.duration, _SHORTEST)
+        super().__init__(start, start + duration, base)
+
+    def state(self, t: float) -> State:
+        """Return the state at time t [s]."""
+        elapsed, drift = t - self.start, self._task.drift
+        x, rate, acceleration = map(np.array, self._motion.at_time(elapsed))
+        x += self._origin + elapsed * drift
+        return State(x, rate + drift, acceleration, self.base)
+
+    def __reduce__(self) -> tuple[type["Fastest"], tuple[object, ...]]:
+        """Return how to make it again: Ruckig's motions cannot be pickled."""
+        given = self.start, self.base, self._task, self._origin, self._bounds
+        return Fastest, given
+
+
+class Joiner:
+    """Makes the segments that lead from a state to a goal, within the bounds."""
+
+    def __init__(self, bounds: MotionBounds) -> None:
+        """Set the bounds."""
+        self.bounds = bounds
+        self._zero = np.zeros(len(bounds.speed))
+
+    def smooth(self, t: float, state: State, goal: Goal) -> Quintic | None:
+        """Return the quintic that reaches a goal in time, if the bounds permit."""
+        T = goal.time - t
+        if T < _SHORTEST:
+            return None
+        ends = np.stack(
+            [
+                *(state.x, T * state.rate, T * T * state.acceleration),
+                *(goal.x, T * goal.rate, T * T * goal.acceleration),
+            ]
+        )
+        if not self.bounds.keep(ends, T):
+            return None
+        return Quintic(t, goal.time, state.base, ends)
+
+    def fastest(self, t: float, state: State, goal: Goal) -> Segment:
+        """Return the fastest way to a goal, which keeps moving at its velocity.
+
+        A goal at rest is reached at its time, or as soon as the bounds permit.
+        """
+        drift = np.clip(goal.rate, -0.9 * self.bounds.speed, 0.9 * self.bounds.speed)
+        origin = goal._replace(rate=drift).at(t)
+        wait = 0.0 if drift.any() else max(goal.time - t, 0.0)
+        task = FastestTask(
+            *(state.x - origin, state.rate - drift, state.acceleration),
+            *(self._zero, drift, True, wait),
+        )
+        return Fastest(t, state.base, task, origin, self.bounds)
+
+    def to_velocity(
+        self, t: float, state: State, rate: Array, delay: float
+    ) -> Segment:
+        """Return a change to another velocity, in ``delay`` [s] if the bounds permit."""
+        # With this end the quintic is the quartic whose velocity is a cubic.
+        x = state.x + 0.5 * delay * (state.rate + rate)
+        x += delay * delay / 12.0 * state.acceleration
+        goal = Goal(t + delay, x, rate, self._zero)
+        if (smooth := self.smooth(t, state, goal)) is not None:
+            return smooth
+        speed = self.bounds.speed
+        task = FastestTask(
+            *(state.x, state.rate, state.acceleration),
+            *(np.clip(rate, -speed, speed), self._zero, False, 0.0),
+        )
+        return Fastest(t, state.base, task, self._zero, self.bounds)

@@ -1,0 +1,429 @@
+"""References that are streamed while the robot moves: points, orientations, poses."""
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, replace
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+from pydantic import AfterValidator
+
+from hsp_control.common.exceptions import StreamError, TrajectoryError
+from hsp_control.declaration import Part
+from hsp_control.declaration.quantities import (
+    NonNegative,
+    Positive,
+    PositiveNumbers,
+    Vector,
+    Vector3,
+)
+from hsp_control.declaration.rotation import Rotation, matrix_of
+from hsp_control.trajectories.orientation import (
+    OrientationSample,
+    OrientationTrajectory,
+)
+from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
+from hsp_control.trajectories.streams.bounds import (
+    MotionBounds,
+    angular_bounds,
+    linear_bounds,
+)
+from hsp_control.trajectories.streams.chart import Chart, State
+from hsp_control.trajectories.streams.mailbox import Mailbox
+from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
+from hsp_control.trajectories.streams.recording import read_recording, recorded
+from hsp_control.trajectories.streams.running import Policy, RunningStream, Source
+from hsp_control.trajectories.streams.udp_listener import (
+    SCHEME,
+    check_address,
+)
+from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+
+
+class Streamed(Part, error=TrajectoryError):
+    """A reference that any thread or process feeds while the robot moves.
+
+    `send` gives targets, velocities or chunks of waypoints, at any rate, late or out of
+    order. The reference is C², x' and x'' are exactly its derivatives, and speed,
+    acceleration and jerk keep their bounds, whatever is sent. Until the first message
+    it stays where it starts. Invalid messages are refused; those of another process are
+    counted, and the reference goes on without them.
+
+    The reference is at a target ``delay`` after the target's time, or as soon as the
+    bounds permit. On its way it follows quintics where they keep the bounds, and
+    otherwise Ruckig's fastest motion.
+
+    * ``latest``: only the newest message counts; the reference comes to rest at its
+      last waypoint.
+    * ``interpolate``: the reference passes through all waypoints, with the velocities
+      and accelerations that they show; it comes to rest at the last one.
+    * ``extrapolate``: it goes on from the last one at the velocity that the waypoints
+      show, for a time, and then comes to rest.
+
+    A value of a stream is shared: whoever has it may send, and each controller that
+    follows it hears all.
+    """
+
+    _: KW_ONLY
+    source: str | None = None
+    """Where messages come from: ``udp://HOST:PORT`` for JSON datagrams, or the path of
+    a recording, of JSON lines with a time ``at`` [-]; by default `send`."""
+    messages: (
+        Annotated[Sequence[Mapping[str, Any]], AfterValidator(tuple)] | None
+    ) = None
+    """A recording, instead of a source: messages with the times ``at`` [s] at which
+    they are taken; a log contains those of its run."""
+    policy: Literal["latest", "interpolate", "extrapolate"] = "latest"
+    """How waypoints are followed."""
+    delay: NonNegative = 0.1
+    """Time from a waypoint's own time to when the reference is there [s]. For
+    ``interpolate`` choose the time between two messages, plus their jitter, plus
+    ``smoothing``."""
+    smoothing: NonNegative = 0.0
+    """Waypoints not farther in time than this are smoothed by a parabola [s]; for noisy
+    trackers. For ``interpolate`` and ``extrapolate``."""
+    extrapolation: NonNegative = 0.1
+    """How long the reference goes on at the last velocity [s]."""
+    hold_after: Positive | None = None
+    """Time without a message after which the reference comes to rest [s]; never by
+    default."""
+    stop_after: Positive | None = None
+    """Time without a message after which the run is stopped [s]; a live loop brakes and
+    holds. Never by default."""
+
+    space: ClassVar[Space]
+
+    def __post_init__(self) -> None:
+        """Check the source."""
+        if self.source is not None and self.messages is not None:
+            raise StreamError("give either source or messages")
+        if self.source is not None and self.source.startswith(SCHEME):
+            check_address(self.source)
+        if self.messages is not None:
+            recorded(self.messages, self.space)
+        vars(self)["_mailbox"] = Mailbox(self._hears, self.space)
+
+    def send(
+        self,
+        value: ArrayLike | pin.SE3 | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        t: float | None = None,
+    ) -> None:
+        """Send a target, or a velocity; from any thread.
+
+        Args:
+            value: The target: n coordinates, a quaternion (x, y, z, w), or for a pose
+                x, y, z and a quaternion, or a pin.SE3; None: only the velocity counts.
+            velocity: The velocity at the target, or alone; angular velocities in world
+                axes [1/s].
+            t: The target's time by the sender's clock [s]; None: now.
+
+        Raises:
+            StreamError: If it is not valid, or the stream has another source.
+        """
+        if isinstance(value, pin.SE3):
+            value = pin.SE3ToXYZQUAT(value)
+        self._mailbox.put(value=value, velocity=velocity, t=t)
+
+    def send_chunk(
+        self,
+        values: ArrayLike,
+        times: ArrayLike,
+        *,
+        velocities: ArrayLike | None = None,
+        t: float | None = None,
+    ) -> None:
+        """Send waypoints, which replace those that were to follow; from any thread.
+
+        Args:
+            values: The waypoints, shape (k, width), each as in `send`.
+            times: Their times after ``t``, increasing, shape (k,) [s].
+            velocities: Their velocities; None: those that the waypoints show.
+            t: When the chunk was made, by the sender's clock [s]; None: now.
+
+        Raises:
+            StreamError: If it is not valid, or the stream has another source.
+        """
+        self._mailbox.put(values=values, times=times, velocities=velocities, t=t)
+
+    def recorded_in(self, folder: Path, allow: Callable[[Path], object]) -> Self:
+        """Return the stream with the messages of its recording, if it names one.
+
+        Args:
+            folder: Where a relative path begins.
+            allow: Raises if a file may not be read.
+
+        Raises:
+            StreamError: If the recording cannot be read, or a message is invalid.
+        """
+        if self.source is None or self.live:
+            return self
+        path = folder / self.source
+        allow(path)
+        return replace(self, source=None, messages=read_recording(path))
+
+    @property
+    def record(self) -> tuple[Mapping[str, Any], ...]:
+        """What the last run has taken, and when; see ``messages``."""
+        return tuple(self._mailbox.record)
+
+    def counts(self) -> dict[str, float]:
+        """Return the time since the last message [s], and how many there were.
+
+        ``taken``: all valid ones; ``late``: of these, those that came too late to
+        count; ``rejected``: invalid ones.
+        """
+        running = self.running
+        return {
+            "age": running.age,
+            "taken": running.taken,
+            "late": running.waypoints.late,
+            "rejected": self._mailbox.inbox.rejected,
+        }
+
+    @property
+    def live(self) -> bool:
+        """Whether another process feeds it, in real time."""
+        return self.source is not None and self.source.startswith(SCHEME)
+
+    @property
+    def _hears(self) -> str:
+        """What it hears besides `send`; empty: nothing."""
+        return self.source or ("a recording" if self.messages is not None else "")
+
+    @property
+    def _mailbox(self) -> Mailbox:
+        mailbox: Mailbox = vars(self)["_mailbox"]
+        return mailbox
+
+    def _shared(self, placed: Self) -> Self:
+        """Return a placed copy, which hears what is sent to this one."""
+        vars(placed)["_mailbox"] = self._mailbox
+        return placed
+
+    @property
+    def running(self) -> RunningStream:
+        """The reference of the present run; begun when first asked for."""
+        if "_running" not in vars(self):
+            vars(self)["_running"] = self._begin()
+        running: RunningStream = vars(self)["_running"]
+        return running
+
+    def _begin(self) -> RunningStream:
+        start, rotational = self._start(), self.space.rotational
+        space = Space(len(start.x) - 3 * rotational, rotational)
+        chart = Chart(len(start.x) - 3 * rotational, rotational)
+        policy = Policy(
+            self.policy,
+            self.delay,
+            self.smoothing,
+            self.extrapolation,
+            inf if self.hold_after is None else self.hold_after,
+            inf if self.stop_after is None else self.stop_after,
+        )
+        source = self._opened(space)
+        return RunningStream(chart, self._bounds(), policy, source, start)
+
+    def _opened(self, space: Space) -> Source:
+        messages: Sequence[Mapping[str, Any]] | None = self.messages
+        if self.source is not None and not self.source.startswith(SCHEME):
+            messages = read_recording(Path(self.source))
+        if messages is not None:
+            return self._mailbox.recording(recorded(messages, space))
+        return self._mailbox.reader(space)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields, and where the reference is in its run, if it runs."""
+        state = super().__getstate__()
+        for name in ("_mailbox", "_running"):
+            if name in vars(self):
+                state[name] = vars(self)[name]
+        return state
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return a stream that hears the same and goes on by itself, if it runs."""
+        if "_running" not in vars(self):
+            return self
+        copy = memo.get(id(self))
+        if copy is None:
+            copy = self._shared(replace(self))
+            vars(copy)["_running"] = self.running.copy()
+            memo[id(self)] = copy
+        return copy  # type: ignore[no-any-return]
+
+    @abstractmethod
+    def _start(self) -> State:
+        """Return where the reference is before the first message."""
+
+    @abstractmethod
+    def _bounds(self) -> MotionBounds:
+        """Return the bounds in the coordinates of the chart."""
+
+
+class Stream(Streamed, Trajectory, type="stream"):
+    """x(t) in Rⁿ that is streamed: the position of a point, or a posture.
+
+    The bounds hold for each coordinate.
+    """
+
+    space: ClassVar[Space] = Space(None, False)
+    points: ClassVar[tuple[str, ...]] = ("start",)
+
+    start: Vector | None = None
+    """Where it is until the first message, shape (n,) [m, or the task's unit]; where
+    the robot starts by default."""
+    _: KW_ONLY
+    speed: PositiveNumbers = 1.0
+    """Bound on |x'|, one number or n [1/s]."""
+    acceleration: PositiveNumbers = 5.0
+    """Bound on |x''|, one number or n [1/s²]."""
+    jerk: PositiveNumbers = 200.0
+    """Bound on |x'''|, one number or n [1/s³]."""
+
+    @property
+    def dimension(self) -> int:
+        """The number n of coordinates."""
+        return 0 if self.start is None else np.size(self.start)
+
+    def anchored(self, start: ArrayLike | None) -> Self:
+        """Return the stream for a new run; see `Trajectory.anchored`."""
+        if self.origin == "start":
+            raise TrajectoryError("a stream has no points that origin: start could move")
+        placed = super().anchored(start)
+        return self._shared(replace(self) if placed is self else placed)
+
+    def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
+        """Return x(t), x'(t) and x''(t); see `Trajectory.sample`."""
+        out = self._output(out)
+        state = self.running.at(t)
+        out.position[:], out.velocity[:] = state.x, state.rate
+        out.acceleration[:] = state.acceleration
+        return out
+
+    def _start(self) -> State:
+        return Chart(self.dimension, False).begin(np.asarray(self.start), np.eye(3))
+
+    def _bounds(self) -> MotionBounds:
+        return linear_bounds(self.speed, self.acceleration, self.jerk, self.dimension)
+
+
+class StreamOrientation(Streamed, OrientationTrajectory, type="stream"):
+    """R(t) that is streamed, as quaternions (x, y, z, w) or angular velocities.
+
+    The bounds hold for the magnitudes of ω, ω' and ω'', in every direction.
+    """
+
+    space: ClassVar[Space] = ORIENTATION
+
+    rotation: Rotation | None = None
+    """The orientation until the first message, body to world: roll, pitch and yaw
+    [rad], a quaternion or a matrix [-]; that in which the robot starts by default."""
+    _: KW_ONLY
+    angular_speed: Positive = 1.5
+    """Bound on |ω| [rad/s]."""
+    angular_acceleration: Positive = 10.0
+    """Bound on |ω'| [rad/s²]."""
+    angular_jerk: Positive = 400.0
+    """Bound on |ω''| [rad/s³]."""
+
+    def anchored(self, start: ArrayLike) -> Self:
+        """Return the stream for a new run; see `OrientationTrajectory.anchored`."""
+        placed = super().anchored(start)
+        return self._shared(replace(self) if placed is self else placed)
+
+    def sample(
+        self, t: float, out: OrientationSample | None = None
+    ) -> OrientationSample:
+        """Return R(t), ω(t) and ω'(t); see `OrientationTrajectory.sample`."""
+        out = self._output(out)
+        running = self.running
+        running.chart.write_orientation(running.at(t), out)
+        return out
+
+    def _start(self) -> State:
+        assert self.rotation is not None
+        return Chart(0, True).begin(np.zeros(0), matrix_of(self.rotation))
+
+    def _bounds(self) -> MotionBounds:
+        return angular_bounds(
+            self.angular_speed, self.angular_acceleration, self.angular_jerk
+        )
+
+
+class StreamPose(Streamed, PoseTrajectory, type="stream"):
+    """M(t) that is streamed, as x, y, z and a quaternion, or as twists in world axes.
+
+    The linear bounds hold for each coordinate, the angular ones in every direction.
+    """
+
+    space: ClassVar[Space] = POSE
+
+    position: Vector3 | None = None
+    """The origin until the first message, shape (3,) [m]; where the robot starts by
+    default."""
+    rotation: Rotation | None = None
+    """The orientation until then, body to world: roll, pitch and yaw [rad], a
+    quaternion or a matrix [-]; that in which the robot starts by default."""
+    _: KW_ONLY
+    speed: PositiveNumbers = 0.5
+    """Bound on |x'|, one number or three [m/s]."""
+    acceleration: PositiveNumbers = 5.0
+    """Bound on |x''|, one number or three [m/s²]."""
+    jerk: PositiveNumbers = 200.0
+    """Bound on |x'''|, one number or three [m/s³]."""
+    angular_speed: Positive = 1.5
+    """Bound on |ω| [rad/s]."""
+    angular_acceleration: Positive = 10.0
+    """Bound on |ω'| [rad/s²]."""
+    angular_jerk: Positive = 400.0
+    """Bound on |ω''| [rad/s³]."""
+
+    @property
+    def relative(self) -> bool:
+        """Whether it depends on where the robot starts."""
+        return self.position is None or self.rotation is None
+
+    def anchored(self, start: pin.SE3) -> Self:
+        """Return the stream for a new run, from where the robot starts."""
+        given: dict[str, Any] = {
+            "position": start.translation if self.position is None else self.position,
+            "rotation": start.rotation if self.rotation is None else self.rotation,
+        }
+        return self._shared(replace(self, **given))
+
+    def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
+        """Return the pose at time t; see `PoseTrajectory.sample`.
+
+        Raises:
+            TrajectoryError: If it is relative to where the robot starts.
+        """
+        if self.relative:
+            raise TrajectoryError(
+                "StreamPose begins where the robot starts, which only a controller "
+                "knows; give position and rotation, or `anchored`"
+            )
+        if out is None:
+            out = PoseSample.allocate()
+        running = self.running
+        state, position = running.at(t), out.position
+        position.position[:], position.velocity[:] = state.x[:3], state.rate[:3]
+        position.acceleration[:] = state.acceleration[:3]
+        running.chart.write_orientation(state, out.orientation)
+        return out
+
+    def _start(self) -> State:
+        assert self.rotation is not None
+        where = np.asarray(self.position)
+        return Chart(3, True).begin(where, matrix_of(self.rotation))
+
+    def _bounds(self) -> MotionBounds:
+        moving = linear_bounds(self.speed, self.acceleration, self.jerk, 3)
+        turning = angular_bounds(
+            self.angular_speed, self.angular_acceleration, self.angular_jerk
+        )
+        return MotionBounds(*map(np.concatenate, zip(moving, turning, strict=True)))
