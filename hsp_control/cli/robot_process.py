@@ -15,6 +15,7 @@ from typing import Any, Self
 from hsp_control.cli.live_experiment import live_period
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.config import Experiment
+from hsp_control.config.streams import without_sources
 from hsp_control.live.faults import Faults
 from hsp_control.live.settings import check_fixed
 from hsp_control.live.udp_hardware import UdpHardware
@@ -59,7 +60,7 @@ class RobotProcess:
         period = live_period(experiment)
         self.hardware = UdpHardware(experiment.robot, period, faults=faults)
         self._settings = {
-            "config": experiment.config,
+            "config": without_sources(experiment.config),
             "meta": {
                 "name": f"{experiment.name}, the robot",
                 "title": experiment.scenario.title,

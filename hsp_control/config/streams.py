@@ -84,6 +84,19 @@ def with_recordings(
     return repeated
 
 
+def without_sources(config: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    """Return a configuration whose streams hear nothing: one process listens, not two.
+
+    Their references stay where they start.
+    """
+    if config is None:
+        return None
+    deaf = deepcopy(dict(config))
+    for stream in _streams(deaf):
+        stream.pop("source", None)
+    return deaf
+
+
 def _streams(data: Any) -> Iterator[dict[str, Any]]:
     """Yield the streams in plain data, in order."""
     if isinstance(data, dict):

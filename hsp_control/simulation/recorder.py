@@ -120,7 +120,9 @@ class Recorder:
 
         A task that is removed keeps its columns and its place in the meta data.
         """
-        self._tasks, column = self._controller.tasks, self._add_column
+        column = self._add_column
+        # By identity: equal tasks of two runs may have streams in different states.
+        self._known = list(map(id, self._controller.tasks))
         self._log_names: dict[str, str] = {}
         probe = _probe(self._controller.robot)
         levels = [
@@ -198,7 +200,7 @@ class Recorder:
         """
         i, columns = self._rows, self._columns
         robot = self._controller.robot
-        if self._controller.tasks != self._tasks:
+        if list(map(id, self._controller.tasks)) != self._known:
             self._add_task_columns()
         if self._controller.field is not self._field:
             self._add_term_columns()
