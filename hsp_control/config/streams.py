@@ -36,15 +36,9 @@ def with_messages(scenario: Scenario, folder: Path, access: Access) -> Scenario:
                 _check_listening(stream, access)
             return stream.recorded_in(folder, lambda p: access.check(p, "recording"))
 
-    tasks = {}
-    for name, task in scenario.tasks.items():
-        with within("tasks", name):
-            tasks[name] = with_parts_replaced(task, Streamed, located)
-    changes = []
-    for k, change in enumerate(scenario.changes):
-        with within("changes", k):
-            changes.append(with_parts_replaced(change, Streamed, located))
-    return replace(scenario, tasks=tasks, changes=tuple(changes))
+    given = {"tasks": scenario.tasks, "changes": scenario.changes}
+    found = with_parts_replaced(given, Streamed, located)
+    return scenario if found is given else replace(scenario, **found)
 
 
 def _check_listening(stream: Streamed, access: Access) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
+from hsp_control.declaration.located import within
 from hsp_control.declaration.part import Part
 
 Kind = TypeVar("Kind", bound=Part)
@@ -28,7 +29,7 @@ def with_parts_replaced(
 ) -> Any:
     """Return a value in which all parts of a kind are replaced.
 
-    What contains none of them stays the same object.
+    What contains none of them stays the same object. Errors contain the key path.
 
     Args:
         value: A part, a mapping or a sequence.
@@ -41,13 +42,19 @@ def with_parts_replaced(
         old = value.all_fields()
         new = with_parts_replaced(old, kind, change)
         changed = {name: new[name] for name in old if new[name] is not old[name]}
-        return replace(value, **changed) if changed else value
+        return replace(value, **changed) if changed else value  # type: ignore[type-var]
     if isinstance(value, Mapping):
-        made = {k: with_parts_replaced(each, kind, change) for k, each in value.items()}
+        made = {}
+        for k, each in value.items():
+            with within(k):
+                made[k] = with_parts_replaced(each, kind, change)
         same = all(made[k] is each for k, each in value.items())
         return value if same else made
     if isinstance(value, tuple | list):
-        items = [with_parts_replaced(each, kind, change) for each in value]
+        items = []
+        for k, each in enumerate(value):
+            with within(k):
+                items.append(with_parts_replaced(each, kind, change))
         same = all(a is b for a, b in zip(items, value, strict=True))
         return value if same else type(value)(items)
     return value

@@ -14,11 +14,11 @@ from hsp_control.common.exceptions import TaskError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.step_plan import StepPlan
 from hsp_control.declaration import Part, within
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import PositiveCount
 from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
-from hsp_control.declaration.nested import parts_within
 from hsp_control.trajectories import Schedule
 from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.streams.stream import Streamed

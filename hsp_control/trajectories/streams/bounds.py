@@ -1,5 +1,6 @@
 """Bounds on speed, acceleration and jerk, and whether a quintic keeps them."""
 
+from itertools import pairwise
 from math import pi, sqrt
 from typing import NamedTuple
 
@@ -68,14 +69,19 @@ def linear_bounds(
 def angular_bounds(speed: float, acceleration: float, jerk: float) -> MotionBounds:
     """Return bounds on a rotation vector that keep those on ω, ω' and ω''; see `Chart`.
 
+    A vector with components up to b/√3 is no longer than b. Each piece has axes of its
+    own; where one begins, a component of ω may be beyond its bound while all of ω is
+    not, and is then brought back. For that the speed is planned 5 % smaller; what was
+    seen in 400 hostile streams is 0.5 %.
+
     Raises:
         TrajectoryError: If the acceleration or the jerk are too small for the speed.
     """
     curved = acceleration - speed**2 / pi
     if curved <= 0.0:
         raise TrajectoryError(
-            f"angular_acceleration is {acceleration:g}; with angular_speed {speed:g} it "
-            f"must be greater than {speed**2 / pi:.4g} (angular_speed²/π)"
+            f"angular_acceleration is {acceleration:g}; with angular_speed {speed:g} "
+            f"it must be greater than {speed**2 / pi:.4g} (angular_speed²/π)"
         )
     turned = jerk - speed * curved - speed**3 / 6.0
     if turned <= 0.0:
@@ -83,8 +89,8 @@ def angular_bounds(speed: float, acceleration: float, jerk: float) -> MotionBoun
             f"angular_jerk is {jerk:g}; with these bounds it must be greater than "
             f"{speed * curved + speed**3 / 6.0:.4g}"
         )
-    # A vector with components up to b/√3 is no longer than b.
-    return MotionBounds(*(np.full(3, b / sqrt(3.0)) for b in (speed, curved, turned)))
+    planned = 0.95 * speed, curved, turned
+    return MotionBounds(*(np.full(3, each / sqrt(3.0)) for each in planned))
 
 
 def _bezier_points() -> Array:
@@ -108,7 +114,9 @@ def _cut(degree: int, start: float, end: float) -> Array:
         ones[0] = 1.0
         for k in range(degree):
             u = end if k < i else start
-            ones = np.concatenate([[ones[0] * (1 - u)], ones[1:] * (1 - u) + ones[:-1] * u])
+            ones = np.concatenate(
+                [[ones[0] * (1 - u)], ones[1:] * (1 - u) + ones[:-1] * u]
+            )
         rows[i] = ones
     return rows
 
@@ -120,7 +128,7 @@ def _derivatives() -> tuple[Array, ...]:
     for k in (1, 2, 3):
         degree = 5 - k
         points = (degree + 1) * np.diff(points, axis=0)
-        cuts = [_cut(degree, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        cuts = [_cut(degree, a, b) for a, b in pairwise(edges)]
         found.append(np.vstack([cut @ points for cut in cuts]))
     return tuple(found)
 

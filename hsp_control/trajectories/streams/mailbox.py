@@ -1,4 +1,4 @@
-"""What the copies of one stream share: where its messages arrive, and what was taken."""
+"""What the copies of one stream share: where messages arrive, and what was taken."""
 
 from typing import Any
 

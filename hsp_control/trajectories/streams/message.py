@@ -191,7 +191,8 @@ def _normalise(values: Array) -> None:
             f"the quaternion {values[worst, -4:].tolist()} has norm "
             f"{norms[worst]:.6g}; needs 1"
         )
-    values[:, -4:] /= norms[:, None]
+    off = np.abs(norms - 1.0) > 1e-15  # else a recording would change by a bit
+    values[off, -4:] /= norms[off, None]
 
 
 def _numbers(value: Any, name: str, ndim: int) -> Array:

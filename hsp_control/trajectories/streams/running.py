@@ -77,7 +77,7 @@ class RunningStream:
             start: Where the reference is until the first message.
         """
         self.chart, self._policy, self._source = chart, policy, source
-        self._joiner = Joiner(bounds)
+        self._joiner = Joiner(bounds, chart.linear)
         self._begin = self._now = -inf
         self._heard = -inf
         self._silent = False
@@ -174,39 +174,29 @@ class RunningStream:
         values = np.array(waypoints.values[used])
         times = np.array(waypoints.times[used])
         x = self.chart.local(values, state.base)
-        for k in _candidates(int(np.searchsorted(times, t, "right")), len(times)):
-            goal = self._goal(state.base, times, x, first, k)
+        last, ahead = len(times) - 1, int(np.searchsorted(times, t, "right"))
+        goals = _Goals(self.chart, waypoints, times, x, first, state.base)
+        for k in _candidates(ahead, last):
+            goal = goals.passed(k, policy.smoothing)
+            if k == ahead == last and self._ends_at_rest:
+                goal = goal.at_rest()  # no message shows how it goes on
             if (smooth := self._joiner.smooth(t, state, goal)) is not None:
                 return smooth
-        if policy.name == "interpolate" and t < goal.time and len(times) > 1:
-            # Too late for all: catch up with the motion that the waypoints show.
-            _, rate, _ = derivatives(times, x, len(times) - 1, policy.smoothing)
-            return self._meet(t, state, goal._replace(rate=rate), goal.time)
-        return self._beyond(t, state, goal)
-
-    def _goal(self, base: Array, times: Array, x: Array, first: int, k: int) -> Goal:
-        """Return waypoint k with the derivatives that it was given, or shows."""
-        given = self.waypoints.velocities[first + k]
-        still = np.zeros_like(x[k])
-        last = first + k == len(self.waypoints.times) - 1
-        if given is not None:
-            rate = self.chart.local_rate(x[k], given, base)
-            return Goal(times[k], x[k], rate, still)
-        if len(times) == 1 or (last and self._policy.name != "extrapolate"):
-            return Goal(times[k], x[k], still, still)
-        point, rate, curve = derivatives(times, x, k, self._policy.smoothing)
-        return Goal(times[k], point, rate, still if last else curve)
-
-    def _beyond(self, t: float, state: State, goal: Goal) -> Segment:
-        """Return what follows where no waypoint can be passed in time."""
-        if not goal.rate.any():
-            if _on_line(state, goal, t):
-                return self._to_rest(t, state)
-            return self._joiner.fastest(t, state, goal)
-        end = goal.time + self._policy.extrapolation
-        if t >= end:
+        goal = goals.passed(last, policy.smoothing)
+        end = goal.time + (0.0 if self._ends_at_rest else policy.extrapolation)
+        if t < end and goal.rate.any():
+            return self._meet(t, state, goal, end)
+        if not self._ends_at_rest:
             return self._to_rest(t, state)
-        return self._meet(t, state, goal, end)
+        if _on_line(state, goal.at_rest(), t):
+            return self._to_rest(t, state)
+        return self._joiner.fastest(t, state, goal.at_rest())
+
+    @property
+    def _ends_at_rest(self) -> bool:
+        """Whether the reference comes to rest at the last waypoint, not beyond it."""
+        given = self.waypoints.velocities[-1] is not None
+        return self._policy.name != "extrapolate" and not given
 
     def _meet(self, t: float, state: State, goal: Goal, end: float) -> Segment:
         """Return a piece that catches up with a goal that keeps moving until ``end``.
@@ -252,15 +242,42 @@ class RunningStream:
             del self._segments[:gone], self._starts[:gone]
 
 
-def _candidates(first: int, count: int) -> list[int]:
+class _Goals:
+    """Waypoints in local coordinates, with the derivatives that they have there."""
+
+    def __init__(
+        self,
+        chart: Chart,
+        waypoints: Waypoints,
+        times: Array,
+        x: Array,
+        first: int,
+        base: Array,
+    ) -> None:
+        """Keep the waypoints from ``first`` on: times (m,) and coordinates (m, n)."""
+        self._chart, self._times, self._x, self._base = chart, times, x, base
+        self._given = waypoints.velocities[first : first + len(times)]
+        self._more = first + len(times) < len(waypoints.times)
+
+    def passed(self, k: int, smoothing: float) -> Goal:
+        """Return waypoint k with the derivatives that it was given, or shows."""
+        time, x, given = float(self._times[k]), self._x[k], self._given[k]
+        still = np.zeros_like(x)
+        if given is not None:
+            return Goal(time, x, self._chart.local_rate(x, given, self._base), still)
+        if len(self._times) == 1:
+            return Goal(time, x, still, still)
+        x, rate, curve = derivatives(self._times, self._x, k, smoothing)
+        newest = k == len(self._times) - 1 and not self._more
+        return Goal(time, x, rate, still if newest else curve)
+
+
+def _candidates(first: int, last: int) -> list[int]:
     """Return which waypoints to try: the next ones closely, later ones more widely."""
-    if first >= count:
-        return [count - 1]
-    found, step = [], 1
-    while first < count:
+    found: list[int] = []
+    while first <= last:
         found.append(first)
-        first += step
-        step = len(found) // 2 + 1
+        first += len(found) // 2 + 1
     return found
 
 
@@ -272,5 +289,3 @@ def _on_line(state: State, goal: Goal, t: float) -> bool:
     """Return whether a state moves with a goal already."""
     apart = np.abs(state.x - goal.at(t)).max(), np.abs(state.rate - goal.rate).max()
     return max(apart) < _SAME and _steady(state)
-
-

@@ -39,6 +39,11 @@ class Goal(NamedTuple):
         """Return where it is at another time, at its velocity, shape (n,)."""
         return self.x + (t - self.time) * self.rate
 
+    def at_rest(self) -> "Goal":
+        """Return the goal as one to stay at."""
+        still = np.zeros_like(self.x)
+        return self._replace(rate=still, acceleration=still)
+
 
 class Segment(ABC):
     """A piece of the reference, from ``start`` to ``end`` [s], about ``base``."""
@@ -94,6 +99,7 @@ class FastestTask(NamedTuple):
         target_rate: x' at the end, in the frame, shape (n,) [1/s].
         drift: Velocity of the frame, shape (n,) [1/s].
         positions: Whether the target is a position; else only a velocity.
+        together: How many of the coordinates, from the first on, arrive together.
         duration: The motion is not shorter [s].
     """
 
@@ -103,6 +109,7 @@ class FastestTask(NamedTuple):
     target_rate: Array
     drift: Array
     positions: bool
+    together: int
     duration: float
 
     def solve(self, bounds: MotionBounds) -> ruckig.Trajectory:
@@ -113,7 +120,9 @@ class FastestTask(NamedTuple):
         """
         for synchronization in _SYNCHRONIZATIONS:
             task = self._input(bounds)
-            task.synchronization = synchronization
+            alone = len(self.x) - self.together
+            kinds = [synchronization] * self.together + [_ALONE] * alone
+            task.per_dof_synchronization = kinds
             motion = ruckig.Trajectory(len(self.x))
             try:
                 ruckig.Ruckig(len(self.x)).calculate(task, motion)
@@ -154,6 +163,7 @@ _SYNCHRONIZATIONS = (
     ruckig.Synchronization.Time,
     ruckig.Synchronization.No,
 )
+_ALONE = ruckig.Synchronization.No
 """How the coordinates belong together: the next where Ruckig fails."""
 
 
@@ -194,9 +204,9 @@ class Fastest(Segment):
 class Joiner:
     """Makes the segments that lead from a state to a goal, within the bounds."""
 
-    def __init__(self, bounds: MotionBounds) -> None:
-        """Set the bounds."""
-        self.bounds = bounds
+    def __init__(self, bounds: MotionBounds, linear: int) -> None:
+        """Set the bounds, and how many coordinates are linear."""
+        self.bounds, self._linear = bounds, linear
         self._zero = np.zeros(len(bounds.speed))
 
     def smooth(self, t: float, state: State, goal: Goal) -> Quintic | None:
@@ -217,21 +227,26 @@ class Joiner:
     def fastest(self, t: float, state: State, goal: Goal) -> Segment:
         """Return the fastest way to a goal, which keeps moving at its velocity.
 
-        A goal at rest is reached at its time, or as soon as the bounds permit.
+        A goal at rest is reached at its time, or as soon as the bounds permit. Where
+        the goal moves, a position does not wait for an orientation that is behind.
         """
         drift = np.clip(goal.rate, -0.9 * self.bounds.speed, 0.9 * self.bounds.speed)
         origin = goal._replace(rate=drift).at(t)
-        wait = 0.0 if drift.any() else max(goal.time - t, 0.0)
+        moves = bool(drift.any())
         task = FastestTask(
-            *(state.x - origin, state.rate - drift, state.acceleration),
-            *(self._zero, drift, True, wait),
+            x=state.x - origin,
+            rate=state.rate - drift,
+            acceleration=state.acceleration,
+            target_rate=self._zero,
+            drift=drift,
+            positions=True,
+            together=self._linear if moves else len(drift),
+            duration=0.0 if moves else max(goal.time - t, 0.0),
         )
         return Fastest(t, state.base, task, origin, self.bounds)
 
-    def to_velocity(
-        self, t: float, state: State, rate: Array, delay: float
-    ) -> Segment:
-        """Return a change to another velocity, in ``delay`` [s] if the bounds permit."""
+    def to_velocity(self, t: float, state: State, rate: Array, delay: float) -> Segment:
+        """Return a change to another velocity, in ``delay`` [s] if bounds permit."""
         # With this end the quintic is the quartic whose velocity is a cubic.
         x = state.x + 0.5 * delay * (state.rate + rate)
         x += delay * delay / 12.0 * state.acceleration
@@ -240,7 +255,13 @@ class Joiner:
             return smooth
         speed = self.bounds.speed
         task = FastestTask(
-            *(state.x, state.rate, state.acceleration),
-            *(np.clip(rate, -speed, speed), self._zero, False, 0.0),
+            x=state.x,
+            rate=state.rate,
+            acceleration=state.acceleration,
+            target_rate=np.clip(rate, -speed, speed),
+            drift=self._zero,
+            positions=False,
+            together=len(rate),
+            duration=0.0,
         )
         return Fastest(t, state.base, task, self._zero, self.bounds)

@@ -1,6 +1,5 @@
 """References that are streamed while the robot moves: points, orientations, poses."""
 
-from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, replace
 from math import inf
@@ -60,7 +59,8 @@ class Streamed(Part, error=TrajectoryError):
     * ``latest``: only the newest message counts; the reference comes to rest at its
       last waypoint.
     * ``interpolate``: the reference passes through all waypoints, with the velocities
-      and accelerations that they show; it comes to rest at the last one.
+      and accelerations that they show. If no more follow, it brakes at the last one,
+      and comes to rest there.
     * ``extrapolate``: it goes on from the last one at the velocity that the waypoints
       show, for a time, and then comes to rest.
 
@@ -72,9 +72,9 @@ class Streamed(Part, error=TrajectoryError):
     source: str | None = None
     """Where messages come from: ``udp://HOST:PORT`` for JSON datagrams, or the path of
     a recording, of JSON lines with a time ``at`` [-]; by default `send`."""
-    messages: (
-        Annotated[Sequence[Mapping[str, Any]], AfterValidator(tuple)] | None
-    ) = None
+    messages: Annotated[Sequence[Mapping[str, Any]], AfterValidator(tuple)] | None = (
+        None
+    )
     """A recording, instead of a source: messages with the times ``at`` [s] at which
     they are taken; a log contains those of its run."""
     policy: Literal["latest", "interpolate", "extrapolate"] = "latest"
@@ -249,20 +249,20 @@ class Streamed(Part, error=TrajectoryError):
         """Return a stream that hears the same and goes on by itself, if it runs."""
         if "_running" not in vars(self):
             return self
-        copy = memo.get(id(self))
+        copy: Self | None = memo.get(id(self))
         if copy is None:
             copy = self._shared(replace(self))
             vars(copy)["_running"] = self.running.copy()
             memo[id(self)] = copy
-        return copy  # type: ignore[no-any-return]
+        return copy
 
-    @abstractmethod
     def _start(self) -> State:
         """Return where the reference is before the first message."""
+        raise NotImplementedError
 
-    @abstractmethod
     def _bounds(self) -> MotionBounds:
         """Return the bounds in the coordinates of the chart."""
+        raise NotImplementedError
 
 
 class Stream(Streamed, Trajectory, type="stream"):
@@ -293,7 +293,9 @@ class Stream(Streamed, Trajectory, type="stream"):
     def anchored(self, start: ArrayLike | None) -> Self:
         """Return the stream for a new run; see `Trajectory.anchored`."""
         if self.origin == "start":
-            raise TrajectoryError("a stream has no points that origin: start could move")
+            raise TrajectoryError(
+                "a stream has no points that origin: start could move"
+            )
         placed = super().anchored(start)
         return self._shared(replace(self) if placed is self else placed)
 
@@ -324,12 +326,17 @@ class StreamOrientation(Streamed, OrientationTrajectory, type="stream"):
     """The orientation until the first message, body to world: roll, pitch and yaw
     [rad], a quaternion or a matrix [-]; that in which the robot starts by default."""
     _: KW_ONLY
-    angular_speed: Positive = 1.5
+    angular_speed: Positive = 2.5
     """Bound on |ω| [rad/s]."""
-    angular_acceleration: Positive = 10.0
+    angular_acceleration: Positive = 20.0
     """Bound on |ω'| [rad/s²]."""
-    angular_jerk: Positive = 400.0
+    angular_jerk: Positive = 1000.0
     """Bound on |ω''| [rad/s³]."""
+
+    def __post_init__(self) -> None:
+        """Check the source and the bounds."""
+        super().__post_init__()
+        self._bounds()
 
     def anchored(self, start: ArrayLike) -> Self:
         """Return the stream for a new run; see `OrientationTrajectory.anchored`."""
@@ -376,12 +383,17 @@ class StreamPose(Streamed, PoseTrajectory, type="stream"):
     """Bound on |x''|, one number or three [m/s²]."""
     jerk: PositiveNumbers = 200.0
     """Bound on |x'''|, one number or three [m/s³]."""
-    angular_speed: Positive = 1.5
+    angular_speed: Positive = 2.5
     """Bound on |ω| [rad/s]."""
-    angular_acceleration: Positive = 10.0
+    angular_acceleration: Positive = 20.0
     """Bound on |ω'| [rad/s²]."""
-    angular_jerk: Positive = 400.0
+    angular_jerk: Positive = 1000.0
     """Bound on |ω''| [rad/s³]."""
+
+    def __post_init__(self) -> None:
+        """Check the source and the bounds."""
+        super().__post_init__()
+        self._bounds()
 
     @property
     def relative(self) -> bool:

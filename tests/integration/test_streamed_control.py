@@ -1,0 +1,293 @@
+"""Streams in a controller: exact tracking, runs that repeat, and YAML."""
+
+import copy
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.exceptions import AccessError, HspControlError, SimulationError
+from hsp_control.simulation.recorder import Recorder
+
+PERIOD = 1e-3
+
+
+@pytest.fixture(scope="module")
+def panda() -> hsp.Robot:
+    return hsp.Robot.load("panda")
+
+
+def hand_pose(robot: hsp.Robot) -> pin.SE3:
+    motion = robot.state(0.0, robot.home(), np.zeros(robot.nv)).frame("panda_tcp")
+    return pin.SE3(motion.rotation, motion.position)
+
+
+def moved(pose: pin.SE3, t: float) -> pin.SE3:
+    """Return a pose that moves about ``pose``."""
+    away = np.array([0.0, 0.08 * np.sin(2 * t), 0.05 * np.sin(t) ** 2])
+    turned = pin.exp3(np.array([0.3, 0.2, 0.0]) * np.sin(1.5 * t))
+    return pin.SE3(pose.rotation @ turned, pose.translation + away)
+
+
+def every(period: float, send: Callable[[float], object]) -> Callable[[Recorder], None]:
+    """Return an ``on_row`` for rows of 10 ms that sends after each period [s]."""
+    rows = iter(range(10**9))
+
+    def on_row(recorder: Recorder) -> None:
+        t = 0.01 * next(rows)
+        if t / period == pytest.approx(round(t / period)):
+            send(t)
+
+    return on_row
+
+
+def test_tracking_and_the_null_space_are_as_exact_as_without_a_stream(
+    panda: hsp.Robot,
+) -> None:
+    # The law in the integrator's stages, without sampling: only the integrator errs.
+    stream = hsp.StreamPose(policy="interpolate", delay=0.15)
+    hand = hsp.FramePose("panda_tcp", stream)
+    controller = hsp.Controller(panda, [hand], hsp.JointCentering(), null_space_gain=8)
+    start = hand_pose(panda)
+    run = hsp.simulate(
+        controller,
+        panda.home(),
+        duration=1.5,
+        integrator=hsp.integrators.Rk4(1e-3),
+        on_row=every(0.05, lambda t: stream.send(moved(start, t), t=t)),
+    )
+    # RK4 is of third order in steps within which the jerk of the reference jumps.
+    assert np.abs(run["task.panda_tcp.error"]).max() < 2e-6
+    norms = run["null_space_norm"]
+    expected = norms[0] * np.exp(-8.0 * run.t)
+    assert np.abs(norms - expected).max() < 1e-5
+    # It was in fact moving.
+    reference = run["task.panda_tcp.reference"]
+    assert np.ptp(reference[:, 1]) > 0.07
+
+
+def test_a_posture_is_streamed_in_joint_positions(panda: hsp.Robot) -> None:
+    stream = hsp.Stream(delay=0.3)
+    task = hsp.JointPosture([0.0] * 7, displacement=stream)
+    controller = hsp.Controller(panda, [task])
+    goal = panda.home() + 0.1
+    stream.send(goal)
+    run = hsp.simulate(controller, panda.home(), duration=2.0, control_period=PERIOD)
+    assert np.abs(run["task.posture.error"]).max() < 1e-3  # from the start on
+    assert np.abs(run.q[-1] - goal).max() < 1e-5
+
+
+def test_an_orientation_is_streamed(panda: hsp.Robot) -> None:
+    stream = hsp.StreamOrientation()
+    task = hsp.FrameOrientation("panda_tcp", stream, name="hand")
+    controller = hsp.Controller(panda, [task])
+    goal = hand_pose(panda).rotation @ pin.exp3(np.array([0.0, 0.4, 0.0]))
+    stream.send(pin.Quaternion(goal).coeffs())
+    run = hsp.simulate(controller, panda.home(), duration=1.5, control_period=PERIOD)
+    assert np.abs(run["task.hand.error"]).max() < 1e-3
+    state = panda.state(0.0, run.q[-1], np.zeros(7)).frame("panda_tcp")
+    assert np.abs(pin.log3(state.rotation.T @ goal)).max() < 1e-5
+
+
+def test_a_target_out_of_reach_is_approached_within_all_limits(
+    panda: hsp.Robot,
+) -> None:
+    stream = hsp.Stream(speed=0.5)
+    controller = hsp.Controller(
+        panda,
+        [hsp.FramePosition("panda_tcp", stream)],
+        hsp.JointCentering(),
+        singularity_threshold=0.1,
+    )
+    here = hand_pose(panda).translation
+    stream.send(here + np.array([0.8, 0.0, 0.1]))
+    back = every(2.5, lambda t: stream.send(here) if t > 1.0 else None)
+    run = hsp.simulate(
+        controller, panda.home(), duration=5.0, control_period=PERIOD, on_row=back
+    )
+    assert run["status"].max() <= 2
+    assert run["velocity_excess"].max() == 0.0
+    assert run["position_excess"].max() == 0.0
+    shoulder = np.array([0.0, 0.0, 0.333])
+    k = int(2.4 / 0.01)
+    stretched = np.linalg.norm(run["task.panda_tcp.actual"][k] - shoulder)
+    assert stretched > 0.92  # of about 0.95
+    assert np.abs(np.diff(run.tau[k - 50 : k], axis=0)).max() < 1.0  # and rests there
+    assert np.linalg.norm(run["task.panda_tcp.error"][-1]) < 1e-3
+
+
+def test_a_second_run_begins_anew(panda: hsp.Robot) -> None:
+    stream = hsp.StreamPose()
+    controller = hsp.Controller(panda, [hsp.FramePose("panda_tcp", stream)])
+    start = hand_pose(panda)
+    references = []
+    for _ in range(2):
+        run = hsp.simulate(
+            controller, panda.home(), duration=0.3, control_period=PERIOD
+        )
+        references.append(run["task.panda_tcp.reference"][:, :3])
+        stream.send(moved(start, 1.0))
+    assert np.abs(references[0] - start.translation).max() < 1e-12
+    assert np.abs(references[1][-1] - start.translation).max() > 0.01
+    assert np.abs(references[1][0] - start.translation).max() < 1e-12
+
+
+def test_two_controllers_hear_one_stream(panda: hsp.Robot) -> None:
+    stream = hsp.Stream()
+    task = hsp.FramePosition("panda_tcp", stream)
+    controllers = [hsp.Controller(panda, [task]) for _ in range(2)]
+    q, v = panda.home(), np.zeros(7)
+    for controller in controllers:
+        controller.compute(0.0, q, v)
+    stream.send(hand_pose(panda).translation + 0.1)
+    efforts = [
+        [each.compute(k * PERIOD, q, v).tau for k in range(1, 60)]
+        for each in controllers
+    ]
+    assert np.array_equal(efforts[0], efforts[1])
+    assert not np.array_equal(efforts[0][0], efforts[0][-1])
+
+
+def test_a_copy_of_a_controller_goes_on_like_the_original(panda: hsp.Robot) -> None:
+    stream = hsp.StreamPose()
+    controller = hsp.Controller(panda, [hsp.FramePose("panda_tcp", stream)])
+    q, v = panda.home(), np.zeros(7)
+    stream.send(moved(hand_pose(panda), 0.5))
+    for k in range(60):
+        controller.compute(k * PERIOD, q, v)
+    other = copy.deepcopy(controller)
+    for k in range(60, 90):
+        tau = controller.compute(k * PERIOD, q, v).tau
+        assert np.array_equal(other.compute(k * PERIOD, q, v).tau, tau)
+
+
+def test_the_reference_of_a_task_changes_to_a_stream_while_it_runs(
+    panda: hsp.Robot,
+) -> None:
+    circle = hsp.Circle(radius=0.05, angular_rate=2.0)
+    controller = hsp.Controller(panda, [hsp.FramePosition("panda_tcp", circle)])
+    stream = hsp.Stream()
+    changed = every(
+        0.3, lambda t: t == pytest.approx(0.3)
+        and controller.at(0.3).ramp(0.4).reference("panda_tcp", stream)
+    )  # fmt: skip
+    run = hsp.simulate(
+        controller, panda.home(), duration=1.5, control_period=PERIOD, on_row=changed
+    )
+    error = np.linalg.norm(run["task.panda_tcp.error"], axis=1)
+    wanted = (1.0 + 10.0 * run.t) * np.exp(-10.0 * run.t) * 0.05  # all along
+    assert np.abs(error - wanted).max() < 5e-3
+    assert np.abs(run.v[-1]).max() < 1e-3
+
+
+def test_silence_stops_a_run_with_the_time(panda: hsp.Robot) -> None:
+    stream = hsp.StreamPose(stop_after=0.2)
+    controller = hsp.Controller(panda, [hsp.FramePose("panda_tcp", stream)])
+    with pytest.raises(SimulationError, match=r"no message for 0\.2.* s; stop_after"):
+        hsp.simulate(controller, panda.home(), duration=1.0, control_period=PERIOD)
+
+
+# -- YAML -----------------------------------------------------------------------------
+
+
+def config(trajectory: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "robot": {"name": "panda"},
+        "tasks": {"hand": {"type": "frame_pose", "trajectory": trajectory}},
+        "null_space": {"gain": 8, "fields": [{"type": "joint_centering"}]},
+        "simulation": {
+            "duration": 0.6,
+            "control_period": PERIOD,
+            "integrator": {"type": "semi_implicit_euler", "step": PERIOD},
+        },
+    }
+
+
+def write(folder: Path, trajectory: dict[str, Any]) -> Path:
+    file = folder / "streamed.yaml"
+    file.write_text(json.dumps(config(trajectory)))  # JSON is YAML
+    return file
+
+
+def goals(folder: Path, robot: hsp.Robot) -> Path:
+    start, file = hand_pose(robot), folder / "goals.jsonl"
+    lines = []
+    for k in range(8):
+        value = pin.SE3ToXYZQUAT(moved(start, 0.05 * k)).tolist()
+        lines.append(json.dumps({"at": 0.02 + 0.05 * k, "t": 0.05 * k, "value": value}))
+    file.write_text("\n".join(lines))
+    return file
+
+
+def test_a_recorded_file_is_followed_and_its_log_repeats_the_run(
+    panda: hsp.Robot, tmp_path: Path
+) -> None:
+    goals(tmp_path, panda)
+    trajectory = {"type": "stream", "source": "goals.jsonl", "policy": "interpolate"}
+    experiment = hsp.load_experiment(write(tmp_path, trajectory))
+    run = experiment.run()
+    assert run["stream.hand.taken"][-1] == 8
+    assert run["stream.hand.rejected"].max() == 0
+    assert np.nanmax(np.abs(run["task.hand.error"])) < 1e-3
+    log = run.save(tmp_path / "run.npz")
+    (tmp_path / "goals.jsonl").unlink()  # the log has what was heard
+    again = hsp.load_experiment(log).run()
+    assert np.array_equal(run.q, again.q)
+    yaml = tmp_path / "again.yaml"
+    yaml.write_text(experiment.to_yaml())
+    assert np.array_equal(hsp.load_experiment(yaml).run().q, run.q)
+
+
+def test_what_python_sends_is_in_the_log_and_repeats_the_run(
+    panda: hsp.Robot, tmp_path: Path
+) -> None:
+    stream = hsp.StreamPose(policy="extrapolate")
+    experiment = hsp.Experiment(
+        "panda",
+        [hsp.FramePose("panda_tcp", stream)],
+        simulation=hsp.load_experiment(config({"type": "stream"})).scenario.simulation,
+    )
+    start = hand_pose(panda)
+    run = experiment.run(
+        on_row=every(0.05, lambda t: stream.send(moved(start, t), t=t))
+    )
+    assert run["stream.panda_tcp.taken"][-1] == 12
+    again = hsp.load_experiment(run.save(tmp_path / "run.npz")).run()
+    assert np.array_equal(run.q, again.q)
+
+
+@pytest.mark.parametrize(
+    ("trajectory", "message"),
+    [
+        ({"source": "udp://:5005"}, r"yaml:1: tasks.hand.trajectory: source is .*HOST"),
+        ({"source": "none.jsonl"}, r"tasks.hand.trajectory.*none.jsonl: the recording"),
+        ({"policy": "newest"}, r"yaml:1: tasks.hand.trajectory.policy"),
+        ({"messages": [{"at": 0.0}]}, r"message 0 of the recording: a message needs a"),
+        ({"angular_speed": 9.0}, r"tasks.hand.*angular_acceleration is 20; with"),
+    ],
+)
+def test_mistakes_name_their_place(
+    tmp_path: Path, trajectory: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(HspControlError, match=message):
+        hsp.load_experiment(write(tmp_path, {"type": "stream", **trajectory}))
+
+
+def test_strict_reading_listens_to_this_computer_and_reads_beside_the_file(
+    tmp_path: Path, panda: hsp.Robot
+) -> None:
+    outside = goals(tmp_path, panda)
+    folder = tmp_path / "inside"
+    folder.mkdir()
+    for source, message in (
+        ("udp://0.0.0.0:5005", "listens to other computers; strict reading allows"),
+        (str(outside), "outside the folders that strict reading allows"),
+    ):
+        file = write(folder, {"type": "stream", "source": source})
+        with pytest.raises(AccessError, match=message):
+            hsp.load_experiment(file, strict=True)

@@ -1,0 +1,590 @@
+"""Streamed references: exact derivatives, bounds, policies, and bad input."""
+
+import copy
+import json
+import pickle
+import socket
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hsp_control.common.exceptions import StreamError, TrajectoryError
+from hsp_control.common.rotations import jexp3, jexp3_dot
+from hsp_control.trajectories import (
+    PoseSample,
+    Stream,
+    StreamOrientation,
+    StreamPose,
+    TrajectorySample,
+)
+from hsp_control.trajectories.polynomial import QUINTIC
+from hsp_control.trajectories.streams.bounds import _DERIVATIVES
+from hsp_control.trajectories.streams.recording import read_recording
+from hsp_control.trajectories.streams.waypoints import SenderClock, derivatives
+
+H = 5e-4
+"""Time between samples [s]."""
+POLICIES = ("latest", "interpolate", "extrapolate")
+
+
+def sampled(
+    stream: Any, duration: float, feed: Callable[[float], object] = lambda t: None
+) -> list[Any]:
+    """Return the samples of a run, in which ``feed`` sends what comes at each time."""
+    samples = []
+    for k in range(round(duration / H) + 1):
+        feed(k * H)
+        samples.append(stream.sample(k * H))
+    return samples
+
+
+def columns(samples: list[TrajectorySample]) -> tuple[np.ndarray, ...]:
+    return tuple(np.array(each) for each in zip(*samples, strict=True))
+
+
+def at_times(*events: tuple[float, Callable[[], object]]) -> Callable[[float], object]:
+    """Return a feed that calls each function once, at its time [s]."""
+    left = sorted(events, key=lambda event: event[0])
+
+    def feed(t: float) -> None:
+        while left and left[0][0] <= t + 1e-9:
+            left.pop(0)[1]()
+
+    return feed
+
+
+def assert_derivatives(x: Any, rate: Any, acceleration: Any, jerk: float) -> None:
+    """Check that x' and x'' are derivatives: their integrals are the differences.
+
+    Trapezia with the next derivative at their ends are exact for cubics. Where the jerk
+    jumps, by at most twice its bound, the error of x is at most that times h³/24.
+    """
+    integral = H * (rate[1:] + rate[:-1]) / 2
+    integral -= H * H * np.diff(acceleration, axis=0) / 12
+    assert np.abs(np.diff(x, axis=0) - integral).max() < jerk * H**3 / 12 + 1e-12
+    trapezia = H * (acceleration[1:] + acceleration[:-1]) / 2
+    assert np.abs(np.diff(rate, axis=0) - trapezia).max() < jerk * H * H / 4 + 1e-11
+
+
+def hostile(rng: np.random.Generator, stream: Any, n: int) -> Callable[[float], None]:
+    """Return a feed of random messages of all kinds, in bursts and out of order."""
+    rotational = 4 if isinstance(stream, StreamPose | StreamOrientation) else 0
+
+    def value() -> np.ndarray:
+        point = rng.normal(size=n) * 10.0 ** rng.uniform(-3, 1)
+        turn = rng.normal(size=rotational)
+        return np.concatenate([point, turn / (np.linalg.norm(turn) or 1.0)])
+
+    def rates() -> np.ndarray:
+        size = n + 3 * bool(rotational)
+        return rng.normal(size=size) * 10.0 ** rng.uniform(-2, 1)
+
+    def feed(t: float) -> None:
+        if rng.random() > 0.02:
+            return
+        for _ in range(rng.integers(1, 4)):
+            stamp = None if rng.random() < 0.4 else t + rng.normal() * 0.05
+            kind = rng.integers(4)
+            if kind == 0:
+                stream.send(velocity=rates(), t=stamp)
+            elif kind == 1:
+                stream.send(value(), velocity=rates(), t=stamp)
+            elif kind == 2:
+                stream.send(value(), t=stamp)
+            else:
+                times = np.cumsum(rng.uniform(1e-3, 0.1, rng.integers(1, 20)))
+                stream.send_chunk([value() for _ in times], times, t=stamp)
+
+    return feed
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(POLICIES), st.floats(0.0, 0.3))
+def test_points_keep_their_bounds_whatever_is_sent(
+    seed: int, policy: Any, delay: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    stream = Stream(
+        [0.2, -0.1], policy=policy, delay=delay, smoothing=rng.choice([0.0, 0.1]),
+        speed=[0.7, 0.3], acceleration=[3.0, 5.0], jerk=[80.0, 40.0],
+        hold_after=0.3,
+    ).anchored(None)  # fmt: skip
+    x, rate, acceleration = columns(sampled(stream, 1.5, hostile(rng, stream, 2)))
+    assert (np.abs(rate) <= np.array([0.7, 0.3]) + 1e-9).all()
+    assert (np.abs(acceleration) <= np.array([3.0, 5.0]) + 1e-9).all()
+    jerk = np.abs(np.diff(acceleration, axis=0)) / H
+    assert (jerk <= np.array([80.0, 40.0]) + 1e-6).all()
+    assert_derivatives(x, rate, acceleration, 80.0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(POLICIES), st.floats(0.0, 0.3))
+def test_poses_keep_their_bounds_whatever_is_sent(
+    seed: int, policy: Any, delay: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    stream = StreamPose(policy=policy, delay=delay).anchored(pin.SE3.Random())
+    samples = sampled(stream, 1.0, hostile(rng, stream, 3))
+    x, rate, acceleration = columns([each.position for each in samples])
+    R, omega, omega_dot = columns([each.orientation for each in samples])
+    assert_derivatives(x, rate, acceleration, stream.jerk)
+    assert np.abs(rate).max() <= stream.speed + 1e-9
+    assert np.abs(acceleration).max() <= stream.acceleration + 1e-9
+    for value, bound in (
+        (omega, stream.angular_speed),
+        (omega_dot, stream.angular_acceleration),
+        (np.diff(omega_dot, axis=0) / H, stream.angular_jerk),
+    ):
+        assert np.linalg.norm(value, axis=1).max() <= bound * (1.0 + 1e-6)
+    for k in range(len(R) - 1):
+        turned = pin.log3(R[k + 1] @ R[k].T)
+        mean = (omega[k] + omega[k + 1]) / 2  # the commutator is of third order
+        assert np.abs(turned - H * mean).max() < stream.angular_jerk * H**3
+        assert np.abs(R[k] @ R[k].T - np.eye(3)).max() < 1e-12
+    trapezia = H * (omega_dot[1:] + omega_dot[:-1]) / 2
+    error = np.abs(np.diff(omega, axis=0) - trapezia).max()
+    assert error < stream.angular_jerk * H * H / 4 + 1e-11
+
+
+def test_bounds_on_rotations_follow_from_those_on_rotation_vectors() -> None:
+    # |ω'| <= |y''| + |y'|²/π and |ω''| <= |y'''| + |y'||y''| + |y'|³/6; see `Chart`.
+    rng = np.random.default_rng(0)
+    J, dJ, step = np.zeros((3, 3)), np.zeros((3, 3)), 1e-5
+
+    def rate_of(y: Any, u: Any) -> np.ndarray:
+        jexp3_dot(y, u, dJ)
+        return dJ.copy()
+
+    worst = np.zeros(3)
+    for _ in range(5000):
+        y, u, w = rng.normal(size=(3, 3))
+        y *= 1.5 * np.pi * rng.random() / np.linalg.norm(y)
+        u, w = u / np.linalg.norm(u), w / np.linalg.norm(w)
+        jexp3(y, J)
+        curved = rate_of(y, u) @ u
+        mixed = 2 * rate_of(y, u) @ w + rate_of(y, w) @ u + np.cross(J @ u, J @ w)
+        twice = (rate_of(y + step * u, u) - rate_of(y - step * u, u)) @ u / (2 * step)
+        cubic = twice + np.cross(J @ u, curved)
+        norms = np.linalg.norm(J, 2), *map(np.linalg.norm, (curved, mixed, cubic))
+        assert norms[0] <= 1.0 + 1e-12
+        worst = np.maximum(worst, norms[1:])
+    assert (worst <= np.array([1 / np.pi, 1.0, 1 / 6]) + 1e-6).all()
+    assert (worst > np.array([0.31, 0.9, 0.15])).all()  # they are not too cautious
+
+
+def test_control_points_bound_a_quintic() -> None:
+    rng = np.random.default_rng(0)
+    u = np.linspace(0.0, 1.0, 2001)
+    for _ in range(200):
+        ends = rng.normal(size=(6, 1))
+        curve = np.polynomial.Polynomial((QUINTIC @ ends)[:, 0])
+        for k, matrix in enumerate(_DERIVATIVES, 1):
+            largest = np.abs(curve.deriv(k)(u)).max()
+            assert largest * (1 - 1e-9) <= np.abs(matrix @ ends).max() < 1.12 * largest
+
+
+# -- policies -------------------------------------------------------------------------
+
+
+def circle(t: float) -> np.ndarray:
+    return np.array([0.1 * np.cos(2 * t) - 0.1, 0.1 * np.sin(2 * t)])
+
+
+@pytest.mark.parametrize("policy", ["interpolate", "extrapolate"])
+def test_the_reference_passes_waypoints_at_their_time(policy: Any) -> None:
+    stream = Stream([0.0, 0.0], policy=policy, delay=0.15).anchored(None)
+    times = np.arange(0.05, 2.0, 0.05)
+    feed = at_times(*((t, lambda t=t: stream.send(circle(t), t=t)) for t in times))
+    x, _, acceleration = columns(sampled(stream, 2.0, feed))
+    for t in times[10:-6]:  # after it has caught up
+        k = round((t + 0.15) / H)
+        # A message is taken at the first sample after it came: the clocks differ by it.
+        assert np.abs(x[k] - circle(t)).max() < 3 * H * 0.2
+    assert np.abs(acceleration[1000:3500]).max() < 0.6  # a circle's is 0.4
+
+
+def test_lost_and_jittered_waypoints_in_any_order_change_little() -> None:
+    rng = np.random.default_rng(1)
+    stream = Stream([0.0, 0.0], policy="interpolate", delay=0.2).anchored(None)
+    events = []
+    for t in np.arange(0.05, 2.0, 0.05):
+        if rng.random() > 0.05:
+            late = t + rng.uniform(0.0, 0.07)  # later than the next one, at times
+            events.append((late, lambda t=t: stream.send(circle(t), t=t)))
+    x, _, _ = columns(sampled(stream, 2.0, at_times(*events)))
+    t = H * np.arange(len(x))
+    wanted = np.array([circle(s - 0.2) for s in t])
+    assert np.abs(x - wanted)[1500:3900].max() < 4e-3
+
+
+def test_the_newest_target_is_reached_at_rest() -> None:
+    stream = Stream([0.0], policy="latest").anchored(None)
+    feed = at_times(
+        (0.1, lambda: stream.send([0.5])), (0.3, lambda: stream.send([0.2]))
+    )
+    x, rate, acceleration = columns(sampled(stream, 2.0, feed))
+    assert x[-1, 0] == pytest.approx(0.2, abs=1e-9)
+    assert not rate[-1].any()
+    assert not acceleration[-1].any()
+
+
+def test_a_near_target_is_reached_after_the_delay() -> None:
+    stream = Stream([0.0], delay=0.25).anchored(None)
+    x, _, _ = columns(
+        sampled(stream, 0.5, at_times((0.1, lambda: stream.send([1e-3]))))
+    )
+    arrival = round(0.35 / H)
+    assert x[arrival - 20, 0] < 1e-3 - 1e-9
+    assert x[arrival, 0] == pytest.approx(1e-3, abs=1e-9)
+
+
+def test_extrapolation_ends_and_the_reference_holds() -> None:
+    stream = Stream([0.0], policy="extrapolate", delay=0.1, extrapolation=0.2).anchored(
+        None
+    )
+    feed = at_times(
+        *((t, lambda t=t: stream.send([0.2 * t], t=t)) for t in np.arange(0, 1, 0.05))
+    )
+    x, rate, _ = columns(sampled(stream, 2.0, feed))
+    last = 0.95 + 0.1
+    going = round((last + 0.19) / H)
+    assert rate[going, 0] == pytest.approx(0.2, abs=1e-6)
+    assert not rate[round(1.6 / H) :].any()
+    assert x[-1, 0] > 0.2 * 0.95 + 0.2 * 0.2
+
+
+def test_a_twist_turns_the_hand_about_a_fixed_axis_until_it_is_silent() -> None:
+    start = pin.SE3(pin.exp3(np.array([0.3, -0.5, 0.9])), np.array([0.4, 0.0, 0.5]))
+    stream = StreamPose(delay=0.05, extrapolation=0.1).anchored(start)
+    twist = np.array([0.1, 0.0, -0.05, 0.0, 0.6, 0.3])
+    feed = at_times(
+        *((t, lambda: stream.send(velocity=twist)) for t in np.arange(0.1, 1, 0.02))
+    )
+    samples = sampled(stream, 1.5, feed)
+    moving, still = samples[round(0.8 / H)], samples[-1]
+    assert np.allclose(moving.position.velocity, twist[:3], atol=1e-9)
+    # Each change of velocity aims at ω to second order; the next message completes it.
+    assert np.allclose(moving.orientation.angular_velocity, twist[3:], atol=1e-5)
+    assert not still.position.velocity.any()
+    assert not still.orientation.angular_velocity.any()
+
+
+def test_a_chunk_replaces_the_rest_of_the_one_before() -> None:
+    stream = Stream([0.0], policy="interpolate", delay=0.05).anchored(None)
+    times = np.arange(1, 17) * 0.02
+    feed = at_times(
+        (0.1, lambda: stream.send_chunk((0.2 * times)[:, None], times, t=0.1)),
+        (0.2, lambda: stream.send_chunk((-0.1 * times)[:, None], times, t=0.2)),
+        # An old chunk that arrives late does not count.
+        (0.25, lambda: stream.send_chunk((9.0 + times)[:, None], times, t=0.15)),
+    )
+    x, _, _ = columns(sampled(stream, 1.0, feed))
+    assert x.max() < 0.05
+    assert x[-1, 0] == pytest.approx(-0.1 * times[-1], abs=1e-9)
+    assert stream.counts()["late"] == 1
+
+
+def test_a_seam_between_chunks_is_bridged_from_what_the_reference_is() -> None:
+    stream = Stream([0.0] * 7, policy="interpolate", delay=0.05).anchored(None)
+    times = np.arange(1, 17) * 0.02
+    path = np.outer(0.3 * times, np.ones(7))
+    feed = at_times(
+        (0.1, lambda: stream.send_chunk(path, times, t=0.1)),
+        (0.2, lambda: stream.send_chunk(path + 0.03 + 0.07, times, t=0.2)),
+    )
+    x, rate, acceleration = columns(sampled(stream, 1.0, feed))
+    assert_derivatives(x, rate, acceleration, stream.jerk)
+    k = round(0.2 / H)
+    assert np.abs(np.diff(x, axis=0)[k : k + 10]).max() < 1e-3
+    assert x[-1, 0] == pytest.approx(path[-1, 0] + 0.1, abs=1e-9)
+
+
+def test_smoothing_takes_noise_out_of_waypoints() -> None:
+    def roughness(smoothing: float) -> float:
+        rng = np.random.default_rng(2)
+        stream = Stream(
+            [0.0, 0.0], policy="interpolate", delay=0.2, smoothing=smoothing
+        ).anchored(None)
+        events = [
+            (t, lambda t=t: stream.send(circle(t) + 2e-4 * rng.normal(size=2), t=t))
+            for t in np.arange(0.05, 2.0, 1 / 60)
+        ]
+        _, _, acceleration = columns(sampled(stream, 2.0, at_times(*events)))
+        x = np.array([circle(k * H - 0.2) for k in range(len(acceleration))])
+        true = np.gradient(np.gradient(x, H, axis=0), H, axis=0)
+        return float(np.sqrt(np.mean((acceleration - true)[1500:-400] ** 2)))
+
+    assert roughness(0.1) < 0.5 * roughness(0.0)
+
+
+def test_derivatives_of_a_parabola_are_exact() -> None:
+    rng = np.random.default_rng(0)
+    times = np.cumsum(rng.uniform(0.01, 0.1, 9))
+    c = rng.normal(size=(3, 2))
+    x = c[0] + np.outer(times, c[1]) + np.outer(times**2, c[2])
+    for k in range(1, 8):
+        for window in (0.0, 0.2):
+            value, slope, curve = derivatives(times, x, k, window)
+            assert np.allclose(value, x[k], atol=1e-12)
+            assert np.allclose(slope, c[1] + 2 * c[2] * times[k], atol=1e-10)
+            assert np.allclose(curve, 2 * c[2], atol=1e-8)
+
+
+# -- time, silence, runs --------------------------------------------------------------
+
+
+def test_without_a_message_it_stays_at_its_start() -> None:
+    stream = Stream().anchored([0.1, 0.2])
+    x, rate, _ = columns(sampled(stream, 0.2))
+    assert (x == [0.1, 0.2]).all()
+    assert not rate.any()
+
+
+def test_silence_holds_and_then_stops_with_the_time() -> None:
+    stream = Stream([0.0], hold_after=0.2, stop_after=0.6).anchored(None)
+    feed = at_times((0.1, lambda: stream.send([50.0])))
+    x, rate, _ = columns(sampled(stream, 0.65, feed))
+    assert rate.max() > 0.5
+    assert not rate[-1].any()
+    assert x[-1, 0] < 1.0
+    with pytest.raises(
+        StreamError, match=r"no message for 0\.6.* s; stop_after is 0\.6"
+    ):
+        stream.sample(0.75)
+
+
+def test_the_sender_s_clock_is_found_and_may_start_again() -> None:
+    clock = SenderClock()
+    arrivals = [(100.0 + 0.05 * k, 0.05 * k + delay) for k, delay in
+                enumerate([0.03, 0.01, 0.02, 0.04])]  # fmt: skip
+    found = [clock.to_controller(t, now) for t, now in arrivals]
+    assert found[1:] == pytest.approx([0.06, 0.11, 0.16])  # the fastest took 0.01 s
+    assert clock.restarts_at(5.0)
+    assert clock.to_controller(5.0, 1.0) == pytest.approx(1.0)
+
+
+def test_a_new_run_begins_anew_and_hears_only_what_is_new() -> None:
+    stream = Stream([0.0])
+    first = stream.anchored(None)
+    feed = at_times((0.1, lambda: stream.send([0.1])))
+    x, _, _ = columns(sampled(first, 1.0, feed))
+    assert x[-1, 0] == pytest.approx(0.1)
+    assert [entry["at"] for entry in stream.record] == [pytest.approx(0.1)]
+    second = stream.anchored(None)
+    x, _, _ = columns(sampled(second, 1.0))
+    assert not x.any()
+
+
+def test_what_was_recorded_gives_the_same_bits() -> None:
+    rng = np.random.default_rng(3)
+    stream = StreamPose(policy="extrapolate").anchored(pin.SE3.Identity())
+    first = sampled(stream, 1.0, hostile(rng, stream, 3))
+    messages = json.loads(json.dumps(stream.record))
+    again = StreamPose(policy="extrapolate", messages=messages)
+    second = sampled(again.anchored(pin.SE3.Identity()), 1.0)
+    for one, other in zip(first, second, strict=True):
+        assert np.array_equal(one.position, other.position)
+        assert all(map(np.array_equal, one.orientation, other.orientation))
+    assert json.loads(json.dumps(again.record)) == messages
+
+
+def test_copies_in_the_middle_of_a_run_go_on_alike_and_apart() -> None:
+    stream = Stream([0.0]).anchored(None)
+    sampled(stream, 0.3, at_times((0.1, lambda: stream.send([0.3]))))
+    copies = [copy.deepcopy(stream), pickle.loads(pickle.dumps(stream))]
+    for k in range(600, 700):
+        wanted = stream.sample(k * H)
+        for each in copies:
+            assert np.array_equal(each.sample(k * H), wanted)
+    stream.send([-0.3])
+    own, other = ([each.sample(t) for t in (0.4, 0.9)] for each in (stream, copies[1]))
+    assert own[1].position[0] < other[1].position[0] - 0.01
+
+
+def test_earlier_times_are_remembered() -> None:
+    stream = Stream([0.0]).anchored(None)
+    feed = at_times(
+        *((0.05 * k, lambda k=k: stream.send([0.01 * k])) for k in range(9))
+    )
+    samples = sampled(stream, 0.5, feed)
+    for k in (100, 500, 900):
+        assert np.array_equal(stream.sample(k * H), samples[k])
+
+
+# -- bad input ------------------------------------------------------------------------
+
+IDENTITY = [0.0, 0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"value": [0.0, np.nan, 0.0, *IDENTITY]}, "value contains nan; needs finite"),
+        ({"value": [1e7, 0.0, 0.0, *IDENTITY]}, "value contains 1e\\+07; needs finite"),
+        ({"value": [0.0, 0.0, 0.0]}, "value has 3 numbers; this stream needs 7: x, y"),
+        ({"value": [0.0] * 7}, "the quaternion .* has norm 0; needs 1"),
+        ({"value": [0, 0, 0, 0, 0, 0, 1.1]}, "has norm 1.1; needs 1"),
+        ({"value": "here"}, "value is 'here'; needs a list of numbers"),
+        ({"velocity": [0.0] * 5}, "velocity has 5 numbers; this stream needs 6"),
+        ({}, "a message needs a value, values or one velocity"),
+        ({"value": [0.0] * 6 + [1.0], "t": np.inf}, "t contains inf"),
+    ],
+)
+def test_a_wrong_target_is_refused_where_it_is_sent(
+    arguments: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(StreamError, match=message):
+        StreamPose().send(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("values", "times", "message"),
+    [
+        ([[0.0], [1.0]], [0.1, 0.1], r"times\[1\] = 0.1 is not later than times\[0\]"),
+        ([[0.0], [1.0]], [0.1], "there are 1 times for 2 values"),
+        ([[0.0]] * 1001, np.arange(1001), "values has 1001 rows; needs 1 to 1000"),
+        ([0.0], [0.1], r"values has shape \(1,\); needs a list of lists"),
+    ],
+)
+def test_a_wrong_chunk_is_refused(values: Any, times: Any, message: str) -> None:
+    with pytest.raises(StreamError, match=message):
+        Stream([0.0]).send_chunk(values, times)
+
+
+def test_what_does_not_fit_the_task_is_counted_and_dropped() -> None:
+    stream = Stream()
+    stream.send([0.1, 0.2])  # before anything knows how many coordinates there are
+    placed = stream.anchored([0.0, 0.0, 0.0])
+    sampled(placed, 0.1)
+    assert placed.counts()["rejected"] == 1
+    with pytest.raises(StreamError, match="value has 2 numbers; this stream needs 3"):
+        stream.send([0.1, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"source": "udp://5005"}, "source is 'udp://5005'; needs udp://HOST:PORT"),
+        ({"source": "udp://a:5005/x"}, "needs udp://HOST:PORT"),
+        ({"source": "a.jsonl", "messages": []}, "give either source or messages"),
+        ({"messages": [{"value": [0.0]}]}, "message 0 of the recording: it needs the"),
+        ({"messages": [{"at": 1.0, "valeu": [0.0]}]}, "has the key 'valeu'; known are"),
+        ({"speed": -1.0}, "speed"),
+        ({"policy": "newest"}, "policy"),
+    ],
+)
+def test_a_wrong_declaration_is_refused(
+    arguments: dict[str, Any], message: str
+) -> None:
+    with pytest.raises((StreamError, TrajectoryError), match=message):
+        Stream(**arguments)
+
+
+def test_bounds_that_contradict_each_other_are_refused() -> None:
+    with pytest.raises(TrajectoryError, match="angular_acceleration is 5; with"):
+        StreamOrientation(angular_speed=4.0, angular_acceleration=5.0)
+    with pytest.raises(TrajectoryError, match="angular_jerk is 10; with these bounds"):
+        StreamPose(angular_jerk=10.0)
+    with pytest.raises(TrajectoryError, match="speed has 2 numbers; the stream needs"):
+        Stream([0.0] * 3, speed=[1.0, 2.0]).anchored(None).sample(0.0)
+    with pytest.raises(TrajectoryError, match="origin: start"):
+        Stream(origin="start").anchored([0.0])
+
+
+def test_a_stream_that_hears_something_else_cannot_be_sent_to() -> None:
+    with pytest.raises(StreamError, match=r"hears udp://127.0.0.1:5; only"):
+        Stream(source="udp://127.0.0.1:5").send([0.0])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('{"at": 0, "value": [0]}\n{"at": NaN}', ":2: not JSON: NaN is no number"),
+        ("{", ":1: not JSON"),
+    ],
+)
+def test_a_wrong_recording_names_its_line(
+    tmp_path: Any, text: str, message: str
+) -> None:
+    file = tmp_path / "goals.jsonl"
+    file.write_text(text)
+    with pytest.raises(StreamError, match=message):
+        read_recording(file)
+    with pytest.raises(StreamError, match="cannot be read"):
+        read_recording(tmp_path / "none.jsonl")
+
+
+# -- other processes ------------------------------------------------------------------
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def wait_until(done: Callable[[], bool]) -> None:
+    """Wait until something has happened in another thread."""
+    import time
+
+    for _ in range(6000):
+        if done():
+            return
+        time.sleep(0.01)
+    raise AssertionError("it did not happen")
+
+
+def test_datagrams_arrive_and_bad_ones_are_counted() -> None:
+    port = free_port()
+    stream = Stream([0.0], source=f"udp://127.0.0.1:{port}").anchored(None)
+    stream.sample(0.0)  # it listens from here on
+    inbox = stream._mailbox.inbox
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for text in (
+            "{",
+            '{"value": [NaN]}',
+            '{"value": [0.1, 0.2]}',
+            "[]",
+            "1" * 9000,
+        ):
+            sender.sendto(text.encode(), ("127.0.0.1", port))
+        sender.sendto(b'{"value": [0.1], "t": 3.5}', ("127.0.0.1", port))
+    wait_until(lambda: inbox.count == 1)
+    samples = columns(sampled(stream, 1.0))
+    assert samples[0][-1, 0] == pytest.approx(0.1, abs=1e-9)
+    assert stream.counts()["rejected"] == 5
+
+
+def test_a_port_in_use_is_told_and_streams_of_one_process_share_it() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        source = f"udp://127.0.0.1:{other.getsockname()[1]}"
+        with pytest.raises(StreamError, match="cannot listen there: Address already"):
+            Stream([0.0], source=source).anchored(None).sample(0.0)
+    one, two = (Stream([0.0], source=source).anchored(None) for _ in range(2))
+    one.sample(0.0)
+    two.sample(0.0)
+    assert one._mailbox.inbox is two._mailbox.inbox
+    with pytest.raises(StreamError, match="already carries 1 numbers; this stream"):
+        Stream([0.0, 0.0], source=source).anchored(None).sample(0.0)
+
+
+def test_a_flood_drops_the_oldest() -> None:
+    stream = Stream([0.0], delay=0.0).anchored(None)
+    stream.sample(0.0)
+    for k in range(10_000):
+        stream.send([k * 1e-6])
+    sampled(stream, 0.5)
+    assert stream.counts()["taken"] == 4096
+    assert stream.sample(1.0).position[0] == pytest.approx(9999e-6, abs=1e-9)
+
+
+def test_out_receives_the_sample() -> None:
+    stream = StreamPose().anchored(pin.SE3.Identity())
+    out = PoseSample.allocate()
+    assert stream.sample(0.0, out) is out
