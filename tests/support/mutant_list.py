@@ -411,7 +411,7 @@ MUTANTS = (
     ),
     Mutant(
         "inverse not bounded in the singularity",
-        LAW + "pseudo_inverse.py",
+        COMMON + "bounded_inverse.py",
         "inverse = 1.0 / x if x >= floor else (2.0 - x / floor) / floor",
         "inverse = 1.0 / x",
         UNIT + "law/test_pseudo_inverse.py -k bound",
