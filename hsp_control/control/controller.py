@@ -577,6 +577,11 @@ class Controller:
         """The joint-space metric."""
         return self._setup.metric
 
+    @read_only()
+    def singularity_threshold(self) -> float:
+        """Singular value below which an inverse is bounded instead of exact."""
+        return self._threshold
+
     @read_only("use at(t).limits(...)")
     def limits(self) -> RobotLimits | None:
         """The limits, as numbers of this robot."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import KW_ONLY
 from functools import partial
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -16,7 +16,13 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.impedance import Impedance, parts_of
 from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
-from hsp_control.tasks.task import Feedback, InForce, SecondOrderTask, TaskSample
+from hsp_control.tasks.task import (
+    Feedback,
+    InForce,
+    SecondOrderTask,
+    Task,
+    TaskSample,
+)
 
 _NO_GAINS = Gains(natural_frequency=10.0)
 
@@ -28,12 +34,18 @@ class CompliantTask(SecondOrderTask):
     them from its J, J', e and e', and evaluates it again with them: the error equation
     of the task stays the only one. A subclass whose error contains a rotation vector
     overrides `_rotating`.
+
+    Attributes:
+        wrench_unit: The unit of a force along the rows of J, if these are axes of the
+            world: the log has such a force, if it is estimated.
     """
+
+    wrench_unit: ClassVar[str | None] = None
 
     _: KW_ONLY
     impedance: Impedance | None = None
-    """Stiffness and damping in N/m and N·s/m, or N·m/rad and N·m·s/rad, instead of
-    `gains`; none by default."""
+    """Stiffness and damping of the rows [N/m and N·s/m, or N·m/rad and N·m·s/rad],
+    instead of `gains`; none by default."""
 
     def __post_init__(self) -> None:
         """Check that there are not both gains and an impedance.
@@ -135,3 +147,8 @@ class CompliantTask(SecondOrderTask):
             write()
         Kp, Kv, offset = in_force.feedback
         return Feedback(Kp.copy(), Kv.copy(), offset.copy())
+
+
+def impedance_of(task: Task) -> Impedance | None:
+    """Return the impedance of a task; None if it has gains."""
+    return task.impedance if isinstance(task, CompliantTask) else None

@@ -60,6 +60,7 @@ class FrameOrientation(
     """
 
     drawn: ClassVar[tuple[Drawn, ...]] = ("orientation",)
+    wrench_unit: ClassVar[str | None] = "N·m"
 
     trajectory: OrientationTrajectory = HoldOrientation()
     """R_d(t), world ← frame [rad]; held as at the start by default."""

@@ -60,6 +60,7 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
     """
 
     drawn: ClassVar[tuple[Drawn, ...]] = ("position", "orientation")
+    wrench_unit: ClassVar[str | None] = "N and N·m"
 
     trajectory: PoseOrPoint = ComposedPose()
     """The desired pose, world ← frame, or the trajectory of its origin, with the

@@ -28,6 +28,7 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
     """
 
     drawn: ClassVar[tuple[Drawn, ...]] = ("position",)
+    wrench_unit: ClassVar[str | None] = "N"
 
     trajectory: Trajectory = Hold()
     """x_d(t), the trajectory of the origin [m]; held at the start by default."""
