@@ -176,14 +176,14 @@ MUTANTS = (
         UNIT + "tasks/test_gains.py",
     ),
     Mutant(
-        "impedance: the rate of the inertia is left out",
+        "impedance: no rate of the inertia",
         TASKS + "impedance_gains.py",
         "Kv[i, j] -= 0.5 * root[i, j]",
         "Kv[i, j] -= 0.0 * root[i, j]",
         UNIT + "tasks/test_impedance.py -k equation",
     ),
     Mutant(
-        "impedance: the axes of a rotation vector's rows stand still",
+        "impedance: rotated axes stand still",
         TASKS + "impedance_gains.py",
         "T_dot[i, 0] = -part[i, 0] - (b * w[2] - c * w[1])",
         "T_dot[i, 0] = -part[i, 0]",
@@ -204,7 +204,7 @@ MUTANTS = (
         UNIT + "tasks/test_impedance.py -k all_joints",
     ),
     Mutant(
-        "impedance: a bounded spring is taken for a soft one",
+        "impedance: bounded spring taken for soft",
         TASKS + "compliant_task.py",
         "parts_of(numbers)[3][:] = 0.0",
         "parts_of(numbers)[3][:] *= 1.0",
