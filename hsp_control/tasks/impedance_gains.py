@@ -232,16 +232,14 @@ def natural_root(B: Array, K: Array, Z: Array, square: Array, out: Array) -> Non
 
     Args:
         B: Whitened Jacobian, shape (m, nv).
-        K: Stiffness, shape (m, m).
+        K: Stiffness, positive definite, shape (m, m).
         Z: Scratch, shape (m, nv).
         square: Scratch; the matrices 4, 5 and 6 are overwritten, shape (7, m, m).
         out: Shape (m, m).
     """
     m, nv = B.shape
     C, U, S = square[4], square[5], square[6]
-    if not cholesky(K, C):
-        out[0, 0] = np.nan
-        return
+    cholesky(K, C)
     for i in range(m):
         for j in range(nv):
             Z[i, j] = 0.0

@@ -28,7 +28,7 @@ def task_wrench(
         disturbance: r, shape (nv,) [N·m or N].
         threshold: Singular value of J in the metric M below which J̄ is bounded.
     """
-    J = task.evaluate(state).jacobian
+    J = task.evaluate(state, feedback=task.feedback()).jacobian
     m, nv = J.shape
     L, B, Q = np.zeros((nv, nv)), np.zeros((m, nv)), np.zeros((m, nv))
     X, part, force = np.zeros((m, m)), np.zeros(m), np.zeros(m)

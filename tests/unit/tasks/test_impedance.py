@@ -39,11 +39,14 @@ from hsp_control.control.compensation import (
     IntegralAction,
     MomentumObserver,
 )
+from hsp_control.geometry import Scene
+from hsp_control.geometry.start import Start
 from hsp_control.null_space.metrics import (
     IdentityMetric,
     MassMatrixMetric,
 )
-from hsp_control.tasks import Impedance
+from hsp_control.tasks import Impedance, TaskSample
+from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
 
 pytestmark = pytest.mark.filterwarnings("error")
 Array = NDArray[np.float64]
@@ -237,6 +240,35 @@ def test_through_a_singularity() -> None:
     np.testing.assert_allclose(  # at the singularity only the damping is left
         Kv, 2.0 * np.real(sqrtm_psd(Kp / 100.0)) * 10.0, rtol=1e-6, atol=1e-6
     )
+
+
+def test_a_singular_mass_matrix_is_not_a_number() -> None:
+    """As for the metric M: the step then says that it is not finite."""
+    task = JointPosture("home", impedance=Impedance(100.0))
+    robot = hsp.Robot.load("planar3r")
+    state = robot.state(0.0, bent(robot, 0.3), np.ones(3))
+    task = task.placed(Start(state, Scene()))
+    in_force, sample = task.in_force(), TaskSample.allocate(3, 3)
+    flat, none = np.zeros((3, 3)), Rotating(3, np.eye(3), np.zeros(3))
+    numbers, scratch = in_force.numbers, Scratch.allocate(3, 3)
+    impedance_gains(flat, flat, none, numbers, sample, scratch, in_force.feedback)
+    assert np.isnan(in_force.feedback.Kp[0, 0])
+    assert np.isnan(in_force.feedback.Kv[0, 0])
+
+
+def test_fingers_that_mimic_each_other() -> None:
+    """Pinocchio has no Coriolis matrix then: M' is taken by differences."""
+    robot = hsp.Robot.load("panda", locked={})
+    assert robot.mimics
+    rng = np.random.default_rng(2)
+    q, v = robot.random_configuration(rng), 0.3 * rng.normal(size=robot.nv)
+    task = JointPosture("home", impedance=Impedance(100.0, damping=5.0))
+    controller = Controller(robot, [task], limits=None)
+    output = controller.compute(0.0, q, v)
+    state = robot.state(0.0, q, v)
+    force = 100.0 * robot.difference(q, robot.home()) - 5.0 * v
+    effort = force - 0.5 * state.mass_matrix_rate @ v + state.nonlinear_effects
+    np.testing.assert_allclose(output.tau, effort, rtol=1e-7, atol=1e-7)
 
 
 def bent(robot: hsp.Robot, bend: float) -> Array:
