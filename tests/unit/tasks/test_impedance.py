@@ -4,6 +4,7 @@ The inertia and its rate are taken from plain Pinocchio and differences along a 
 never from the kernels that compute the gains.
 """
 
+import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -333,6 +334,38 @@ def test_a_change_counts_from_what_is_in_force() -> None:
         Kp, Kv, _ = controller.feedback("hand")
         np.testing.assert_allclose(Kp, scale * first.Kp, rtol=1e-9)
         np.testing.assert_allclose(Kv, ratio * np.sqrt(scale) * first.Kv, rtol=1e-9)
+
+
+def test_many_changes_overlap_and_a_copy_goes_on() -> None:
+    """No edge of a change is a jump, and a copy in the middle does the same."""
+    rng = np.random.default_rng(5)
+    controller = panda_hand(impedance=Impedance(300.0))
+    begins = np.sort(rng.uniform(0.0, 2.0, 30))
+    ramps = rng.uniform(0.1, 0.5, 30)
+    for at, ramp in zip(begins, ramps, strict=True):
+        stiffness = rng.uniform(100.0, 900.0, 3).tolist()
+        options: dict[str, Any] = [
+            {"damping_ratio": float(rng.uniform(0.3, 1.5))},
+            {"damping": float(rng.uniform(20.0, 60.0))},
+            {"largest_error": float(rng.uniform(0.01, 0.1))},
+        ][rng.integers(3)]
+        controller.at(at).ramp(ramp).impedance("hand", Impedance(stiffness, **options))
+    q, v = controller.robot.home(), np.linspace(-0.3, 0.3, 7)
+    edges = np.sort(np.concatenate([begins, begins + ramps]))
+    between = rng.uniform(0.0, 2.0, 60)
+
+    def steps(times: Array, gap: float) -> Array:
+        there = pickle.loads(pickle.dumps(controller))
+        pairs = [[there.compute(x, q, v).tau for x in (t, t + gap)] for t in times]
+        return np.abs(np.diff(pairs, axis=1)).max(axis=(1, 2))
+
+    assert steps(edges, 1e-5).max() < 0.05 * steps(np.sort(between), 1e-3).max()
+    for t in (0.0, 0.7, 1.3):
+        controller.compute(t, q, v)
+    copy = pickle.loads(pickle.dumps(controller))
+    for t in (1.3, 1.31, 1.8, 3.0):
+        mine, its = (each.compute(t, q, v).tau for each in (controller, copy))
+        np.testing.assert_array_equal(mine, its)
 
 
 COUPLED = [[200.0, 50.0, 0.0], [50.0, 200.0, 0.0], [0.0, 0.0, 100.0]]
