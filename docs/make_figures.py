@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 import hsp_control as hsp
 from hsp_control.null_space import metrics
 from hsp_control.null_space.fields import FunctionField
-from hsp_control.robot.integrators import Dop853
+from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.log_series import chosen_rows
 from hsp_control.trajectories import ComposedPose, HoldOrientation
 from hsp_control.visualization.palette import DESIRED, INK, SERIES
@@ -94,6 +94,11 @@ def main() -> None:
         draw_propositions(left, middle)
         draw_chaos(right)
         figure.savefig(FOLDER / "propositions.png", dpi=130)
+        figure = new_figure(11.0, 3.6)
+        left, right = figure.subplots(1, 2)
+        draw_null_space_under_a_force(left)
+        draw_observed_force(right)
+        figure.savefig(FOLDER / "compliance.png", dpi=110)
     draw_sweep()
     for file in sorted(FOLDER.glob("*.png")):
         print(f"Figure: {file.relative_to(FOLDER.parents[1])}")
@@ -172,6 +177,67 @@ def moving_iiwa(robot: hsp.Robot, metric: metrics.Metric) -> hsp.Rollout:
         duration=3.0,
         integrator=Dop853(1e-10, 1e-10),
     )
+
+
+def draw_null_space_under_a_force(axes: Axes) -> None:
+    """Draw ‖e_N‖ of a compliant Panda that is pushed at the hand, in two metrics."""
+    robot = hsp.Robot.load("panda")
+    spring = hsp.Impedance([600, 600, 600, 40, 40, 40], damping_ratio=0.8)
+    push = hsp.plants.Push("panda_tcp", [10.0, 30.0, 10.0], start=0.5, duration=1.0)
+    integrator = Rk4(0.001)
+    start = robot.integrate(robot.home(), 0.1 * np.cos(1.0 + np.arange(7)))
+    away = robot.integrate(start, 0.4 * np.sin(1.0 + np.arange(7)))
+    shown = {"W = I": metrics.IdentityMetric(), "W = M": metrics.MassMatrixMetric()}
+    axes.axvspan(push.start, push.start + push.duration, color=INK, alpha=0.08)
+    for color, width, name in zip(SERIES, (2.0, 4.5), shown, strict=False):
+        rollout = hsp.simulate(
+            hsp.Controller(
+                robot,
+                [hsp.FramePose("panda_tcp", impedance=spring)],
+                hsp.TargetPosture(away),
+                null_space_gain=GAIN,
+                metric=shown[name],
+                limits=None,
+            ),
+            start,
+            duration=2.5,
+            integrator=integrator,
+            plant=hsp.plants.RigidBody(pushes=[push]).build(robot, integrator),
+        )
+        norm = rollout["null_space_norm"]
+        axes.semilogy(rollout.t, norm / norm[0], color=color, lw=width, label=name)
+    style = {"color": INK, "lw": 1.0, "ls": "--"}
+    axes.semilogy(rollout.t, np.exp(-GAIN * rollout.t), **style, label="no force")
+    axes.set(
+        title="(a)  33 N at the hand, which nobody expects",
+        xlabel="time [s]",
+        ylabel="‖e_N‖_W relative to start [-]",
+    )
+    axes.legend()
+
+
+def draw_observed_force(axes: Axes) -> None:
+    """Draw the force at the hand of a bundled run: true, observed, and the spring's."""
+    experiment = hsp.load_experiment("compliance/panda_cartesian_impedance")
+    rollout = experiment.run()
+    pushes = experiment.scenario.plant.pushes
+    at_hand = [each for each in pushes if each.frame == "panda_tcp"]
+    t = rollout.t
+    true = sum(each.force[1] * np.array([each.is_active(x) for x in t])
+               for each in at_hand)  # fmt: skip
+    soft = np.clip((t - 5.0) / 0.5, 0.0, 1.0)
+    soft = soft**3 * (10.0 - 15.0 * soft + 6.0 * soft**2)
+    spring = -(600.0 - 450.0 * soft) * rollout["task.hand.error"][:, 1]
+    axes.plot(t, spring, color=SERIES[1], lw=2.0, label="K (x - x_d), the spring")
+    observed = rollout["observer.wrench.hand"][:, 1]
+    axes.plot(t, observed, color=SERIES[0], lw=2.0, label="observed, in the log")
+    axes.plot(t, true, color=INK, lw=1.0, ls="--", label="true, at the hand")
+    axes.set(
+        title="(b)  The force along y; from 5 s on the springs are softer",
+        xlabel="time [s]",
+        ylabel="force along y [N]",
+    )
+    axes.legend()
 
 
 def draw_chaos(axes: Axes) -> None:

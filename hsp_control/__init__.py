@@ -62,6 +62,7 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .tasks import FramePose as FramePose
     from .tasks import FramePosition as FramePosition
     from .tasks import Gains as Gains
+    from .tasks import Impedance as Impedance
     from .tasks import JointPosture as JointPosture
     from .tasks import Pointing as Pointing
     from .tasks import Task as Task
@@ -79,8 +80,8 @@ _NAMES = {
     "geometry": "Obstacle Sphere",
     "trajectories": "Circle Hold Line Stream StreamOrientation StreamPose",
     "tasks": (
-        "CenterOfMass FrameOrientation FramePose FramePosition Gains JointPosture "
-        "Pointing Task"
+        "CenterOfMass FrameOrientation FramePose FramePosition Gains Impedance "
+        "JointPosture Pointing Task"
     ),
     "null_space.fields": (
         "Cost FunctionCost JointCentering Manipulability NullSpaceField "

@@ -18,7 +18,7 @@ from hsp_control.null_space.fields import FieldSample, FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
-from hsp_control.tasks.task import Feedback
+from hsp_control.tasks.task import InForce
 
 
 class ActiveStack:
@@ -52,7 +52,7 @@ class ActiveStack:
         state: RobotState,
         support: Support,
         levels: Sequence[Sequence[PlannedTask]],
-        feedback: Mapping[int, Feedback],
+        feedback: Mapping[int, InForce],
         base: Indices,
         metric: Metric,
         field: NullSpaceField,
@@ -107,7 +107,8 @@ class ActiveStack:
         for each in tasks:
             sample = self.rows.rows(row, row + each.task.rows)
             self._parts.append((each.task, sample))
-            plans.append(partial(each.task.compile, state, feedback[each.key], sample))
+            in_force = feedback[each.key]
+            plans.append(partial(each.task.compile_in_force, state, in_force, sample))
             row += each.task.rows
         self._plans = plans
         self.damped_level = 0

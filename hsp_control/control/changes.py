@@ -24,7 +24,9 @@ from hsp_control.declaration.quantities import Flag, Gain, NonNegative, Number
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
-from hsp_control.tasks import Gains, Task
+from hsp_control.tasks import Gains, Impedance, Task
+from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.tasks.impedance import check_bounded, parts_of
 from hsp_control.trajectories import (
     Crossfade,
     OrientationTrajectory,
@@ -40,6 +42,7 @@ __all__ = [
     "ChangeContact",
     "ChangeField",
     "ChangeGains",
+    "ChangeImpedance",
     "ChangeLimits",
     "ChangeNullSpaceGain",
     "ChangeReference",
@@ -141,9 +144,50 @@ class ChangeGains(Change, type="gains"):
             raise ControllerError(
                 f"task {self.task!r} has no gains: its error equation is of first order"
             )
+        if impedance_of(planned.task) is not None:
+            raise ControllerError(
+                f"task {self.task!r} has an impedance instead of gains; a change of "
+                "type impedance changes it"
+            )
         with within("gains"):
             target = np.stack(self.gains.matrices(planned.task.rows))
         return setup.with_task(k, gains=planned.gains.then(self.at, self.ramp, target))
+
+
+class ChangeImpedance(Change, type="impedance"):
+    """The impedance of a task changes; its equation holds throughout.
+
+    While the stiffness K changes, it adds the power ½ eᵀK'e to the motion.
+    """
+
+    task: str
+    """Name of the task."""
+    impedance: Impedance
+    """The new impedance."""
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the impedance; see `Change.apply`.
+
+        Raises:
+            ControllerError: If the task has no impedance.
+            GainError: If the impedance does not fit the task, or what it was.
+        """
+        k = setup.find_task(self.task)
+        planned = setup.tasks[k]
+        if impedance_of(planned.task) is None:
+            raise ControllerError(
+                f"task {self.task!r} has no impedance from the start, so none can "
+                "follow; give it one"
+            )
+        with within("impedance"):
+            target = self.impedance.numbers(planned.task.rows)
+            numbers = planned.gains.then(self.at, self.ramp, target)
+            values = [numbers.initial, *(each.target for each in numbers.transitions)]
+            # In between, the stiffness of one meets the bounds of another.
+            if any(parts_of(each)[3].any() for each in values):
+                for each in values:
+                    check_bounded(parts_of(each)[0])
+        return setup.with_task(k, gains=numbers)
 
 
 class ChangeReference(Change, type="reference"):
@@ -369,6 +413,11 @@ class Changes:
     def gains(self, task: str, gains: Gains) -> Self:
         """Change the gains of a task; see `ChangeGains`."""
         return self._do(ChangeGains(task, gains, at=self._at, ramp=self._ramp))
+
+    def impedance(self, task: str, impedance: Impedance) -> Self:
+        """Change the impedance of a task; see `ChangeImpedance`."""
+        at, ramp = self._at, self._ramp
+        return self._do(ChangeImpedance(task, impedance, at=at, ramp=ramp))
 
     def reference(self, task: str, trajectory: AnyReference) -> Self:
         """Change the trajectory of a task; see `ChangeReference`."""

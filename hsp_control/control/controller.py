@@ -53,7 +53,7 @@ from hsp_control.null_space.metrics.metric import CONSTANT
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
 from hsp_control.tasks.gains import as_gain
-from hsp_control.tasks.task import Feedback
+from hsp_control.tasks.task import Feedback, InForce
 
 AccelerationModifier = Callable[
     [RobotState, ActiveStack, Array], tuple[Array, Array | None]
@@ -166,7 +166,7 @@ class Controller:
         self._state = RobotState(robot)
         self._modified, self._mixed = np.zeros((2, robot.nv))
         self._gain = np.zeros((robot.nv, robot.nv))
-        self._feedback: dict[int, Feedback] = {}
+        self._feedback: dict[int, InForce] = {}
         self._by_key: dict[int, Task] = {}
         self._stacks: dict[tuple[int, ...], ActiveStack] = {}
         self._field: NullSpaceField = Rest()
@@ -252,19 +252,18 @@ class Controller:
         self._actuation.plan(setup.limits, self._latest)
         self._write_gains(self._latest)
 
-    def _feedback_of(self, key: int, task: Task) -> Feedback:
+    def _feedback_of(self, key: int, task: Task) -> InForce:
         """Return the feedback of a task that is new, or follows a new trajectory."""
         old = self._by_key.get(key)
         if old is not None and old.name == task.name and old.rows == task.rows:
             return self._feedback[key]
-        return task.feedback()
+        return task.in_force()
 
     def _write_gains(self, t: float) -> None:
         """Write the gains of a time; every step reads these arrays."""
         for each in self._setup.tasks:
             if not (each.gains.constant and each.key in self._written):
-                feedback = self._feedback[each.key]
-                feedback.Kp[:], feedback.Kv[:] = each.gains.at(t)
+                self._feedback[each.key].numbers[:] = each.gains.at(t)
         self._written = set(self._by_key)
         self._gain[:] = self._setup.gain.at(t)
 
@@ -427,8 +426,8 @@ class Controller:
             self._actuation.forget()
             self._now, self._begun = -np.inf, False
             self._active = None  # the next step places what is relative
-            for feedback in self._feedback.values():
-                feedback.offset[:] = 0.0
+            for in_force in self._feedback.values():
+                in_force.feedback.offset[:] = 0.0
             if self._changes or any(each.task.remembers for each in self._setup.tasks):
                 self._compose(self._start)
 
@@ -578,6 +577,11 @@ class Controller:
         """The joint-space metric."""
         return self._setup.metric
 
+    @read_only()
+    def singularity_threshold(self) -> float:
+        """Singular value below which an inverse is bounded instead of exact."""
+        return self._threshold
+
     @read_only("use at(t).limits(...)")
     def limits(self) -> RobotLimits | None:
         """The limits, as numbers of this robot."""
@@ -617,6 +621,20 @@ class Controller:
         Raises:
             ControllerError: If there is no such task.
         """
+        return self._in_force(task).feedback
+
+    def linear_feedback(self, task: str, state: RobotState) -> Feedback:
+        """Return a task's feedback for small errors about a state.
+
+        With gains it is the one in force; an impedance gives other gains at each state.
+
+        Raises:
+            ControllerError: If there is no such task.
+        """
+        planned = self._setup.tasks[self._setup.find_task(task)]
+        return planned.task.linear_feedback(state, self._feedback[planned.key])
+
+    def _in_force(self, task: str) -> InForce:
         return self._feedback[self._setup.tasks[self._setup.find_task(task)].key]
 
     def weight_of(self, task: str, t: float) -> float:
@@ -740,7 +758,9 @@ class Controller:
             "open": self._open,
             "now": self._now,
             "at": (state.t, state.q.copy(), state.v.copy()),
-            "offsets": {k: each.offset.copy() for k, each in self._feedback.items()},
+            "offsets": {
+                k: each.feedback.offset.copy() for k, each in self._feedback.items()
+            },
             "last_effort": self._actuation.memory(),
         }
 
@@ -751,7 +771,7 @@ class Controller:
         self._open, self._begun, self._now = saved["open"], saved["begun"], saved["now"]
         self._install(_applied(self._open, self._settled))
         for key, offset in saved["offsets"].items():
-            self._feedback[key].offset[:] = offset
+            self._feedback[key].feedback.offset[:] = offset
         self._state.update(*saved["at"])
         self._actuation.remember(saved["last_effort"])
 

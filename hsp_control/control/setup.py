@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-import numpy as np
-
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
@@ -30,7 +28,8 @@ class PlannedTask:
         key: Tells it from every other task of the controller, also of the same name.
         task: The task, placed.
         presence: 1 while it is part of the controller, 0 while not.
-        gains: Kp and Kv, shape (2, m, m) [1/s², 1/s].
+        gains: The numbers of its feedback: Kp and Kv, shape (2, m, m) [1/s², 1/s], or
+            those of an impedance; see `Task.in_force`.
     """
 
     key: int
@@ -186,8 +185,7 @@ def _changed(planned: Planned, **changes: Any) -> Planned:
 
 def planned_task(key: int, task: Task, presence: Evolution[float]) -> PlannedTask:
     """Return a placed task with its own gains."""
-    Kp, Kv, _ = task.feedback()
-    return PlannedTask(key, task, presence, Evolution(np.stack([Kp, Kv])))
+    return PlannedTask(key, task, presence, Evolution(task.in_force().numbers))
 
 
 def planned_terms(

@@ -1,19 +1,16 @@
 """The weighted pseudo-inverse, exact away from singularities and bounded through them.
 
 Written for the whitened Jacobian B = J L⁻ᵀ with W = L Lᵀ, in which every metric is the
-Euclidean one. It is kept as two factors, which the law multiplies by one after the
-other: J# = L⁻ᵀ Qᵀ X. Away from singularities Q = X B has orthonormal rows, X lower
-triangular; near them Q = U B has orthogonal rows, and X = q(s²) U inverts the spectrum.
+Euclidean one. It is kept as the two factors of `bounded_inverse`, which the law
+multiplies by one after the other: J# = L⁻ᵀ Qᵀ X.
 """
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.bounded_inverse import bounded_inverse
 from hsp_control.common.kernels import kernel
 from hsp_control.common.linalg import (
     multiply,
     multiply_transposed,
-    orthogonalise_rows,
-    orthonormalise_rows,
-    smallest_singular_value_bound,
     solve_lower,
     solve_lower_transposed,
 )
@@ -47,13 +44,7 @@ def weighted_pseudo_inverse(
         X: Shape (m, m).
     """
     whiten(J, L, form, B)
-    # The spectrum is computed only where cheaper bounds cannot decide.
-    bound = orthonormalise_rows(B, Q, X)
-    if 0.0 < bound < threshold:
-        bound = smallest_singular_value_bound(X)
-    if bound < threshold:
-        return _bounded_factors(B, threshold, Q, X)
-    return False
+    return bounded_inverse(B, threshold, Q, X)
 
 
 @kernel
@@ -64,27 +55,6 @@ def whiten(J: Array, L: Array, form: int, B: Array) -> None:
             B[k, i] = J[k, i]
         if form != IDENTITY:
             solve_lower(L, B[k])
-
-
-@kernel
-def _bounded_factors(B: Array, threshold: float, Q: Array, X: Array) -> bool:
-    """Write Q = U B with rows of norms s, and X = q(s²) U; return whether it damped."""
-    m, n = B.shape
-    for k in range(m):
-        for i in range(n):
-            Q[k, i] = B[k, i]
-    orthogonalise_rows(Q, X)
-    floor = threshold * threshold
-    damped = False
-    for k in range(m):
-        x = 0.0
-        for i in range(n):
-            x += Q[k, i] * Q[k, i]
-        inverse = 1.0 / x if x >= floor else (2.0 - x / floor) / floor
-        damped = damped or x < floor
-        for i in range(m):
-            X[k, i] *= inverse
-    return damped
 
 
 @kernel

@@ -6,6 +6,7 @@ from .frame_orientation import FrameOrientation as FrameOrientation
 from .frame_pose import FramePose as FramePose
 from .frame_position import FramePosition as FramePosition
 from .gains import Gains as Gains
+from .impedance import Impedance as Impedance
 from .joint_posture import JointPosture as JointPosture
 from .pointing import Pointing as Pointing
 from .relative_pose import RelativePose as RelativePose

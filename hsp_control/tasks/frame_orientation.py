@@ -24,7 +24,9 @@ from hsp_control.common.rotations import (
 from hsp_control.geometry.start import Start
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
+from hsp_control.tasks.compliant_task import CompliantTask
 from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
+from hsp_control.tasks.impedance_gains import Rotating
 from hsp_control.tasks.placing import place_orientation
 from hsp_control.tasks.task import (
     Drawn,
@@ -46,7 +48,9 @@ ORIENTATION_SCRATCH = 12
 """Rows of the scratch array of `orientation_error` and `orientation_acceleration`."""
 
 
-class FrameOrientation(FrameTask, TrackingTask, type="frame_orientation"):
+class FrameOrientation(
+    FrameTask, TrackingTask, CompliantTask, type="frame_orientation"
+):
     """e = -log(R_dᵀ R), the orientation of a frame in the world [rad].
 
     e is a rotation vector in the axes of the desired frame. The error equation is
@@ -56,6 +60,7 @@ class FrameOrientation(FrameTask, TrackingTask, type="frame_orientation"):
     """
 
     drawn: ClassVar[tuple[Drawn, ...]] = ("orientation",)
+    wrench_unit: ClassVar[str | None] = "N·m"
 
     trajectory: OrientationTrajectory = HoldOrientation()
     """R_d(t), world ← frame [rad]; held as at the start by default."""
@@ -100,6 +105,10 @@ class FrameOrientation(FrameTask, TrackingTask, type="frame_orientation"):
             out,
         )
         return self.trajectory.follow(desired), write
+
+    def _rotating(self, state: RobotState) -> Rotating:
+        motion = state.frame(self.frame_name).motion
+        return Rotating(0, motion.rotation, motion.velocity[3:])
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return the desired angular velocity w_d in world axes, shape (3,) [rad/s]."""

@@ -15,12 +15,14 @@ from hsp_control.declaration import AnyOf
 from hsp_control.geometry.start import Start
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
+from hsp_control.tasks.compliant_task import CompliantTask
 from hsp_control.tasks.frame_orientation import (
     ORIENTATION_SCRATCH,
     orientation_acceleration,
     orientation_error,
 )
 from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
+from hsp_control.tasks.impedance_gains import Rotating
 from hsp_control.tasks.placing import place_pose
 from hsp_control.tasks.task import (
     Drawn,
@@ -48,7 +50,7 @@ POSE_ERROR = (
 )
 
 
-class FramePose(FrameTask, TrackingTask, type="frame_pose"):
+class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
     """e = (x_d - x, -log(R_dᵀ R)), the pose of a frame in the world [m, rad].
 
     Position rows are in world axes; orientation rows are those of `FrameOrientation`.
@@ -58,6 +60,7 @@ class FramePose(FrameTask, TrackingTask, type="frame_pose"):
     """
 
     drawn: ClassVar[tuple[Drawn, ...]] = ("position", "orientation")
+    wrench_unit: ClassVar[str | None] = "N and N·m"
 
     trajectory: PoseOrPoint = ComposedPose()
     """The desired pose, world ← frame, or the trajectory of its origin, with the
@@ -112,6 +115,10 @@ class FramePose(FrameTask, TrackingTask, type="frame_pose"):
             out,
         )
         return self.pose.follow(PoseSample.over(desired)), write
+
+    def _rotating(self, state: RobotState) -> Rotating:
+        motion = state.frame(self.frame_name).motion
+        return Rotating(3, motion.rotation, motion.velocity[3:])
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' and w_d in world axes, shape (6,) [m/s, rad/s]."""

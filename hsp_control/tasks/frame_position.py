@@ -11,6 +11,7 @@ from hsp_control.geometry.start import Start
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.axes import axis_indices, track_axes
+from hsp_control.tasks.compliant_task import CompliantTask
 from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
 from hsp_control.tasks.placing import place_point
 from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, TaskSample
@@ -19,7 +20,7 @@ from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.following import Follower
 
 
-class FramePosition(FrameTask, TrackingTask, type="frame_position"):
+class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position"):
     """e = x_d - x, the position of a frame's origin in world axes [m].
 
     J are the linear rows of the frame's Jacobian in world axes;
@@ -27,6 +28,7 @@ class FramePosition(FrameTask, TrackingTask, type="frame_position"):
     """
 
     drawn: ClassVar[tuple[Drawn, ...]] = ("position",)
+    wrench_unit: ClassVar[str | None] = "N"
 
     trajectory: Trajectory = Hold()
     """x_d(t), the trajectory of the origin [m]; held at the start by default."""

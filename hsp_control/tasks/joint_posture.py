@@ -17,10 +17,10 @@ from hsp_control.geometry.start import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.configuration_space import joint_displacements
 from hsp_control.robot.postures import Posture, configuration
+from hsp_control.tasks.compliant_task import CompliantTask
 from hsp_control.tasks.task import (
     ErrorPart,
     Feedback,
-    SecondOrderTask,
     TaskSample,
     add_feedback,
 )
@@ -29,7 +29,7 @@ from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.following import stay
 
 
-class JointPosture(SecondOrderTask, type="joint_posture"):
+class JointPosture(CompliantTask, type="joint_posture"):
     """e = q_d ⊖ q of some joints, with q_d(t) = reference ⊕ displacement(t).
 
     Each joint has one degree of freedom, in rad or m. The error is exactly linear, and

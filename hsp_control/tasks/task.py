@@ -80,6 +80,19 @@ class Feedback(NamedTuple):
     offset: Array
 
 
+class InForce(NamedTuple):
+    """What a task's feedback is made of while it runs: the controller owns it.
+
+    Attributes:
+        numbers: What changes change: Kp and Kv, shape (2, m, m), or what another kind
+            of feedback is made of.
+        feedback: What the task reads.
+    """
+
+    numbers: Array
+    feedback: Feedback
+
+
 Drawn = Literal["position", "orientation", "direction"]
 """What can be drawn in the world; see `Task`."""
 
@@ -180,6 +193,29 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         Raises:
             GainError: If the gains do not fit the rows, or the error would not decay.
         """
+
+    def in_force(self) -> InForce:
+        """Return new arrays of the task's own feedback, for a run."""
+        Kp, Kv, offset = self.feedback()
+        numbers = np.stack([Kp, Kv])
+        return InForce(numbers, Feedback(numbers[0], numbers[1], offset))
+
+    def compile_in_force(
+        self, state: RobotState, in_force: InForce, out: TaskSample
+    ) -> StepPlan:
+        """Return the step plan with a feedback that may change; see `compile`."""
+        return self.compile(state, in_force.feedback, out)
+
+    def feedback_at(self, state: RobotState) -> Feedback:
+        """Return new arrays of the task's own feedback at a state, without offset."""
+        return self.feedback()
+
+    def linear_feedback(self, state: RobotState, in_force: InForce) -> Feedback:
+        """Return the feedback for small errors about a state, at which it may depend.
+
+        The check of the control rate uses it.
+        """
+        return in_force.feedback
 
     def placed(self, start: Start) -> Self:
         """Return the task for a robot and a start, checked.
@@ -321,7 +357,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """Return both, or new ones where they are None."""
         return (
             TaskSample.allocate(self.rows, state.robot.nv) if out is None else out,
-            self.feedback() if feedback is None else feedback,
+            self.feedback_at(state) if feedback is None else feedback,
         )
 
     @abstractmethod

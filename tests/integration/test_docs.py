@@ -50,6 +50,20 @@ def test_the_readme_s_python_runs(
     np.testing.assert_allclose(rollout["null_space_norm"], decay, rtol=1e-4, atol=1e-8)
 
 
+def test_the_page_of_compliance_is_true() -> None:
+    text = (ROOT / "docs" / "compliance.md").read_text(encoding="utf-8")
+    (snippet,) = blocks(text, "python")
+    exec(compile(snippet, "compliance.md", "exec"), {})
+    (configuration,) = blocks(text, "yaml")
+    rest = {
+        "robot": {"name": "panda"},
+        "simulation": {"duration": 0.02, "control_period": 0.001},
+    }
+    assert load_experiment(yaml.safe_load(configuration) | rest).run().status == (
+        "completed"
+    )
+
+
 @pytest.mark.parametrize("page", ["sweeps", "latency", "robustness"])
 def test_the_pages_python_runs_and_their_commands_exist(page: str) -> None:
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")

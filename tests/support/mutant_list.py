@@ -171,9 +171,51 @@ MUTANTS = (
     Mutant(
         "gains: Kv is not ramped",
         CONTROL + "controller.py",
-        "feedback.Kp[:], feedback.Kv[:] = each.gains.at(t)",
-        "feedback.Kp[:] = each.gains.at(t)[0]",
+        "self._feedback[each.key].numbers[:] = each.gains.at(t)",
+        "self._feedback[each.key].numbers[0] = each.gains.at(t)[0]",
         UNIT + "tasks/test_gains.py",
+    ),
+    Mutant(
+        "impedance: no rate of the inertia",
+        TASKS + "impedance_gains.py",
+        "Kv[i, j] -= 0.5 * root[i, j]",
+        "Kv[i, j] -= 0.0 * root[i, j]",
+        UNIT + "tasks/test_impedance.py -k equation",
+    ),
+    Mutant(
+        "impedance: rotated axes stand still",
+        TASKS + "impedance_gains.py",
+        "T_dot[i, 0] = -part[i, 0] - (b * w[2] - c * w[1])",
+        "T_dot[i, 0] = -part[i, 0]",
+        UNIT + "tasks/test_impedance.py -k equation",
+    ),
+    Mutant(
+        "impedance: a bounded spring pulls on",
+        TASKS + "impedance_gains.py",
+        "return 1.0 / beyond if beyond > 1.0 else 1.0",
+        "return 1.0",
+        UNIT + "tasks/test_impedance.py -k equation",
+    ),
+    Mutant(
+        "impedance: the mass matrix of another state",
+        TASKS + "compliant_task.py",
+        "StepPlan(task.follow, (*update, *task.write, write, *task.write))",
+        "StepPlan(task.follow, (*task.write, write, *task.write))",
+        UNIT + "tasks/test_impedance.py -k all_joints",
+    ),
+    Mutant(
+        "impedance: bounded spring taken for soft",
+        TASKS + "compliant_task.py",
+        "parts_of(numbers)[3][:] = 0.0",
+        "parts_of(numbers)[3][:] *= 1.0",
+        UNIT + "tasks/test_impedance.py -k of_the_step",
+    ),
+    Mutant(
+        "observer: it cancels what it is only to see",
+        COMPENSATION + "momentum_observer.py",
+        "        if not self.cancel:\n            return np.zeros(robot.nv)\n",
+        "",
+        "tests/integration/test_compliance.py -k observer",
     ),
     # ------------------------------------------------------------------ null space
     Mutant(
@@ -411,7 +453,7 @@ MUTANTS = (
     ),
     Mutant(
         "inverse not bounded in the singularity",
-        LAW + "pseudo_inverse.py",
+        COMMON + "bounded_inverse.py",
         "inverse = 1.0 / x if x >= floor else (2.0 - x / floor) / floor",
         "inverse = 1.0 / x",
         UNIT + "law/test_pseudo_inverse.py -k bound",

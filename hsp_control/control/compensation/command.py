@@ -25,11 +25,13 @@ from hsp_control.control.compensation.integral_action import RunningIntegral
 from hsp_control.control.compensation.momentum_observer import RunningObserver
 from hsp_control.control.compensation.predictor import Predictor, RunningPredictor
 from hsp_control.control.compensation.start_up_ramp import RunningRamp
+from hsp_control.control.compensation.task_wrench import task_wrench
 from hsp_control.control.compensation.velocity_filter import RunningFilter
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
 from hsp_control.robot import RobotState
+from hsp_control.tasks.compliant_task import CompliantTask
 
 
 class Command:
@@ -174,6 +176,7 @@ class Command:
             found["observer.disturbance"] = LogChannel(
                 self._observer.disturbance, unit, "estimated disturbance r"
             )
+            found |= self._wrenches(self._observer.disturbance)
         if self._feed_forward is not None:
             found["friction.feed_forward"] = LogChannel(
                 self._friction_sent, unit, "feed-forward of friction"
@@ -190,6 +193,18 @@ class Command:
             found["shown.v"] = LogChannel(
                 self._shown[1], "rad/s or m/s", "velocity at which the law is computed"
             )
+        return found
+
+    def _wrenches(self, disturbance: Array) -> dict[str, LogChannel]:
+        """Return the force at each task of a frame that explains a disturbance."""
+        found, threshold = {}, self.controller.singularity_threshold
+        for task in self.controller.tasks:
+            if isinstance(task, CompliantTask) and task.wrench_unit is not None:
+                found[f"observer.wrench.{task.name}"] = LogChannel(
+                    task_wrench(task, self._measured, disturbance, threshold),
+                    task.wrench_unit,
+                    "estimated force on the robot, in world axes",
+                )
         return found
 
     # -- the links of the chain -------------------------------------------------------

@@ -19,6 +19,7 @@ from hsp_control.control.compensation.velocity_filter import VelocityFilter
 from hsp_control.declaration import Part, within
 from hsp_control.robot import Robot
 from hsp_control.tasks import Task
+from hsp_control.tasks.compliant_task import impedance_of
 
 
 class Compensation(Part, error=CompensationError):
@@ -34,7 +35,8 @@ class Compensation(Part, error=CompensationError):
     predictor: Predictor | None = None
     """Evaluates the law for the predicted state in which its effort will act."""
     momentum_observer: MomentumObserver | None = None
-    """Estimates the efforts that the model does not explain, and cancels them."""
+    """Estimates the efforts that the model does not explain, and cancels them if it is
+    to."""
     friction_feed_forward: Literal["urdf"] | FrictionFeedForward | None = None
     """Adds efforts against friction at the desired velocity; ``urdf`` takes the
     friction from the robot's file."""
@@ -77,6 +79,7 @@ class Compensation(Part, error=CompensationError):
             if part is not None:
                 with within(name):
                     part.check(robot)
+        self._check_compliance(tasks)
         if self.integral_action is not None:
             with within("integral_action"):
                 self.integral_action.check(tasks)
@@ -87,4 +90,18 @@ class Compensation(Part, error=CompensationError):
                     raise CompensationError(
                         "limits.effort_rate keeps the rate already, and deviates in "
                         "the null space first; remove one of the two"
+                    )
+
+    def _check_compliance(self, tasks: Sequence[Task]) -> None:
+        """Check that no force is cancelled to which a task is to yield."""
+        observer = self.momentum_observer
+        if observer is None or not observer.cancel or observer.clip is not None:
+            return
+        for task in tasks:
+            if impedance_of(task) is not None:
+                with within("momentum_observer"):
+                    raise CompensationError(
+                        f"the observer would cancel every force to which task "
+                        f"{task.name!r} is to yield by its impedance; set cancel to "
+                        "false, or a clip [N·m] that is as large as the friction"
                     )

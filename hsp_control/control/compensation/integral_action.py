@@ -15,6 +15,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import ArrayField, Gain, Names, Positive
 from hsp_control.tasks import Task
+from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.gains import as_gain, as_matrix
 
 
@@ -80,6 +81,11 @@ class IntegralAction(Part, error=CompensationError):
         for task in tasks:
             if self.tasks is not None and task.name not in self.tasks:
                 continue
+            if impedance_of(task) is not None:
+                raise CompensationError(
+                    f"task {task.name!r} has an impedance: integral action would press "
+                    "against what it yields to; list the other tasks in tasks"
+                )
             if task.name in self.ki:
                 with within("ki", task.name):
                     Ki = as_matrix(as_gain(self.ki[task.name], "Ki"), task.rows, "Ki")

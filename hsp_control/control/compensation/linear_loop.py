@@ -82,7 +82,9 @@ class LinearLoop:
             r, momentum = 0.0 * r, 0.0 * momentum
         for u in sent[1:]:
             x_seen, v_seen = _moved(x_seen, v_seen, u + r, h)
-        u = -self.kp @ x_seen - self.kv @ v_seen - self.ki @ z - r
+        u = -self.kp @ x_seen - self.kv @ v_seen - self.ki @ z
+        if own.momentum_observer is not None and own.momentum_observer.cancel:
+            u = u - r
         z = z + h * x_seen if self.ki.any() else 0.0 * z
         drives = [*drives, u]
         x, v = _moved(x, v, self.share * drives[0], h)

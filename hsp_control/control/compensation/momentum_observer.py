@@ -8,6 +8,7 @@ momenta", ICRA 2003. With p = M v, p' = tau + Cᵀv - G + d for a disturbance d,
 is a low-pass of d. It needs no measured acceleration.
 """
 
+from dataclasses import KW_ONLY
 from math import exp
 
 import numpy as np
@@ -17,12 +18,12 @@ from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.limits.numbers_by_joint import Positives
 from hsp_control.control.compensation.checks import check_fixed_base, per_dof
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.quantities import Positive
+from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import Robot, RobotState
 
 
 class MomentumObserver(Part, error=CompensationError):
-    """The efforts that the model does not explain are estimated and cancelled.
+    """The efforts that the model does not explain are estimated, and cancelled.
 
     Over a period h with a constant effort, the mean of the disturbance d is
     Δp/h - tau - (mean of Cᵀv - G), to second order in h. The estimate r moves towards
@@ -30,7 +31,8 @@ class MomentumObserver(Part, error=CompensationError):
     itself is stable for every K_O h.
 
     The cancelled part of r is clipped. Otherwise the robot would resist a person who
-    holds it, or a collision, with its full effort.
+    holds it, or a collision, with its full effort. With ``cancel`` off it only
+    estimates: a hand with an impedance then yields to the forces that the log shows.
     """
 
     bandwidth: Positive = 50.0
@@ -38,6 +40,21 @@ class MomentumObserver(Part, error=CompensationError):
     clip: Positives | None = None
     """Largest effort that is cancelled [N·m or N], one number or nv; unlimited by
     default."""
+    _: KW_ONLY
+    cancel: Flag = True
+    """Whether the estimate is cancelled [-]; false: it is only logged."""
+
+    def __post_init__(self) -> None:
+        """Check that nothing is clipped if nothing is cancelled.
+
+        Raises:
+            CompensationError: If it is.
+        """
+        if self.clip is not None and not self.cancel:
+            raise CompensationError(
+                "clip bounds the effort that is cancelled, and cancel is false; remove "
+                "one of the two"
+            )
 
     def check(self, robot: Robot) -> None:
         """Check that the observer fits the robot.
@@ -55,6 +72,8 @@ class MomentumObserver(Part, error=CompensationError):
 
     def _bounds(self, robot: Robot) -> Array:
         """Return the maximum of |r| that is cancelled, shape (nv,) [N·m or N]."""
+        if not self.cancel:
+            return np.zeros(robot.nv)
         with within("clip"):
             return per_dof(robot, self.clip)
 

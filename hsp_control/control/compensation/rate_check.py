@@ -15,12 +15,12 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, UnstableRateError
 from hsp_control.control.compensation.compensation import Compensation
 from hsp_control.control.compensation.linear_loop import LinearLoop
-from hsp_control.control.compensation.momentum_observer import MomentumObserver
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
 from hsp_control.null_space.fields import FieldSample
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks.compliant_task import impedance_of
 
 RULE = 0.2
 """Recommended maximum of K_N h, and of ω0 h without delay: up to it the loop is close
@@ -102,7 +102,8 @@ def rate_findings(
 
     Args:
         controller: The controller.
-        q: Configuration at which the field's slope is computed, shape (nq,).
+        q: Configuration at which the field's slope, and the gains that an impedance
+            gives, are computed, shape (nq,).
         period: The control period h [s].
         compensation: The compensators; None: none.
         effort_delay: Delay of efforts, in periods; None: the predictor's setting.
@@ -123,7 +124,7 @@ def rate_findings(
     delays = effort_delay, sensor_delay, compensation
     state = controller.robot.state(0.0, q, np.zeros(controller.robot.nv))
     found = [
-        *_task_findings(controller, period, delays),
+        *_task_findings(controller, state, period, delays),
         *_null_space_findings(controller, state, period, delays),
     ]
     return [finding for finding in found if finding is not None]
@@ -133,30 +134,69 @@ _Delays = tuple[int, int, Compensation]
 
 
 def _task_findings(
-    controller: Controller, period: float, delays: _Delays
+    controller: Controller, state: RobotState, period: float, delays: _Delays
 ) -> list["RateFinding | None"]:
     action = delays[2].integral_action
     integral = {} if action is None else action.gains(controller.tasks)
     found = []
     for task in controller.tasks:
-        Kp, Kv, _ = controller.feedback(task.name)
+        Kp, Kv, _ = controller.linear_feedback(task.name, state)
         zero = np.zeros_like(Kp)
         Ki = integral.get(task.name, zero)
         if task.order == 1:  # e' + K e = 0 with K in the place of Kp
             loop = LinearLoop(zero, Kp.copy(), zero, period, *delays)
-            label = f"K of task {task.name!r}", float(np.diag(Kp).max())
+            speed = _of_gain(f"K of task {task.name!r}", float(np.diag(Kp).max()))
             path: tuple[str, ...] = ("tasks", task.name)
         else:
             loop = LinearLoop(Kp.copy(), Kv.copy(), Ki, period, *delays)
             frequency = float(np.sqrt(np.abs(np.linalg.eigvals(Kp)).max()))
-            label = f"ω0 of task {task.name!r}", frequency
             path = ("tasks", task.name, "gains")
+            speed = _of_gain(f"ω0 of task {task.name!r}", frequency)
+            if impedance_of(task) is not None:
+                path = ("tasks", task.name, "impedance")
+                damped = 0.5 * float(np.abs(np.linalg.eigvals(Kv)).max())
+                speed = _of_impedance(task.name, frequency, damped)
         delayed = delays[0] + delays[1] > 0 and delays[2].predictor is None
         rule = RULE_DELAYED if delayed else RULE
-        found.append(_finding(path, loop, label, rule, ""))
+        found.append(_finding(path, loop, speed, rule, ""))
         if task.name in integral:
             found.append(_integral_finding(task.name, loop))
     return found
+
+
+class _Speed(NamedTuple):
+    """How fast a loop is to be, and what makes it slower.
+
+    Attributes:
+        what: The setting that decides.
+        rate: Its rate [1/s].
+        at_most: Which settings make the rate another one: a function of this [1/s].
+    """
+
+    what: str
+    rate: float
+    at_most: Callable[[float], str]
+
+
+def _of_gain(what: str, rate: float) -> _Speed:
+    return _Speed(what, rate, lambda x: f"{what} of at most {_rounded(x)} 1/s")
+
+
+def _of_impedance(task: str, frequency: float, damped: float) -> _Speed:
+    """Return the speed of an impedance: √(K/Λ), or D/(2Λ) if that is larger."""
+    rate = max(frequency, damped)
+    what = f"√(stiffness/inertia) of task {task!r}"
+    if damped > frequency * (1.0 + 1e-9):
+        what = f"damping/(2 inertia) of task {task!r}"
+
+    def at_most(x: float) -> str:
+        s = x / rate
+        return (
+            f"at most {_rounded(s * s)} times this stiffness and {_rounded(s)} times "
+            "this damping"
+        )
+
+    return _Speed(f"{what} at the start", rate, at_most)
 
 
 def _integral_finding(name: str, loop: LinearLoop) -> RateFinding | None:
@@ -194,8 +234,8 @@ def _null_space_findings(
     extra = "" if stiffness < 1e-3 * gain else (
         f", with a field of stiffness {stiffness:.4g} 1/s"
     )  # fmt: skip
-    label = "K_N", gain
-    found = [_finding(("null_space", "gain"), loop, label, RULE, extra, (K, A))]
+    speed = _of_gain("K_N", gain)
+    found = [_finding(("null_space", "gain"), loop, speed, RULE, extra, (K, A))]
     if found[0] is None and stiffness * period > RULE:
         found = [
             RateFinding(
@@ -256,15 +296,15 @@ def field_slope(controller: Controller, state: RobotState) -> Array:
 def _finding(
     path: tuple[str, ...],
     loop: LinearLoop,
-    label: tuple[str, float],
+    speed: _Speed,
     rule: float,
     extra: str,
     null_space: tuple[Array, Array] | None = None,
 ) -> RateFinding | None:
-    radius, (what, gain), h = loop.radius(), label, loop.period
-    product = f"{what} times the period is {gain * h:.3g}{extra}"
+    radius, gain, h = loop.radius(), speed.rate, loop.period
+    product = f"{speed.what} times the period is {gain * h:.3g}{extra}"
     if radius > 1.0 + _ROUNDING:
-        choices = _stabilising_changes(loop, what, gain, null_space)
+        choices = _stabilising_changes(loop, speed, null_space)
         solution = (
             f"use {' or '.join(choices)}"
             if choices
@@ -283,8 +323,9 @@ def _finding(
     if gain * h > rule * (1.0 + 1e-9):
         return RateFinding(
             path,
-            f"{product}; at most {rule:g} is recommended: use {what} of at most "
-            f"{rule / h:.3g} 1/s, or a control_period of at most {rule / gain:.3g} s",
+            f"{product}; at most {rule:g} is recommended: use "
+            f"{speed.at_most(rule / h)}, or a control_period of at most "
+            f"{rule / gain:.3g} s",
             radius,
             False,
         )
@@ -293,8 +334,7 @@ def _finding(
 
 def _stabilising_changes(
     loop: LinearLoop,
-    what: str,
-    gain: float,
+    speed: _Speed,
     null_space: tuple[Array, Array] | None,
 ) -> list[str]:
     """Return changes of single settings, each of which makes the loop stable."""
@@ -307,8 +347,8 @@ def _stabilising_changes(
 
     own, choices = loop.compensation, []
     if (s := _largest(gains)) is not None:
-        choices.append(f"{what} of at most {_rounded(s * gain)} 1/s")
-    if null_space is not None and null_space[1].max() > 1e-3 * gain:
+        choices.append(speed.at_most(s * speed.rate))
+    if null_space is not None and null_space[1].max() > 1e-3 * speed.rate:
         K, A = null_space
 
         def weights(s: float) -> LinearLoop:
@@ -318,11 +358,12 @@ def _stabilising_changes(
             choices.append(f"fields of at most {_rounded(s)} times these weights")
     if (s := _largest(lambda s: replace(loop, period=s * loop.period))) is not None:
         choices.append(f"a control_period of at most {_rounded(s * loop.period)} s")
-    if own.momentum_observer is not None:
-        rate = own.momentum_observer.bandwidth
+    if own.momentum_observer is not None and own.momentum_observer.cancel:
+        running = own.momentum_observer
+        rate = running.bandwidth
 
         def observer(s: float) -> LinearLoop:
-            slower = MomentumObserver(s * rate)
+            slower = replace(running, bandwidth=s * rate)
             return replace(loop, compensation=replace(own, momentum_observer=slower))
 
         if (s := _largest(observer)) is not None:

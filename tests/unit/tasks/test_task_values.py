@@ -39,7 +39,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.declaration import Part
 from hsp_control.declaration.part import value_fields
-from hsp_control.tasks import AngularMomentum, RelativePose
+from hsp_control.tasks import AngularMomentum, Impedance, RelativePose
 from hsp_control.trajectories import (
     ComposedPose,
     HoldOrientation,
@@ -65,6 +65,7 @@ EXAMPLES: dict[type[Part], Part] = {
     FramePose: FramePose(),
     FramePosition: FramePosition(),
     Gains: Gains(4.0, 5.0),
+    Impedance: Impedance(100.0),
     JointPosture: JointPosture(),
     Pointing: Pointing(direction=[0, 0, 1]),
     RelativePose: RelativePose(reference="panda_link0"),
@@ -78,6 +79,9 @@ _TASK: dict[str, Any] = {
 }
 _GAINS: dict[str, Any] = {"gains": Gains(natural_frequency=[1, 2, 3])}
 _TRACKING: dict[str, Any] = {**_TASK, **_GAINS, "blend": 2}
+_SPRING: dict[str, Any] = {
+    "impedance": [Impedance([100, 200, 300]), Impedance(50, damping=20)]
+}
 _FRAME: dict[str, Any] = {"frame": "panda_hand"}
 _POINT = [Hold([0.1, 0, 0]), Circle(0.1, 2), Line([1, 2, 3], 1.0, origin="start")]
 _TURN = [Spin([0, 0, 1], 0.5), HoldOrientation(np.eye(3))]
@@ -90,16 +94,29 @@ _POSE = [
 OTHERS: dict[type[Part], dict[str, Any]] = {
     AngularMomentum: {**_TASK, "trajectory": _POINT, "rate": 5},
     CenterOfMass: {**_TRACKING, "trajectory": _POINT, "axes": ["xy", "zx"]},
-    FrameOrientation: {**_TRACKING, **_FRAME, "trajectory": _TURN},
-    FramePose: {**_TRACKING, **_FRAME, "trajectory": _POSE},
-    FramePosition: {**_TRACKING, **_FRAME, "trajectory": _POINT, "axes": "y"},
+    FrameOrientation: {**_TRACKING, **_SPRING, **_FRAME, "trajectory": _TURN},
+    FramePose: {**_TRACKING, **_SPRING, **_FRAME, "trajectory": _POSE},
+    FramePosition: {
+        **_TRACKING,
+        **_SPRING,
+        **_FRAME,
+        "trajectory": _POINT,
+        "axes": "y",
+    },
     Gains: {
         "kp": [3, [1, 2], np.array([1.0, 3.0]), [[4, 0.1], [0.2, 5]]],
         "kv": [np.float32(2.5), [1.0, 2.0]],
     },
+    Impedance: {
+        "stiffness": [3, [1, 2], np.array([1.0, 3.0]), [[4, 0.1], [0.1, 5]]],
+        "damping": [2, [1, 2], [[4, 0.1], [0.1, 5]]],
+        "damping_ratio": 0.7,
+        "largest_error": [0.1, [0.1, 0.2]],
+    },
     JointPosture: {
         **_TASK,
         **_GAINS,
+        **_SPRING,
         "reference": ["home", np.linspace(-1, 1, 7), [0, 1, 0]],
         "joints": [["panda_joint1"], ("panda_joint2", "panda_joint1")],
         "displacement": _POINT,
@@ -146,7 +163,7 @@ def test_every_class_and_every_field_is_tried() -> None:
         for each in Task.family.members.values()
         if each.__module__.startswith("hsp_control.")
     ]
-    assert set(MEMBERS) == {*own, Gains}
+    assert set(MEMBERS) == {*own, Gains, Impedance}
     assert set(EXAMPLES) == set(OTHERS) == set(MEMBERS)
     for cls in MEMBERS:
         tried = {name for each in ALONE.get(cls, []) for name in each.changed_fields()}
@@ -218,7 +235,9 @@ def test_what_was_given_may_change_afterwards() -> None:
 @pytest.mark.parametrize("part", ALL, ids=repr)
 def test_a_mapping_makes_an_equal_part(part: Part) -> None:
     """What YAML says of it, and what YAML makes of that."""
-    adapter: TypeAdapter[Any] = TypeAdapter(Task if isinstance(part, Task) else Gains)
+    adapter: TypeAdapter[Any] = TypeAdapter(
+        Task if isinstance(part, Task) else type(part)
+    )
     data = part.to_dict()
     assert adapter.validate_python(data) == part
     assert data.get("type") == part.yaml_type
@@ -307,6 +326,13 @@ _WRONG_TRACKING: Wrong = {
     **_WRONG_GAINS,
     "blend": [(0.0, "blend: 0.0 is too small; must be greater than 0")],
 }
+_WRONG_SPRING: Wrong = {
+    "impedance": [
+        (100.0, "impedance: 100.0 is a decimal number; expected a mapping"),
+        ({"damping": 3}, "impedance: missing key 'stiffness'"),
+        ({"stiffness": -1}, "impedance.stiffness: -1 is negative; must be greater"),
+    ]
+}
 _WRONG_FRAME: Wrong = {"frame": [(7, "frame: 7 is an integer; expected text")]}
 _WRONG_POINT: list[tuple[Any, str]] = [
     ([0, 0, 1], "trajectory: .* expected a mapping"),
@@ -337,10 +363,21 @@ WRONG: dict[type[Part], Wrong] = {
         "trajectory": _WRONG_POINT,
         "axes": _WRONG_AXES,
     },
-    FrameOrientation: {**_WRONG_TRACKING, **_WRONG_FRAME, "trajectory": _WRONG_TURN},
-    FramePose: {**_WRONG_TRACKING, **_WRONG_FRAME, "trajectory": _WRONG_POSE},
+    FrameOrientation: {
+        **_WRONG_TRACKING,
+        **_WRONG_SPRING,
+        **_WRONG_FRAME,
+        "trajectory": _WRONG_TURN,
+    },
+    FramePose: {
+        **_WRONG_TRACKING,
+        **_WRONG_SPRING,
+        **_WRONG_FRAME,
+        "trajectory": _WRONG_POSE,
+    },
     FramePosition: {
         **_WRONG_TRACKING,
+        **_WRONG_SPRING,
         **_WRONG_FRAME,
         "trajectory": _WRONG_POINT,
         "axes": _WRONG_AXES,
@@ -351,8 +388,29 @@ WRONG: dict[type[Part], Wrong] = {
         "natural_frequency": [(1.0, "give either kp and kv, or natural_frequency and")],
         "damping_ratio": [(1.0, "give either kp and kv, or .* and damping_ratio")],
     },
+    Impedance: {
+        "stiffness": [
+            (0, "stiffness: 0 is too small; must be greater than 0"),
+            ([1.0, np.nan], "stiffness.1: .nan is not a finite number"),
+            ([[1, 0, 0], [0, 1, 0]], r"stiffness has shape \(2, 3\); a matrix gain"),
+            ([[1, 0.2], [0.1, 1]], r"stiffness is .*; a matrix must be symmetric"),
+            ([[1, 2], [2, 1]], "with the eigenvalue -1; a matrix must be positive def"),
+        ],
+        "damping": [
+            (-3, "damping: -3 is negative; must be greater than 0"),
+            ([[2, 1], [0, 2]], "damping is .*; a matrix must be symmetric"),
+            ([[1, 2], [2, 1]], "damping is .* positive definite"),
+        ],
+        "damping_ratio": [([1, 2], r"damping_ratio: \[1, 2\] is a list; expected")],
+        "largest_error": [
+            (0, "largest_error: 0 is too small; must be greater than 0"),
+            ([[0.1]], r"largest_error.0: \[0.1\] is a list; expected"),
+            (np.inf, "largest_error: .inf is not a finite number"),
+        ],
+    },
     JointPosture: {
         **_WRONG_TASK,
+        **_WRONG_SPRING,
         **_WRONG_GAINS,
         "reference": [
             (

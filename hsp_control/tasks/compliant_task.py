@@ -1,0 +1,154 @@
+"""The base class of tasks that may have an impedance instead of gains."""
+
+from collections.abc import Callable
+from dataclasses import KW_ONLY
+from functools import partial
+from typing import ClassVar, Self
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import GainError
+from hsp_control.common.native import bind
+from hsp_control.common.step_plan import StepPlan
+from hsp_control.declaration import within
+from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks.gains import Gains
+from hsp_control.tasks.impedance import Impedance, parts_of
+from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
+from hsp_control.tasks.task import (
+    Feedback,
+    InForce,
+    SecondOrderTask,
+    Task,
+    TaskSample,
+)
+
+_NO_GAINS = Gains(natural_frequency=10.0)
+
+
+class CompliantTask(SecondOrderTask):
+    """A task with gains, or with an impedance: then it yields to a force as a spring.
+
+    An impedance is gains that depend on the state. A step evaluates the task, computes
+    them from its J, J', e and e', and evaluates it again with them: the error equation
+    of the task stays the only one. A subclass whose error contains a rotation vector
+    overrides `_rotating`.
+
+    Attributes:
+        wrench_unit: The unit of a force along the rows of J, if these are axes of the
+            world: the log has such a force, if it is estimated.
+    """
+
+    wrench_unit: ClassVar[str | None] = None
+
+    _: KW_ONLY
+    impedance: Impedance | None = None
+    """Stiffness and damping of the rows [N/m and N·s/m, or N·m/rad and N·m·s/rad],
+    instead of `gains`; none by default."""
+
+    def __post_init__(self) -> None:
+        """Check that there are not both gains and an impedance.
+
+        Raises:
+            GainError: If there are.
+        """
+        if self.impedance is not None and self.gains != _NO_GAINS:
+            raise GainError(
+                "give either gains [1/s², 1/s] or impedance [N/m, N·s/m], not both"
+            )
+
+    def _rotating(self, state: RobotState) -> Rotating:
+        """Return which rows are a rotation vector, of a frame that is kept up to date.
+
+        By default none are.
+        """
+        return Rotating(self.rows, np.eye(3), np.zeros(3))
+
+    def checked(self, robot: Robot) -> Self:
+        """Return the task itself, whose rows and gains fit; see `Task.checked`.
+
+        Raises:
+            GainError: If it has an impedance, and the robot a floating base.
+        """
+        if self.impedance is not None and robot.unactuated:
+            with within("impedance"):
+                raise GainError(
+                    f"{robot.name} has a free-flyer root: its inertia at a task "
+                    "depends on the contacts; needs a robot with a fixed base"
+                )
+        return super().checked(robot)
+
+    def feedback(self) -> Feedback:
+        """Return new arrays of feedback; zeros with an impedance, see `feedback_at`."""
+        if self.impedance is None:
+            return super().feedback()
+        rows = self.rows
+        with within("impedance"):
+            self.impedance.numbers(rows)
+        return Feedback(np.zeros((rows, rows)), np.zeros((rows, rows)), np.zeros(rows))
+
+    def in_force(self) -> InForce:
+        """Return new arrays of the task's own feedback; see `Task.in_force`."""
+        if self.impedance is None:
+            return super().in_force()
+        return InForce(self.impedance.numbers(self.rows), self.feedback())
+
+    def compile_in_force(
+        self, state: RobotState, in_force: InForce, out: TaskSample
+    ) -> StepPlan:
+        """Return the step plan: the task, its gains, the task with these gains."""
+        task = self.compile(state, in_force.feedback, out)
+        if self.impedance is None:
+            return task
+        matrices = state.mass_matrix, state.mass_matrix_rate
+        update: list[Callable[[], object]] = [
+            partial(getattr, state, name)
+            for name in ("mass_matrix", "mass_matrix_rate")
+        ]
+        write = bind(
+            impedance_gains,
+            *matrices,
+            self._rotating(state),
+            in_force.numbers,
+            out,
+            Scratch.allocate(self.rows, state.robot.nv),
+            in_force.feedback,
+        )
+        return StepPlan(task.follow, (*update, *task.write, write, *task.write))
+
+    def feedback_at(self, state: RobotState) -> Feedback:
+        """Return new arrays of feedback at a state; see `Task.feedback_at`."""
+        if self.impedance is None:
+            return super().feedback_at(state)
+        return self._at(state, self.in_force().numbers)
+
+    def linear_feedback(self, state: RobotState, in_force: InForce) -> Feedback:
+        """Return the feedback for small errors: no spring is at its largest error."""
+        if self.impedance is None:
+            return super().linear_feedback(state, in_force)
+        numbers = in_force.numbers.copy()
+        parts_of(numbers)[3][:] = 0.0
+        return self._at(state, numbers)
+
+    def _at(self, state: RobotState, numbers: Array) -> Feedback:
+        """Return Kp and Kv of the numbers of an impedance at a state."""
+
+        def make() -> tuple[InForce, StepPlan]:
+            in_force = InForce(np.zeros_like(numbers), self.feedback())
+            sample = TaskSample.allocate(self.rows, state.robot.nv)
+            return in_force, self.compile_in_force(state, in_force, sample)
+
+        in_force, plan = state.made(self, "impedance", make)
+        in_force.numbers[:] = numbers
+        for follow in plan.follow:
+            follow(state.t)
+        for write in plan.write:
+            write()
+        Kp, Kv, offset = in_force.feedback
+        return Feedback(Kp.copy(), Kv.copy(), offset.copy())
+
+
+def impedance_of(task: Task) -> Impedance | None:
+    """Return the impedance of a task; None if it has gains."""
+    return task.impedance if isinstance(task, CompliantTask) else None

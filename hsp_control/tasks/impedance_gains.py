@@ -1,0 +1,297 @@
+"""From an impedance to the gains that give it at a state.
+
+With J_e the Jacobian of the error's coordinates, e' = -J_e v plus what the reference
+does, G = Λ⁻¹ = J_e M⁻¹ J_eᵀ and an external force f, τ = J_eᵀ f:
+
+    e'' = e''_commanded - G f
+
+so that e''_commanded = -Kv e' - Kp e with
+
+    Kp = G K S,    Kv = -½ G' Λ + G D + 2 ζ √(G K)
+
+gives Λ e'' + (½ Λ' + D + D_ζ) e' + K S e = -f, because Λ' = -Λ G' Λ. S = diag(s) is
+the part of the error that counts, s_i e_i = sat(e_i). D_ζ = 2 ζ Λ √(G K) is symmetric,
+and damps each mode of (Λ, K) with the ratio ζ. With K = C Cᵀ,
+
+    √(G K) = C⁻ᵀ √(Cᵀ G C) Cᵀ,
+
+which needs no inverse of G. Only the first term does. There Λ = J̄ᵀ M J̄, with the
+pseudo-inverse J̄ = M⁻¹J_eᵀΛ, bounded where the law bounds its own.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.bounded_inverse import bounded_inverse
+from hsp_control.common.kernels import kernel
+from hsp_control.common.linalg import (
+    cholesky,
+    gram,
+    orthogonalise_rows,
+    solve_rows,
+    solve_rows_transposed,
+    squared_norm,
+)
+from hsp_control.common.rotations import compose, jexp3_dot, jlog3
+from hsp_control.tasks.task import Feedback, TaskSample
+
+_THRESHOLD = 0.03
+"""Default threshold of the law's singularities: see `Controller`."""
+
+
+class Rotating(NamedTuple):
+    """Which rows of an error are a rotation vector, and what rotates.
+
+    Attributes:
+        first: The first of the three rows; the number of rows if there are none.
+        rotation: World ← frame, shape (3, 3).
+        angular_velocity: Of the frame, in world axes, shape (3,) [rad/s].
+    """
+
+    first: int
+    rotation: Array
+    angular_velocity: Array
+
+
+class Scratch(NamedTuple):
+    """Memory of `impedance_gains`.
+
+    Attributes:
+        factor: Shape (nv, nv).
+        wide: Shape (5, m, nv).
+        square: Shape (7, m, m).
+        turning: Shape (4, 3, 3).
+        vectors: Shape (2, 3).
+    """
+
+    factor: Array
+    wide: Array
+    square: Array
+    turning: Array
+    vectors: Array
+
+    @classmethod
+    def allocate(cls, rows: int, nv: int) -> "Scratch":
+        """Return zeros."""
+        return cls(
+            np.zeros((nv, nv)),
+            np.zeros((5, rows, nv)),
+            np.zeros((7, rows, rows)),
+            np.zeros((4, 3, 3)),
+            np.zeros((2, 3)),
+        )
+
+
+@kernel
+def impedance_gains(
+    M: Array,
+    M_dot: Array,
+    rotating: Rotating,
+    numbers: Array,
+    sample: TaskSample,
+    scratch: Scratch,
+    feedback: Feedback,
+) -> None:
+    """Write Kp and Kv: what the task's own kernel then reads.
+
+    Where M is singular they are NaN, so that the law reports that the step is not
+    finite.
+
+    Args:
+        M: Mass matrix, shape (nv, nv).
+        M_dot: Its rate, shape (nv, nv).
+        rotating: The rows that are a rotation vector.
+        numbers: K, D, ζ, 1/largest error: see `Impedance.numbers`.
+        sample: J, J', e and e' of the task at the state.
+        scratch: Overwritten.
+        feedback: Its Kp and Kv are written.
+    """
+    m, nv = sample.jacobian.shape
+    K, D, ratio = numbers[:m], numbers[m : 2 * m], numbers[2 * m, 0]
+    inverse_bound, e = numbers[2 * m + 1], sample.error
+    Kp, Kv, _ = feedback
+    L, B, B_dot, X = scratch.factor, scratch.wide[0], scratch.wide[1], scratch.wide[2]
+    G, G_dot, GK, root = (
+        scratch.square[0],
+        scratch.square[1],
+        scratch.square[2],
+        scratch.square[3],
+    )
+    error_jacobian(rotating, sample, scratch.turning, scratch.vectors, B, B_dot)
+    total = 1.0
+    for i in range(nv):
+        total += M[i, i]
+    if not cholesky(M, L):
+        Kp[0, 0] = Kv[0, 0] = np.nan
+        return
+    solve_rows(L, B)  # J_e L⁻ᵀ
+    gram(B, B, False, G)
+    # G' = A M⁻¹J_eᵀ + its transpose, A = J_e' - ½ J_e M⁻¹M'.
+    for i in range(m):
+        for j in range(nv):
+            X[i, j] = B[i, j]
+    solve_rows_transposed(L, X)  # J_e M⁻¹
+    for i in range(m):
+        for j in range(nv):
+            for k in range(nv):
+                B_dot[i, j] -= 0.5 * X[i, k] * M_dot[k, j]
+    gram(B_dot, X, True, G_dot)
+    product(G, K, GK)
+    product(G, D, Kv)
+    if ratio > 0.0:
+        natural_root(B, K, scratch.wide[3], scratch.square, root)
+        for i in range(m):
+            for j in range(m):
+                Kv[i, j] += 2.0 * ratio * root[i, j]
+    inertia = scratch.square[4]
+    Q = scratch.wide[4]
+    # The law whitens with its own metric: W = I at worst, where the singular values of
+    # J L⁻ᵀ may be less than those of J by √(largest eigenvalue of M).
+    bounded_inertia(B, _THRESHOLD / np.sqrt(total), Q, scratch.square[5], inertia)
+    product(G_dot, inertia, root)
+    for i in range(m):
+        for j in range(m):
+            Kv[i, j] -= 0.5 * root[i, j]
+            Kp[i, j] = GK[i, j] * counted(e[j], inverse_bound[j])
+
+
+@kernel
+def counted(e: float, inverse_bound: float) -> float:
+    """Return sat(e)/e, where sat clips e to ± the bound; 1 without a bound."""
+    beyond = abs(e) * inverse_bound
+    return 1.0 / beyond if beyond > 1.0 else 1.0
+
+
+@kernel
+def error_jacobian(
+    rotating: Rotating,
+    sample: TaskSample,
+    turning: Array,
+    vectors: Array,
+    J_e: Array,
+    J_e_dot: Array,
+) -> None:
+    """Write J_e and J_e': J and J', but T J and its rate for a rotation vector.
+
+    e = -y with y' = T ω, T = Jlog(y) Rᵀ, plus what the reference does; hence
+    T' = -Jlog Jexp' T - T [ω]×.
+
+    Args:
+        rotating: The rows that are a rotation vector.
+        sample: J, J', e and e'.
+        turning: Scratch, shape (4, 3, 3).
+        vectors: Scratch, shape (2, 3).
+        J_e: Shape (m, nv).
+        J_e_dot: Its rate, shape (m, nv).
+    """
+    J, J_dot, e, e_dot, _ = sample
+    m, nv = J.shape
+    for i in range(m):
+        for j in range(nv):
+            J_e[i, j] = J[i, j]
+            J_e_dot[i, j] = J_dot[i, j]
+    first, R, w = rotating
+    if first + 3 > m:
+        return
+    T, T_dot, part, other = turning[0], turning[1], turning[2], turning[3]
+    y, y_dot = vectors[0], vectors[1]
+    for i in range(3):
+        y[i], y_dot[i] = -e[first + i], -e_dot[first + i]
+    jlog3(y, part)
+    for i in range(3):
+        for j in range(3):
+            T[i, j] = 0.0
+            for k in range(3):
+                T[i, j] += part[i, k] * R[j, k]
+    jexp3_dot(y, y_dot, other)
+    compose(part, other, T_dot)
+    compose(T_dot, T, part)
+    for i in range(3):
+        # T [ω]×, row by row: (T [ω]×)_i = T_i × ω.
+        a, b, c = T[i, 0], T[i, 1], T[i, 2]
+        T_dot[i, 0] = -part[i, 0] - (b * w[2] - c * w[1])
+        T_dot[i, 1] = -part[i, 1] - (c * w[0] - a * w[2])
+        T_dot[i, 2] = -part[i, 2] - (a * w[1] - b * w[0])
+    for i in range(3):
+        for j in range(nv):
+            J_e[first + i, j] = J_e_dot[first + i, j] = 0.0
+            for k in range(3):
+                J_e[first + i, j] += T[i, k] * J[first + k, j]
+                J_e_dot[first + i, j] += (
+                    T[i, k] * J_dot[first + k, j] + T_dot[i, k] * J[first + k, j]
+                )
+
+
+@kernel
+def natural_root(B: Array, K: Array, Z: Array, square: Array, out: Array) -> None:
+    """Write √(G K) = C⁻ᵀ √(Cᵀ G C) Cᵀ, with G = B Bᵀ and K = C Cᵀ.
+
+    The singular values of Cᵀ B are the natural frequencies of the modes [rad/s].
+
+    Args:
+        B: Whitened Jacobian, shape (m, nv).
+        K: Stiffness, positive definite, shape (m, m).
+        Z: Scratch, shape (m, nv).
+        square: Scratch; the matrices 4, 5 and 6 are overwritten, shape (7, m, m).
+        out: Shape (m, m).
+    """
+    m, nv = B.shape
+    C, U, S = square[4], square[5], square[6]
+    cholesky(K, C)
+    for i in range(m):
+        for j in range(nv):
+            Z[i, j] = 0.0
+            for k in range(i, m):
+                Z[i, j] += C[k, i] * B[k, j]
+    orthogonalise_rows(Z, U)  # Cᵀ G C = Uᵀ diag(ω²) U
+    for i in range(m):
+        for j in range(m):
+            S[i, j] = 0.0
+    for k in range(m):
+        frequency = np.sqrt(squared_norm(Z[k]))
+        for i in range(m):
+            for j in range(m):
+                S[i, j] += U[k, i] * frequency * U[k, j]
+    solve_rows_transposed(C, S)  # S C⁻¹, the transpose of C⁻ᵀ S
+    for i in range(m):
+        for j in range(m):
+            out[i, j] = 0.0
+            for k in range(j + 1):
+                out[i, j] += S[k, i] * C[j, k]
+
+
+@kernel
+def bounded_inertia(B: Array, threshold: float, Q: Array, X: Array, out: Array) -> None:
+    """Write Λ = (B#)ᵀ B#, the inverse of B Bᵀ; it fades to zero where B loses rank.
+
+    Args:
+        B: Whitened Jacobian, shape (m, nv).
+        threshold: Singular value of B above which it is the inverse.
+        Q: Scratch, shape (m, nv).
+        X: Scratch, shape (m, m).
+        out: Shape (m, m).
+    """
+    bounded_inverse(B, threshold, Q, X)
+    m = B.shape[0]
+    for i in range(m):
+        for j in range(m):
+            out[i, j] = 0.0
+    for k in range(m):  # the rows of Q are orthogonal
+        square = squared_norm(Q[k])
+        for i in range(m):
+            for j in range(m):
+                out[i, j] += square * X[k, i] * X[k, j]
+
+
+@kernel
+def product(A: Array, B: Array, out: Array) -> None:
+    """Write A B; shapes (m, m)."""
+    m = A.shape[0]
+    for i in range(m):
+        for j in range(m):
+            total = 0.0
+            for k in range(m):
+                total += A[i, k] * B[k, j]
+            out[i, j] = total

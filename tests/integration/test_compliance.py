@@ -1,0 +1,321 @@
+"""A compliant hand along whole motions: what a force does to it, and what it does not.
+
+The law runs in the integrator's stages, so that what is compared are the equations
+themselves; where efforts are held, the difference is said.
+"""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import simpson
+
+import hsp_control as hsp
+from hsp_control import Controller, FramePose, FramePosition, Robot, Rollout
+from hsp_control.control.compensation import Compensation, MomentumObserver, check_rate
+from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
+from hsp_control.robot.integrators import Dop853, Rk4
+from hsp_control.simulation.plants import Push, RigidBody
+from hsp_control.tasks import Impedance
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+PRECISE = Dop853(rtol=1e-11, atol=1e-11)
+FORCE, MOMENT = np.array([25.0, -15.0, 20.0]), np.array([1.5, -1.0, 0.7])
+POSE = Impedance([500, 700, 600, 25, 30, 20], damping_ratio=0.8)
+
+
+@cache
+def panda() -> Robot:
+    return Robot.load("panda")
+
+
+def start() -> Array:
+    return panda().integrate(panda().home(), 0.1 * np.cos(1.0 + np.arange(7)))
+
+
+def position_hand(**fields: Any) -> FramePosition:
+    return FramePosition("panda_tcp", name="hand", **fields)
+
+
+def pose_hand(**fields: Any) -> FramePose:
+    return FramePose("panda_tcp", name="hand", **fields)
+
+
+def run(
+    hand: hsp.Task, metric: Metric, pushes: list[Push], gain: float = 3.0, **how: Any
+) -> Rollout:
+    """Return a run from rest, its null space off its field; nobody tells of pushes."""
+    robot, q = panda(), start()
+    away = robot.integrate(q, 0.4 * np.sin(1.0 + np.arange(7)))
+    field = hsp.TargetPosture(away, weight=1.5)
+    controller = Controller(
+        robot, [hand], field, null_space_gain=gain, metric=metric, limits=None
+    )
+    how = {"duration": 0.8, "log_period": 0.02, "integrator": PRECISE} | how
+    plant = RigidBody(pushes=pushes).build(robot, how["integrator"])
+    return hsp.simulate(controller, q, plant=plant, **how)
+
+
+# --- the theorem ---------------------------------------------------------------------
+
+CASES = {
+    "position": (
+        position_hand(impedance=Impedance(600.0, damping_ratio=0.7)),
+        Push("panda_tcp", FORCE, duration=10.0),
+    ),
+    "pose": (
+        pose_hand(impedance=POSE),
+        Push("panda_tcp", FORCE, MOMENT, duration=10.0),
+    ),
+    "gains": (pose_hand(), Push("panda_tcp", FORCE, MOMENT, duration=10.0)),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_an_unknown_force_at_the_hand_does_not_reach_the_null_space(name: str) -> None:
+    """With W = M: e_N' = -K_N e_N - P M⁻¹J_hᵀ f, and P M⁻¹J_hᵀ = 0.
+
+    It is so for gains as for an impedance. With W = I the same force is felt.
+    """
+    hand, push = CASES[name]
+    pushed = run(hand, MassMatrixMetric(), [push])
+    predicted = pushed["null_space_norm"][0] * np.exp(-3.0 * pushed.t)
+    assert predicted[0] > 0.05
+    assert np.abs(pushed["task.hand.error"]).max() > 0.02  # the hand gives way
+    np.testing.assert_allclose(pushed["null_space_norm"], predicted, rtol=1e-8)
+    felt = run(hand, IdentityMetric(), [push])
+    predicted = felt["null_space_norm"][0] * np.exp(-3.0 * felt.t)
+    assert (felt["null_space_norm"] / predicted).max() > 3.0
+
+
+def test_a_force_elsewhere_does_reach_it() -> None:
+    """At the elbow it must: the elbow is what the null space moves."""
+    elbow = Push("panda_link4", FORCE, duration=10.0)
+    pushed = run(pose_hand(impedance=POSE), MassMatrixMetric(), [elbow])
+    predicted = pushed["null_space_norm"][0] * np.exp(-3.0 * pushed.t)
+    assert (pushed["null_space_norm"] / predicted).max() > 2.0
+
+
+def test_a_moment_is_a_force_elsewhere_for_a_position() -> None:
+    """The rows of a position do not hold it: a pose keeps it from the null space."""
+    turned = Push("panda_tcp", moment=MOMENT, duration=10.0)
+    hand = position_hand(impedance=Impedance(600.0))
+    pushed = run(hand, MassMatrixMetric(), [turned])
+    predicted = pushed["null_space_norm"][0] * np.exp(-3.0 * pushed.t)
+    assert (pushed["null_space_norm"] / predicted).max() > 1.5
+
+
+# --- the spring ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("metric", [IdentityMetric(), MassMatrixMetric()], ids=repr)
+def test_under_a_constant_force_the_hand_rests_where_the_spring_holds_it(
+    metric: Metric,
+) -> None:
+    """x - x_d = K⁻¹ f, for a matrix as well; a moment turns it about its own axes."""
+    coupled = np.array([[600.0, 150.0, 0.0], [150.0, 400.0, -80.0], [0, -80.0, 500.0]])
+    stiffness = np.zeros((6, 6))
+    stiffness[:3, :3], stiffness[3:, 3:] = coupled, np.diag([25.0, 30.0, 20.0])
+    hand = pose_hand(impedance=Impedance(stiffness))
+    rest = run(
+        hand,
+        metric,
+        [Push("panda_tcp", FORCE, duration=60.0)],
+        duration=6.0,
+        integrator=Rk4(0.004),
+        gain=5.0,
+    )
+    moved = np.linalg.solve(coupled, FORCE)
+    error = rest["task.hand.error"][-1]
+    np.testing.assert_allclose(-error[:3], moved, rtol=1e-5)
+    np.testing.assert_allclose(error[3:], 0.0, atol=1e-5)
+
+
+def test_a_bounded_spring_pulls_no_harder() -> None:
+    """At four times its largest error the hand feels the same force: it creeps on."""
+    stiffness, bound, damping = 500.0, 0.02, 80.0
+    spring = Impedance(stiffness, damping=damping, largest_error=bound)
+    push = Push("panda_tcp", [0.0, 0.0, -16.0], duration=10.0)
+    slow = run(position_hand(impedance=spring), MassMatrixMetric(), [push], gain=5.0)
+    error, rate = slow["task.hand.error"][:, 2], slow["task.hand.error_rate"][:, 2]
+    assert error[-1] > 3.0 * bound
+    # What is left of the force moves the damper: 16 N - 10 N over 80 N·s/m, but for
+    # the change of the inertia along the way.
+    np.testing.assert_allclose(rate[-5:], 6.0 / damping, rtol=0.05)
+
+
+def inertia(q: Array, rows: int) -> Array:
+    state = panda().state(0.0, q, np.zeros(7))
+    J = state.frame("panda_tcp").jacobian[:rows]
+    return np.linalg.inv(J @ np.linalg.solve(state.mass_matrix, J.T))
+
+
+@pytest.mark.parametrize("metric", [IdentityMetric(), MassMatrixMetric()], ids=repr)
+def test_the_energy_is_what_came_in_less_what_was_damped(metric: Metric) -> None:
+    """E' = fᵀv - e'ᵀDe' + ½ eᵀK'e, E = ½ e'ᵀΛe' + ½ eᵀKe: passive at the hand.
+
+    The last term is what a growing stiffness adds.
+    """
+    robot, q = panda(), start()
+    soft, hard = np.array([200.0, 300.0, 250.0]), np.array([900.0, 500.0, 700.0])
+    damping = 30.0
+    hand = position_hand(impedance=Impedance(soft, damping=damping))
+    controller = Controller(robot, [hand], metric=metric, limits=None)
+    controller.at(0.2).ramp(0.3).impedance("hand", Impedance(hard, damping=damping))
+    push = Push("panda_tcp", FORCE, duration=10.0)
+    plant = RigidBody(pushes=[push]).build(robot, PRECISE)
+    log = hsp.simulate(
+        controller,
+        q,
+        plant=plant,
+        duration=0.8,
+        log_period=0.001,
+        integrator=PRECISE,
+    )
+    e, rate = log["task.hand.error"], log["task.hand.error_rate"]
+    s = np.clip((log.t - 0.2) / 0.3, 0.0, 1.0)
+    grown = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    grows = 30.0 * s**2 * (1.0 - s) ** 2 / 0.3
+    K = soft + grown[:, None] * (hard - soft)
+    K_dot = grows[:, None] * (hard - soft)
+    kinetic = [0.5 * r @ inertia(x, 3) @ r for x, r in zip(log.q, rate, strict=True)]
+    energy = np.array(kinetic) + 0.5 * (K * e**2).sum(axis=1)
+    power = -rate @ FORCE - damping * (rate**2).sum(axis=1)
+    ramped = 0.5 * (K_dot * e**2).sum(axis=1)
+    assert simpson(ramped, x=log.t) > 0.02  # it counts
+    gained = simpson(power + ramped, x=log.t)
+    assert energy[-1] - energy[0] == pytest.approx(gained, rel=1e-6)
+
+
+# --- what the observer says ----------------------------------------------------------
+
+
+def test_the_observer_finds_the_force_and_does_not_fight_it() -> None:
+    """A known wrench is found at 1 kHz, and the hand moves as without an observer."""
+    push = Push("panda_tcp", FORCE, MOMENT, duration=10.0)
+    how: dict[str, Any] = {
+        "duration": 1.5, "control_period": 0.001, "integrator": Rk4(0.001), "gain": 5.0,
+    }  # fmt: skip
+    hand = pose_hand(impedance=POSE)
+    only = Compensation(momentum_observer=MomentumObserver(60.0, cancel=False))
+    seen = run(hand, MassMatrixMetric(), [push], compensation=only, **how)
+    alone = run(hand, MassMatrixMetric(), [push], **how)
+    np.testing.assert_array_equal(seen.q, alone.q)
+    found = seen["observer.wrench.hand"]
+    about = seen.meta["columns"]["observer.wrench.hand"]
+    assert about["unit"] == "N and N·m"
+    settled = seen.t > 0.3
+    wrench = np.concatenate([FORCE, MOMENT])
+    assert np.abs(found[settled] - wrench).max() < 0.15  # still moving
+    assert np.abs(found[-1] - wrench).max() < 1e-3
+    # A low-pass of the truth: 1 - exp(-K_O t).
+    early = seen.t < 0.1
+    low_pass = 1.0 - np.exp(-60.0 * seen.t[early])
+    assert np.abs(found[early] - low_pass[:, None] * wrench).max() < 0.5
+
+
+def test_a_position_sees_the_force_that_moves_it() -> None:
+    push = Push("panda_tcp", FORCE, duration=10.0)
+    only = Compensation(momentum_observer=MomentumObserver(60.0, cancel=False))
+    hand = position_hand(axes="zx", impedance=Impedance(600.0))
+    log = run(
+        hand,
+        MassMatrixMetric(),
+        [push],
+        compensation=only,
+        duration=1.0,
+        control_period=0.001,
+        integrator=Rk4(0.001),
+    )
+    # Of the three components two are rows: f = Λ J M⁻¹ r for these. The estimate of a
+    # robot that moves lags by 1/K_O.
+    state = panda().state(0.0, log.q[-1], log.v[-1])
+    J = state.frame("panda_tcp").jacobian
+    rows = J[[2, 0]]
+    M_inv = np.linalg.inv(state.mass_matrix)
+    expected = np.linalg.solve(rows @ M_inv @ rows.T, rows @ M_inv @ J[:3].T @ FORCE)
+    np.testing.assert_allclose(log["observer.wrench.hand"][-1], expected, atol=0.2)
+    assert log.meta["columns"]["observer.wrench.hand"]["unit"] == "N"
+
+
+# --- the rate ------------------------------------------------------------------------
+
+
+def stiff(impedance: Impedance) -> Controller:
+    return Controller(panda(), [position_hand(impedance=impedance)], limits=None)
+
+
+def test_a_stiffness_that_the_period_does_not_bear() -> None:
+    """It is said before the run, and the advice is right."""
+    q = panda().home()
+    with pytest.raises(
+        hsp.errors.UnstableRateError,
+        match=r"tasks.hand.impedance: unstable at this rate: √\(stiffness/inertia\) of "
+        r"task 'hand' at the start times the period is .*; use at most ([\d.]+) times "
+        r"this stiffness and ([\d.]+) times this damping or a control_period",
+    ) as caught:
+        check_rate(stiff(Impedance(4e6)), q, 0.001)
+    text = str(caught.value)
+    factor = float(text.split("use at most ")[1].split(" times")[0])
+    assert not [
+        each
+        for each in check_rate(stiff(Impedance(0.999 * factor * 4e6)), q, 0.001)
+        if each.unstable
+    ]
+    (warned,) = check_rate(stiff(Impedance(1e5)), q, 0.001)
+    assert warned.path == ("tasks", "hand", "impedance")
+    assert "at most 0.2 is recommended: use at most" in warned.message
+    assert not check_rate(stiff(Impedance(800.0)), q, 0.001)
+    with pytest.raises(hsp.errors.UnstableRateError, match=r"damping/\(2 inertia\) of"):
+        check_rate(stiff(Impedance(100.0, damping=8000.0)), q, 0.001)
+
+
+def test_the_check_looks_at_the_spring_below_its_bound() -> None:
+    """Far from the reference a bounded spring is soft; it will not stay there."""
+    robot, q = panda(), panda().home()
+    far = hsp.Hold(robot.state(0.0, q, np.zeros(7)).position("panda_tcp") + 0.2)
+    bounded = Impedance(4e6, largest_error=1e-4)
+    hand = FramePosition("panda_tcp", far, name="hand", impedance=bounded)
+    with pytest.raises(hsp.errors.UnstableRateError):
+        check_rate(Controller(robot, [hand], limits=None), q, 0.001)
+
+
+# --- the configurations --------------------------------------------------------------
+
+
+def at(log: Rollout, column: str, t: float) -> Array:
+    return log[column][np.searchsorted(log.t, t - 1e-9)]
+
+
+def test_the_cartesian_configuration_makes_its_point() -> None:
+    log = hsp.load_experiment("compliance/panda_cartesian_impedance").run()
+    assert log.status == "completed"
+    assert not log["status"].any()
+    np.testing.assert_allclose(
+        at(log, "task.hand.error", 1.99)[:3], [0.0, -0.05, 0.0], atol=1e-4
+    )
+    np.testing.assert_allclose(
+        at(log, "observer.wrench.hand", 1.99), [0, 30, 0, 0, 0, 0], atol=0.05
+    )
+    assert at(log, "task.hand.error", 7.49)[1] == pytest.approx(-0.2, abs=2e-3)
+    norm = log["null_space_norm"]
+    elbow = (log.t >= 3.5) & (log.t < 5.0)
+    assert norm[elbow].max() > 0.5
+    assert norm[~elbow].max() < 0.01 * norm[elbow].max()
+
+
+def test_the_joint_configuration_makes_its_point() -> None:
+    experiment = hsp.load_experiment("compliance/panda_joint_impedance")
+    log = experiment.run()
+    assert log.status == "completed"
+    assert not log["status"].any()
+    error = at(log, "task.joints.error", 1.49)
+    force = np.array([300.0, 300, 300, 300, 100, 60, 20]) * error
+    state = experiment.robot.state(1.49, at(log, "q", 1.49), np.zeros(7))
+    J = state.frame("panda_tcp").jacobian[:3]
+    np.testing.assert_allclose(-force, J.T @ [0.0, 0.0, -30.0], atol=0.1)
+    assert np.abs(log["task.joints.error"][-1]).max() < 1e-3

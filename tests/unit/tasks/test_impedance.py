@@ -1,0 +1,472 @@
+"""A task with an impedance moves as its inertia on springs and dampers, exactly.
+
+The inertia and its rate are taken from plain Pinocchio and differences along a motion,
+never from the kernels that compute the gains.
+"""
+
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+from scipy.linalg import sqrtm
+from task_cases import (
+    GAINS,
+    SECOND,
+    TIME,
+    Case,
+    Motion,
+    Orientation,
+    Pose,
+    Position,
+    Posture,
+    place,
+)
+
+import hsp_control as hsp
+from hsp_control import Controller, FramePose, FramePosition, Gains, JointPosture
+from hsp_control.common.exceptions import (
+    CompensationError,
+    ControllerError,
+    GainError,
+    TaskError,
+)
+from hsp_control.control.compensation import (
+    Compensation,
+    IntegralAction,
+    MomentumObserver,
+)
+from hsp_control.geometry import Scene
+from hsp_control.geometry.start import Start
+from hsp_control.null_space.metrics import (
+    IdentityMetric,
+    MassMatrixMetric,
+)
+from hsp_control.tasks import Impedance, TaskSample
+from hsp_control.tasks.impedance_gains import Rotating, Scratch, impedance_gains
+
+pytestmark = pytest.mark.filterwarnings("error")
+Array = NDArray[np.float64]
+
+CASES = [
+    Case("planar3r", Position("tip", "xy")),
+    Case("planar3r", Posture(None, True)),
+    Case("panda", Position("panda_tcp", "xyz")),
+    Case("panda", Position("panda_tcp", "zx")),
+    Case("panda", Orientation("panda_tcp")),
+    Case("panda", Pose("panda_tcp")),
+    Case("panda", Posture(None, True)),
+    Case("panda", Posture(("panda_joint4", "panda_joint2"), False)),
+    Case("iiwa14", Position("iiwa_link_ee", "yz")),
+    Case("iiwa14", Orientation("iiwa_link_ee")),
+    Case("iiwa14", Pose("iiwa_link_ee")),
+    Case("iiwa14", Posture(None, False)),
+]
+every_case = pytest.mark.parametrize("case", CASES, ids=str)
+
+
+def definite(rng: np.random.Generator, size: int, scale: float) -> Array:
+    """Return a symmetric positive definite matrix."""
+    A = np.eye(size) + 0.3 * rng.normal(size=(size, size))
+    return scale * A @ A.T
+
+
+def impedance(kind: str, rows: int, rng: np.random.Generator) -> Impedance:
+    """Return an impedance of one kind; stiff rows beside soft ones."""
+    each = (200.0 * rng.uniform(0.3, 3.0, rows)).tolist()
+    if kind == "ratio":
+        return Impedance(each, damping_ratio=0.7)
+    if kind == "matrices":
+        return Impedance(definite(rng, rows, 150.0), damping=definite(rng, rows, 20.0))
+    return Impedance(each, damping=30.0, largest_error=0.2)
+
+
+def mass_matrix(robot: hsp.Robot, q: Array) -> Array:
+    upper = np.triu(pin.crba(robot.model, robot.model.createData(), q))
+    return upper + np.triu(upper, 1).T
+
+
+def errors(task: Any, motion: Motion) -> Callable[[float], Array]:
+    """Return e(s) along a motion."""
+    robot, still = motion.robot, np.zeros(motion.robot.nv)
+    return lambda s: (
+        task.evaluate(
+            robot.state(TIME + s, motion.configuration(s), still),
+            feedback=task.feedback(),
+        ).error
+    )
+
+
+def inverse_inertia(task: Any, motion: Motion, s: float) -> tuple[Array, Array]:
+    """Return Λ⁻¹ and J_e at a point of a motion, J_e = -∂e/∂q by differences."""
+    robot, q = motion.robot, motion.configuration(s)
+    columns = []
+    for direction in np.eye(robot.nv):
+        slide = Motion(robot, q, direction, np.zeros(robot.nv))
+
+        def error(x: float, slide: Motion = slide) -> Array:
+            state = robot.state(TIME + s, slide.configuration(x), np.zeros(robot.nv))
+            return task.evaluate(state, feedback=task.feedback()).error
+
+        columns.append(-slide.derivative(error))
+    J_e = np.array(columns).T
+    return J_e @ np.linalg.solve(mass_matrix(robot, q), J_e.T), J_e
+
+
+def inverse_inertias(task: Any, motion: Motion) -> Callable[[float], Array]:
+    """Return Λ⁻¹(s) along a motion."""
+    return lambda s: inverse_inertia(task, motion, s)[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["ratio", "matrices", "bounded"])
+@every_case
+def test_the_equation_holds_whatever_the_force_and_the_metric(
+    case: Case, kind: str
+) -> None:
+    """Λ e'' + (½ Λ' + D) e' + K sat(e) = -f along the motion that follows from f."""
+    rng = np.random.default_rng(3)
+    for seed, metric in ((1, IdentityMetric()), (2, MassMatrixMetric())):
+        motion = place(case, seed)
+        robot, rows = motion.robot, case.family.rows
+        plain = case.family.build(robot, motion, 0.5, GAINS, seed)
+        rows = plain.rows
+        spring = impedance(kind, rows, rng)
+        task = replace(
+            plain, gains=Gains(natural_frequency=10.0), impedance=spring, name="hand"
+        )
+        controller = Controller(robot, [task], metric=metric, limits=None)
+        output = controller.compute(TIME, motion.q, motion.v)
+        assert not output.damped
+        still = Motion(robot, motion.q, motion.v, np.zeros(robot.nv))
+        inverse, J_e = inverse_inertia(task, still, 0.0)
+        f = 20.0 * rng.normal(size=rows)
+        push = np.linalg.solve(mass_matrix(robot, motion.q), J_e.T @ f)
+        moving = Motion(robot, motion.q, motion.v, output.acceleration + push)
+        e = errors(task, moving)
+        e_dot, e_ddot = moving.derivative(e), moving.derivative(e, SECOND)
+        # Λ' depends on q and v alone.
+        rate = moving.derivative(inverse_inertias(task, moving))
+        inertia = np.linalg.inv(inverse)
+        inertia_rate = -inertia @ rate @ inertia
+        K = np.array(spring.stiffness)
+        K = np.diag(K) if K.ndim == 1 else K
+        if spring.damping is None:
+            D = 2 * 0.7 * inertia @ np.real(sqrtm(inverse @ K))
+            np.testing.assert_allclose(D, D.T, rtol=0, atol=1e-6 * np.abs(D).max())
+        else:
+            D = np.array(spring.damping) * np.eye(rows)
+            if np.ndim(spring.damping) == 2:
+                D = np.array(spring.damping)
+        bound = np.inf if spring.largest_error is None else 0.2
+        force = K @ np.clip(e(0.0), -bound, bound)
+        residual = inertia @ e_ddot + (0.5 * inertia_rate + D) @ e_dot + force + f
+        scale = np.abs(force).max() + np.abs(inertia @ e_ddot).max()
+        assert np.abs(residual).max() < 1e-7 * scale
+
+
+@pytest.mark.parametrize("case", CASES[:3], ids=str)
+def test_gains_at_a_state_are_those_of_the_step(case: Case) -> None:
+    """A task by itself evaluates as a controller does; given gains are used."""
+    motion = place(case, 4)
+    robot = motion.robot
+    plain = case.family.build(robot, motion, 0.3, GAINS, 4)
+    bare = replace(plain, gains=Gains(natural_frequency=10.0), name="hand")
+    task = replace(bare, impedance=Impedance(300.0, damping=20.0, largest_error=0.1))
+    controller = Controller(robot, [task], limits=None)
+    output = controller.compute(TIME, motion.q, motion.v)
+    state = robot.state(TIME, motion.q, motion.v)
+    Kp, Kv, offset = task.feedback_at(state)
+    used = controller.feedback("hand")
+    np.testing.assert_allclose(used.Kp, Kp, rtol=1e-12)
+    np.testing.assert_allclose(used.Kv, Kv, rtol=1e-12)
+    assert not offset.any()
+    own = task.evaluate(state)
+    np.testing.assert_allclose(own.acceleration, output.task.acceleration, rtol=1e-11)
+    again = bare.evaluate(state, feedback=used)
+    np.testing.assert_allclose(again.acceleration, own.acceleration, rtol=1e-12)
+    # For small errors the spring is not at its bound.
+    soft = controller.linear_feedback("hand", state)
+    kept = np.minimum(1.0, 0.1 / np.abs(own.error))
+    np.testing.assert_allclose(soft.Kp * kept, Kp, rtol=1e-12)
+    assert (kept < 1.0).any()
+
+
+def test_joint_impedance_of_all_joints_has_the_mass_matrix() -> None:
+    robot = hsp.Robot.load("panda")
+    spring = Impedance([600, 600, 600, 600, 250, 150, 50], damping=12.0)
+    task = JointPosture("home", impedance=spring)
+    controller = Controller(robot, [task], limits=None)
+    K = np.diag(np.array(spring.stiffness))
+    for away in (0.2, -0.1, 0.4):
+        q, v = robot.home() + away, np.linspace(-away, 0.5, 7)
+        output = controller.compute(0.0, q, v)
+        state = robot.state(0.0, q, v)
+        force = K @ robot.difference(q, robot.home()) - 12.0 * v
+        effort = force - 0.5 * state.mass_matrix_rate @ v + state.nonlinear_effects
+        np.testing.assert_allclose(output.tau, effort, rtol=1e-9, atol=1e-9)
+
+
+def test_modes_have_the_damping_ratio() -> None:
+    """At rest the error's modes are those of one ratio, whatever the inertia."""
+    robot = hsp.Robot.load("iiwa14")
+    spring = Impedance([500, 900, 300, 20, 30, 10], damping_ratio=0.4)
+    task = FramePose(impedance=spring, name="hand")
+    controller = Controller(robot, [task], limits=None)
+    controller.compute(0.0, robot.home(), np.zeros(7))
+    Kp, Kv, _ = controller.feedback("hand")
+    eye, zero = np.eye(6), np.zeros((6, 6))
+    roots = np.linalg.eigvals(np.block([[zero, eye], [-Kp, -Kv]]))
+    np.testing.assert_allclose(-roots.real / np.abs(roots), 0.4, rtol=1e-6)
+
+
+def test_through_a_singularity() -> None:
+    """A straight arm: gains stay finite, and the term in the inertia's rate fades."""
+    robot = hsp.Robot.load("planar3r")
+    task = FramePosition("tip", impedance=Impedance(100.0), axes="xy", name="tip")
+    controller = Controller(robot, [task], limits=None, start=bent(robot, 0.8))
+    v = np.array([0.3, -1.0, 0.7])
+    largest = 0.0
+    for bend in [*np.geomspace(1.0, 1e-12, 200), 0.0]:
+        output = controller.compute(0.0, bent(robot, bend), v)
+        Kp, Kv, _ = controller.feedback("tip")
+        assert np.isfinite(output.tau).all()
+        largest = max(largest, float(np.abs(Kv).max()))
+    assert largest < 2e3
+    assert np.linalg.matrix_rank(Kp, tol=1e-9) == 1
+    np.testing.assert_allclose(  # at the singularity only the damping is left
+        Kv, 2.0 * np.real(sqrtm_psd(Kp / 100.0)) * 10.0, rtol=1e-6, atol=1e-6
+    )
+
+
+def test_a_singular_mass_matrix_is_not_a_number() -> None:
+    """As for the metric M: the step then says that it is not finite."""
+    task = JointPosture("home", impedance=Impedance(100.0))
+    robot = hsp.Robot.load("planar3r")
+    state = robot.state(0.0, bent(robot, 0.3), np.ones(3))
+    task = task.placed(Start(state, Scene()))
+    in_force, sample = task.in_force(), TaskSample.allocate(3, 3)
+    flat, none = np.zeros((3, 3)), Rotating(3, np.eye(3), np.zeros(3))
+    numbers, scratch = in_force.numbers, Scratch.allocate(3, 3)
+    impedance_gains(flat, flat, none, numbers, sample, scratch, in_force.feedback)
+    assert np.isnan(in_force.feedback.Kp[0, 0])
+    assert np.isnan(in_force.feedback.Kv[0, 0])
+
+
+def test_fingers_that_mimic_each_other() -> None:
+    """Pinocchio has no Coriolis matrix then: M' is taken by differences."""
+    robot = hsp.Robot.load("panda", locked={})
+    assert robot.mimics
+    rng = np.random.default_rng(2)
+    q, v = robot.random_configuration(rng), 0.3 * rng.normal(size=robot.nv)
+    task = JointPosture("home", impedance=Impedance(100.0, damping=5.0))
+    controller = Controller(robot, [task], limits=None)
+    output = controller.compute(0.0, q, v)
+    state = robot.state(0.0, q, v)
+    force = 100.0 * robot.difference(q, robot.home()) - 5.0 * v
+    effort = force - 0.5 * state.mass_matrix_rate @ v + state.nonlinear_effects
+    np.testing.assert_allclose(output.tau, effort, rtol=1e-7, atol=1e-7)
+
+
+def bent(robot: hsp.Robot, bend: float) -> Array:
+    """Return a configuration of the planar arm; straight for 0."""
+    return robot.integrate(robot.neutral(), np.array([0.4, bend, 0.5 * bend]))
+
+
+def sqrtm_psd(A: Array) -> Array:
+    """Return the square root of a symmetric positive semidefinite matrix."""
+    values, vectors = np.linalg.eigh(A)
+    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+
+
+# --- changes -------------------------------------------------------------------------
+
+
+def panda_hand(**fields: Any) -> Controller:
+    robot = hsp.Robot.load("panda")
+    home = robot.home()
+    at = robot.state(0.0, home, np.zeros(7)).position("panda_tcp").copy()
+    hand = FramePosition(
+        "panda_tcp", hsp.Hold(at + np.array([0.05, -0.03, 0.02])), name="hand", **fields
+    )
+    return Controller(robot, [hand], limits=None)
+
+
+def test_stiffness_changes_without_a_jump() -> None:
+    """Stiffness, kind of damping and bound: the effort is continuous, and arrives."""
+    soft = Impedance([200, 300, 400], damping_ratio=0.7)
+    hard = Impedance(2000.0, damping=150.0, largest_error=0.01)
+    controller = panda_hand(impedance=soft)
+    robot = controller.robot
+    controller.at(1.0).ramp(0.5).impedance("hand", hard)
+    v = np.linspace(-0.3, 0.3, 7)
+
+    def effort(t: float) -> Array:
+        return controller.compute(t, robot.home(), v).tau.copy()
+
+    times = np.linspace(0.9, 1.6, 1401)
+    tau = np.array([effort(t) for t in times])
+    before, after = effort(0.9), effort(1.6)
+    np.testing.assert_array_equal(tau[0], before)
+    other = panda_hand(impedance=hard).compute(1.6, robot.home(), v).tau
+    np.testing.assert_allclose(after, other, rtol=1e-9, atol=1e-9)
+    steps = np.abs(np.diff(tau, axis=0)).max(axis=1)
+    assert steps.max() < 0.02 * np.abs(after - before).max()
+    assert steps[times[1:] < 1.0].max() == 0.0
+    # A smooth step begins with its third power: no corner.
+    begin = np.abs(effort(1.0 + 1e-3) - before).max()
+    assert begin < 1e-6 * np.abs(after - before).max()
+
+
+def test_a_change_counts_from_what_is_in_force() -> None:
+    controller = panda_hand(impedance=Impedance(100.0))
+    at = controller.at(1.0).ramp(1.0)
+    at.impedance("hand", Impedance(300.0, damping_ratio=0.5))
+    q, v = controller.robot.home(), np.zeros(7)
+    state = controller.robot.state(0.0, q, v)
+    first = controller.tasks[0].feedback_at(state)
+    for t, scale, ratio in ((0.5, 1.0, 1.0), (1.5, 2.0, 0.75), (2.5, 3.0, 0.5)):
+        controller.compute(t, q, v)
+        Kp, Kv, _ = controller.feedback("hand")
+        np.testing.assert_allclose(Kp, scale * first.Kp, rtol=1e-9)
+        np.testing.assert_allclose(Kv, ratio * np.sqrt(scale) * first.Kv, rtol=1e-9)
+
+
+def test_many_changes_overlap_and_a_copy_goes_on() -> None:
+    """No edge of a change is a jump, and a copy in the middle does the same."""
+    rng = np.random.default_rng(5)
+    controller = panda_hand(impedance=Impedance(300.0))
+    begins = np.sort(rng.uniform(0.0, 2.0, 30))
+    ramps = rng.uniform(0.1, 0.5, 30)
+    for at, ramp in zip(begins, ramps, strict=True):
+        stiffness = rng.uniform(100.0, 900.0, 3).tolist()
+        options: dict[str, Any] = [
+            {"damping_ratio": float(rng.uniform(0.3, 1.5))},
+            {"damping": float(rng.uniform(20.0, 60.0))},
+            {"largest_error": float(rng.uniform(0.01, 0.1))},
+        ][rng.integers(3)]
+        controller.at(at).ramp(ramp).impedance("hand", Impedance(stiffness, **options))
+    q, v = controller.robot.home(), np.linspace(-0.3, 0.3, 7)
+    edges = np.sort(np.concatenate([begins, begins + ramps]))
+    between = rng.uniform(0.0, 2.0, 60)
+
+    def steps(times: Array, gap: float) -> Array:
+        there = pickle.loads(pickle.dumps(controller))
+        pairs = [[there.compute(x, q, v).tau for x in (t, t + gap)] for t in times]
+        return np.abs(np.diff(pairs, axis=1)).max(axis=(1, 2))
+
+    assert steps(edges, 1e-5).max() < 0.05 * steps(np.sort(between), 1e-3).max()
+    for t in (0.0, 0.7, 1.3):
+        controller.compute(t, q, v)
+    copy = pickle.loads(pickle.dumps(controller))
+    for t in (1.3, 1.31, 1.8, 3.0):
+        mine, its = (each.compute(t, q, v).tau for each in (controller, copy))
+        np.testing.assert_array_equal(mine, its)
+
+
+COUPLED = [[200.0, 50.0, 0.0], [50.0, 200.0, 0.0], [0.0, 0.0, 100.0]]
+REFUSED: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
+    "two dampings": (
+        lambda: Impedance(1.0, damping=1.0, damping_ratio=1.0),
+        GainError,
+        "give either damping or damping_ratio",
+    ),
+    "bounded matrix": (
+        lambda: Impedance(COUPLED, largest_error=0.1),
+        GainError,
+        "largest_error needs a diagonal stiffness: with .* would have no energy",
+    ),
+    "gains and impedance": (
+        lambda: FramePosition(gains=Gains(1.0, 2.0), impedance=Impedance(1.0)),
+        GainError,
+        r"give either gains \[1/s², 1/s\] or impedance \[N/m, N·s/m\], not both",
+    ),
+    "rows": (
+        lambda: panda_hand(impedance=Impedance([1.0, 2.0])),
+        GainError,
+        r"tasks.hand.impedance: stiffness has shape \(2,\); needs a number, 3 numbers",
+    ),
+    "rows of a bound": (
+        lambda: panda_hand(impedance=Impedance(1.0, largest_error=[1.0, 2.0])),
+        GainError,
+        r"tasks.hand.impedance: largest_error has shape \(2,\); needs a number, 3",
+    ),
+    "another task": (
+        lambda: hsp.CenterOfMass(impedance=Impedance(1.0)),  # type: ignore[call-arg]
+        TaskError,
+        "impedance",
+    ),
+    "gains of a spring": (
+        lambda: panda_hand(impedance=Impedance(1.0)).at(1.0).gains("hand", GAINS),
+        ControllerError,
+        "task 'hand' has an impedance instead of gains; a change of type impedance",
+    ),
+    "spring of gains": (
+        lambda: panda_hand().at(1.0).impedance("hand", Impedance(1.0)),
+        ControllerError,
+        "task 'hand' has no impedance from the start, so none can follow",
+    ),
+    "rows of a change": (
+        lambda: (
+            panda_hand(impedance=Impedance(1.0))
+            .at(1.0)
+            .impedance("hand", Impedance([1.0, 2.0]))
+        ),
+        GainError,
+        r"impedance: stiffness has shape \(2,\); needs a number, 3 numbers",
+    ),
+    "bounds beside a matrix": (
+        lambda: (
+            panda_hand(impedance=Impedance(COUPLED))
+            .at(1.0)
+            .impedance("hand", Impedance(1.0))
+            .impedance("hand", Impedance(1.0, largest_error=0.1))
+        ),
+        GainError,
+        "impedance: largest_error needs a diagonal stiffness",
+    ),
+    "integral action": (
+        lambda: IntegralAction(1.0).check(panda_hand(impedance=Impedance(1.0)).tasks),
+        CompensationError,
+        "task 'hand' has an impedance: integral action would press against what",
+    ),
+    "a cancelling observer": (
+        lambda: Compensation(momentum_observer=MomentumObserver()).check(
+            hsp.Robot.load("panda"), panda_hand(impedance=Impedance(1.0)).tasks
+        ),
+        CompensationError,
+        "momentum_observer: the observer would cancel every force to which task 'hand'",
+    ),
+    "clip of what is not cancelled": (
+        lambda: MomentumObserver(clip=3.0, cancel=False),
+        CompensationError,
+        "clip bounds the effort that is cancelled, and cancel is false",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_refused(name: str) -> None:
+    make, error, message = REFUSED[name]
+    with pytest.raises(error, match=message):
+        make()
+
+
+def test_a_floating_base_is_refused() -> None:
+    pytest.importorskip("example_robot_data")
+    robot = hsp.Robot.load("ur5", root="free_flyer")
+    hand = FramePosition("tool0", impedance=Impedance(100.0))
+    message = "tasks.tool0.impedance: ur5 has a free-flyer root: its inertia at a task"
+    with pytest.raises(GainError, match=message):
+        Controller(robot, [hand], base="driven")
+
+
+def test_a_clip_makes_room_for_a_hand() -> None:
+    """Friction of this size is cancelled, and a larger force is yielded to."""
+    observer = MomentumObserver(clip=2.0)
+    tasks = panda_hand(impedance=Impedance(1.0)).tasks
+    Compensation(momentum_observer=observer).check(hsp.Robot.load("panda"), tasks)
