@@ -102,6 +102,20 @@ def your_robot(said: str) -> None:
     assert "malformed XML" in said
 
 
+def command_it_now(said: str) -> None:
+    errors = [float(x) for x in re.findall(r"within (\S+) mm of the reference", said)]
+    assert len(errors) == 2
+    assert max(errors) < 0.5
+    assert "at the end 0.00 m/s" in said
+    assert "StreamError · value contains nan" in said
+    stretched = re.findall(r"N/m: (\S+) mm, F/K = (\S+) mm", said)
+    assert len(stretched) == 2
+    for moved, promised in stretched:
+        assert abs(float(moved) / float(promised) - 1.0) < 0.03
+    (largest,) = re.findall(r"effort in 10 ms: (\S+) N·m", said)
+    assert float(largest) < 20.0
+
+
 def a_field_keeps_clear(said: str) -> None:
     without, with_field = (float(x) for x in re.findall(r"nearest (\S+) mm", said))
     assert without < -20.0
@@ -112,6 +126,7 @@ PROMISES = {
     "01_the_law": the_law,
     "02_panda_fields": panda_fields,
     "03_your_robot": your_robot,
+    "04_command_it_now": command_it_now,
 }
 
 
@@ -147,7 +162,7 @@ def test_a_cell_that_fails_fails_the_test(tmp_path: Path) -> None:
 # ----------------------------------------------------------------------- as they stand
 
 
-def test_there_are_three_and_documents_lead_to_them() -> None:
+def test_there_are_four_and_documents_lead_to_them() -> None:
     assert list(PROMISES) == NAMES
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     for name in NAMES:
