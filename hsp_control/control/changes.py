@@ -157,7 +157,9 @@ class ChangeGains(Change, type="gains"):
 class ChangeImpedance(Change, type="impedance"):
     """The impedance of a task changes; its equation holds throughout.
 
-    While the stiffness K changes, it adds the power ½ eᵀK'e to the motion.
+    While the stiffness K changes, it adds the power ½ eᵀK'e to the motion. Where
+    efforts are held for a period, the change waits while that is more than the damping
+    takes out: a hand that is held away from its target becomes stiffer when it moves.
     """
 
     task: str

@@ -41,6 +41,7 @@ from hsp_control.control.setup import (
     levels_of,
     planned_task,
 )
+from hsp_control.control.stiffening import changes_impedance, waiting_time
 from hsp_control.declaration import within
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
@@ -52,7 +53,9 @@ from hsp_control.null_space.metrics import IdentityMetric, Metric
 from hsp_control.null_space.metrics.metric import CONSTANT
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
+from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.gains import as_gain
+from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.task import Feedback, InForce
 
 AccelerationModifier = Callable[
@@ -73,7 +76,7 @@ class Controller:
     Wherever the stacked Jacobian keeps its rank and no limit binds: every task's error
     obeys e'' + Kv e' + Kp e = 0, and V = ½ e_NᵀW e_N obeys V' = -e_NᵀW K_N e_N. The
     same state gives the same effort: its only memory is the last effort, used where
-    the effort rate is limited (see `applied`).
+    the effort rate is limited (see `applied`), and how long changes of impedances wait.
 
     The parts are values and do not change; `at` makes changes while the controller
     runs. What they leave relative (a circle without a centre, ``target="start"``)
@@ -167,6 +170,7 @@ class Controller:
         self._modified, self._mixed = np.zeros((2, robot.nv))
         self._gain = np.zeros((robot.nv, robot.nv))
         self._feedback: dict[int, InForce] = {}
+        self._behind: dict[int, float] = {}
         self._by_key: dict[int, Task] = {}
         self._stacks: dict[tuple[int, ...], ActiveStack] = {}
         self._field: NullSpaceField = Rest()
@@ -246,6 +250,9 @@ class Controller:
         self._by_key = by_key
         self._written: set[int] = set()
         self._fading = [each for each in setup.tasks if not each.always]
+        self._stiffening = [
+            each for each in setup.tasks if changes_impedance(each.task, each.gains)
+        ]
         self._levels = levels_of(setup.tasks, self._robot)
         self._steady = setup.steady and setup.end == -np.inf
         self._active: ActiveStack | None = None
@@ -263,7 +270,8 @@ class Controller:
         """Write the gains of a time; every step reads these arrays."""
         for each in self._setup.tasks:
             if not (each.gains.constant and each.key in self._written):
-                self._feedback[each.key].numbers[:] = each.gains.at(t)
+                behind = self._behind.get(each.key, 0.0)
+                self._feedback[each.key].numbers[:] = each.gains.at(t - behind)
         self._written = set(self._by_key)
         self._gain[:] = self._setup.gain.at(t)
 
@@ -416,6 +424,26 @@ class Controller:
         if not period > 0.0:
             raise ControllerError(f"period is {period} s; must be positive")
         self._actuation.applied(self._state, tau, period)
+        if self._stiffening:
+            self._wait(period)
+
+    def _wait(self, period: float) -> None:
+        """Let changes of impedances wait where they would add energy."""
+        t, active = self._state.t, self.active_stack
+        for each in self._stiffening:
+            rows = active.task_rows.get(each.task.name)
+            if rows is None:
+                continue
+            sample, behind = active.rows, self._behind.get(each.key, 0.0)
+            self._behind[each.key] = waiting_time(
+                each.gains,
+                self._feedback[each.key].mobility,
+                sample.error[rows],
+                sample.error_rate[rows],
+                t,
+                period,
+                behind,
+            )
 
     def restart(self) -> None:
         """Begin anew: forget the last effort, the offsets of tasks, and where it began.
@@ -425,6 +453,7 @@ class Controller:
         with self._lock:
             self._actuation.forget()
             self._now, self._begun = -np.inf, False
+            self._behind.clear()
             self._active = None  # the next step places what is relative
             for in_force in self._feedback.values():
                 in_force.feedback.offset[:] = 0.0
@@ -448,8 +477,9 @@ class Controller:
             self._begin(self._state)
         self._now = max(self._now, t)
         if self._open:
-            if self._now > self._open[0].end + _MEMORY:
-                self._settle(self._now - _MEMORY)
+            done = self._now - _MEMORY - max(self._behind.values(), default=0.0)
+            if done > self._open[0].end:
+                self._settle(done)
             self._write_gains(t)
             self._actuation.update_limits(t)
         weights = {each.key: each.weight(t) for each in self._fading}
@@ -634,6 +664,19 @@ class Controller:
         planned = self._setup.tasks[self._setup.find_task(task)]
         return planned.task.linear_feedback(state, self._feedback[planned.key])
 
+    def stiffness(self, task: str) -> Array:
+        """Return the stiffness K in force of a task with an impedance, shape (m, m).
+
+        A change of it waits where it would add energy; see `ChangeImpedance`.
+
+        Raises:
+            ControllerError: If there is no such task, or it has no impedance.
+        """
+        planned = self._setup.tasks[self._setup.find_task(task)]
+        if impedance_of(planned.task) is None:
+            raise ControllerError(f"task {task!r} has gains, and no stiffness")
+        return parts_of(self._feedback[planned.key].numbers)[0].copy()
+
     def _in_force(self, task: str) -> InForce:
         return self._feedback[self._setup.tasks[self._setup.find_task(task)].key]
 
@@ -757,6 +800,7 @@ class Controller:
             "settled": self._settled,
             "open": self._open,
             "now": self._now,
+            "behind": self._behind.copy(),
             "at": (state.t, state.q.copy(), state.v.copy()),
             "offsets": {
                 k: each.feedback.offset.copy() for k, each in self._feedback.items()
@@ -769,6 +813,7 @@ class Controller:
         self._allocate()
         self._start, self._settled = saved["start"], saved["settled"]
         self._open, self._begun, self._now = saved["open"], saved["begun"], saved["now"]
+        self._behind = saved["behind"]
         self._install(_applied(self._open, self._settled))
         for key, offset in saved["offsets"].items():
             self._feedback[key].feedback.offset[:] = offset

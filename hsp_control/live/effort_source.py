@@ -1,10 +1,12 @@
 """The interface of what computes an effort from a measurement."""
 
+from collections.abc import Mapping
 from typing import Protocol
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation import Command
 from hsp_control.control.controller import Controller
+from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
 from hsp_control.robot import RobotState
 
@@ -50,6 +52,9 @@ class EffortSource(Protocol):
             tau: The effort after all limits, shape (nv,).
             period: Time until the next effort [s].
         """
+
+    def log_channels(self) -> Mapping[str, LogChannel]:
+        """Return what it logs of the last effort besides the controller, by name."""
 
 
 def as_effort_source(controller: "Controller | EffortSource") -> EffortSource:

@@ -207,6 +207,8 @@ class LoopLog:
             age=nan if measurement is None else measurement.age,
             response=response,
         )
+        if phase == Phase.RUNNING and not self.controller_failed:
+            log_channels = {**self._effort_source.log_channels(), **log_channels}
         return Row(state, self._output(phase, state), limiter.applied, log_channels)
 
     def end(self, report: LoopReport) -> None:

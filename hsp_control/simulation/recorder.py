@@ -28,6 +28,7 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.log_file import MAX_SIZE
 from hsp_control.simulation.rollout import FORMAT, Rollout, complete_columns
 from hsp_control.tasks import Task
+from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.trajectories.streams.stream import Streamed
 
 STREAM_CHANNELS = {
@@ -146,6 +147,8 @@ class Recorder:
                 for what, meaning in STREAM_CHANNELS.items():
                     unit_of = "s" if what == "age" else "-"
                     column(f"{stream}.{what}", (), unit_of, meaning)
+            if impedance_of(task) is not None:
+                column(f"{prefix}.stiffness", (m,), "N/m or N·m/rad", "diagonal of K")
             column(f"{prefix}.reference", (width,), unit, "desired value")
             column(f"{prefix}.actual", (width,), unit, "actual value")
 
@@ -266,6 +269,9 @@ class Recorder:
             prefix = f"task.{self._log_names[task]}"
             columns[f"{prefix}.error"][i] = errors.error[rows]
             columns[f"{prefix}.error_rate"][i] = errors.error_rate[rows]
+            if f"{prefix}.stiffness" in columns:
+                stiffness = np.diag(controller.stiffness(task))
+                columns[f"{prefix}.stiffness"][i] = stiffness
         diagnostics = controller.diagnose()
         columns["field.g"][i] = output.field.g
         columns["field.value"][i] = diagnostics.field_value

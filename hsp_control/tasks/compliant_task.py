@@ -92,7 +92,8 @@ class CompliantTask(SecondOrderTask):
         """Return new arrays of the task's own feedback; see `Task.in_force`."""
         if self.impedance is None:
             return super().in_force()
-        return InForce(self.impedance.numbers(self.rows), self.feedback())
+        mobility = np.zeros((self.rows, self.rows))
+        return InForce(self.impedance.numbers(self.rows), self.feedback(), mobility)
 
     def compile_in_force(
         self, state: RobotState, in_force: InForce, out: TaskSample
@@ -113,6 +114,7 @@ class CompliantTask(SecondOrderTask):
             in_force.numbers,
             out,
             Scratch.allocate(self.rows, state.robot.nv),
+            in_force.mobility,
             in_force.feedback,
         )
         return StepPlan(task.follow, (*update, *task.write, write, *task.write))
@@ -135,7 +137,8 @@ class CompliantTask(SecondOrderTask):
         """Return Kp and Kv of the numbers of an impedance at a state."""
 
         def make() -> tuple[InForce, StepPlan]:
-            in_force = InForce(np.zeros_like(numbers), self.feedback())
+            mobility = np.zeros((self.rows, self.rows))
+            in_force = InForce(np.zeros_like(numbers), self.feedback(), mobility)
             sample = TaskSample.allocate(self.rows, state.robot.nv)
             return in_force, self.compile_in_force(state, in_force, sample)
 

@@ -61,7 +61,7 @@ class Scratch(NamedTuple):
     Attributes:
         factor: Shape (nv, nv).
         wide: Shape (5, m, nv).
-        square: Shape (7, m, m).
+        square: Shape (6, m, m).
         turning: Shape (4, 3, 3).
         vectors: Shape (2, 3).
     """
@@ -78,7 +78,7 @@ class Scratch(NamedTuple):
         return cls(
             np.zeros((nv, nv)),
             np.zeros((5, rows, nv)),
-            np.zeros((7, rows, rows)),
+            np.zeros((6, rows, rows)),
             np.zeros((4, 3, 3)),
             np.zeros((2, 3)),
         )
@@ -92,9 +92,10 @@ def impedance_gains(
     numbers: Array,
     sample: TaskSample,
     scratch: Scratch,
+    mobility: Array,
     feedback: Feedback,
 ) -> None:
-    """Write Kp and Kv: what the task's own kernel then reads.
+    """Write Λ⁻¹, Kp and Kv: what the task's own kernel then reads.
 
     Where M is singular they are NaN, so that the law reports that the step is not
     finite.
@@ -106,6 +107,7 @@ def impedance_gains(
         numbers: K, D, ζ, 1/largest error: see `Impedance.numbers`.
         sample: J, J', e and e' of the task at the state.
         scratch: Overwritten.
+        mobility: G = Λ⁻¹, written, shape (m, m).
         feedback: Its Kp and Kv are written.
     """
     m, nv = sample.jacobian.shape
@@ -114,10 +116,10 @@ def impedance_gains(
     Kp, Kv, _ = feedback
     L, B, B_dot, X = scratch.factor, scratch.wide[0], scratch.wide[1], scratch.wide[2]
     G, G_dot, GK, root = (
+        mobility,
         scratch.square[0],
         scratch.square[1],
         scratch.square[2],
-        scratch.square[3],
     )
     error_jacobian(rotating, sample, scratch.turning, scratch.vectors, B, B_dot)
     total = 1.0
@@ -145,11 +147,11 @@ def impedance_gains(
         for i in range(m):
             for j in range(m):
                 Kv[i, j] += 2.0 * ratio * root[i, j]
-    inertia = scratch.square[4]
+    inertia = scratch.square[3]
     Q = scratch.wide[4]
     # The law whitens with its own metric: W = I at worst, where the singular values of
     # J L⁻ᵀ may be less than those of J by √(largest eigenvalue of M).
-    bounded_inertia(B, _THRESHOLD / np.sqrt(total), Q, scratch.square[5], inertia)
+    bounded_inertia(B, _THRESHOLD / np.sqrt(total), Q, scratch.square[4], inertia)
     product(G_dot, inertia, root)
     for i in range(m):
         for j in range(m):
@@ -234,11 +236,11 @@ def natural_root(B: Array, K: Array, Z: Array, square: Array, out: Array) -> Non
         B: Whitened Jacobian, shape (m, nv).
         K: Stiffness, positive definite, shape (m, m).
         Z: Scratch, shape (m, nv).
-        square: Scratch; the matrices 4, 5 and 6 are overwritten, shape (7, m, m).
+        square: Scratch; the matrices 3, 4 and 5 are overwritten, shape (6, m, m).
         out: Shape (m, m).
     """
     m, nv = B.shape
-    C, U, S = square[4], square[5], square[6]
+    C, U, S = square[3], square[4], square[5]
     cholesky(K, C)
     for i in range(m):
         for j in range(nv):

@@ -87,10 +87,13 @@ class InForce(NamedTuple):
         numbers: What changes change: Kp and Kv, shape (2, m, m), or what another kind
             of feedback is made of.
         feedback: What the task reads.
+        mobility: Λ⁻¹ in the coordinates of the error, shape (m, m), of the last step;
+            only of a task with an impedance.
     """
 
     numbers: Array
     feedback: Feedback
+    mobility: Array
 
 
 Drawn = Literal["position", "orientation", "direction"]
@@ -198,7 +201,8 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """Return new arrays of the task's own feedback, for a run."""
         Kp, Kv, offset = self.feedback()
         numbers = np.stack([Kp, Kv])
-        return InForce(numbers, Feedback(numbers[0], numbers[1], offset))
+        feedback = Feedback(numbers[0], numbers[1], offset)
+        return InForce(numbers, feedback, np.zeros((0, 0)))
 
     def compile_in_force(
         self, state: RobotState, in_force: InForce, out: TaskSample

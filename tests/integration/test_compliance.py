@@ -4,6 +4,7 @@ The law runs in the integrator's stages, so that what is compared are the equati
 themselves; where efforts are held, the difference is said.
 """
 
+import pickle
 from functools import cache
 from typing import Any
 
@@ -11,10 +12,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import simpson
+from scipy.linalg import sqrtm
 
 import hsp_control as hsp
 from hsp_control import Controller, FramePose, FramePosition, Robot, Rollout
+from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.compensation import Compensation, MomentumObserver, check_rate
+from hsp_control.control.stiffening import dissipated, spring_energy
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.robot.integrators import Dop853, Rk4
 from hsp_control.simulation.plants import Push, RigidBody
@@ -189,6 +193,99 @@ def test_the_energy_is_what_came_in_less_what_was_damped(metric: Metric) -> None
     assert simpson(ramped, x=log.t) > 0.02  # it counts
     gained = simpson(power + ramped, x=log.t)
     assert energy[-1] - energy[0] == pytest.approx(gained, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "damping", [{"damping": 40.0}, {"damping_ratio": 0.7}], ids=repr
+)
+def test_a_stiffness_that_changes_adds_no_energy(damping: dict[str, float]) -> None:
+    """Held away by a force, the hand waits; let go, it becomes stiffer as it moves.
+
+    E(t) - E(0) <= ∫ fᵀx' at all times, where efforts are held for a period.
+    """
+    hand = position_hand(impedance=Impedance(200.0, **damping))
+    controller = Controller(panda(), [hand], metric=MassMatrixMetric(), limits=None)
+    hard = Impedance(1000.0, **damping)
+    controller.at(1.5).ramp(0.2).impedance("hand", hard)
+    force = np.array([0.0, 20.0, 0.0])
+    push = Push("panda_tcp", force, duration=2.5)
+    log = hsp.simulate(
+        controller,
+        start(),
+        plant=RigidBody(pushes=[push]),
+        duration=4.5,
+        control_period=1e-3,
+        log_period=0.01,
+        integrator=Rk4(1e-3),
+    )
+    t, K = log.t, log["task.hand.stiffness"]
+    e, rate = log["task.hand.error"], log["task.hand.error_rate"]
+    held = (t > 1.6) & (t < 2.5)
+    assert np.abs(rate[held][-1]).max() < 1e-3
+    assert K[held].max() < 260.0  # the ramp would be over at 1.7
+    assert K[-1] == pytest.approx([1000.0] * 3)
+    assert (np.diff(K[:, 0]) >= 0.0).all()
+    kinetic = [0.5 * r @ inertia(x, 3) @ r for x, r in zip(log.q, rate, strict=True)]
+    energy = np.array(kinetic) + 0.5 * (K * e**2).sum(axis=1)
+    power = np.where(t[:, None] < 2.5, -rate * force, 0.0).sum(axis=1)
+    came = np.concatenate([[0.0], np.cumsum(0.005 * (power[1:] + power[:-1]))])
+    assert (energy <= came + 2e-3).all()  # of 1 J
+    assert energy.max() > 0.9
+    # The change as a function of time alone would have added 4 J.
+    moved = e[int(2.4 / 0.01)]
+    assert 0.5 * (1000.0 - 200.0) * moved @ moved > 3.0
+    assert np.abs(np.diff(log.tau, axis=0)).max() < 4.0  # in 10 ms; 3.5 by the force
+
+
+def test_at_its_target_a_hand_becomes_stiffer_at_once_and_copies_wait_alike() -> None:
+    hand = position_hand(impedance=Impedance(200.0))
+    controller = Controller(panda(), [hand], limits=None)
+    controller.at(0.1).ramp(0.2).impedance("hand", Impedance(1000.0))
+    q, v = start(), np.zeros(7)
+    for k in range(310):
+        controller.applied(controller.compute(1e-3 * k, q, v).tau, 1e-3)
+    assert np.diag(controller.stiffness("hand")) == pytest.approx([1000.0] * 3)
+    away = panda().integrate(q, np.full(7, 0.05))
+    controller.at(0.4).ramp(0.1).impedance("hand", Impedance(2000.0))
+    for k in range(310, 600):
+        controller.applied(controller.compute(1e-3 * k, away, v).tau, 1e-3)
+    assert np.diag(controller.stiffness("hand")) == pytest.approx([1000.0] * 3)
+    other = pickle.loads(pickle.dumps(controller))
+    for k in range(600, 720):
+        for each in (controller, other):
+            each.applied(each.compute(1e-3 * k, q, v).tau, 1e-3)
+        np.testing.assert_array_equal(
+            other.stiffness("hand"), controller.stiffness("hand")
+        )
+    assert np.diag(controller.stiffness("hand")) == pytest.approx([2000.0] * 3)
+    with pytest.raises(ControllerError, match="'posture' has gains, and no stiffness"):
+        Controller(panda(), [hsp.JointPosture()]).stiffness("posture")
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_power_of_the_damping_is_that_of_the_gains(seed: int) -> None:
+    """e'ᵀ(D + D_ζ) e' from the modes, and from D_ζ = 2 ζ Λ √(Λ⁻¹K)."""
+    rng = np.random.default_rng(seed)
+    m = rng.integers(1, 7)
+    A, B, C = rng.normal(size=(3, m, m))
+    K, D = A @ A.T + np.eye(m), B @ B.T + np.eye(m)
+    G, rate = C @ C.T + 0.1 * np.eye(m), rng.normal(size=m)
+    D_ratio = 1.4 * np.linalg.inv(G) @ sqrtm(G @ K)
+    for impedance, damping in (
+        (Impedance(K, damping=D), D),
+        (Impedance(K, damping_ratio=0.7), D_ratio.real),
+    ):
+        power = dissipated(impedance.numbers(m), G, rate)
+        assert power == pytest.approx(rate @ damping @ rate, rel=1e-8)
+
+
+def test_the_spring_s_energy_is_the_integral_of_its_force() -> None:
+    spring = Impedance([200.0, 300.0], largest_error=[0.1, 0.2])
+    for e in (np.array([0.05, -0.1]), np.array([0.3, -0.5])):
+        s = np.linspace(0.0, 1.0, 20001)[:, None]
+        force = np.array([200.0, 300.0]) * np.clip(s * e, [-0.1, -0.2], [0.1, 0.2])
+        work = simpson(force @ e, x=s[:, 0])
+        assert spring_energy(spring.numbers(2), e) == pytest.approx(work, rel=1e-6)
 
 
 # --- what the observer says ----------------------------------------------------------

@@ -252,7 +252,9 @@ def test_a_singular_mass_matrix_is_not_a_number() -> None:
     in_force, sample = task.in_force(), TaskSample.allocate(3, 3)
     flat, none = np.zeros((3, 3)), Rotating(3, np.eye(3), np.zeros(3))
     numbers, scratch = in_force.numbers, Scratch.allocate(3, 3)
-    impedance_gains(flat, flat, none, numbers, sample, scratch, in_force.feedback)
+    impedance_gains(
+        flat, flat, none, numbers, sample, scratch, in_force.mobility, in_force.feedback
+    )
     assert np.isnan(in_force.feedback.Kp[0, 0])
     assert np.isnan(in_force.feedback.Kv[0, 0])
 
