@@ -141,6 +141,16 @@ def test_the_controller_receives_the_applied_effort() -> None:
     assert np.abs(sent[0]).max() == pytest.approx(50.0 * PERIOD)
 
 
+def test_a_stream_that_falls_silent_stops_the_robot_safely() -> None:
+    target = hsp.StreamPose(stop_after=0.05)
+    hand = hsp.FramePose("panda_tcp", target)
+    rig = Rig()
+    report = run_loop(hsp.Controller(panda(), [hand]), rig, duration=1.0)
+    assert report.ended == "fault"
+    assert report.reason.startswith("StreamError: no message for 0.051 s; stop_after")
+    assert (report.phase, report.silent) == (Phase.HOLDING, False)
+
+
 # --- the robot's interface -----------------------------------------------------------
 
 
