@@ -311,6 +311,11 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
                 f"{path}: the run cannot be repeated, because changes were made while "
                 f"it ran that are not data: {lost}"
             )
+        if lost := run.meta.get("streams_lost"):
+            raise ConfigError(
+                f"{path}: the run cannot be repeated, because {lost} messages of its "
+                "streams were too many to be recorded"
+            )
         made = run.meta.get("changes") or []
         config = with_recordings(run.config, run.meta.get("streams") or {})
         return Document(config | {"changes": made}, {}, str(path))

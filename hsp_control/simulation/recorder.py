@@ -406,12 +406,12 @@ def repeatable(controller: Controller) -> dict[str, Any]:
 
     The changes that were made, and for each task what its streams have taken.
     """
-    heard = {
-        task.name: [list(stream.record) for stream in parts_within(task, Streamed)]
-        for task in controller.tasks
-        if task.remembers
-    }
-    return _changes(controller) | ({"streams": heard} if heard else {})
+    tasks = [task for task in controller.tasks if task.remembers]
+    streams = {task.name: list(parts_within(task, Streamed)) for task in tasks}
+    heard = {name: [list(s.record) for s in each] for name, each in streams.items()}
+    lost = sum(s.unrecorded for each in streams.values() for s in each)
+    found = _changes(controller) | ({"streams": heard} if heard else {})
+    return found | ({"streams_lost": lost} if lost else {})
 
 
 def _changes(controller: Controller) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.message import Message, Space, decoded, message_of
+from hsp_control.trajectories.streams.record import Record
 
 CAPACITY = 4096
 """Most messages that wait; where more come, the oldest are dropped."""
@@ -89,14 +90,8 @@ class Inbox:
 class InboxReader:
     """A reader of an inbox in one run; it begins with what nobody took before."""
 
-    def __init__(self, inbox: Inbox, record: list[dict[str, Any]] | None) -> None:
-        """Begin to read.
-
-        Args:
-            inbox: The inbox.
-            record: Where to write what is taken: `Message.to_dict` with the
-                controller's time ``at`` [s]; None: nowhere.
-        """
+    def __init__(self, inbox: Inbox, record: Record) -> None:
+        """Begin to read, and to record what is taken."""
         self._inbox, self._record = inbox, record
         self._number = inbox.taken
 
@@ -108,13 +103,12 @@ class InboxReader:
         if received:
             self._number = received[-1].number
         messages = [each.message for each in received if self._fits(each.message)]
-        if self._record is not None:
-            self._record += [{"at": t, **each.to_dict()} for each in messages]
+        self._record.add(t, messages)
         return messages
 
     def copy(self) -> "InboxReader":
-        """Return a reader that goes on from here, and writes no record."""
-        other = InboxReader(self._inbox, None)
+        """Return a reader that goes on from here, with a record of its own."""
+        other = InboxReader(self._inbox, Record())
         other._number = self._number
         return other
 

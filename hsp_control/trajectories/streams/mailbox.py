@@ -5,6 +5,7 @@ from typing import Any
 from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.inbox import Inbox, InboxReader
 from hsp_control.trajectories.streams.message import Message, Space
+from hsp_control.trajectories.streams.record import Record
 from hsp_control.trajectories.streams.recording import Recording
 from hsp_control.trajectories.streams.udp_listener import SCHEME, listening_inbox
 
@@ -13,7 +14,7 @@ class Mailbox:
     """The messages of one stream, whichever controller it was placed in.
 
     Attributes:
-        record: What the last run has taken, and when; see `InboxReader`.
+        record: What the last run has taken, and when.
         inbox: The messages that wait.
     """
 
@@ -26,7 +27,7 @@ class Mailbox:
         """
         self._hears = hears
         self.inbox = Inbox(space)
-        self.record: list[dict[str, Any]] = []
+        self.record = Record()
 
     def put(self, **data: Any) -> None:
         """Add a message; see `message_of`.
@@ -55,10 +56,10 @@ class Mailbox:
                 f"{space.words} are needed"
             )
         self.inbox.space = space
-        self.record = []
+        self.record = Record()
         return InboxReader(self.inbox, self.record)
 
     def recording(self, entries: list[tuple[float, Message]]) -> Recording:
         """Return recorded messages, see `recorded`, as the source of a new run."""
-        self.record = []
+        self.record = Record()
         return Recording(entries, self.record)

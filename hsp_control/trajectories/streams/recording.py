@@ -7,6 +7,7 @@ from typing import Any, NoReturn
 
 from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.message import Message, Space, message_of
+from hsp_control.trajectories.streams.record import Record
 
 LARGEST_FILE = 100_000_000
 """Size of the largest recording that is read [bytes]."""
@@ -16,15 +17,13 @@ class Recording:
     """Recorded messages as a source; the same run takes them at the same times."""
 
     def __init__(
-        self,
-        entries: Iterable[tuple[float, Message]],
-        record: list[dict[str, Any]] | None,
+        self, entries: Iterable[tuple[float, Message]], record: Record
     ) -> None:
-        """Begin at the first message.
+        """Begin at the first message, and record what is taken.
 
         Args:
             entries: Times [s] and messages, in order of time.
-            record: Where to write what is taken, see `InboxReader`; None: nowhere.
+            record: The record of the run.
         """
         self._entries, self._record = list(entries), record
         self._next = 0
@@ -35,13 +34,12 @@ class Recording:
         while self._next < len(self._entries) and self._entries[self._next][0] <= t:
             found.append(self._entries[self._next][1])
             self._next += 1
-        if self._record is not None:
-            self._record += [{"at": t, **each.to_dict()} for each in found]
+        self._record.add(t, found)
         return found
 
     def copy(self) -> "Recording":
-        """Return a source that goes on from here, and writes no record."""
-        other = Recording(self._entries, None)
+        """Return a source that goes on from here, with a record of its own."""
+        other = Recording(self._entries, Record())
         other._next = self._next
         return other
 

@@ -170,7 +170,12 @@ class Streamed(Part, error=TrajectoryError):
     @property
     def record(self) -> tuple[Mapping[str, Any], ...]:
         """What the last run has taken, and when; see ``messages``."""
-        return tuple(self._mailbox.record)
+        return tuple(self._mailbox.record.to_list())
+
+    @property
+    def unrecorded(self) -> int:
+        """How many messages of the last run the record had no room for."""
+        return self._mailbox.record.lost
 
     def counts(self) -> dict[str, float]:
         """Return the time since the last message [s], and how many there were.

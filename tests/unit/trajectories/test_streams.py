@@ -23,6 +23,7 @@ from hsp_control.trajectories import (
     TrajectorySample,
 )
 from hsp_control.trajectories.polynomial import QUINTIC
+from hsp_control.trajectories.streams import record
 from hsp_control.trajectories.streams.bounds import _DERIVATIVES
 from hsp_control.trajectories.streams.recording import read_recording
 from hsp_control.trajectories.streams.waypoints import SenderClock, derivatives
@@ -414,6 +415,15 @@ def test_earlier_times_are_remembered() -> None:
     samples = sampled(stream, 0.5, feed)
     for k in (100, 500, 900):
         assert np.array_equal(stream.sample(k * H), samples[k])
+
+
+def test_a_record_that_is_full_says_how_much_it_lost(monkeypatch: Any) -> None:
+    monkeypatch.setattr(record, "MOST", 3)
+    stream = Stream([0.0]).anchored(None)
+    feed = at_times(*((0.1, lambda: stream.send([0.1])) for _ in range(5)))
+    sampled(stream, 0.2, feed)
+    assert (len(stream.record), stream.unrecorded) == (3, 2)
+    assert stream.counts()["taken"] == 5
 
 
 # -- bad input ------------------------------------------------------------------------

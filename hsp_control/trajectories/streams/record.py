@@ -1,0 +1,34 @@
+"""What a run has taken from a stream, and when: for the log, so that it repeats."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from hsp_control.trajectories.streams.message import Message
+
+MOST = 300_000
+"""Most messages that are recorded: 80 minutes at 60 Hz, 0.1 GB."""
+
+
+class Record:
+    """Messages and the controller's times at which they were taken.
+
+    Attributes:
+        lost: How many messages came after the record was full.
+    """
+
+    def __init__(self) -> None:
+        """Begin without messages."""
+        self.lost = 0
+        self._entries: list[tuple[float, Message]] = []
+
+    def add(self, t: float, messages: Iterable[Message]) -> None:
+        """Record messages that are taken at a time [s], as long as there is room."""
+        for each in messages:
+            if len(self._entries) < MOST:
+                self._entries.append((t, each))
+            else:
+                self.lost += 1
+
+    def to_list(self) -> list[dict[str, Any]]:
+        """Return the messages as `recorded` reads them."""
+        return [{"at": t, **each.to_dict()} for t, each in self._entries]
