@@ -653,16 +653,26 @@ class Controller:
         """
         return self._in_force(task).feedback
 
-    def linear_feedback(self, task: str, state: RobotState) -> Feedback:
-        """Return a task's feedback for small errors about a state.
+    def linear_feedback(self, task: str, state: RobotState) -> dict[float, Feedback]:
+        """Return a task's feedback for small errors about a state, now and later.
 
         With gains it is the one in force; an impedance gives other gains at each state.
+
+        Returns:
+            The feedback, by the time from which it is in force [s]: -inf for now, and
+            the ends of the changes that are open.
 
         Raises:
             ControllerError: If there is no such task.
         """
         planned = self._setup.tasks[self._setup.find_task(task)]
-        return planned.task.linear_feedback(state, self._feedback[planned.key])
+        now = planned.task.linear_feedback(state, self._feedback[planned.key])
+        found = {-np.inf: now}
+        for each in planned.gains.transitions:
+            later = planned.task.in_force()
+            later.numbers[:] = each.target
+            found[each.end] = planned.task.linear_feedback(state, later)
+        return found
 
     def stiffness(self, task: str) -> Array:
         """Return the stiffness K in force of a task with an impedance, shape (m, m).

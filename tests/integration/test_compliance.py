@@ -371,6 +371,24 @@ def test_a_stiffness_that_the_period_does_not_bear() -> None:
         check_rate(stiff(Impedance(100.0, damping=8000.0)), q, 0.001)
 
 
+def test_changes_to_come_are_checked_too() -> None:
+    q, soft = panda().home(), Impedance(100.0)
+    controller = stiff(soft)
+    controller.at(2.0).ramp(0.5).impedance("hand", Impedance(4e6))
+    with pytest.raises(
+        hsp.errors.UnstableRateError,
+        match=r"impedance: .* of task 'hand' from t = 2.5 s on times the period is",
+    ):
+        check_rate(controller, q, 0.001)
+    gains = Controller(panda(), [position_hand()], limits=None)
+    gains.at(1.0).ramp(0.0).gains("hand", hsp.Gains(natural_frequency=3000.0))
+    with pytest.raises(
+        hsp.errors.UnstableRateError,
+        match=r"tasks.hand.gains: .*ω0 of task 'hand' from t = 1 s on times the period",
+    ):
+        check_rate(gains, q, 0.001)
+
+
 def test_the_check_looks_at_the_spring_below_its_bound() -> None:
     """Far from the reference a bounded spring is soft; it will not stay there."""
     robot, q = panda(), panda().home()

@@ -20,6 +20,7 @@ from hsp_control.declaration import within
 from hsp_control.null_space.fields import FieldSample
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 
 RULE = 0.2
@@ -138,29 +139,45 @@ def _task_findings(
 ) -> list["RateFinding | None"]:
     action = delays[2].integral_action
     integral = {} if action is None else action.gains(controller.tasks)
-    found = []
+    found: list[RateFinding | None] = []
     for task in controller.tasks:
-        Kp, Kv, _ = controller.linear_feedback(task.name, state)
-        zero = np.zeros_like(Kp)
-        Ki = integral.get(task.name, zero)
-        if task.order == 1:  # e' + K e = 0 with K in the place of Kp
-            loop = LinearLoop(zero, Kp.copy(), zero, period, *delays)
-            speed = _of_gain(f"K of task {task.name!r}", float(np.diag(Kp).max()))
-            path: tuple[str, ...] = ("tasks", task.name)
-        else:
-            loop = LinearLoop(Kp.copy(), Kv.copy(), Ki, period, *delays)
-            frequency = float(np.sqrt(np.abs(np.linalg.eigvals(Kp)).max()))
-            path = ("tasks", task.name, "gains")
-            speed = _of_gain(f"ω0 of task {task.name!r}", frequency)
-            if impedance_of(task) is not None:
-                path = ("tasks", task.name, "impedance")
-                damped = 0.5 * float(np.abs(np.linalg.eigvals(Kv)).max())
-                speed = _of_impedance(task.name, frequency, damped)
-        delayed = delays[0] + delays[1] > 0 and delays[2].predictor is None
-        rule = RULE_DELAYED if delayed else RULE
-        found.append(_finding(path, loop, speed, rule, ""))
-        if task.name in integral:
-            found.append(_integral_finding(task.name, loop))
+        feedbacks = controller.linear_feedback(task.name, state)
+        for since, (Kp, Kv, _) in feedbacks.items():
+            Ki = integral.get(task.name, np.zeros_like(Kp))
+            found += _findings_of(task, Kp, Kv, Ki, since, period, delays)
+    return found
+
+
+def _findings_of(
+    task: Task,
+    Kp: Array,
+    Kv: Array,
+    Ki: Array,
+    since: float,
+    period: float,
+    delays: _Delays,
+) -> list["RateFinding | None"]:
+    """Return the problems of a task with these gains, in force from a time on [s]."""
+    name, zero = task.name, np.zeros_like(Kp)
+    of = f"of task {name!r}" + (f" from t = {since:g} s on" if since > -np.inf else "")
+    if task.order == 1:  # e' + K e = 0 with K in the place of Kp
+        loop = LinearLoop(zero, Kp.copy(), zero, period, *delays)
+        speed = _of_gain(f"K {of}", float(np.diag(Kp).max()))
+        path: tuple[str, ...] = ("tasks", name)
+    else:
+        loop = LinearLoop(Kp.copy(), Kv.copy(), Ki, period, *delays)
+        frequency = float(np.sqrt(np.abs(np.linalg.eigvals(Kp)).max()))
+        path = ("tasks", name, "gains")
+        speed = _of_gain(f"ω0 {of}", frequency)
+        if impedance_of(task) is not None:
+            path = ("tasks", name, "impedance")
+            damped = 0.5 * float(np.abs(np.linalg.eigvals(Kv)).max())
+            of += "" if since > -np.inf else " at the start"
+            speed = _of_impedance(of, frequency, damped)
+    delayed = delays[0] + delays[1] > 0 and delays[2].predictor is None
+    found = [_finding(path, loop, speed, RULE_DELAYED if delayed else RULE, "")]
+    if Ki.any():
+        found.append(_integral_finding(name, loop))
     return found
 
 
@@ -182,12 +199,12 @@ def _of_gain(what: str, rate: float) -> _Speed:
     return _Speed(what, rate, lambda x: f"{what} of at most {_rounded(x)} 1/s")
 
 
-def _of_impedance(task: str, frequency: float, damped: float) -> _Speed:
+def _of_impedance(of: str, frequency: float, damped: float) -> _Speed:
     """Return the speed of an impedance: √(K/Λ), or D/(2Λ) if that is larger."""
     rate = max(frequency, damped)
-    what = f"√(stiffness/inertia) of task {task!r}"
+    what = f"√(stiffness/inertia) {of}"
     if damped > frequency * (1.0 + 1e-9):
-        what = f"damping/(2 inertia) of task {task!r}"
+        what = f"damping/(2 inertia) {of}"
 
     def at_most(x: float) -> str:
         s = x / rate
@@ -196,7 +213,7 @@ def _of_impedance(task: str, frequency: float, damped: float) -> _Speed:
             "this damping"
         )
 
-    return _Speed(f"{what} at the start", rate, at_most)
+    return _Speed(what, rate, at_most)
 
 
 def _integral_finding(name: str, loop: LinearLoop) -> RateFinding | None:
