@@ -427,6 +427,24 @@ class Controller:
         if self._stiffening:
             self._wait(period)
 
+    def disturbed(self, acceleration: ArrayLike) -> None:
+        """Store an acceleration that something else than the efforts causes.
+
+        From now on limits on motion hold for the sum of it and the law's acceleration:
+        a robot that somebody pushes may be braked harder, and not driven on. An
+        observer tells it; without one the limits hold for the model alone.
+
+        Args:
+            acceleration: M⁻¹ times the disturbing efforts, shape (nv,) [rad/s² or
+                m/s²].
+
+        Raises:
+            ShapeError: If it has another shape.
+            NonFiniteError: If it contains NaN or inf.
+        """
+        known = self._robot.check_tangent(acceleration, "acceleration")
+        self._actuation.disturbed(known)
+
     def _wait(self, period: float) -> None:
         """Let changes of impedances wait where they would add energy."""
         t, active = self._state.t, self.active_stack

@@ -109,16 +109,25 @@ def violated_limits(
     where: Indices,
     limits: MotionLimits,
     error: Array,
+    disturbance: Array,
     bounds: Bounds,
 ) -> int:
     """Write the acceleration bounds, and return which bounds a and tau violate.
 
-    See `acceleration_bounds` for the arguments.
+    The robot accelerates by a plus the disturbance, so the bounds on a are moved by it.
+
+    See `acceleration_bounds` for the other arguments.
+
+    Args:
+        disturbance: Acceleration that something else causes, shape (nv,).
 
     Returns:
         0 for none, `MOTION`, `EFFORT`, or the sum of both.
     """
     acceleration_bounds(q, v, where, limits, error, bounds.a_lower, bounds.a_upper)
+    for i in range(a.shape[0]):
+        bounds.a_lower[i] -= disturbance[i]
+        bounds.a_upper[i] -= disturbance[i]
     violated = 0 if within(a, bounds.a_lower, bounds.a_upper) else MOTION
     effort_ok = within(tau, bounds.tau_lower, bounds.tau_upper)
     return violated if effort_ok else violated + EFFORT

@@ -189,6 +189,10 @@ class Actuation:
             assert self._window is not None
             self._window()
 
+    def disturbed(self, acceleration: Array) -> None:
+        """Expect an acceleration that something else than the efforts causes, (nv,)."""
+        self._held.disturbance[:] = acceleration
+
     def forget(self) -> None:
         """Forget the last efforts: the rate limit does not apply to the next one."""
         self._held.forget()
@@ -386,4 +390,5 @@ def _check(
     See `observe` and `violated_limits`.
     """
     observe(v, held, t)
-    return violated_limits(q, v, a, tau, where, limits, held.error, bounds)
+    error, disturbance = held.error, held.disturbance
+    return violated_limits(q, v, a, tau, where, limits, error, disturbance, bounds)

@@ -25,12 +25,14 @@ class Held(NamedTuple):
         expected: The velocity that is expected then, shape (nv,).
         stray: Differences from it, summed over about `_WINDOW`, shape (nv,).
         error: The largest error of late, shape (nv,).
+        disturbance: Acceleration that something else causes, shape (nv,).
     """
 
     timing: Array
     expected: Array
     stray: Array
     error: Array
+    disturbance: Array
 
 
 class HeldEffort:
@@ -45,11 +47,14 @@ class HeldEffort:
 
     Attributes:
         error: The largest error of late, shape (nv,) [rad/s² or m/s²].
+        disturbance: Acceleration that something else than the effort is known to cause,
+            shape (nv,) [rad/s² or m/s²].
     """
 
     def __init__(self, nv: int) -> None:
         """Begin without an error."""
         self.error: Array = np.zeros(nv)
+        self.disturbance: Array = np.zeros(nv)
         self._expected, self._stray = np.zeros(nv), np.zeros(nv)
         self._timing = np.full(2, np.nan)
         self._expect = IdentityCache(self._compile_expect)
@@ -71,12 +76,14 @@ class HeldEffort:
         observe(v, self.memory_of_kernels, t)
 
     def _compile_expect(self, v: Array, a: Array) -> Callable[[], float]:
-        return bind(_expect, v, a, self._timing, self._expected)
+        return bind(_expect, v, a, self.disturbance, self._timing, self._expected)
 
     @property
     def memory_of_kernels(self) -> "Held":
         """What `observe` reads and writes."""
-        return Held(self._timing, self._expected, self._stray, self.error)
+        return Held(
+            self._timing, self._expected, self._stray, self.error, self.disturbance
+        )
 
     def prepare(self, v: Array, a: Array) -> None:
         """Compile what `sent` calls, for these arrays."""
@@ -84,27 +91,34 @@ class HeldEffort:
 
     def forget(self) -> None:
         """Begin anew."""
-        self.error[:] = 0.0
+        self.error[:] = self.disturbance[:] = 0.0
         self._stray[:] = 0.0
         self._timing[:] = np.nan
 
+    @property
+    def _memories(self) -> tuple[Array, ...]:
+        kept = self._stray, self._expected, self._timing
+        return (self.error, self.disturbance, *kept)
+
     def memory(self) -> tuple[Array, ...]:
         """Return a copy of what it remembers."""
-        own = self.error, self._stray, self._expected, self._timing
+        own = self._memories
         return tuple(each.copy() for each in own)
 
     def remember(self, memory: tuple[Array, ...]) -> None:
         """Set what `memory` returned."""
-        own = self.error, self._stray, self._expected, self._timing
+        own = self._memories
         for each, value in zip(own, memory, strict=True):
             each[:] = value
 
 
 @kernel
-def _expect(v: Array, a: Array, timing: Array, expected: Array) -> None:
+def _expect(
+    v: Array, a: Array, disturbance: Array, timing: Array, expected: Array
+) -> None:
     """Write the velocity at the end of a period."""
     for i in range(v.shape[0]):
-        expected[i] = v[i] + timing[1] * a[i]
+        expected[i] = v[i] + timing[1] * (a[i] + disturbance[i])
 
 
 @kernel
@@ -116,7 +130,7 @@ def observe(v: Array, held: Held, t: float) -> None:
         held: The memory; updated at the end of a period, once.
         t: Time [s].
     """
-    timing, expected, stray, error = held
+    timing, expected, stray, error, _ = held
     period = timing[1]
     if not abs(t - timing[0]) < 0.01 * period:
         return

@@ -214,7 +214,11 @@ class Command:
     ) -> None:
         """Update the observer with the effort that acted since the last measurement."""
         acted = self._under_way[0] if self._under_way else self._zero
-        observer.update(self._measured.update(t, q, v), acted, period)
+        state = self._measured.update(t, q, v)
+        observer.update(state, acted, period)
+        remaining = observer.disturbance - observer.cancelled
+        if self.controller.limits is not None and remaining.any():
+            self.controller.disturbed(np.linalg.solve(state.mass_matrix, remaining))
 
     def _predict(
         self, predictor: Predictor, t: float, q: Array, v: Array, period: float
