@@ -288,6 +288,24 @@ def test_the_spring_s_energy_is_the_integral_of_its_force() -> None:
         assert spring_energy(spring.numbers(2), e) == pytest.approx(work, rel=1e-6)
 
 
+@pytest.mark.parametrize(("observed", "most"), [(True, 0), (False, 15)])
+def test_limits_are_not_bound_by_a_push(observed: bool, most: int) -> None:
+    """The robot's own limits, far from being reached: they know that it is pushed.
+
+    Without an observer the first 10 ms of a push are not yet known.
+    """
+    experiment = hsp.load_experiment(
+        "compliance/panda_cartesian_impedance",
+        "simulation.duration=2.5",
+        *([] if observed else ["compensation.momentum_observer=null"]),
+    )
+    log = experiment.run()
+    assert (log["status"] >= 2).sum() <= most
+    pushed = log["null_space_norm"][log.t > 0.5].max()
+    assert pushed < (0.002 if observed else 0.1)
+    assert np.abs(log["task.hand.error"][:, 1]).max() == pytest.approx(0.05, rel=0.02)
+
+
 # --- what the observer says ----------------------------------------------------------
 
 

@@ -37,7 +37,7 @@ def test_the_readme_s_python_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (snippet,) = blocks(README, "python")
+    snippet, streamed = blocks(README, "python")
     assert len([line for line in snippet.splitlines() if line.strip()]) <= 16
     space: dict = {}
     exec(compile(snippet, "README.md", "exec"), space)
@@ -48,6 +48,11 @@ def test_the_readme_s_python_runs(
     # It does what the README claims: the law's exponential on the user's own cost.
     decay = np.exp(-8.0 * rollout.t) * rollout["null_space_norm"][0]
     np.testing.assert_allclose(rollout["null_space_norm"], decay, rtol=1e-4, atol=1e-8)
+    exec(compile(streamed, "README.md", "exec"), space)
+    controller = space["hsp"].Controller(space["robot"], [space["hand"]])
+    assert np.isfinite(
+        controller.compute(0.0, space["robot"].home(), [0.0] * 7).tau
+    ).all()
 
 
 def test_the_page_of_compliance_is_true() -> None:
@@ -64,7 +69,7 @@ def test_the_page_of_compliance_is_true() -> None:
     )
 
 
-@pytest.mark.parametrize("page", ["sweeps", "latency", "robustness"])
+@pytest.mark.parametrize("page", ["sweeps", "latency", "robustness", "streams"])
 def test_the_pages_python_runs_and_their_commands_exist(page: str) -> None:
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
     (snippet,) = blocks(text, "python")

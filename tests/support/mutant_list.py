@@ -23,6 +23,7 @@ class Mutant(NamedTuple):
 
 PACKAGE = "hsp_control/"
 COMMON, ROBOT, SHAPES = PACKAGE + "common/", PACKAGE + "robot/", PACKAGE + "geometry/"
+STREAMS = PACKAGE + "trajectories/streams/"
 PATHS, TASKS = PACKAGE + "trajectories/", PACKAGE + "tasks/"
 FIELDS = PACKAGE + "null_space/fields/"
 METRICS = PACKAGE + "null_space/metrics/"
@@ -40,6 +41,7 @@ EVERY_FIELD = UNIT + "null_space/test_every_field.py -k "
 EVERY_SHAPE = UNIT + "null_space/test_clearance_rates.py -k "
 EVERY_TASK = UNIT + "tasks/test_every_task.py -k "
 EVERY_PATH = UNIT + "trajectories/test_trajectories.py -k "
+OF_STREAMS = UNIT + "trajectories/test_streams.py -k "
 ON_NUMBERS = UNIT + "law/test_law_on_numbers.py -k "
 ON_ROBOTS = UNIT + "law/test_law_on_robots.py -k "
 OF_LEVELS = UNIT + "law/test_hierarchy.py -k "
@@ -171,9 +173,58 @@ MUTANTS = (
     Mutant(
         "gains: Kv is not ramped",
         CONTROL + "controller.py",
-        "self._feedback[each.key].numbers[:] = each.gains.at(t)",
-        "self._feedback[each.key].numbers[0] = each.gains.at(t)[0]",
+        "self._feedback[each.key].numbers[:] = each.gains.at(t - behind)",
+        "self._feedback[each.key].numbers[0] = each.gains.at(t - behind)[0]",
         UNIT + "tasks/test_gains.py",
+    ),
+    Mutant(
+        "impedance: a change waits for nothing",
+        CONTROL + "stiffening.py",
+        "return behind + (1.0 - given / needed) * period",
+        "return behind",
+        "tests/integration/test_compliance.py -k adds_no_energy",
+    ),
+    Mutant(
+        "limits: a push moves no bound",
+        LIMITS + "acceleration_bounds.py",
+        "bounds.a_lower[i] -= disturbance[i]",
+        "bounds.a_lower[i] -= 0.0 * disturbance[i]",
+        "tests/integration/test_compliance.py -k bound_by_a_push",
+    ),
+    Mutant(
+        "streams: a plan begins where the last one ends",
+        STREAMS + "running.py",
+        "state = self.chart.rebased(self._segments[-1].state(t))",
+        "state = self.chart.rebased(self._segments[-1].state(t + 1e-3))",
+        OF_STREAMS + "keep_their_bounds",
+    ),
+    Mutant(
+        "streams: quintics keep no bound on the jerk",
+        STREAMS + "bounds.py",
+        "for k in (1, 2, 3):",
+        "for k in (1, 2):",
+        OF_STREAMS + "points_keep_their_bounds",
+    ),
+    Mutant(
+        "streams: an old chunk counts",
+        STREAMS + "waypoints.py",
+        "if made < self._made and (replace or chunk):",
+        "if made < self._made and replace:",
+        OF_STREAMS + "chunk_replaces",
+    ),
+    Mutant(
+        "streams: a second run hears the first one's",
+        STREAMS + "inbox.py",
+        "self._number = inbox.taken",
+        "self._number = 0",
+        OF_STREAMS + "new_run",
+    ),
+    Mutant(
+        "streams: silence is never too long",
+        STREAMS + "running.py",
+        "if self.age > policy.stop_after:",
+        "if self.age > 10.0 * policy.stop_after:",
+        OF_STREAMS + "silence",
     ),
     Mutant(
         "impedance: no rate of the inertia",

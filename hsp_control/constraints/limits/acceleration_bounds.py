@@ -114,12 +114,9 @@ def violated_limits(
 ) -> int:
     """Write the acceleration bounds, and return which bounds a and tau violate.
 
-    The robot accelerates by a plus the disturbance, so the bounds on a are moved by it.
-
-    See `acceleration_bounds` for the other arguments.
-
-    Args:
-        disturbance: Acceleration that something else causes, shape (nv,).
+    The robot accelerates by a plus the disturbance, the acceleration that something
+    else causes, shape (nv,); so the bounds on a are moved by it. See
+    `acceleration_bounds` for the other arguments.
 
     Returns:
         0 for none, `MOTION`, `EFFORT`, or the sum of both.

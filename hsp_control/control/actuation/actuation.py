@@ -191,7 +191,7 @@ class Actuation:
 
     def disturbed(self, acceleration: Array) -> None:
         """Expect an acceleration that something else than the efforts causes, (nv,)."""
-        self._held.disturbance[:] = acceleration
+        self._held.known[:] = acceleration
 
     def forget(self) -> None:
         """Forget the last efforts: the rate limit does not apply to the next one."""

@@ -216,8 +216,8 @@ class Command:
         acted = self._under_way[0] if self._under_way else self._zero
         state = self._measured.update(t, q, v)
         observer.update(state, acted, period)
-        remaining = observer.disturbance - observer.cancelled
-        if self.controller.limits is not None and remaining.any():
+        if self.controller.limits is not None:
+            remaining = observer.disturbance - observer.cancelled
             self.controller.disturbed(np.linalg.solve(state.mass_matrix, remaining))
 
     def _predict(
