@@ -6,6 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
 import yaml
 from numpy.typing import ArrayLike
 
@@ -316,6 +317,7 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
                 f"{path}: the run cannot be repeated, because {lost} messages of its "
                 "streams were too many to be recorded"
             )
+        _check_heard(path, run)
         made = run.meta.get("changes") or []
         config = with_recordings(run.config, run.meta.get("streams") or {})
         return Document(config | {"changes": made}, {}, str(path))
@@ -328,6 +330,24 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
         f"no configuration {str(source)!r}{did_you_mean(str(source), known)} "
         f"(give the path of a .yaml file, or one of: {listing(known)})"
     )
+
+
+def _check_heard(path: Path, run: Rollout) -> None:
+    """Check that a log holds all that its streams have taken.
+
+    Raises:
+        ConfigError: If it does not: it is the journal of a process that was killed.
+    """
+    for name, recordings in (run.meta.get("streams") or {}).items():
+        for k, messages in enumerate(recordings):
+            column = f"stream.{name}{f'_{k + 1}' if k else ''}.taken"
+            taken = np.nanmax(run[column]) if column in run.columns else 0
+            if taken > len(messages):
+                raise ConfigError(
+                    f"{path}: the run cannot be repeated: a stream of task {name!r} "
+                    f"took {taken:.0f} messages, and the log holds {len(messages)} of "
+                    "them, because it has no end"
+                )
 
 
 def _is_file(path: Path) -> bool:

@@ -35,6 +35,7 @@ from hsp_control.trajectories import (
     crossfade,
 )
 from hsp_control.trajectories.crossfade import AnyReference
+from hsp_control.trajectories.streams.stream import Streamed, stream_for
 
 __all__ = [
     "AddTask",
@@ -207,7 +208,11 @@ class ChangeReference(Change, type="reference"):
     def placed(self, start: Start, setup: Setup) -> Self:
         """Return the change with its trajectory in the world."""
         task = setup.tasks[setup.find_task(self.task)].task
-        followed = task.following(self.trajectory).placed(start).followed
+        trajectory = self.trajectory
+        if isinstance(trajectory, Streamed):  # YAML has one word for all kinds
+            with within("trajectory"):
+                trajectory = stream_for(task.followed, trajectory)
+        followed = task.following(trajectory).placed(start).followed
         assert followed is not None
         return replace(self, trajectory=followed)
 

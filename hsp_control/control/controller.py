@@ -36,12 +36,13 @@ from hsp_control.control.planned_contact import PlannedContact
 from hsp_control.control.planned_limits import PlannedLimits
 from hsp_control.control.read_only import read_only
 from hsp_control.control.setup import (
+    PlannedTask,
     PlannedTerm,
     Setup,
     levels_of,
     planned_task,
 )
-from hsp_control.control.stiffening import changes_impedance, waiting_time
+from hsp_control.control.stiffening import changes_impedance, next_numbers
 from hsp_control.declaration import within
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
@@ -170,7 +171,7 @@ class Controller:
         self._modified, self._mixed = np.zeros((2, robot.nv))
         self._gain = np.zeros((robot.nv, robot.nv))
         self._feedback: dict[int, InForce] = {}
-        self._behind: dict[int, float] = {}
+        self._waiting: dict[int, Array] = {}
         self._by_key: dict[int, Task] = {}
         self._stacks: dict[tuple[int, ...], ActiveStack] = {}
         self._field: NullSpaceField = Rest()
@@ -250,9 +251,9 @@ class Controller:
         self._by_key = by_key
         self._written: set[int] = set()
         self._fading = [each for each in setup.tasks if not each.always]
-        self._stiffening = [
-            each for each in setup.tasks if changes_impedance(each.task, each.gains)
-        ]
+        self._stiffening = any(
+            changes_impedance(each.task, each.gains) for each in setup.tasks
+        )
         self._levels = levels_of(setup.tasks, self._robot)
         self._steady = setup.steady and setup.end == -np.inf
         self._active: ActiveStack | None = None
@@ -270,8 +271,9 @@ class Controller:
         """Write the gains of a time; every step reads these arrays."""
         for each in self._setup.tasks:
             if not (each.gains.constant and each.key in self._written):
-                behind = self._behind.get(each.key, 0.0)
-                self._feedback[each.key].numbers[:] = each.gains.at(t - behind)
+                numbers = self._waiting.get(each.key)
+                numbers = each.gains.at(t) if numbers is None else numbers
+                self._feedback[each.key].numbers[:] = numbers
         self._written = set(self._by_key)
         self._gain[:] = self._setup.gain.at(t)
 
@@ -424,7 +426,7 @@ class Controller:
         if not period > 0.0:
             raise ControllerError(f"period is {period} s; must be positive")
         self._actuation.applied(self._state, tau, period)
-        if self._stiffening:
+        if self._stiffening or self._waiting:
             self._wait(period)
 
     def disturbed(self, acceleration: ArrayLike) -> None:
@@ -448,20 +450,29 @@ class Controller:
     def _wait(self, period: float) -> None:
         """Let changes of impedances wait where they would add energy."""
         t, active = self._state.t, self.active_stack
-        for each in self._stiffening:
+        for each in self._setup.tasks:
+            changes = each.key in self._waiting or changes_impedance(
+                each.task, each.gains
+            )
             rows = active.task_rows.get(each.task.name)
-            if rows is None:
+            if not changes or rows is None:
                 continue
-            sample, behind = active.rows, self._behind.get(each.key, 0.0)
-            self._behind[each.key] = waiting_time(
+            in_force, sample = self._feedback[each.key], active.rows
+            following = next_numbers(
+                in_force.numbers,
                 each.gains,
-                self._feedback[each.key].mobility,
+                in_force.mobility,
                 sample.error[rows],
                 sample.error_rate[rows],
                 t,
                 period,
-                behind,
             )
+            if following is None:
+                self._waiting.pop(each.key, None)
+                following = each.gains.at(t + period)
+            else:
+                self._waiting[each.key] = following
+            in_force.numbers[:] = following
 
     def restart(self) -> None:
         """Begin anew: forget the last effort, the offsets of tasks, and where it began.
@@ -471,7 +482,7 @@ class Controller:
         with self._lock:
             self._actuation.forget()
             self._now, self._begun = -np.inf, False
-            self._behind.clear()
+            self._waiting.clear()
             self._active = None  # the next step places what is relative
             for in_force in self._feedback.values():
                 in_force.feedback.offset[:] = 0.0
@@ -495,9 +506,8 @@ class Controller:
             self._begin(self._state)
         self._now = max(self._now, t)
         if self._open:
-            done = self._now - _MEMORY - max(self._behind.values(), default=0.0)
-            if done > self._open[0].end:
-                self._settle(done)
+            if self._now > self._open[0].end + _MEMORY:
+                self._settle(self._now - _MEMORY)
             self._write_gains(t)
             self._actuation.update_limits(t)
         weights = {each.key: each.weight(t) for each in self._fading}
@@ -683,7 +693,7 @@ class Controller:
         Raises:
             ControllerError: If there is no such task.
         """
-        planned = self._setup.tasks[self._setup.find_task(task)]
+        planned = self._present(task)
         now = planned.task.linear_feedback(state, self._feedback[planned.key])
         found = {-np.inf: now}
         for each in planned.gains.transitions:
@@ -691,6 +701,14 @@ class Controller:
             later.numbers[:] = each.target
             found[each.end] = planned.task.linear_feedback(state, later)
         return found
+
+    def _present(self, task: str) -> PlannedTask:
+        """Return the task of a name that counts now, or is to come."""
+        now = self._latest
+        for each in self._setup.tasks:
+            if each.task.name == task and each.presence.at(now) > 0.0:
+                return each
+        return self._setup.tasks[self._setup.find_task(task)]
 
     def stiffness(self, task: str) -> Array:
         """Return the stiffness K in force of a task with an impedance, shape (m, m).
@@ -700,7 +718,7 @@ class Controller:
         Raises:
             ControllerError: If there is no such task, or it has no impedance.
         """
-        planned = self._setup.tasks[self._setup.find_task(task)]
+        planned = self._present(task)
         if impedance_of(planned.task) is None:
             raise ControllerError(f"task {task!r} has gains, and no stiffness")
         return parts_of(self._feedback[planned.key].numbers)[0].copy()
@@ -828,7 +846,7 @@ class Controller:
             "settled": self._settled,
             "open": self._open,
             "now": self._now,
-            "behind": self._behind.copy(),
+            "waiting": {k: each.copy() for k, each in self._waiting.items()},
             "at": (state.t, state.q.copy(), state.v.copy()),
             "offsets": {
                 k: each.feedback.offset.copy() for k, each in self._feedback.items()
@@ -841,7 +859,7 @@ class Controller:
         self._allocate()
         self._start, self._settled = saved["start"], saved["settled"]
         self._open, self._begun, self._now = saved["open"], saved["begun"], saved["now"]
-        self._behind = saved["behind"]
+        self._waiting = saved["waiting"]
         self._install(_applied(self._open, self._settled))
         for key, offset in saved["offsets"].items():
             self._feedback[key].feedback.offset[:] = offset

@@ -5,8 +5,9 @@ With E = ½ e'ᵀΛe' + U(e), U the energy of the spring, and an external force 
     E' = fᵀx' - e'ᵀ(D + D_ζ) e' + ∂U/∂t.
 
 A spring that becomes stiffer while it is stretched stores energy that nobody gave. So
-a change proceeds only as fast as ∂U/∂t is no more than what the damping takes out:
-E' <= fᵀx', to first order in the period.
+the numbers in force follow those that were planned only as fast as ∂U/∂t is no more
+than what the damping takes out: E' <= fᵀx', to first order in the period. Where they
+are behind, they catch up in half of the change's ramp, so that no effort jumps.
 """
 
 import numpy as np
@@ -23,34 +24,40 @@ def changes_impedance(task: Task, numbers: Evolution[Array]) -> bool:
     return impedance_of(task) is not None and not numbers.constant
 
 
-def waiting_time(
-    numbers: Evolution[Array],
+def next_numbers(
+    now: Array,
+    planned: Evolution[Array],
     mobility: Array,
     e: Array,
     e_dot: Array,
     t: float,
     period: float,
-    behind: float,
-) -> float:
-    """Return how far a change is behind its own time after the next period [s].
+) -> Array | None:
+    """Return the numbers of an impedance for the next period.
 
     Args:
-        numbers: The numbers of the impedance, as they were planned.
+        now: The numbers in force, shape (2 m + 2, m); see `Impedance.numbers`.
+        planned: Those that were planned.
         mobility: Λ⁻¹, shape (m, m).
         e: Error, shape (m,).
         e_dot: Its rate, shape (m,) [1/s].
         t: Time [s].
         period: Time until the next effort [s].
-        behind: How far it is behind now [s].
+
+    Returns:
+        The numbers, or None if they are as planned.
     """
-    if t - behind >= numbers.end:
-        return 0.0  # complete
-    now, then = numbers.at(t - behind), numbers.at(t - behind + period)
-    needed = spring_energy(then, e) - spring_energy(now, e)
-    given = period * dissipated(now, mobility, e_dot)
-    if needed <= given:
-        return behind
-    return behind + (1.0 - given / needed) * period
+    then = planned.at(t + period)
+    step = then - now
+    if not np.allclose(now, planned.at(t), rtol=1e-4, atol=1e-9):  # it has waited
+        begun = [each.ramp for each in planned.transitions if each.start <= t]
+        step *= min(2.0 * period / max(begun[-1] if begun else 0.3, period), 1.0)
+    needed = spring_energy(now + step, e) - spring_energy(now, e)
+    if needed > 0.0:
+        given = period * dissipated(now, mobility, e_dot)
+        if needed > given:
+            return np.asarray(now + given / needed * step)
+    return None if np.array_equal(now + step, then) else now + step
 
 
 def spring_energy(numbers: Array, e: Array) -> float:

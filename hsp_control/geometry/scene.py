@@ -13,6 +13,7 @@ from hsp_control.common.exceptions import SceneError, TrajectoryError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import Part
 from hsp_control.declaration.named import BY_NAME, stored
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import ArrayField, Name
 from hsp_control.geometry.shapes import Shape
 from hsp_control.trajectories import (
@@ -23,14 +24,16 @@ from hsp_control.trajectories import (
     TrajectorySample,
 )
 from hsp_control.trajectories.following import Follower, follow_all
+from hsp_control.trajectories.streams.stream import Streamed
 
 
 def _in_space(center: Trajectory) -> Trajectory:
     """Return the trajectory of a point in the world.
 
     Raises:
-        SceneError: If it is relative to a start, or its dimension is not 3.
+        SceneError: If it is relative to a start, streamed, or its dimension is not 3.
     """
+    _refuse_streams(center)
     try:
         center = center.anchored(None)
     except TrajectoryError as error:
@@ -40,12 +43,22 @@ def _in_space(center: Trajectory) -> Trajectory:
     return center
 
 
+def _refuse_streams(trajectory: Part) -> None:
+    """Raise for a stream: a scene is no part of a run, and has no memory of one."""
+    if any(True for _ in parts_within(trajectory, Streamed)):
+        raise SceneError(
+            "a stream cannot move an obstacle; while the controller runs, "
+            "controller.at(t).obstacle(name, center) moves it on another trajectory"
+        )
+
+
 def _or_world_axes(orientation: Any) -> Any:
     """Return the world's axes for None, which logs of version 0.1 contain."""
     return HoldOrientation((0.0, 0.0, 0.0)) if orientation is None else orientation
 
 
 def _from_world_axes(orientation: OrientationTrajectory) -> OrientationTrajectory:
+    _refuse_streams(orientation)
     return orientation.anchored(np.eye(3))
 
 

@@ -17,7 +17,7 @@ from hsp_control.live.safe_stop import Phase
 from hsp_control.live.state_reader import StateReader
 from hsp_control.robot import RobotState
 from hsp_control.simulation.journal import JournalWriter
-from hsp_control.simulation.recorder import Recorder, repeatable
+from hsp_control.simulation.recorder import Recorder
 
 CHANNEL_INFO = {
     "phase": ("-", "0 waiting; 1 running; 2 safe stop, damping; 3 safe stop, hold"),
@@ -69,7 +69,7 @@ class LiveLog:
         Raises:
             LogError: If it cannot be written.
         """
-        self.path, self._controller = path, controller
+        self.path = path
         self._recorder = Recorder(controller, scene or Scene(), 1)
         self._meta = dict(meta or {})
         self._last_t = -inf
@@ -113,7 +113,7 @@ class LiveLog:
             LogError: If it cannot be written.
         """
         try:
-            came = repeatable(self._controller)
+            came = self._recorder.repeatable()
             self._journal.write_end(status, message, **came, **meta)
         finally:
             self._journal.close()

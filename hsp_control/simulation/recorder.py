@@ -125,7 +125,7 @@ class Recorder:
         # By identity: equal tasks of two runs may have streams in different states.
         self._known = list(map(id, self._controller.tasks))
         self._log_names: dict[str, str] = {}
-        probe = _probe(self._controller.robot)
+        probe = _probe(self._controller)
         levels = [
             (level, task)
             for level, tasks in enumerate(self._controller.levels)
@@ -167,7 +167,7 @@ class Recorder:
 
     def _add_term_columns(self) -> None:
         """Add the columns of the field's terms; the field may change during the run."""
-        controller, probe = self._controller, _probe(self._controller.robot)
+        controller, probe = self._controller, _probe(self._controller)
         self._field, self._terms = controller.field, _terms(controller)
         shape, unit = (controller.robot.nv,), f"{self._joint_unit}/s"
         for name, field in self._terms.items():
@@ -340,6 +340,21 @@ class Recorder:
         complete_columns(columns, continuous_dofs(self._controller.robot))
         return Rollout(columns, self.meta(status, message, **meta))
 
+    def repeatable(self) -> dict[str, Any]:
+        """Return what came during the run, as data, so that the run can be repeated.
+
+        The changes that were made, and for each task what its streams have taken.
+        """
+        streams = {
+            name: list(parts_within(task, Streamed))
+            for name, task in self._logged.items()
+            if task.remembers
+        }
+        heard = {name: [list(s.record) for s in each] for name, each in streams.items()}
+        lost = sum(s.unrecorded for each in streams.values() for s in each)
+        found = _changes(self._controller) | ({"streams": heard} if heard else {})
+        return found | ({"streams_lost": lost} if lost else {})
+
     def meta(self, status: str, message: str, **meta: Any) -> dict[str, Any]:
         """Return the meta data of a rollout of these rows, as JSON data."""
         controller, robot = self._controller, self._controller.robot
@@ -362,7 +377,7 @@ class Recorder:
                 name: {**_task_meta(task), "level": self._levels[name]}
                 for name, task in self._logged.items()
             },
-            **repeatable(controller),
+            **self.repeatable(),
             "field": controller.field.name,
             "controls_null_space": controller.field.controls,
             "null_space_gain": controller.null_space_gain.tolist(),
@@ -399,19 +414,6 @@ def versions() -> dict[str, str]:
         "python": platform.python_version(),
         **{package: version(package) for package in packages},
     }
-
-
-def repeatable(controller: Controller) -> dict[str, Any]:
-    """Return what came during the run, as data, so that the run can be repeated.
-
-    The changes that were made, and for each task what its streams have taken.
-    """
-    tasks = [task for task in controller.tasks if task.remembers]
-    streams = {task.name: list(parts_within(task, Streamed)) for task in tasks}
-    heard = {name: [list(s.record) for s in each] for name, each in streams.items()}
-    lost = sum(s.unrecorded for each in streams.values() for s in each)
-    found = _changes(controller) | ({"streams": heard} if heard else {})
-    return found | ({"streams_lost": lost} if lost else {})
 
 
 def _changes(controller: Controller) -> dict[str, Any]:
@@ -461,8 +463,10 @@ def _constant_matrix(metric: Metric) -> list[list[float]] | None:
     return None
 
 
-def _probe(robot: Robot) -> RobotState:
-    return robot.state(0.0, robot.neutral(), np.zeros(robot.nv))
+def _probe(controller: Controller) -> RobotState:
+    """Return a state at the present time: streams would go on to any later one."""
+    robot = controller.robot
+    return robot.state(controller.state.t, robot.neutral(), np.zeros(robot.nv))
 
 
 def _skeleton(

@@ -251,7 +251,7 @@ def test_at_its_target_a_hand_becomes_stiffer_at_once_and_copies_wait_alike() ->
         controller.applied(controller.compute(1e-3 * k, away, v).tau, 1e-3)
     assert np.diag(controller.stiffness("hand")) == pytest.approx([1000.0] * 3)
     other = pickle.loads(pickle.dumps(controller))
-    for k in range(600, 720):
+    for k in range(600, 1400):
         for each in (controller, other):
             each.applied(each.compute(1e-3 * k, q, v).tau, 1e-3)
         np.testing.assert_array_equal(
@@ -260,6 +260,29 @@ def test_at_its_target_a_hand_becomes_stiffer_at_once_and_copies_wait_alike() ->
     assert np.diag(controller.stiffness("hand")) == pytest.approx([2000.0] * 3)
     with pytest.raises(ControllerError, match="'posture' has gains, and no stiffness"):
         Controller(panda(), [hsp.JointPosture()]).stiffness("posture")
+
+
+def test_a_hand_that_is_held_becomes_softer_at_once() -> None:
+    """A stiffening that waits delays no other change, and nothing piles up."""
+    hand = position_hand(impedance=Impedance(600.0))
+    controller = Controller(panda(), [hand], limits=None)
+    controller.at(0.2).ramp(0.3).impedance("hand", Impedance(2000.0))
+    q, v = start(), np.zeros(7)
+    away = panda().integrate(q, np.full(7, 0.05))
+    controller.compute(0.0, q, v)
+
+    def hold(begin: float, end: float) -> Array:
+        for t in np.arange(begin, end, 1e-3):
+            controller.applied(controller.compute(t, away, v).tau, 1e-3)
+        return np.diag(controller.stiffness("hand"))
+
+    assert hold(0.001, 3.0) == pytest.approx([600.0] * 3)
+    controller.at(3.0).ramp(0.3).impedance("hand", Impedance(60.0))
+    assert hold(3.0, 6.0) == pytest.approx([60.0] * 3)
+    for _ in range(3):  # all else goes on
+        controller.at(6.0).ramp(0.1).null_space_gain(5.0)
+    hold(6.0, 8.0)
+    assert len(controller._open) == 0
 
 
 @pytest.mark.parametrize("seed", range(20))

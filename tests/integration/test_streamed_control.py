@@ -192,6 +192,47 @@ def test_silence_stops_a_run_with_the_time(panda: hsp.Robot) -> None:
         hsp.simulate(controller, panda.home(), duration=1.0, control_period=PERIOD)
 
 
+def test_runs_that_begin_at_any_time(panda: hsp.Robot) -> None:
+    here = hand_pose(panda).translation
+    for begin in (-5.0, 3.0):
+        stream = hsp.Stream()
+        task = hsp.FramePosition("panda_tcp", stream, name="hand")
+        stream.send(here + np.array([0.0, 0.05, 0.0]))
+        run = hsp.simulate(
+            hsp.Controller(panda, [task]),
+            panda.home(),
+            duration=0.9,
+            control_period=PERIOD,
+            start_time=begin,
+        )
+        reference = run["task.hand.reference"]
+        assert reference[0] == pytest.approx(here)
+        assert reference[-1] == pytest.approx(here + np.array([0.0, 0.05, 0.0]))
+        assert np.abs(np.diff(reference, axis=0)).max() < 0.01
+
+
+def test_continuous_integration_takes_messages_at_their_own_times(
+    panda: hsp.Robot,
+) -> None:
+    here = hand_pose(panda).translation
+    messages = [
+        {"at": 0.123, "value": (here + 0.02).tolist()},
+        {"at": 0.4567, "value": here.tolist()},
+    ]
+    references = []
+    for period in (0.3, 0.01):
+        stream = hsp.Stream(messages=messages)
+        task = hsp.FramePosition("panda_tcp", stream, name="hand")
+        run = hsp.simulate(
+            hsp.Controller(panda, [task]),
+            panda.home(),
+            duration=0.6,
+            log_period=period,
+        )
+        references.append(run["task.hand.reference"][:: round(0.3 / period)])
+    np.testing.assert_allclose(references[0], references[1], atol=1e-12)
+
+
 # -- YAML -----------------------------------------------------------------------------
 
 
@@ -276,6 +317,65 @@ def test_mistakes_name_their_place(
 ) -> None:
     with pytest.raises(HspControlError, match=message):
         hsp.load_experiment(write(tmp_path, {"type": "stream", **trajectory}))
+
+
+def test_a_run_whose_streamed_task_was_removed_repeats(
+    panda: hsp.Robot, tmp_path: Path
+) -> None:
+    stream, start = hsp.Stream(), hand_pose(panda).translation
+    experiment = hsp.Experiment(
+        "panda",
+        [
+            hsp.FramePosition("panda_tcp", stream, name="hand"),
+            hsp.FrameOrientation("panda_tcp", name="turned"),
+        ],
+        changes=[hsp.changes.RemoveTask("hand", at=0.2, ramp=0.1)],
+        simulation=hsp.load_experiment(config({"type": "stream"})).scenario.simulation,
+    )
+    run = experiment.run(
+        on_row=every(0.05, lambda t: stream.send(start + np.array([0.0, 0.1 * t, 0.0])))
+    )
+    again = hsp.load_experiment(run.save(tmp_path / "run.npz")).run()
+    assert np.array_equal(run.q, again.q)
+
+
+def test_a_log_that_does_not_hold_all_that_was_heard_is_not_repeated(
+    panda: hsp.Robot, tmp_path: Path
+) -> None:
+    goals(tmp_path, panda)
+    trajectory = {"type": "stream", "source": "goals.jsonl"}
+    run = hsp.load_experiment(write(tmp_path, trajectory)).run()
+    run.meta["streams"]["hand"][0] = run.meta["streams"]["hand"][0][:3]
+    log = run.save(tmp_path / "run.npz")
+    with pytest.raises(
+        hsp.errors.ConfigError, match="'hand' took 8 messages, and the log holds 3 of"
+    ):
+        hsp.load_experiment(log)
+
+
+@pytest.mark.parametrize(
+    ("task", "value"),
+    [
+        ({"type": "frame_position", "frame": "panda_tcp"}, [0.3, 0.1, 0.5]),
+        ({"type": "frame_orientation", "frame": "panda_tcp"}, [1.0, 0.0, 0.0, 0.0]),
+        ({"type": "frame_pose", "frame": "panda_tcp"}, [0.3, 0.1, 0.5, 1, 0, 0, 0]),
+    ],
+)
+def test_any_task_changes_to_a_stream_in_yaml(
+    task: dict[str, Any], value: list[float], tmp_path: Path
+) -> None:
+    stream = {"type": "stream", "messages": [{"at": 0.3, "value": value}]}
+    change = {"type": "reference", "task": "hand", "at": 0.2, "trajectory": stream}
+    data = config({"type": "stream"}) | {"tasks": {"hand": task}, "changes": [change]}
+    run = hsp.load_experiment(data).run()
+    assert run["stream.hand.taken"][-1] == 1
+    again = hsp.load_experiment(run.save(tmp_path / "run.npz")).run()
+    assert np.array_equal(run.q, again.q)
+
+
+def test_a_stream_moves_no_obstacle() -> None:
+    with pytest.raises(hsp.errors.SceneError, match="a stream cannot move an obstacle"):
+        hsp.Obstacle("ball", hsp.Sphere(0.1), hsp.Stream([0.0, 0.0, 1.0]))
 
 
 def test_strict_reading_listens_to_this_computer_and_reads_beside_the_file(

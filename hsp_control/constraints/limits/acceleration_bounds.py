@@ -110,21 +110,26 @@ def violated_limits(
     limits: MotionLimits,
     error: Array,
     disturbance: Array,
+    known: bool,
     bounds: Bounds,
 ) -> int:
     """Write the acceleration bounds, and return which bounds a and tau violate.
 
     The robot accelerates by a plus the disturbance, the acceleration that something
-    else causes, shape (nv,); so the bounds on a are moved by it. See
-    `acceleration_bounds` for the other arguments.
+    else causes, shape (nv,); so the bounds on a are moved by it. If it is not known but
+    what was seen of late, it makes a bound wider by less beyond half of a joint's
+    speed. See `acceleration_bounds` for the other arguments.
 
     Returns:
         0 for none, `MOTION`, `EFFORT`, or the sum of both.
     """
     acceleration_bounds(q, v, where, limits, error, bounds.a_lower, bounds.a_upper)
     for i in range(a.shape[0]):
-        bounds.a_lower[i] -= disturbance[i]
-        bounds.a_upper[i] -= disturbance[i]
+        used = abs(v[i]) / limits.velocity[i]
+        wider = 1.0 if known else min(max(2.0 - 2.0 * used, 0.0), 1.0)
+        up, down = max(disturbance[i], 0.0), min(disturbance[i], 0.0)
+        bounds.a_lower[i] -= wider * up + down
+        bounds.a_upper[i] -= up + wider * down
     violated = 0 if within(a, bounds.a_lower, bounds.a_upper) else MOTION
     effort_ok = within(tau, bounds.tau_lower, bounds.tau_upper)
     return violated if effort_ok else violated + EFFORT

@@ -390,5 +390,15 @@ def _check(
     See `observe` and `violated_limits`.
     """
     observe(v, held, t)
-    error, disturbance = held.error, held.disturbance
-    return violated_limits(q, v, a, tau, where, limits, error, disturbance, bounds)
+    return violated_limits(
+        q,
+        v,
+        a,
+        tau,
+        where,
+        limits,
+        held.error,
+        held.disturbance,
+        not np.isnan(held.known[0]),
+        bounds,
+    )

@@ -74,12 +74,13 @@ class Inbox:
             return [each for each in self._waiting if each.number > number]
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the space alone: a copy elsewhere hears what is sent there."""
-        return {"space": self.space}
+        """Return no messages: a copy elsewhere hears what is sent there."""
+        return {"space": self.space, "count": self.count}
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
         """Begin without messages."""
         self.__init__(saved["space"])  # type: ignore[misc]
+        self.count = self.taken = saved["count"]
 
     def _add(self, message: Message) -> None:
         with self._lock:
@@ -95,8 +96,8 @@ class InboxReader:
         self._inbox, self._record = inbox, record
         self._number = inbox.taken
 
-    def take(self, t: float) -> list[Message]:
-        """Return the messages that are there at a time [s] and were not taken."""
+    def take(self, t: float) -> list[tuple[float, Message]]:
+        """Return what is there at a time [s] and was not taken, and this time."""
         if self._inbox.count == self._number:
             return []
         received = self._inbox.after(self._number)
@@ -104,7 +105,7 @@ class InboxReader:
             self._number = received[-1].number
         messages = [each.message for each in received if self._fits(each.message)]
         self._record.add(t, messages)
-        return messages
+        return [(t, each) for each in messages]
 
     def copy(self) -> "InboxReader":
         """Return a reader that goes on from here, with a record of its own."""

@@ -52,8 +52,8 @@ class Mailbox:
             self.inbox = listening_inbox(self._hears, space)
         elif self.inbox.space.linear not in (None, space.linear):
             raise StreamError(
-                f"this stream already carries {self.inbox.space.words}; here "
-                f"{space.words} are needed"
+                f"this stream already carries {self.inbox.space.width} numbers; here "
+                f"{space.width} are needed"
             )
         self.inbox.space = space
         self.record = Record()

@@ -13,8 +13,10 @@ from hsp_control.common.exceptions import StreamError
 MOST_WAYPOINTS = 1000
 """Most waypoints of one message."""
 LARGEST = 1e6
-"""Numbers beyond this are refused [m, rad or s]: they are mistakes, and would
+"""Numbers beyond this are refused [m or rad]: they are mistakes, and would
 overflow."""
+LATEST = 1e12
+"""Times beyond this are refused [s]; a clock of 1970 shows 2e9."""
 _UNIT = 1e-3
 """Deviation of a quaternion's norm from 1 that counts as a sender's rounding."""
 
@@ -47,7 +49,7 @@ class Space(NamedTuple):
             return "x, y, z and a quaternion (x, y, z, w)"
         if self.rotational:
             return "a quaternion (x, y, z, w)"
-        return "numbers" if self.linear is None else f"{self.linear} numbers"
+        return ""
 
 
 POSE = Space(3, True)
@@ -63,21 +65,31 @@ class Message(NamedTuple):
         values: The waypoints, shape (k, width), quaternions of norm 1; None: the
             message is a velocity alone.
         velocities: Their velocities, shape (k, rates), in world axes; None: unknown.
+        chunk: Whether they replace those that were to follow.
     """
 
     t: float | None
     times: Array
     values: Array | None
     velocities: Array | None
+    chunk: bool = False
+
+    @property
+    def size(self) -> int:
+        """How many numbers it has."""
+        found = (self.times, self.values, self.velocities)
+        return sum(each.size for each in found if each is not None)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `message_of` reads."""
         data: dict[str, Any] = {} if self.t is None else {"t": self.t}
-        for name in ("values", "velocities"):
-            array = getattr(self, name)
-            if array is not None:
-                data[name] = array.tolist()
-        if self.values is not None:
+        for one, several in (("value", "values"), ("velocity", "velocities")):
+            array = getattr(self, several)
+            if array is not None and self.chunk:
+                data[several] = array.tolist()
+            elif array is not None:
+                data[one] = array[0].tolist()
+        if self.chunk:
             data["times"] = self.times.tolist()
         return data
 
@@ -101,9 +113,9 @@ def message_of(data: Any, space: Space) -> Message:
         )
     given = {key: value for key, value in data.items() if value is not None}
     _check_alternatives(given)
-    t = None if "t" not in given else float(_numbers(given["t"], "t", 0))
+    t = None if "t" not in given else _clock(given["t"])
     values = _rows(given, "value", "values", space.width, space.words)
-    rates = "one velocity for each coordinate, angular velocities in world axes"
+    rates = "linear and angular velocities in world axes" if space.rotational else ""
     velocities = _rows(given, "velocity", "velocities", space.rates, rates)
     if values is None:
         if velocities is None or len(velocities) != 1:
@@ -115,7 +127,9 @@ def message_of(data: Any, space: Space) -> Message:
         )
     if space.rotational:
         _normalise(values)
-    return Message(t, _times(given, len(values)), values, velocities)
+    return Message(
+        t, _times(given, len(values)), values, velocities, chunk="times" in given
+    )
 
 
 def decoded(text: bytes, space: Space) -> Message:
@@ -144,6 +158,17 @@ def _check_alternatives(given: Mapping[str, Any]) -> None:
         raise StreamError("times need values, one for each")
 
 
+def _clock(value: Any) -> float:
+    """Return the time of a sender's clock [s]."""
+    number = isinstance(value, int | float | np.floating | np.integer)
+    if isinstance(value, bool) or not number or not abs(value) <= LATEST:
+        raise StreamError(
+            f"t, the time of the sender's clock, is {_shown(value)}; needs a number of "
+            f"at most {LATEST:g} s"
+        )
+    return float(value)
+
+
 def _rows(
     given: Mapping[str, Any], one: str, several: str, width: int | None, words: str
 ) -> Array | None:
@@ -153,11 +178,14 @@ def _rows(
         return None
     rows = _numbers(given[name], name, 1 if name == one else 2)
     rows = rows[None, :] if name == one else rows
-    if not 1 <= len(rows) <= MOST_WAYPOINTS or rows.shape[1] == 0:
+    if rows.shape[1] == 0:
+        raise StreamError(f"{name} is empty")
+    if not 1 <= len(rows) <= MOST_WAYPOINTS:
         raise StreamError(f"{name} has {len(rows)} rows; needs 1 to {MOST_WAYPOINTS}")
     if width is not None and rows.shape[1] != width:
         raise StreamError(
-            f"{name} has {rows.shape[1]} numbers; this stream needs {width}: {words}"
+            f"{name} has {rows.shape[1]} numbers; this stream needs {width}"
+            + (f": {words}" if words else "")
         )
     return rows
 

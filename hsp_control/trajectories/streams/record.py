@@ -5,8 +5,8 @@ from typing import Any
 
 from hsp_control.trajectories.streams.message import Message
 
-MOST = 300_000
-"""Most messages that are recorded: 80 minutes at 60 Hz, 0.1 GB."""
+MOST = 5_000_000
+"""Most numbers that are recorded: poses at 60 Hz for three hours, 0.1 GB."""
 
 
 class Record:
@@ -18,14 +18,15 @@ class Record:
 
     def __init__(self) -> None:
         """Begin without messages."""
-        self.lost = 0
+        self.lost = self._size = 0
         self._entries: list[tuple[float, Message]] = []
 
     def add(self, t: float, messages: Iterable[Message]) -> None:
         """Record messages that are taken at a time [s], as long as there is room."""
         for each in messages:
-            if len(self._entries) < MOST:
+            if self._size + each.size <= MOST:
                 self._entries.append((t, each))
+                self._size += each.size
             else:
                 self.lost += 1
 

@@ -28,13 +28,14 @@ class Recording:
         self._entries, self._record = list(entries), record
         self._next = 0
 
-    def take(self, t: float) -> list[Message]:
-        """Return the messages up to a time [s] that were not taken."""
-        found = []
+    def take(self, t: float) -> list[tuple[float, Message]]:
+        """Return what was recorded up to a time and was not taken, and when [s]."""
+        begin = self._next
         while self._next < len(self._entries) and self._entries[self._next][0] <= t:
-            found.append(self._entries[self._next][1])
             self._next += 1
-        self._record.add(t, found)
+        found = self._entries[begin : self._next]
+        for at, message in found:
+            self._record.add(at, (message,))
         return found
 
     def copy(self) -> "Recording":

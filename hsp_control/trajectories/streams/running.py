@@ -8,6 +8,7 @@ the reference is a C² function of time, whatever arrives and however often it i
 from bisect import bisect_right
 from collections.abc import Sequence
 from copy import copy
+from itertools import groupby
 from math import inf
 from typing import NamedTuple, Protocol
 
@@ -25,8 +26,10 @@ _KEPT = 1.0
 """Pieces are kept for this time; an integrator may ask for earlier times [s]."""
 _SAME = 1e-7
 """States that differ by less are the same, in x, x' and x''."""
-_CONSIDERED = 32
+_CONSIDERED = 256
 """The reference joins one of the next waypoints, at most this many."""
+_AT_ONCE = 256
+"""Of more messages that come at once the oldest do not count."""
 
 
 class Policy(NamedTuple):
@@ -43,8 +46,8 @@ class Policy(NamedTuple):
 class Source(Protocol):
     """What messages come from: an `Inbox`, or a recording."""
 
-    def take(self, t: float) -> Sequence[Message]:
-        """Return the messages that are there at a time [s] and were not taken."""
+    def take(self, t: float) -> Sequence[tuple[float, Message]]:
+        """Return the messages up to a time that were not taken, and their times [s]."""
 
     def copy(self) -> "Source":
         """Return a source that goes on from here, without the other's knowledge."""
@@ -56,6 +59,7 @@ class RunningStream:
     Attributes:
         chart: The local coordinates.
         taken: How many messages it has taken.
+        refused: How many asked for what no motion within the bounds can do.
         waypoints: The waypoints that were received.
     """
 
@@ -78,13 +82,13 @@ class RunningStream:
         """
         self.chart, self._policy, self._source = chart, policy, source
         self._joiner = Joiner(bounds, chart.linear)
-        self._begin = self._now = -inf
+        self._begin = self._now = self._oldest = -inf
         self._heard = -inf
         self._silent = False
         self._command: Array | None = None
         self._segments: list[Segment] = [Coast(0.0, inf, start)]
         self._starts = [-inf]
-        self.taken = 0
+        self.taken = self.refused = 0
         self.waypoints = Waypoints()
 
     @property
@@ -96,10 +100,16 @@ class RunningStream:
         """Return the reference at a time [s]; see `Chart`.
 
         Raises:
-            StreamError: If no message came for too long.
+            StreamError: If no message came for too long, or the time lies so far back
+                that it is not known any more.
         """
         if t > self._now:
             self._advance(t)
+        elif t < self._oldest:
+            raise StreamError(
+                f"the reference at t = {t:g} s is not known any more: the run is at "
+                f"{self._now:g} s; begin another one with controller.restart()"
+            )
         k = max(bisect_right(self._starts, t) - 1, 0)
         return self._segments[k].state(t)
 
@@ -108,31 +118,39 @@ class RunningStream:
         other = copy(self)
         other._source = self._source.copy()
         other._segments, other._starts = self._segments.copy(), self._starts.copy()
-        other.waypoints = copy(self.waypoints)
-        for name in ("times", "values", "velocities"):
-            setattr(other.waypoints, name, getattr(self.waypoints, name).copy())
+        other.waypoints = self.waypoints.copy()
         return other
 
     def _advance(self, t: float) -> None:
         """Plan up to a time: first what follows by itself, then for new messages."""
-        began = self._now > -inf
-        self._now = t
-        if not began:  # what is computed at the very start is not yet the run
-            self._begin = t
+        if self._now == -inf:  # what is computed at the very start is not yet the run
+            self._now = self._begin = t
             return
+        messages = self._source.take(t)
+        surplus = max(len(messages) - _AT_ONCE, 0)
+        self.taken += surplus
+        self.waypoints.late += surplus
+        for at, group in groupby(messages[surplus:], key=lambda each: each[0]):
+            self._step(max(at, self._now), [message for _, message in group])
+        self._step(t, [])
+        if self.age > self._policy.stop_after:
+            raise StreamError(
+                f"no message for {self.age:.3g} s; stop_after is "
+                f"{self._policy.stop_after:g}"
+            )
+        self._forget(t)
+
+    def _step(self, t: float, messages: Sequence[Message]) -> None:
+        """Plan up to a time at which messages arrive."""
+        self._now = t
         while self._segments[-1].end <= t:
             self._plan(self._segments[-1].end)
         changed = False
-        for message in self._source.take(t):
+        for message in messages:
             changed = self._accept(message, t) or changed
-        policy = self._policy
-        if changed or self._falls_silent(t):
+        silent = self._falls_silent()
+        if changed or silent:
             self._plan(t)
-        if self.age > policy.stop_after:
-            raise StreamError(
-                f"no message for {self.age:.3g} s; stop_after is {policy.stop_after:g}"
-            )
-        self._forget(t)
 
     def _accept(self, message: Message, t: float) -> bool:
         """Take a message; return whether it changes what lies ahead."""
@@ -148,7 +166,7 @@ class RunningStream:
             self._command = message.velocities[0]
         return True
 
-    def _falls_silent(self, t: float) -> bool:
+    def _falls_silent(self) -> bool:
         """Return whether the reference must come to rest now, for want of messages."""
         was, self._silent = self._silent, self.age > self._policy.hold_after
         return self._silent and not was
@@ -156,9 +174,16 @@ class RunningStream:
     def _plan(self, t: float) -> None:
         """Begin another piece at a time."""
         state = self.chart.rebased(self._segments[-1].state(t))
+        try:
+            following = self._next(t, state)
+        except StreamError:  # so far away that no motion is found
+            self.refused += 1
+            self._command = None
+            self.waypoints.clear()
+            following = self._to_rest(t, state)
         if self._segments[-1].start == t:  # replaced before anything could see it
             del self._segments[-1], self._starts[-1]
-        self._segments.append(self._next(t, state))
+        self._segments.append(following)
         self._starts.append(t)
 
     def _next(self, t: float, state: State) -> Segment:
@@ -169,8 +194,8 @@ class RunningStream:
             return self._follow_command(t, state, self._command)
         if not waypoints.times:
             return self._to_rest(t, state)
-        first = max(waypoints.ahead(t) - 3, 0)
-        used = slice(first, first + 3 + _CONSIDERED)
+        used = waypoints.near(t, policy.smoothing, _CONSIDERED)
+        first = used.start
         values = np.array(waypoints.values[used])
         times = np.array(waypoints.times[used])
         x = self.chart.local(values, state.base)
@@ -240,6 +265,7 @@ class RunningStream:
         gone = bisect_right(self._starts, t - _KEPT) - 1
         if gone > 0:
             del self._segments[:gone], self._starts[:gone]
+            self._oldest = self._starts[0]
 
 
 class _Goals:
@@ -277,7 +303,7 @@ def _candidates(first: int, last: int) -> list[int]:
     found: list[int] = []
     while first <= last:
         found.append(first)
-        first += len(found) // 2 + 1
+        first += 1 + len(found) ** 2 // 8
     return found
 
 

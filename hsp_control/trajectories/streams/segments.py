@@ -126,11 +126,11 @@ class FastestTask(NamedTuple):
             motion = ruckig.Trajectory(len(self.x))
             try:
                 ruckig.Ruckig(len(self.x)).calculate(task, motion)
-            except ruckig.RuckigError as error:
-                reason = str(error)
+            except (ruckig.RuckigError, ValueError) as error:
+                reason = str(error)  # ValueError: a motion of more than two hours
             else:
                 return motion
-        raise StreamError(f"no motion within the bounds was found: {reason}")
+        raise StreamError(f"no motion within the bounds was found: {reason:.200}")
 
     def _input(self, bounds: MotionBounds) -> ruckig.InputParameter:
         size = len(self.x)

@@ -13,6 +13,7 @@ from pydantic import AfterValidator
 
 from hsp_control.common.exceptions import StreamError, TrajectoryError
 from hsp_control.declaration import Part
+from hsp_control.declaration.part import value_fields
 from hsp_control.declaration.quantities import (
     NonNegative,
     Positive,
@@ -103,8 +104,8 @@ class Streamed(Part, error=TrajectoryError):
             raise StreamError("give either source or messages")
         if self.source is not None and self.source.startswith(SCHEME):
             check_address(self.source)
-        if self.messages is not None:
-            recorded(self.messages, self.space)
+        if self.messages is not None:  # what they carry is checked where it is known
+            recorded(self.messages, Space(None, False))
         vars(self)["_mailbox"] = Mailbox(self._hears, self.space)
 
     def send(
@@ -138,7 +139,7 @@ class Streamed(Part, error=TrajectoryError):
         velocities: ArrayLike | None = None,
         t: float | None = None,
     ) -> None:
-        """Send waypoints, which replace those that were to follow; from any thread.
+        """Send waypoints, which replace all that were to follow; from any thread.
 
         Args:
             values: The waypoints, shape (k, width), each as in `send`.
@@ -181,14 +182,14 @@ class Streamed(Part, error=TrajectoryError):
         """Return the time since the last message [s], and how many there were.
 
         ``taken``: all valid ones; ``late``: of these, those that came too late to
-        count; ``rejected``: invalid ones.
+        count; ``rejected``: invalid ones, and those that no motion can follow.
         """
         running = self.running
         return {
             "age": running.age,
             "taken": running.taken,
             "late": running.waypoints.late,
-            "rejected": self._mailbox.inbox.rejected,
+            "rejected": self._mailbox.inbox.rejected + running.refused,
         }
 
     @property
@@ -207,9 +208,34 @@ class Streamed(Part, error=TrajectoryError):
         return mailbox
 
     def _shared(self, placed: Self) -> Self:
-        """Return a placed copy, which hears what is sent to this one."""
+        """Return a placed copy, which hears what is sent to this one.
+
+        Raises:
+            StreamError: If its messages do not fit.
+        """
+        if placed.messages is not None:
+            start = placed._start()
+            rotational = placed.space.rotational
+            recorded(placed.messages, Space(len(start.x) - 3 * rotational, rotational))
         vars(placed)["_mailbox"] = self._mailbox
         return placed
+
+    def like(self, kind: "type[Streamed]") -> "Streamed":
+        """Return the stream as one of another kind, which hears the same.
+
+        Raises:
+            TrajectoryError: If it has settings that the other kind does not know.
+        """
+        if isinstance(self, kind):
+            return self
+        settings = self.changed_fields()
+        known = {field.name for field in value_fields(kind)}
+        if unknown := [name for name in settings if name not in known]:
+            raise TrajectoryError(f"{unknown[0]} is no setting of a {kind.__name__}")
+        made = kind(**settings)
+        vars(made)["_mailbox"] = self._mailbox
+        self._mailbox.inbox.space = made.space
+        return made
 
     @property
     def running(self) -> RunningStream:
@@ -444,3 +470,17 @@ class StreamPose(Streamed, PoseTrajectory, type="stream"):
             self.angular_speed, self.angular_acceleration, self.angular_jerk
         )
         return MotionBounds(*map(np.concatenate, zip(moving, turning, strict=True)))
+
+
+def stream_for(followed: object, stream: Streamed) -> Any:
+    """Return a stream of the kind that can follow a reference.
+
+    Args:
+        followed: What a task follows so far.
+        stream: The stream.
+    """
+    if isinstance(followed, PoseTrajectory):
+        return stream if isinstance(stream, Stream) else stream.like(StreamPose)
+    if isinstance(followed, OrientationTrajectory):
+        return stream.like(StreamOrientation)
+    return stream.like(Stream)

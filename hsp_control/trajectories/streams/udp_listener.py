@@ -48,20 +48,24 @@ def listening_inbox(source: str, space: Space) -> Inbox:
     if known is not None:
         if known.space != space:
             raise StreamError(
-                f"{source} already carries {known.space.words}; this stream needs "
-                f"{space.words}"
+                f"{source} already carries {known.space.width} numbers; this stream "
+                f"needs {space.width}"
             )
         return known
+    if source in _threads:  # of an inbox that nobody uses: the port is soon free
+        _threads[source].join()
     opened = _open(source)
     inbox = Inbox(space)
     _inboxes[source] = inbox
-    Thread(
+    _threads[source] = Thread(
         target=_listen, args=(opened, ref(inbox)), name=f"stream {source}", daemon=True
-    ).start()
+    )
+    _threads[source].start()
     return inbox
 
 
 _inboxes: WeakValueDictionary[str, Inbox] = WeakValueDictionary()
+_threads: dict[str, Thread] = {}
 
 
 def _open(source: str) -> socket.socket:
@@ -88,6 +92,7 @@ def _listen(opened: socket.socket, inbox: "ref[Inbox]") -> None:
                 continue
             except OSError:
                 return
-            if (there := inbox()) is not None:
+            there = inbox()
+            if there is not None:
                 there.put_text(text)
             del there

@@ -2,6 +2,7 @@
 
 from bisect import bisect_left, bisect_right
 from collections import deque
+from copy import copy, deepcopy
 
 import numpy as np
 
@@ -14,8 +15,11 @@ _NEW_CLOCK = 1.0
 """A sender whose time jumps back by more than this has started again [s]."""
 _KEPT = 1.0
 """Waypoints that were passed are kept for this time, to estimate velocities [s]."""
-MOST = 2048
+MOST = 4096
 """Most waypoints that are kept."""
+_APART = 0.01
+"""Neighbours for derivatives are at least so far in time [s]: of waypoints that are
+closer, noise would be most of the difference."""
 
 
 class SenderClock:
@@ -66,6 +70,15 @@ class Waypoints:
         self.late = 0
         self._clock = SenderClock()
         self._made = -np.inf  # when the newest message was made
+        self._superseded = -np.inf  # what was made before this no longer counts
+
+    def copy(self) -> "Waypoints":
+        """Return waypoints that go on from here by themselves."""
+        other = copy(self)
+        other._clock = deepcopy(self._clock)
+        other.times, other.values = self.times.copy(), self.values.copy()
+        other.velocities = self.velocities.copy()
+        return other
 
     def add(self, message: Message, now: float, delay: float, replace: bool) -> bool:
         """Add a message's waypoints; return whether it changes what lies ahead.
@@ -74,39 +87,58 @@ class Waypoints:
             message: The message.
             now: When it arrived [s].
             delay: From the time of a waypoint to when the reference is there [s].
-            replace: Whether each message replaces all earlier ones. A chunk replaces
-                the waypoints after its first one anyhow.
+            replace: Whether each message replaces all earlier ones. A chunk and a
+                velocity replace what was to follow anyhow.
         """
         made = now
         if message.t is not None:
             if self._clock.restarts_at(message.t):
                 self.clear()
-                self._made = -np.inf
+                self._made = self._superseded = -np.inf
             made = self._clock.to_controller(message.t, now)
-        chunk = len(message.times) > 1
-        if made < self._made and (replace or chunk):
+        alone = message.values is None
+        newer = replace or message.chunk or alone
+        if made < (self._made if newer else self._superseded):
             self.late += 1
             return False
         times = made + delay + message.times
-        if times[-1] <= now and not replace and self.times and self.times[-1] > now:
+        behind = times[-1] <= now and bool(self.times) and self.times[-1] > now
+        if behind and not newer:
             self.late += 1
             return False
         self._made = max(made, self._made)
+        if newer:
+            self._superseded = made
+        if alone or replace:
+            self.clear()
+        elif message.chunk:
+            self._cut(self.ahead(now))
         if message.values is None:
-            self.clear()
             return True
-        if replace:
-            self.clear()
-        elif chunk:
-            self._cut(bisect_left(self.times, times[0]))
-        for k, time in enumerate(times):
-            velocity = None if message.velocities is None else message.velocities[k]
-            self._insert(float(time), message.values[k], velocity)
+        given = message.velocities
+        rates: list[Array | None] = [None] * len(times) if given is None else [*given]
+        if not self.times or times[0] > self.times[-1]:
+            self.times += times.tolist()
+            self.values += [*message.values]
+            self.velocities += rates
+            return True
+        for time, value, velocity in zip(times, message.values, rates, strict=True):
+            self._insert(float(time), value, velocity)
         return True
 
     def ahead(self, t: float) -> int:
         """Return the index of the first waypoint later than a time [s]."""
         return bisect_right(self.times, t)
+
+    def near(self, t: float, window: float, most: int) -> slice:
+        """Return which waypoints matter at a time [s].
+
+        Some that were passed, within the window [s] and at least three; and ``most`` of
+        those ahead.
+        """
+        ahead = self.ahead(t)
+        first = min(bisect_left(self.times, t - window), max(ahead - 3, 0))
+        return slice(max(first, ahead - most), ahead + most)
 
     def forget(self, t: float) -> None:
         """Forget waypoints that were passed long before a time [s], and the surplus."""
@@ -136,8 +168,9 @@ class Waypoints:
 def derivatives(times: Array, x: Array, k: int, window: float) -> tuple[Array, ...]:
     """Return x_k, x_k' and x_k'' of a parabola through waypoints, shape (n,) each.
 
-    Through a waypoint and its two neighbours; or, with a window, nearest to all
-    waypoints not farther from it in time, which smooths noise (Savitzky and Golay).
+    Through a waypoint and its two neighbours, at least `_APART` from it; or, with a
+    window, nearest to all waypoints not farther from it in time, which smooths noise
+    (Savitzky and Golay).
 
     Args:
         times: Shape (m,) [s].
@@ -149,13 +182,15 @@ def derivatives(times: Array, x: Array, k: int, window: float) -> tuple[Array, .
         wide = slice(*np.searchsorted(times, [times[k] - window, times[k] + window]))
         if wide.stop - wide.start > 3:
             return _nearest_parabola(times[wide] - times[k], x[wide])
-    if 0 < k < len(times) - 1:
-        before, after = times[k] - times[k - 1], times[k + 1] - times[k]
-        back, forth = (x[k] - x[k - 1]) / before, (x[k + 1] - x[k]) / after
+    i = min(int(np.searchsorted(times, times[k] - _APART, "right")) - 1, k - 1)
+    j = max(int(np.searchsorted(times, times[k] + _APART)), k + 1)
+    if i >= 0 and j < len(times):
+        before, after = times[k] - times[i], times[j] - times[k]
+        back, forth = (x[k] - x[i]) / before, (x[j] - x[k]) / after
         curve = 2.0 * (forth - back) / (before + after)
         return x[k], (after * back + before * forth) / (before + after), curve
-    one, other = (k, k + 1) if k == 0 else (k - 1, k)
-    slope = (x[other] - x[one]) / (times[other] - times[one])
+    i, j = max(i, 0), min(j, len(times) - 1)
+    slope = (x[j] - x[i]) / (times[j] - times[i])
     return x[k], slope, np.zeros_like(slope)
 
 

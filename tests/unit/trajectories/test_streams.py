@@ -418,12 +418,132 @@ def test_earlier_times_are_remembered() -> None:
 
 
 def test_a_record_that_is_full_says_how_much_it_lost(monkeypatch: Any) -> None:
-    monkeypatch.setattr(record, "MOST", 3)
+    monkeypatch.setattr(record, "MOST", 7)  # a value and its time each
     stream = Stream([0.0]).anchored(None)
     feed = at_times(*((0.1, lambda: stream.send([0.1])) for _ in range(5)))
     sampled(stream, 0.2, feed)
     assert (len(stream.record), stream.unrecorded) == (3, 2)
     assert stream.counts()["taken"] == 5
+
+
+def test_the_first_message_after_silence_counts() -> None:
+    stream = Stream([0.0], hold_after=0.5).anchored(None)
+    feed = at_times(
+        (0.7, lambda: stream.send([0.05])), (1.7, lambda: stream.send([0.1]))
+    )
+    x, _, _ = columns(sampled(stream, 2.5, feed))
+    assert x[round(1.6 / H), 0] == pytest.approx(0.05)
+    assert x[-1, 0] == pytest.approx(0.1)
+
+
+def test_a_chunk_of_one_waypoint_replaces_the_plan() -> None:
+    stream = Stream([0.0], policy="interpolate", delay=0.05).anchored(None)
+    times = np.arange(1, 9) * 0.2
+    feed = at_times(
+        (0.1, lambda: stream.send_chunk((0.5 * times)[:, None], times)),
+        (0.5, lambda: stream.send_chunk([[0.0]], [0.4])),
+    )
+    x, _, _ = columns(sampled(stream, 2.0, feed))
+    assert x[-1, 0] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_an_older_velocity_or_value_undoes_nothing(policy: Any) -> None:
+    stream = Stream([0.0], policy=policy, extrapolation=5.0).anchored(None)
+    feed = at_times(
+        (0.1, lambda: stream.send(velocity=[0.1], t=0.1)),
+        (0.3, lambda: stream.send(velocity=[0.0], t=0.3)),  # stop
+        (0.31, lambda: stream.send(velocity=[0.1], t=0.2)),
+        (0.32, lambda: stream.send([1.0], t=0.25)),
+    )
+    _, rate, _ = columns(sampled(stream, 1.0, feed))
+    assert abs(rate[-1, 0]) < 1e-9
+    assert stream.counts()["late"] == 2
+
+
+def test_a_target_that_no_motion_reaches_is_refused_and_the_reference_rests() -> None:
+    stream = Stream([0.0] * 3, speed=0.01).anchored(None)
+    feed = at_times(
+        (0.1, lambda: stream.send([0.1, 0.0, 0.0])),
+        (0.5, lambda: stream.send([9e5, 1.0, 1.0])),
+        (1.5, lambda: stream.send([0.0, 0.0, 0.001])),
+    )
+    x, rate, _ = columns(sampled(stream, 3.0, feed))
+    assert stream.counts()["rejected"] == 1
+    assert not rate[round(1.4 / H)].any()
+    assert x[-1] == pytest.approx([0.0, 0.0, 0.001])
+
+
+def test_a_time_that_is_forgotten_is_an_error_and_not_an_extrapolation() -> None:
+    stream = Stream([0.0]).anchored(None)
+    feed = at_times(
+        *((0.05 * k, lambda k=k: stream.send([0.1 * k])) for k in range(60))
+    )
+    sampled(stream, 3.0, feed)
+    with pytest.raises(StreamError, match=r"at t = 0 s is not known any more: the run"):
+        stream.sample(0.0)
+
+
+def test_clocks_of_any_epoch_are_understood() -> None:
+    stream = Stream([0.0]).anchored(None)
+    feed = at_times((0.1, lambda: stream.send([0.1], t=1.7e9)))
+    x, _, _ = columns(sampled(stream, 1.0, feed))
+    assert x[-1, 0] == pytest.approx(0.1)
+
+
+def test_a_pickled_stream_hears_what_comes_next() -> None:
+    stream = Stream([0.0]).anchored(None)
+    for _ in range(5):
+        stream.send([0.01])
+    sampled(stream, 0.1)
+    other = pickle.loads(pickle.dumps(stream))
+    other.send([0.3])
+    for k in range(200, 4000):
+        x = other.sample(k * H)
+    assert x.position[0] == pytest.approx(0.3)
+
+
+def test_a_copy_changes_nothing_for_the_original() -> None:
+    def run(preview: bool) -> np.ndarray:
+        stream = Stream([0.0], policy="interpolate", delay=0.2).anchored(None)
+
+        def feed(t: float) -> None:
+            k = round(t / H)
+            if k % 100 == 0:
+                late = 0.0 if k == 2000 else 0.08
+                stream.send([np.sin(t - late)], t=t - late + 100.0)
+            if preview and k == 2100:
+                copy.deepcopy(stream).sample(4.0)
+
+        return columns(sampled(stream, 2.0, feed))[0]
+
+    assert np.array_equal(run(False), run(True))
+
+
+def test_a_burst_costs_no_more_than_its_newest_part() -> None:
+    stream = Stream([0.0] * 7, policy="interpolate").anchored(None)
+    stream.sample(0.0)
+    for k in range(3000):
+        stream.send(np.full(7, 1e-5 * k), t=1e-4 * k)
+    sampled(stream, 1.0)
+    counts = stream.counts()
+    assert (counts["taken"], counts["late"]) == (3000, 3000 - 256)
+    assert stream.sample(1.5).position == pytest.approx(np.full(7, 0.02999))
+
+
+def test_dense_noise_is_smoothed_over_the_whole_window() -> None:
+    rng = np.random.default_rng(0)
+    stream = Stream(
+        [0.0], policy="interpolate", delay=0.2, smoothing=0.1, acceleration=100.0,
+        jerk=1e4,
+    ).anchored(None)  # fmt: skip
+    events = [
+        (t, lambda t=t: stream.send([0.1 * t + 1e-3 * rng.normal()], t=t))
+        for t in np.arange(0.0, 1.5, 0.004)
+    ]
+    x, _, _ = columns(sampled(stream, 1.5, at_times(*events)))
+    t = H * np.arange(len(x))
+    assert np.abs(x[:, 0] - 0.1 * (t - 0.2))[1500:].max() < 6e-4  # of 3 mm
 
 
 # -- bad input ------------------------------------------------------------------------
@@ -442,7 +562,7 @@ IDENTITY = [0.0, 0.0, 0.0, 1.0]
         ({"value": "here"}, "value is 'here'; needs a list of numbers"),
         ({"velocity": [0.0] * 5}, "velocity has 5 numbers; this stream needs 6"),
         ({}, "a message needs a value, values or one velocity"),
-        ({"value": [0.0] * 6 + [1.0], "t": np.inf}, "t contains inf"),
+        ({"value": [0.0] * 6 + [1.0], "t": np.inf}, "clock, is inf; needs a number of"),
     ],
 )
 def test_a_wrong_target_is_refused_where_it_is_sent(
@@ -582,6 +702,12 @@ def test_a_port_in_use_is_told_and_streams_of_one_process_share_it() -> None:
     assert one._mailbox.inbox is two._mailbox.inbox
     with pytest.raises(StreamError, match="already carries 1 numbers; this stream"):
         Stream([0.0, 0.0], source=source).anchored(None).sample(0.0)
+
+
+def test_a_port_is_free_again_when_its_stream_is_gone() -> None:
+    source = f"udp://127.0.0.1:{free_port()}"
+    for _ in range(3):
+        Stream([0.0], source=source).anchored(None).sample(0.0)
 
 
 def test_a_flood_drops_the_oldest() -> None:
