@@ -211,7 +211,7 @@ def main() -> None:
     rng = np.random.default_rng(0)
     cases = [
         Case("goals, 20 Hz", hand_path, in_order(goals(rng)), 0.12, 0.0),
-        Case("tracked hand, 60 Hz", hand_path, in_order(tracked(rng)), 0.12, 0.1),
+        Case("tracked hand, 60 Hz", hand_path, in_order(tracked(rng)), 0.14, 0.1),
         Case("chunks, 10 Hz", arm_path, in_order(chunks(rng)), 0.05, 0.0),
     ]
     ways = ["zero-order hold", "linear", "latest", "interpolate", "extrapolate"]
