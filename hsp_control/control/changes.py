@@ -35,7 +35,11 @@ from hsp_control.trajectories import (
     crossfade,
 )
 from hsp_control.trajectories.crossfade import AnyReference
-from hsp_control.trajectories.streams.stream import Streamed, stream_for
+from hsp_control.trajectories.streams.stream import (
+    Streamed,
+    stream_for,
+    with_streams_copied,
+)
 
 __all__ = [
     "AddTask",
@@ -67,6 +71,10 @@ class Change(Part, ABC, family="changes", error=ControllerError):
     """When it begins [s]; a time that has passed means now."""
     ramp: NonNegative = 0.3
     """How long it takes [s]; 0 is a jump."""
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return the change, with streams of its own if it has any."""
+        return with_streams_copied(self, memo)
 
     @property
     def end(self) -> float:

@@ -1,6 +1,7 @@
 """The controller: from tasks, a null-space field and a metric to one effort."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from copy import deepcopy
 from dataclasses import replace
 from itertools import pairwise, takewhile
 from math import isfinite
@@ -44,6 +45,7 @@ from hsp_control.control.setup import (
 )
 from hsp_control.control.stiffening import changes_impedance, next_numbers
 from hsp_control.declaration import within
+from hsp_control.declaration.nested import with_parts_replaced
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.law import Outcome, Resolution
@@ -58,6 +60,7 @@ from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.gains import as_gain
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.task import Feedback, InForce
+from hsp_control.trajectories.streams.stream import Streamed
 
 AccelerationModifier = Callable[
     [RobotState, ActiveStack, Array], tuple[Array, Array | None]
@@ -834,6 +837,19 @@ class Controller:
                 f"Controller has no {name!r} to assign; at(t) changes it while it runs"
             )
         object.__setattr__(self, name, value)
+
+    def preview(self) -> "Controller":
+        """Return a copy at the beginning of a run: to look ahead, or at a log.
+
+        It is of the same robot object. What its streams hear counts for it alone.
+        """
+        other = deepcopy(self, {id(self._robot): self._robot})
+        other._declared_tasks = tuple(
+            with_parts_replaced(task, Streamed, Streamed.preview)
+            for task in self._declared_tasks
+        )
+        other.restart()
+        return other
 
     # -- copies -----------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
 from hsp_control.trajectories import Schedule
 from hsp_control.trajectories.crossfade import AnyReference
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.stream import Streamed, with_streams_copied
 
 
 class TaskSample(NamedTuple):
@@ -265,6 +265,10 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     def remembers(self) -> bool:
         """Whether its trajectory has a memory of the run, as streams have."""
         return any(True for _ in parts_within(self, Streamed))
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return the task, with streams of its own if it has any."""
+        return with_streams_copied(self, memo)
 
     def following(self, trajectory: AnyReference) -> Self:
         """Return the task with another trajectory.

@@ -166,6 +166,19 @@ def test_a_copy_of_a_controller_goes_on_like_the_original(panda: hsp.Robot) -> N
         assert np.array_equal(other.compute(k * PERIOD, q, v).tau, tau)
 
 
+def test_a_preview_takes_nothing_from_the_run(panda: hsp.Robot) -> None:
+    stream = hsp.StreamPose()
+    controller = hsp.Controller(panda, [hsp.FramePose("panda_tcp", stream)])
+    stream.send(moved(hand_pose(panda), 0.5))
+    preview, v = controller.preview(), np.zeros(7)
+    for t in np.arange(0.0, 3.0, 0.01):
+        preview.compute(t, panda.home(), v)
+    run = hsp.simulate(controller, panda.home(), duration=1.0, control_period=PERIOD)
+    there = moved(hand_pose(panda), 0.5).translation
+    assert run["task.panda_tcp.reference"][-1, :3] == pytest.approx(there)
+    assert len(stream.record) == 1
+
+
 def test_the_reference_of_a_task_changes_to_a_stream_while_it_runs(
     panda: hsp.Robot,
 ) -> None:
@@ -391,3 +404,15 @@ def test_strict_reading_listens_to_this_computer_and_reads_beside_the_file(
         file = write(folder, {"type": "stream", "source": source})
         with pytest.raises(AccessError, match=message):
             hsp.load_experiment(file, strict=True)
+
+
+def test_a_recorded_stream_is_copied_before_and_after_it_is_placed(
+    panda: hsp.Robot,
+) -> None:
+    value = pin.SE3ToXYZQUAT(moved(hand_pose(panda), 0.5)).tolist()
+    stream = hsp.StreamPose(messages=[{"at": 0.1, "value": value}])
+    controller = hsp.Controller(panda, [hsp.FramePose("panda_tcp", stream)])
+    for each in (copy.deepcopy(controller), controller, copy.deepcopy(controller)):
+        run = hsp.simulate(each, panda.home(), duration=1.0, control_period=PERIOD)
+        reference = run["task.panda_tcp.reference"]
+        assert reference[-1, :3] == pytest.approx(np.array(value[:3]))

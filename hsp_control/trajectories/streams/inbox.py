@@ -67,10 +67,16 @@ class Inbox:
             self.rejected += 1
             self.reason = reason
 
-    def after(self, number: int) -> list[Received]:
-        """Return the messages that wait, later than a number, in order of arrival."""
+    def after(self, number: int, *, take: bool) -> list[Received]:
+        """Return the messages that wait, later than a number, in order of arrival.
+
+        Args:
+            number: The number.
+            take: Whether later readers begin after them.
+        """
         with self._lock:
-            self.taken = self.count
+            if take:
+                self.taken = self.count
             return [each for each in self._waiting if each.number > number]
 
     def __getstate__(self) -> dict[str, Any]:
@@ -95,12 +101,13 @@ class InboxReader:
         """Begin to read, and to record what is taken."""
         self._inbox, self._record = inbox, record
         self._number = inbox.taken
+        self._previews = False
 
     def take(self, t: float) -> list[tuple[float, Message]]:
         """Return what is there at a time [s] and was not taken, and this time."""
         if self._inbox.count == self._number:
             return []
-        received = self._inbox.after(self._number)
+        received = self._inbox.after(self._number, take=not self._previews)
         if received:
             self._number = received[-1].number
         messages = [each.message for each in received if self._fits(each.message)]
@@ -110,7 +117,7 @@ class InboxReader:
     def copy(self) -> "InboxReader":
         """Return a reader that goes on from here, with a record of its own."""
         other = InboxReader(self._inbox, Record())
-        other._number = self._number
+        other._number, other._previews = self._number, True
         return other
 
     def _fits(self, message: Message) -> bool:

@@ -42,8 +42,13 @@ class Mailbox:
             )
         self.inbox.put(**data)
 
-    def reader(self, space: Space) -> InboxReader:
+    def reader(self, space: Space, *, kept: bool) -> InboxReader:
         """Return the reader of a new run; a source is opened here.
+
+        Args:
+            space: What a value is.
+            kept: Whether what it takes is recorded, and not taken again by later runs;
+                otherwise it is a preview.
 
         Raises:
             StreamError: If the source cannot be opened, or carries other values.
@@ -56,10 +61,16 @@ class Mailbox:
                 f"{space.width} are needed"
             )
         self.inbox.space = space
+        if not kept:
+            return InboxReader(self.inbox, Record()).copy()
         self.record = Record()
         return InboxReader(self.inbox, self.record)
 
-    def recording(self, entries: list[tuple[float, Message]]) -> Recording:
+    def recording(
+        self, entries: list[tuple[float, Message]], *, kept: bool
+    ) -> Recording:
         """Return recorded messages, see `recorded`, as the source of a new run."""
+        if not kept:
+            return Recording(entries, Record())
         self.record = Record()
         return Recording(entries, self.record)

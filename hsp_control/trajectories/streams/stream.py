@@ -1,10 +1,11 @@
 """References that are streamed while the robot moves: points, orientations, poses."""
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import KW_ONLY, replace
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -13,6 +14,7 @@ from pydantic import AfterValidator
 
 from hsp_control.common.exceptions import StreamError, TrajectoryError
 from hsp_control.declaration import Part
+from hsp_control.declaration.nested import with_parts_replaced
 from hsp_control.declaration.part import value_fields
 from hsp_control.declaration.quantities import (
     NonNegative,
@@ -207,18 +209,23 @@ class Streamed(Part, error=TrajectoryError):
         mailbox: Mailbox = vars(self)["_mailbox"]
         return mailbox
 
-    def _shared(self, placed: Self) -> Self:
-        """Return a placed copy, which hears what is sent to this one.
+    def _shared(self, other: Self) -> Self:
+        """Return another value of the same stream, which hears what this one hears."""
+        vars(other)["_mailbox"] = self._mailbox
+        vars(other)["_previews"] = vars(self).get("_previews", False)
+        return other
+
+    def _placed(self, placed: Self) -> Self:
+        """Return this stream, placed.
 
         Raises:
             StreamError: If its messages do not fit.
         """
         if placed.messages is not None:
-            start = placed._start()
-            rotational = placed.space.rotational
+            start, rotational = placed._start(), placed.space.rotational
             recorded(placed.messages, Space(len(start.x) - 3 * rotational, rotational))
-        vars(placed)["_mailbox"] = self._mailbox
-        return placed
+        vars(placed)["_is_placed"] = True
+        return self._shared(placed)
 
     def like(self, kind: "type[Streamed]") -> "Streamed":
         """Return the stream as one of another kind, which hears the same.
@@ -261,30 +268,38 @@ class Streamed(Part, error=TrajectoryError):
         return RunningStream(chart, self._bounds(), policy, source, start)
 
     def _opened(self, space: Space) -> Source:
+        kept = not vars(self).get("_previews", False)
         messages: Sequence[Mapping[str, Any]] | None = self.messages
         if self.source is not None and not self.source.startswith(SCHEME):
             messages = read_recording(Path(self.source))
         if messages is not None:
-            return self._mailbox.recording(recorded(messages, space))
-        return self._mailbox.reader(space)
+            return self._mailbox.recording(recorded(messages, space), kept=kept)
+        return self._mailbox.reader(space, kept=kept)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields, and where the reference is in its run, if it runs."""
         state = super().__getstate__()
-        for name in ("_mailbox", "_running"):
+        for name in ("_mailbox", "_running", "_is_placed", "_previews"):
             if name in vars(self):
                 state[name] = vars(self)[name]
         return state
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return a stream that hears the same and goes on by itself, if it runs."""
-        if "_running" not in vars(self):
+        """Return the value itself; once it is placed, one that goes on by itself."""
+        if not vars(self).get("_is_placed", False):
             return self
         copy: Self | None = memo.get(id(self))
         if copy is None:
-            copy = self._shared(replace(self))
-            vars(copy)["_running"] = self.running.copy()
-            memo[id(self)] = copy
+            memo[id(self)] = copy = self.preview()
+            if "_running" in vars(self):
+                vars(copy)["_running"] = self.running.copy()
+        return copy
+
+    def preview(self) -> Self:
+        """Return a stream that hears the same, but counts as heard for itself alone."""
+        copy = self._shared(replace(self))
+        vars(copy)["_previews"] = True
+        vars(copy)["_is_placed"] = vars(self).get("_is_placed", False)
         return copy
 
     def _start(self) -> State:
@@ -328,7 +343,7 @@ class Stream(Streamed, Trajectory, type="stream"):
                 "a stream has no points that origin: start could move"
             )
         placed = super().anchored(start)
-        return self._shared(replace(self) if placed is self else placed)
+        return self._placed(replace(self) if placed is self else placed)
 
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
         """Return x(t), x'(t) and x''(t); see `Trajectory.sample`."""
@@ -372,7 +387,7 @@ class StreamOrientation(Streamed, OrientationTrajectory, type="stream"):
     def anchored(self, start: ArrayLike) -> Self:
         """Return the stream for a new run; see `OrientationTrajectory.anchored`."""
         placed = super().anchored(start)
-        return self._shared(replace(self) if placed is self else placed)
+        return self._placed(replace(self) if placed is self else placed)
 
     def sample(
         self, t: float, out: OrientationSample | None = None
@@ -437,7 +452,7 @@ class StreamPose(Streamed, PoseTrajectory, type="stream"):
             "position": start.translation if self.position is None else self.position,
             "rotation": start.rotation if self.rotation is None else self.rotation,
         }
-        return self._shared(replace(self, **given))
+        return self._placed(replace(self, **given))
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
         """Return the pose at time t; see `PoseTrajectory.sample`.
@@ -484,3 +499,17 @@ def stream_for(followed: object, stream: Streamed) -> Any:
     if isinstance(followed, OrientationTrajectory):
         return stream.like(StreamOrientation)
     return stream.like(Stream)
+
+
+Holder = TypeVar("Holder", bound=Part)
+
+
+def with_streams_copied(part: Holder, memo: dict[int, Any]) -> Holder:
+    """Return the deep copy of a part: the part itself, but for its streams.
+
+    Args:
+        part: The part.
+        memo: That of `copy.deepcopy`.
+    """
+    copied: Holder = with_parts_replaced(part, Streamed, lambda s: deepcopy(s, memo))
+    return copied

@@ -1,7 +1,6 @@
 """Quantities of a controller that the viewer draws: field terms and projector."""
 
 from collections.abc import Iterator
-from copy import copy
 from typing import TypeVar
 
 import numpy as np
@@ -26,11 +25,9 @@ def from_the_start(controller: Controller) -> Controller:
 
     A controller forgets changes that are complete, but the rows of a run begin before.
     """
-    if not controller.changes:
+    if not controller.changes and not any(t.remembers for t in controller.tasks):
         return controller
-    fresh = copy(controller)
-    fresh.restart()
-    return fresh
+    return controller.preview()
 
 
 def null_space_projector(controller: Controller, state: RobotState) -> Array:

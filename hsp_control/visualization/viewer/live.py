@@ -155,7 +155,8 @@ class LiveView:
 
 def _preview(experiment: Experiment) -> Rollout:
     """Return a log of the references and obstacles, with the robot at its start."""
-    robot, controller = experiment.robot, experiment.controller
+    # A stream would go on to the end of the preview.
+    robot, controller = experiment.robot, experiment.controller.preview()
     duration = experiment.scenario.simulation.duration
     recorder = Recorder(controller, experiment.scene, _PREVIEW_ROWS)
     state = RobotState(robot)
