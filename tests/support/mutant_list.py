@@ -187,8 +187,8 @@ MUTANTS = (
     Mutant(
         "limits: a push moves no bound",
         LIMITS + "acceleration_bounds.py",
-        "bounds.a_lower[i] -= wider * up + max(down, -most)",
-        "bounds.a_lower[i] -= 0.0 * up + max(down, -most)",
+        "bounds.a_lower[i] -= up + max(down, -most)",
+        "bounds.a_lower[i] -= max(down, -most)",
         "tests/integration/test_compliance.py -k bound_by_a_push",
     ),
     Mutant(

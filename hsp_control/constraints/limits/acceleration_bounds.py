@@ -110,29 +110,24 @@ def violated_limits(
     limits: MotionLimits,
     error: Array,
     disturbance: Array,
-    known: bool,
     bounds: Bounds,
 ) -> int:
     """Write the acceleration bounds, and return which bounds a and tau violate.
 
     The robot accelerates by a plus the disturbance, the acceleration that something
-    else causes, shape (nv,); so the bounds on a are moved by it. If it is not known but
-    what was seen of late, it makes a bound wider by less beyond half of a joint's
-    speed. It makes a bound narrower by no more than the speed's barrier permits at
-    rest, so that a push that ends does no harm. See `acceleration_bounds` for the other
-    arguments.
+    else is known to cause, shape (nv,); so the bounds on a are moved by it. It makes a
+    bound narrower by no more than the speed's barrier permits at rest, so that a push
+    that ends does no harm. See `acceleration_bounds` for the other arguments.
 
     Returns:
         0 for none, `MOTION`, `EFFORT`, or the sum of both.
     """
     acceleration_bounds(q, v, where, limits, error, bounds.a_lower, bounds.a_upper)
     for i in range(a.shape[0]):
-        used = abs(v[i]) / limits.velocity[i]
-        wider = 1.0 if known else min(max(2.0 - 2.0 * used, 0.0), 1.0)
         most = 2.0 * limits.bandwidth[0] * limits.velocity[i]
         up, down = max(disturbance[i], 0.0), min(disturbance[i], 0.0)
-        bounds.a_lower[i] -= wider * up + max(down, -most)
-        bounds.a_upper[i] -= min(up, most) + wider * down
+        bounds.a_lower[i] -= up + max(down, -most)
+        bounds.a_upper[i] -= min(up, most) + down
     violated = 0 if within(a, bounds.a_lower, bounds.a_upper) else MOTION
     effort_ok = within(tau, bounds.tau_lower, bounds.tau_upper)
     return violated if effort_ok else violated + EFFORT

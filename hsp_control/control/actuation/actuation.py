@@ -191,7 +191,7 @@ class Actuation:
 
     def disturbed(self, acceleration: Array) -> None:
         """Expect an acceleration that something else than the efforts causes, (nv,)."""
-        self._held.known[:] = acceleration
+        self._held.disturbance[:] = acceleration
 
     def forget(self) -> None:
         """Forget the last efforts: the rate limit does not apply to the next one."""
@@ -390,15 +390,5 @@ def _check(
     See `observe` and `violated_limits`.
     """
     observe(v, held, t)
-    return violated_limits(
-        q,
-        v,
-        a,
-        tau,
-        where,
-        limits,
-        held.error,
-        held.disturbance,
-        not np.isnan(held.known[0]),
-        bounds,
-    )
+    error, disturbance = held.error, held.disturbance
+    return violated_limits(q, v, a, tau, where, limits, error, disturbance, bounds)

@@ -25,16 +25,13 @@ class Held(NamedTuple):
         expected: The velocity that is expected then, shape (nv,).
         stray: Differences from it, summed over about `_WINDOW`, shape (nv,).
         error: The largest error of late, shape (nv,).
-        known: Acceleration that something else is known to cause, shape (nv,); NaN
-            while nobody says.
-        disturbance: That, or what the differences show, shape (nv,).
+        disturbance: Acceleration that something else causes, shape (nv,).
     """
 
     timing: Array
     expected: Array
     stray: Array
     error: Array
-    known: Array
     disturbance: Array
 
 
@@ -46,20 +43,18 @@ class HeldEffort:
     at the beginning of each period, so that a speed limit is exceeded by the error over
     the barrier's bandwidth, unless the margin grows by as much. The error is
     observed: it is the difference between the speed at the end of a period and what was
-    expected. So it includes whatever else the model lacks, such as a push: the bounds
-    on the law's acceleration are moved by what the robot does besides.
+    expected. So it includes whatever else the model lacks.
 
     Attributes:
         error: The largest error of late, shape (nv,) [rad/s² or m/s²].
-        known: Acceleration that something else than the effort is known to cause, shape
-            (nv,) [rad/s² or m/s²]; NaN while nobody says.
+        disturbance: Acceleration that something else than the effort is known to cause,
+            shape (nv,) [rad/s² or m/s²].
     """
 
     def __init__(self, nv: int) -> None:
         """Begin without an error."""
         self.error: Array = np.zeros(nv)
-        self.known: Array = np.full(nv, np.nan)
-        self._disturbance = np.zeros(nv)
+        self.disturbance: Array = np.zeros(nv)
         self._expected, self._stray = np.zeros(nv), np.zeros(nv)
         self._timing = np.full(2, np.nan)
         self._expect = IdentityCache(self._compile_expect)
@@ -81,18 +76,13 @@ class HeldEffort:
         observe(v, self.memory_of_kernels, t)
 
     def _compile_expect(self, v: Array, a: Array) -> Callable[[], float]:
-        return bind(_expect, v, a, self.known, self._timing, self._expected)
+        return bind(_expect, v, a, self.disturbance, self._timing, self._expected)
 
     @property
     def memory_of_kernels(self) -> "Held":
         """What `observe` reads and writes."""
         return Held(
-            self._timing,
-            self._expected,
-            self._stray,
-            self.error,
-            self.known,
-            self._disturbance,
+            self._timing, self._expected, self._stray, self.error, self.disturbance
         )
 
     def prepare(self, v: Array, a: Array) -> None:
@@ -101,15 +91,14 @@ class HeldEffort:
 
     def forget(self) -> None:
         """Begin anew."""
-        self.error[:] = self._disturbance[:] = 0.0
-        self.known[:] = np.nan
+        self.error[:] = self.disturbance[:] = 0.0
         self._stray[:] = 0.0
         self._timing[:] = np.nan
 
     @property
     def _memories(self) -> tuple[Array, ...]:
         kept = self._stray, self._expected, self._timing
-        return (self.error, self.known, self._disturbance, *kept)
+        return (self.error, self.disturbance, *kept)
 
     def memory(self) -> tuple[Array, ...]:
         """Return a copy of what it remembers."""
@@ -124,33 +113,34 @@ class HeldEffort:
 
 
 @kernel
-def _expect(v: Array, a: Array, known: Array, timing: Array, expected: Array) -> None:
+def _expect(
+    v: Array, a: Array, disturbance: Array, timing: Array, expected: Array
+) -> None:
     """Write the velocity at the end of a period."""
     for i in range(v.shape[0]):
-        besides = 0.0 if np.isnan(known[i]) else known[i]
-        expected[i] = v[i] + timing[1] * (a[i] + besides)
+        expected[i] = v[i] + timing[1] * (a[i] + disturbance[i])
 
 
 @kernel
 def observe(v: Array, held: Held, t: float) -> None:
-    """Add a period to the differences of velocity, and update what they show.
+    """Add a period to the differences of velocity, and update the largest error.
 
     Args:
         v: Velocity, shape (nv,).
-        held: The memory; its differences are updated at the end of a period, once.
+        held: The memory; updated at the end of a period, once.
         t: Time [s].
     """
-    timing, expected, stray, error, known, disturbance = held
+    timing, expected, stray, error, _ = held
     period = timing[1]
-    if abs(t - timing[0]) < 0.01 * period:
-        timing[0] = np.nan
-        fresh = min(period / _WINDOW, 1.0)
-        fading = np.exp(-period / _MEMORY)
-        for i in range(v.shape[0]):
-            stray[i] = (1.0 - fresh) * stray[i] + v[i] - expected[i]
-            seen = stray[i] / max(period, _WINDOW)
-            error[i] = max(fading * error[i], abs(seen))
-            disturbance[i] = seen if np.isnan(known[i]) else known[i]
+    if not abs(t - timing[0]) < 0.01 * period:
+        return
+    timing[0] = np.nan
+    fresh = min(period / _WINDOW, 1.0)
+    fading = np.exp(-period / _MEMORY)
+    for i in range(v.shape[0]):
+        stray[i] = (1.0 - fresh) * stray[i] + v[i] - expected[i]
+        present = abs(stray[i]) / max(period, _WINDOW)
+        error[i] = max(fading * error[i], present)
 
 
 @kernel
