@@ -126,12 +126,12 @@ class RunningStream:
         if self._now == -inf:  # what is computed at the very start is not yet the run
             self._now = self._begin = t
             return
-        messages = self._source.take(t)
-        surplus = max(len(messages) - _AT_ONCE, 0)
-        self.taken += surplus
-        self.waypoints.late += surplus
-        for at, group in groupby(messages[surplus:], key=lambda each: each[0]):
-            self._step(max(at, self._now), [message for _, message in group])
+        for at, group in groupby(self._source.take(t), key=lambda each: each[0]):
+            messages = [message for _, message in group]
+            surplus = max(len(messages) - _AT_ONCE, 0)
+            self.taken += surplus
+            self.waypoints.late += surplus
+            self._step(max(at, self._now), messages[surplus:])
         self._step(t, [])
         if self.age > self._policy.stop_after:
             raise StreamError(
