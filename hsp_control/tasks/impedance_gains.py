@@ -140,8 +140,8 @@ def impedance_gains(
             for k in range(nv):
                 B_dot[i, j] -= 0.5 * X[i, k] * M_dot[k, j]
     gram(B_dot, X, True, G_dot)
-    product(G, K, GK)
-    product(G, D, Kv)
+    gram(G, K, False, GK)  # K, D and Λ are symmetric
+    gram(G, D, False, Kv)
     if ratio > 0.0:
         natural_root(B, K, scratch.wide[3], scratch.square, root)
         for i in range(m):
@@ -152,7 +152,7 @@ def impedance_gains(
     # The law whitens with its own metric: W = I at worst, where the singular values of
     # J L⁻ᵀ may be less than those of J by √(largest eigenvalue of M).
     bounded_inertia(B, _THRESHOLD / np.sqrt(total), Q, scratch.square[4], inertia)
-    product(G_dot, inertia, root)
+    gram(G_dot, inertia, False, root)
     for i in range(m):
         for j in range(m):
             Kv[i, j] -= 0.5 * root[i, j]
@@ -285,15 +285,3 @@ def bounded_inertia(B: Array, threshold: float, Q: Array, X: Array, out: Array) 
         for i in range(m):
             for j in range(m):
                 out[i, j] += square * X[k, i] * X[k, j]
-
-
-@kernel
-def product(A: Array, B: Array, out: Array) -> None:
-    """Write A B; shapes (m, m)."""
-    m = A.shape[0]
-    for i in range(m):
-        for j in range(m):
-            total = 0.0
-            for k in range(m):
-                total += A[i, k] * B[k, j]
-            out[i, j] = total

@@ -217,8 +217,10 @@ class Command:
         state = self._measured.update(t, q, v)
         observer.update(state, acted, period)
         if self.controller.limits is not None:
-            remaining = observer.disturbance - observer.cancelled
-            self.controller.disturbed(np.linalg.solve(state.mass_matrix, remaining))
+            besides: Array = observer.disturbance - observer.cancelled
+            if besides.any():  # what is cancelled causes nothing
+                besides = np.asarray(np.linalg.solve(state.mass_matrix, besides), float)
+            self.controller.disturbed(besides)
 
     def _predict(
         self, predictor: Predictor, t: float, q: Array, v: Array, period: float

@@ -139,10 +139,20 @@ def decoded(text: bytes, space: Space) -> Message:
         StreamError: If it is no valid message.
     """
     try:
-        data = json.loads(text, parse_constant=_refuse_constant)
+        data = parsed(text)
     except (ValueError, RecursionError) as error:
         raise StreamError(f"a message is not JSON: {error}") from None
     return message_of(data, space)
+
+
+def parsed(text: str | bytes) -> Any:
+    """Return what a JSON text says; NaN and Infinity are no JSON.
+
+    Raises:
+        ValueError: If it is not JSON.
+        RecursionError: If it is nested too deeply.
+    """
+    return json.loads(text, parse_constant=_refuse_constant)
 
 
 _KEYS = ("value", "values", "times", "velocity", "velocities", "t")

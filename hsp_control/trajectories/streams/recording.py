@@ -1,12 +1,11 @@
 """Messages that were recorded: a file, or a log's, each with the time it was taken."""
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams.message import Message, Space, message_of
+from hsp_control.trajectories.streams.message import Message, Space, message_of, parsed
 from hsp_control.trajectories.streams.record import Record
 
 LARGEST_FILE = 100_000_000
@@ -91,7 +90,7 @@ def read_recording(path: Path) -> list[dict[str, Any]]:
         if not line.strip():
             continue
         try:
-            found.append(json.loads(line, parse_constant=_refuse_constant))
+            found.append(parsed(line))
         except (ValueError, RecursionError) as error:
             raise StreamError(f"{path}:{k + 1}: not JSON: {error}") from None
     return found
@@ -100,7 +99,3 @@ def read_recording(path: Path) -> list[dict[str, Any]]:
 def _is_number(value: object) -> bool:
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return number and abs(value) < float("inf")  # type: ignore[arg-type]
-
-
-def _refuse_constant(text: str) -> NoReturn:
-    raise ValueError(f"{text} is no number")

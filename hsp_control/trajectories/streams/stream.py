@@ -176,6 +176,11 @@ class Streamed(Part, error=TrajectoryError):
         return tuple(self._mailbox.record.to_list())
 
     @property
+    def last_rejection(self) -> str:
+        """Why the last invalid message of another process was one; empty for none."""
+        return self._mailbox.inbox.reason
+
+    @property
     def unrecorded(self) -> int:
         """How many messages of the last run the record had no room for."""
         return self._mailbox.record.lost
@@ -360,17 +365,9 @@ class Stream(Streamed, Trajectory, type="stream"):
         return linear_bounds(self.speed, self.acceleration, self.jerk, self.dimension)
 
 
-class StreamOrientation(Streamed, OrientationTrajectory, type="stream"):
-    """R(t) that is streamed, as quaternions (x, y, z, w) or angular velocities.
+class Turning(Streamed):
+    """A stream with a rotation."""
 
-    The bounds hold for the magnitudes of ω, ω' and ω'', in every direction.
-    """
-
-    space: ClassVar[Space] = ORIENTATION
-
-    rotation: Rotation | None = None
-    """The orientation until the first message, body to world: roll, pitch and yaw
-    [rad], a quaternion or a matrix [-]; that in which the robot starts by default."""
     _: KW_ONLY
     angular_speed: Positive = 2.5
     """Bound on |ω| [rad/s]."""
@@ -383,6 +380,26 @@ class StreamOrientation(Streamed, OrientationTrajectory, type="stream"):
         """Check the source and the bounds."""
         super().__post_init__()
         self._bounds()
+
+    @property
+    def _turning(self) -> MotionBounds:
+        """The bounds on a rotation vector."""
+        return angular_bounds(
+            self.angular_speed, self.angular_acceleration, self.angular_jerk
+        )
+
+
+class StreamOrientation(Turning, OrientationTrajectory, type="stream"):
+    """R(t) that is streamed, as quaternions (x, y, z, w) or angular velocities.
+
+    The bounds hold for the magnitudes of ω, ω' and ω'', in every direction.
+    """
+
+    space: ClassVar[Space] = ORIENTATION
+
+    rotation: Rotation | None = None
+    """The orientation until the first message, body to world: roll, pitch and yaw
+    [rad], a quaternion or a matrix [-]; that in which the robot starts by default."""
 
     def anchored(self, start: ArrayLike) -> Self:
         """Return the stream for a new run; see `OrientationTrajectory.anchored`."""
@@ -403,12 +420,10 @@ class StreamOrientation(Streamed, OrientationTrajectory, type="stream"):
         return Chart(0, True).begin(np.zeros(0), matrix_of(self.rotation))
 
     def _bounds(self) -> MotionBounds:
-        return angular_bounds(
-            self.angular_speed, self.angular_acceleration, self.angular_jerk
-        )
+        return self._turning
 
 
-class StreamPose(Streamed, PoseTrajectory, type="stream"):
+class StreamPose(Turning, PoseTrajectory, type="stream"):
     """M(t) that is streamed, as x, y, z and a quaternion, or as twists in world axes.
 
     The linear bounds hold for each coordinate, the angular ones in every direction.
@@ -429,17 +444,6 @@ class StreamPose(Streamed, PoseTrajectory, type="stream"):
     """Bound on |x''|, one number or three [m/s²]."""
     jerk: PositiveNumbers = 200.0
     """Bound on |x'''|, one number or three [m/s³]."""
-    angular_speed: Positive = 2.5
-    """Bound on |ω| [rad/s]."""
-    angular_acceleration: Positive = 20.0
-    """Bound on |ω'| [rad/s²]."""
-    angular_jerk: Positive = 1000.0
-    """Bound on |ω''| [rad/s³]."""
-
-    def __post_init__(self) -> None:
-        """Check the source and the bounds."""
-        super().__post_init__()
-        self._bounds()
 
     @property
     def relative(self) -> bool:
@@ -481,9 +485,7 @@ class StreamPose(Streamed, PoseTrajectory, type="stream"):
 
     def _bounds(self) -> MotionBounds:
         moving = linear_bounds(self.speed, self.acceleration, self.jerk, 3)
-        turning = angular_bounds(
-            self.angular_speed, self.angular_acceleration, self.angular_jerk
-        )
+        turning = self._turning
         return MotionBounds(*map(np.concatenate, zip(moving, turning, strict=True)))
 
 

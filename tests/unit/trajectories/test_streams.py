@@ -688,6 +688,7 @@ def test_datagrams_arrive_and_bad_ones_are_counted() -> None:
     samples = columns(sampled(stream, 1.0))
     assert samples[0][-1, 0] == pytest.approx(0.1, abs=1e-9)
     assert stream.counts()["rejected"] == 5
+    assert "is not JSON: Exceeds the limit" in stream.last_rejection
 
 
 def test_a_port_in_use_is_told_and_streams_of_one_process_share_it() -> None:
