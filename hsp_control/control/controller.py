@@ -32,6 +32,7 @@ from hsp_control.control.composition import (
     priority_of,
 )
 from hsp_control.control.evolution import PRESENT, Evolution
+from hsp_control.control.held_gains import check_held
 from hsp_control.control.output import ControlOutput, Diagnostics
 from hsp_control.control.planned_contact import PlannedContact
 from hsp_control.control.planned_limits import PlannedLimits
@@ -580,6 +581,8 @@ class Controller:
 
         Raises:
             ControllerError: If it names something that does not exist at its time.
+            UnstableRateError: If gains that follow make the running loop unstable at
+                its period, without delays, where the robot is now.
             HspControlError: If its parts do not fit the robot.
         """
         with self._lock:
@@ -592,7 +595,10 @@ class Controller:
             earlier = [each for each in self._open if each.at <= change.at]
             placed = change.placed(start, _applied(earlier, self._settled))
             opened = _in_order((*self._open, placed))
-            self._install(_applied(opened, self._settled))
+            setup = _applied(opened, self._settled)
+            if self._actuation.period:
+                check_held(self._setup, setup, start.state, self._actuation.period)
+            self._install(setup)
             self._open = opened
             made = placed if self._begun else change
             self._changes = (*self._changes, made)

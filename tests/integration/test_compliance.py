@@ -18,6 +18,8 @@ import hsp_control as hsp
 from hsp_control import Controller, FramePose, FramePosition, Robot, Rollout
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.compensation import Compensation, MomentumObserver, check_rate
+from hsp_control.control.compensation.linear_loop import LinearLoop
+from hsp_control.control.held_gains import held_radius
 from hsp_control.control.stiffening import dissipated, spring_energy
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.robot.integrators import Dop853, Rk4
@@ -425,6 +427,65 @@ def test_changes_to_come_are_checked_too() -> None:
         check_rate(gains, q, 0.001)
 
 
+@pytest.mark.parametrize("kind", ["impedance", "gains", "null_space_gain", "add"])
+def test_a_change_that_the_period_does_not_bear_is_refused_while_it_runs(
+    kind: str,
+) -> None:
+    """The advice is right: just below it a loop settles, just above it grows."""
+    robot, q, v, h = panda(), panda().home(), np.zeros(7), 0.001
+    spring = Impedance(400.0) if kind == "impedance" else None
+    controller = Controller(robot, [position_hand(impedance=spring)], limits=None)
+    controller.applied(controller.compute(0.0, q, v).tau, h)
+    before = controller.compute(0.0, q, v).tau
+
+    def make(scale: float) -> None:
+        begin = controller.at(0.001).ramp(0.0)
+        if kind == "impedance":
+            begin.impedance("hand", Impedance(scale**2 * 4e6))
+        elif kind == "gains":
+            begin.gains("hand", hsp.Gains(natural_frequency=scale * 4000.0))
+        elif kind == "null_space_gain":
+            begin.null_space_gain(scale * 4000.0)
+        else:
+            gains = hsp.Gains(natural_frequency=scale * 4000.0)
+            joints = ["panda_joint1"]
+            begin.add(hsp.JointPosture(joints=joints, gains=gains, name="added"))
+
+    with pytest.raises(hsp.errors.UnstableRateError, match="unstable") as caught:
+        make(1.0)
+    np.testing.assert_array_equal(controller.compute(0.0, q, v).tau, before)
+    assert not controller.changes
+    text = str(caught.value)
+    if kind == "impedance":
+        assert "impedance: this impedance of task 'hand', held for 0.001 s" in text
+        most = float(text.split("this stiffness and ")[1].split(" times")[0])
+    elif kind == "null_space_gain":
+        most = float(text.split("less than ")[1].split(" 1/s")[0]) / 4000.0
+    else:
+        most = float(text.split("at most ")[1].split(" times")[0])
+    with pytest.raises(hsp.errors.UnstableRateError):
+        make(1.01 * most)
+    make(0.999 * most)
+    assert len(controller.changes) == 1
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_radius_of_held_gains_is_that_of_the_loop_and_of_its_closed_form(
+    seed: int,
+) -> None:
+    """x'' = -kp x - kv x' held for h is stable if and only if kv h < 2, kp h < 2 kv."""
+    rng = np.random.default_rng(seed)
+    m, h = int(rng.integers(1, 7)), float(10.0 ** rng.uniform(-4, -1))
+    kv = rng.uniform(0.1, 2.5, size=m) / h
+    kp = rng.uniform(0.1, 2.5, size=m) * kv / h
+    T = rng.normal(size=(m, m)) + 3.0 * np.eye(m)
+    Kp, Kv = (T @ np.diag(k) @ np.linalg.inv(T) for k in (kp, kv))
+    radius = held_radius(Kp, Kv, h)
+    assert (radius < 1.0) == bool(((kv * h < 2.0) & (kp * h < 2.0 * kv)).all())
+    loop = LinearLoop(Kp, Kv, np.zeros((m, m)), h)
+    assert radius == pytest.approx(loop.radius(), rel=1e-6)
+
+
 def test_the_check_looks_at_the_spring_below_its_bound() -> None:
     """Far from the reference a bounded spring is soft; it will not stay there."""
     robot, q = panda(), panda().home()
@@ -460,13 +521,20 @@ def test_the_cartesian_configuration_makes_its_point() -> None:
 
 
 def test_the_joint_configuration_makes_its_point() -> None:
+    """Efforts at the sprung joints do not reach the free one; a push at it does."""
     experiment = hsp.load_experiment("compliance/panda_joint_impedance")
     log = experiment.run()
     assert log.status == "completed"
     assert not log["status"].any()
     error = at(log, "task.joints.error", 1.49)
-    force = np.array([300.0, 300, 300, 300, 100, 60, 20]) * error
+    force = np.array([300.0, 300, 300, 100, 60, 20]) * error
     state = experiment.robot.state(1.49, at(log, "q", 1.49), np.zeros(7))
-    J = state.frame("panda_tcp").jacobian[:3]
+    J = np.delete(state.frame("panda_tcp").jacobian[:3], 2, axis=1)
     np.testing.assert_allclose(-force, J.T @ [0.0, 0.0, -30.0], atol=0.1)
     assert np.abs(log["task.joints.error"][-1]).max() < 1e-3
+    norm, elbow = log["null_space_norm"], log.q[:, 2]
+    pushed = (log.t >= 2.5) & (log.t < 2.9)
+    assert norm[log.t < 2.5].max() < 0.002 * norm[pushed].max()
+    assert norm[-1] < 1e-4 * norm[pushed].max()
+    assert np.ptp(elbow) > 0.05
+    assert abs(elbow[-1] - elbow[0]) < 0.02 * np.ptp(elbow)

@@ -185,6 +185,13 @@ MUTANTS = (
         "tests/integration/test_compliance.py -k adds_no_energy",
     ),
     Mutant(
+        "gains: a running loop bears any of them",
+        CONTROL + "held_gains.py",
+        "if held_radius(Kp, Kv, period) < 1.0 + _ROUNDING:",
+        "if held_radius(0.9 * Kp, 0.9 * Kv, period) < 1.0 + _ROUNDING:",
+        "tests/integration/test_compliance.py -k period_does_not_bear",
+    ),
+    Mutant(
         "limits: a push moves no bound",
         LIMITS + "acceleration_bounds.py",
         "bounds.a_lower[i] -= up + max(down, -most)",

@@ -93,6 +93,7 @@ class Actuation:
         self._resolution: Resolution | None = None
         self._step: LimitedStep | None = None
         self.delivered: Array = np.zeros(nv)
+        self.period = 0.0
         self._held = HeldEffort(nv)
         self._sent = np.zeros(nv + 1)  # the last effort, and how long it is held
         # Kernels read these copies, which stay where they are when limits change.
@@ -181,6 +182,7 @@ class Actuation:
             tau: Effort, shape (nv,) [N·m or N].
             period: Time until the next effort [s].
         """
+        self.period = period
         if self.limits is None:
             return
         self._held.sent(state.t, state.v, self.delivered, period)
@@ -195,6 +197,7 @@ class Actuation:
 
     def forget(self) -> None:
         """Forget the last efforts: the rate limit does not apply to the next one."""
+        self.period = 0.0
         self._held.forget()
         self._forget_effort()
 

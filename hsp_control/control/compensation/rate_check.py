@@ -16,6 +16,7 @@ from hsp_control.common.exceptions import CompensationError, UnstableRateError
 from hsp_control.control.compensation.compensation import Compensation
 from hsp_control.control.compensation.linear_loop import LinearLoop
 from hsp_control.control.controller import Controller
+from hsp_control.control.held_gains import rounded_down
 from hsp_control.declaration import within
 from hsp_control.null_space.fields import FieldSample
 from hsp_control.null_space.metrics import MetricSample
@@ -196,7 +197,7 @@ class _Speed(NamedTuple):
 
 
 def _of_gain(what: str, rate: float) -> _Speed:
-    return _Speed(what, rate, lambda x: f"{what} of at most {_rounded(x)} 1/s")
+    return _Speed(what, rate, lambda x: f"{what} of at most {rounded_down(x)} 1/s")
 
 
 def _of_impedance(of: str, frequency: float, damped: float) -> _Speed:
@@ -209,8 +210,8 @@ def _of_impedance(of: str, frequency: float, damped: float) -> _Speed:
     def at_most(x: float) -> str:
         s = x / rate
         return (
-            f"at most {_rounded(s * s)} times this stiffness and {_rounded(s)} times "
-            "this damping"
+            f"at most {rounded_down(s * s)} times this stiffness and "
+            f"{rounded_down(s)} times this damping"
         )
 
     return _Speed(what, rate, at_most)
@@ -227,7 +228,9 @@ def _integral_finding(name: str, loop: LinearLoop) -> RateFinding | None:
     if times is None:  # unstable with the exact model, too: already reported
         return None
     scale = _largest(lambda s: replace(heavy, ki=s * heavy.ki))
-    less = "" if scale is None else f" Ki of at most {_rounded(scale)} times this, or"
+    less = (
+        "" if scale is None else f" Ki of at most {rounded_down(scale)} times this, or"
+    )
     faster = "" if loop.compensation.momentum_observer is None else " faster"
     return RateFinding(
         ("compensation", "integral_action"),
@@ -372,9 +375,9 @@ def _stabilising_changes(
             return replace(loop, kp=s * K @ A, kv=K + s * A)
 
         if (s := _largest(weights)) is not None:
-            choices.append(f"fields of at most {_rounded(s)} times these weights")
+            choices.append(f"fields of at most {rounded_down(s)} times these weights")
     if (s := _largest(lambda s: replace(loop, period=s * loop.period))) is not None:
-        choices.append(f"a control_period of at most {_rounded(s * loop.period)} s")
+        choices.append(f"a control_period of at most {rounded_down(s * loop.period)} s")
     if own.momentum_observer is not None and own.momentum_observer.cancel:
         running = own.momentum_observer
         rate = running.bandwidth
@@ -385,7 +388,7 @@ def _stabilising_changes(
 
         if (s := _largest(observer)) is not None:
             choices.append(
-                f"momentum_observer.bandwidth of at most {_rounded(s * rate)} 1/s"
+                f"momentum_observer.bandwidth of at most {rounded_down(s * rate)} 1/s"
             )
     if own.velocity_filter is not None:
         filter_ = own.velocity_filter
@@ -426,10 +429,3 @@ def _largest(
         middle = np.sqrt(low * high)
         low, high = (middle, high) if stable(middle) else (low, middle)
     return low
-
-
-def _rounded(value: float) -> str:
-    """Return a number rounded down to three digits, so that the advice is safe."""
-    exponent = int(np.floor(np.log10(value))) - 2
-    unit = 10.0**exponent
-    return f"{np.floor(value / unit + 1e-6) * unit:.10g}"
