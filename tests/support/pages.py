@@ -3,9 +3,19 @@
 import asyncio
 import threading
 from typing import Any
+from urllib.parse import urlsplit
 
 import umsgpack
+from tornado.httpclient import HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
+
+
+def scene_request(url: str, **headers: str) -> HTTPRequest:
+    """Return a page's request for the scene: from the page's own origin."""
+    address = urlsplit(url)
+    origin = f"{address.scheme}://{address.netloc}"
+    scene = address._replace(scheme="ws", path="/scene").geturl()
+    return HTTPRequest(scene, headers={"Origin": origin} | headers)
 
 
 class Page(threading.Thread):
@@ -24,7 +34,7 @@ class Page(threading.Thread):
         self.loop.call_soon_threadsafe(self.socket.close)
 
     async def look(self) -> None:
-        page = await websocket_connect(self.url.replace("http", "ws") + "scene")
+        page = await websocket_connect(scene_request(self.url))
         self.loop, self.socket = asyncio.get_running_loop(), page
         try:
             while (message := await page.read_message()) is not None:

@@ -1,18 +1,24 @@
 """The server's process: serves the page, and sends the scene to all open pages.
 
-It listens on the loopback address only. It reads commands from its standard input, so
-that no other process can send any. When the input is closed because the parent ended
-or was killed, the server ends too. It imports neither Pinocchio nor modules that do.
+It listens on the loopback address unless it is told another one. It reads commands from
+its standard input, so that no other process can send any. When the input is closed
+because the parent ended or was killed, the server ends too. It imports neither
+Pinocchio nor modules that do.
+
+Pages and their connections must name the server's own host, against DNS rebinding, and
+connections must come from one of its own pages. With a key, pages and connections need
+it in their address, and one page at a time may steer the program; see `steering`.
 """
 
 import asyncio
+import hmac
 import json
 import os
 import socket
 import struct
 import sys
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
@@ -22,14 +28,40 @@ from tornado.websocket import WebSocketClosedError, WebSocketHandler
 from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
 from hsp_control.visualization.viewer.message_batches import batch_messages
 from hsp_control.visualization.viewer.pipe_protocol import ASK, DELETE, Decoder, Record
+from hsp_control.visualization.viewer.steering import LONGEST, Steering
 
-ADDRESS = "127.0.0.1"
 PORTS = (*range(7000, 7100), 0)  # 0: any free port
 TAKEN = "taken"  # a page's acknowledgement of a message
 
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 _LOOPBACK_NAMES = {"127.0.0.1", "localhost"}
 _PARENT_CHECK_PERIOD = 1.0  # s
+_FLUSH_PERIOD = 0.005  # s
+
+
+class Door(NamedTuple):
+    """Who is let in.
+
+    Attributes:
+        host: The address that the server listens on.
+        key: What an address must contain; empty: nothing, and no page may steer.
+    """
+
+    host: str
+    key: str
+
+    def check(self, handler: RequestHandler, *, needs_key: bool) -> None:
+        """Check a request.
+
+        Raises:
+            HTTPError: If it names another host, or the key is missing.
+        """
+        names = _LOOPBACK_NAMES if self.host in _LOOPBACK_NAMES else {self.host}
+        if handler.request.host_name not in names:
+            raise HTTPError(403, reason="Another host")
+        given = handler.get_query_argument("key", "")
+        if needs_key and not hmac.compare_digest(given.encode(), self.key.encode()):
+            raise HTTPError(403, reason="The address needs the key that was printed")
 
 
 class Hub:
@@ -39,14 +71,37 @@ class Hub:
         scene: All commands that a newly opened page needs.
         pages: The open pages.
         asked: The number of the parent's latest request: does a page show everything?
+        steering: Which page steers; None: none may.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, steering: Steering | None) -> None:
         """Start with an empty scene and no page."""
         self.scene = LatestCommands()
         self.pages: set[Page] = set()
         self.asked = 0
+        self.steering = steering
         self._decoder = Decoder()
+        self._flushing = False
+
+    def tell_who_steers(self) -> None:
+        """Tell all pages whether they steer, and pass on what the parent is told."""
+        steering = self.steering
+        if steering is None:
+            return
+        for page in self.pages:
+            page.tell_drive(steering.page is page, steering.page is not None)
+        self.flush()
+
+    def flush(self) -> None:
+        """Pass on what pages have sent, soon: what comes meanwhile is put together."""
+        if not self._flushing:
+            self._flushing = True
+            asyncio.get_running_loop().call_later(_FLUSH_PERIOD, self._flush)
+
+    def _flush(self) -> None:
+        self._flushing = False
+        if self.steering is not None and not self.steering.flush():
+            self.flush()
 
     def feed(self, data: bytes) -> None:
         """Process bytes from the parent."""
@@ -81,13 +136,23 @@ class Hub:
 class Page(WebSocketHandler):
     """One open page. A newer command replaces one of its key that was not yet sent."""
 
-    def initialize(self, hub: Hub) -> None:
-        """Store the hub; called by Tornado."""
-        self.hub = hub
+    def initialize(self, hub: Hub, door: Door) -> None:
+        """Store the hub, and who is let in; called by Tornado."""
+        self.hub, self._door = hub, door
         self.pending = LatestCommands()
         self.has_pending = asyncio.Event()
         self.answered = self._asked = 0
         self._ready = asyncio.Event()
+
+    def prepare(self) -> None:
+        """Check host and key, and that the connection comes from one of our pages.
+
+        Tornado compares the origin with the host, but lets in what names no origin:
+        programs, and not browsers.
+        """
+        self._door.check(self, needs_key=bool(self._door.key))
+        if "Origin" not in self.request.headers:
+            raise HTTPError(403, reason="The connection names no origin")
 
     def open(self, *args: str, **kwargs: str) -> None:
         """Send the page the whole scene, then all changes."""
@@ -95,18 +160,45 @@ class Page(WebSocketHandler):
         self.has_pending.set()
         self.hub.pages.add(self)
         self._delivery = asyncio.create_task(self._deliver())
+        if self.hub.steering is not None:
+            self.hub.steering.enter(self)
+            self.hub.tell_who_steers()
 
     def on_message(self, message: str | bytes) -> None:
-        """Process an answer: an acknowledgement, or the number of a request."""
-        if message == TAKEN:
-            self._ready.set()
-        else:
-            self.answered = max(self.answered, int(message))
+        """Process an answer, the number of a request, or what a page that steers says.
+
+        A page that says anything else is not ours: its connection is closed.
+        """
+        steering = self.hub.steering
+        try:
+            if message == TAKEN:
+                self._ready.set()
+            elif str(message).startswith("{") and steering is not None:
+                if steering.take(self, str(message)):
+                    self.hub.tell_who_steers()
+                self.hub.flush()
+            else:
+                self.answered = max(self.answered, int(message))
+        except ValueError as error:
+            self.close(1008, str(error))
 
     def on_close(self) -> None:
         """Remove the page."""
         self.hub.pages.discard(self)
         self._delivery.cancel()
+        if self.hub.steering is not None and self.hub.steering.leave(self):
+            self.hub.tell_who_steers()
+
+    def tell_drive(self, mine: bool, taken: bool) -> None:
+        """Tell the page whether it steers, and whether any page does."""
+        # {"type": "play_drive", "path": "/play", "mine": ..., "taken": ...}
+        flags = [b"\xc3" if each else b"\xc2" for each in (mine, taken)]
+        packed = (
+            b"\x84\xa4type\xaaplay_drive\xa4path\xa5/play"
+            b"\xa4mine" + flags[0] + b"\xa5taken" + flags[1]
+        )
+        self.pending.put(key_of("/play", "drive"), packed)
+        self.has_pending.set()
 
     def ask(self, number: int) -> None:
         """Request that the page returns a number once it shows all sent before."""
@@ -135,14 +227,14 @@ class Page(WebSocketHandler):
 class FileHandler(RequestHandler):
     """Serves the page's files."""
 
-    def initialize(self, files: dict[str, tuple[str, bytes]]) -> None:
-        """Store the files, path -> (type, content); called by Tornado."""
-        self._files = files
+    def initialize(self, files: dict[str, tuple[str, bytes]], door: Door) -> None:
+        """Store the files, path -> (type, content), and the door; called by Tornado."""
+        self._files, self._door = files, door
 
     def prepare(self) -> None:
-        """Check that the request names the loopback host, against DNS rebinding."""
-        if self.request.host_name not in _LOOPBACK_NAMES:
-            raise HTTPError(403)
+        """Check the host, and for the page itself the key."""
+        page = self.request.path == "/" and bool(self._door.key)
+        self._door.check(self, needs_key=page)
 
     def get(self, name: str) -> None:
         """Send the file."""
@@ -151,22 +243,25 @@ class FileHandler(RequestHandler):
         kind, content = self._files[name]
         self.set_header("Content-Type", f"{kind}; charset=utf-8")
         self.set_header("Cache-Control", "no-cache")
+        self.set_header("Referrer-Policy", "no-referrer")  # the address has the key
         self.finish(content)
 
 
-def main(meshcat: str, port: int, parent: int) -> NoReturn:
+def main(meshcat: str, port: int, parent: int, host: str, key: str) -> NoReturn:
     """Serve until the parent has ended.
 
     Args:
         meshcat: The folder of Meshcat's page.
         port: The port to listen on, or 0 for a free one.
         parent: The parent's process id.
+        host: The address to listen on.
+        key: The key that the page's address contains; empty: none, and no page steers.
     """
-    asyncio.run(_serve(Path(meshcat), port, parent))
+    asyncio.run(_serve(Path(meshcat), port, parent, Door(host, key)))
     os._exit(0)
 
 
-async def _serve(meshcat: Path, port: int, parent: int) -> None:
+async def _serve(meshcat: Path, port: int, parent: int, door: Door) -> None:
     files = {
         file.name: (_TYPES[file.suffix], file.read_bytes())
         for file in (
@@ -175,29 +270,33 @@ async def _serve(meshcat: Path, port: int, parent: int) -> None:
         )
     }
     files[""] = files.pop("index.html")
-    hub = Hub()
+    hub = Hub(Steering(sys.stdout.fileno()) if door.key else None)
     routes: list[Any] = [
-        (r"/scene", Page, {"hub": hub}),
-        (r"/(.*)", FileHandler, {"files": files}),
+        (r"/scene", Page, {"hub": hub, "door": door}),
+        (r"/(.*)", FileHandler, {"files": files, "door": door}),
     ]
-    sockets = _listen(port)
-    HTTPServer(Application(routes, websocket_ping_interval=20)).add_sockets(sockets)
+    sockets = _listen(door.host, port)
+    application = Application(
+        routes, websocket_ping_interval=20, websocket_max_message_size=LONGEST
+    )
+    HTTPServer(application).add_sockets(sockets)
     os.set_blocking(0, False)
     asyncio.get_running_loop().add_reader(0, _read, hub)
-    _tell_parent(url=f"http://{ADDRESS}:{sockets[0].getsockname()[1]}/")
+    address = f"http://{door.host}:{sockets[0].getsockname()[1]}/"
+    _tell_parent(url=address + (f"?key={door.key}" if door.key else ""))
     # Other children of the parent may hold our standard input open after its death.
     while os.getppid() == parent:
         await asyncio.sleep(_PARENT_CHECK_PERIOD)
 
 
-def _listen(port: int) -> list[socket.socket]:
+def _listen(host: str, port: int) -> list[socket.socket]:
     candidates = (port,) if port else PORTS
     for candidate in candidates:
         try:
-            return bind_sockets(candidate, address=ADDRESS, family=socket.AF_INET)
+            return bind_sockets(candidate, address=host, family=socket.AF_INET)
         except OSError as error:
             reason = error.strerror
-    raise OSError(f"cannot listen on {ADDRESS}:{candidates[-1]}: {reason}")
+    raise OSError(f"cannot listen on {host}:{candidates[-1]}: {reason}")
 
 
 def _read(hub: Hub) -> None:

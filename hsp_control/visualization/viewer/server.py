@@ -4,11 +4,13 @@ import atexit
 import importlib.util
 import json
 import os
+import secrets
 import select
 import subprocess
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -24,6 +26,7 @@ from hsp_control.visualization.viewer.pipe_protocol import (
     encode,
 )
 
+LOOPBACK = "127.0.0.1"
 START_TIMEOUT = 30.0  # s; it takes 0.2 on an idle machine
 STALL_TIMEOUT = 5.0  # s without progress after which the server counts as dead
 RELOAD_TIMEOUT = 3.0  # s; a page that reconnects within it was reloaded
@@ -32,13 +35,13 @@ _POLL = 0.05  # s
 # The process imports a few modules of this package, without the package's __init__.
 _LAUNCH = """
 import json, sys, types
-viewer, meshcat, port, parent = sys.argv[1:]
+viewer, meshcat, port, parent, host, key = sys.argv[1:]
 for name in ("hsp_control", "hsp_control.visualization.viewer"):
     sys.modules[name] = types.ModuleType(name)
     sys.modules[name].__path__ = [viewer]
 try:
     from hsp_control.visualization.viewer.page_server import main
-    main(meshcat, int(port), int(parent))
+    main(meshcat, int(port), int(parent), host, key)
 except Exception as error:
     print(json.dumps({"error": str(error) or repr(error)}), flush=True)
 """
@@ -47,19 +50,24 @@ except Exception as error:
 class Server:
     """The server's process, owned by this viewer; see `page_server`.
 
-    It listens on 127.0.0.1. It ends with `close`, and when this process ends or is
-    killed.
+    It ends with `close`, and when this process ends or is killed.
 
     Attributes:
-        url: The page's address.
+        url: The page's address; with its key, if pages may steer.
         process: The process.
     """
 
-    def __init__(self, port: int | None = None) -> None:
+    def __init__(
+        self, port: int | None = None, *, host: str = LOOPBACK, steerable: bool = False
+    ) -> None:
         """Start the process.
 
         Args:
             port: The port to listen on; None: the first free one from 7000.
+            host: The address to listen on; with another one than the loopback address
+                pages may be opened on other computers.
+            steerable: Whether a page may send messages; it then needs a key, new for
+                each server, that `url` contains.
 
         Raises:
             ViewerError: If Meshcat is not installed, the port is taken, or the process
@@ -72,7 +80,10 @@ class Server:
         self._unsent = b""
         self._answers = b""
         self._asked = 0
-        arguments = [Path(__file__).parent, meshcat_page(), port or 0, os.getpid()]
+        self._messages: deque[dict[str, Any]] = deque()
+        key = secrets.token_urlsafe(16) if steerable else ""
+        folder = Path(__file__).parent
+        arguments = [folder, meshcat_page(), port or 0, os.getpid(), host, key]
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-c", _LAUNCH, *map(str, arguments)],
             bufsize=0,
@@ -104,6 +115,26 @@ class Server:
         ]
         with self._lock:
             self._write(b"".join(map(encode, records)))
+
+    def messages(self) -> list[dict[str, Any]]:
+        """Return what the page that steers has sent since the last call; never waits.
+
+        ``{"do": "left"}`` says that it was closed, or that another page took over.
+
+        Raises:
+            ViewerError: If the server has ended.
+        """
+        with self._lock:
+            if self.process.stdout is None or self.process.stdout.closed:
+                raise ViewerError("the viewer is closed")
+            descriptor = self.process.stdout.fileno()
+            while _wait(descriptor, select.POLLIN, 0.0):
+                self._read(descriptor)
+            *lines, self._answers = self._answers.split(b"\n")
+            self._messages.extend(json.loads(line)["message"] for line in lines)
+            found = list(self._messages)
+            self._messages.clear()
+        return found
 
     def wait_for_page(self, timeout: float) -> bool:
         """Wait until a page shows all that was sent; return whether one does.
@@ -175,21 +206,29 @@ class Server:
             )  # not empty after Ctrl-C: no record is cut in two
 
     def _answer(self, deadline: float) -> dict[str, Any]:
-        """Return the process's next answer."""
+        """Return the process's next answer; messages that come before it are kept."""
         assert self.process.stdout is not None
         descriptor = self.process.stdout.fileno()
-        while b"\n" not in self._answers:
-            if not _wait(descriptor, select.POLLIN, deadline - time.monotonic()):
-                self._fail("does not answer")
-            data = os.read(descriptor, 4096)
-            if not data:
-                self._fail("has ended")
-            self._answers += data
-        line, _, self._answers = self._answers.partition(b"\n")
-        answer: dict[str, Any] = json.loads(line)
-        if "error" in answer:
-            raise ViewerError(f"the viewer's server cannot start: {answer['error']}")
-        return answer
+        while True:
+            while b"\n" not in self._answers:
+                if not _wait(descriptor, select.POLLIN, deadline - time.monotonic()):
+                    self._fail("does not answer")
+                self._read(descriptor)
+            line, _, self._answers = self._answers.partition(b"\n")
+            answer: dict[str, Any] = json.loads(line)
+            if "error" in answer:
+                raise ViewerError(
+                    f"the viewer's server cannot start: {answer['error']}"
+                )
+            if "message" not in answer:
+                return answer
+            self._messages.append(answer["message"])
+
+    def _read(self, descriptor: int) -> None:
+        data = os.read(descriptor, 1 << 16)
+        if not data:
+            self._fail("has ended")
+        self._answers += data
 
     def _fail(self, reason: str) -> None:
         self.process.kill()

@@ -171,7 +171,7 @@ function ask({number}) {
 
 // Connect to the server; when it ends, retry until one runs at the same address.
 function connect(again = false) {
-  const address = new URL("scene", location.href);
+  const address = new URL("scene" + location.search, location.href);  // with its key
   address.protocol = address.protocol.replace("http", "ws");
   const socket = new WebSocket(address);
   socket.binaryType = "arraybuffer";
