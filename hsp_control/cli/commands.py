@@ -216,6 +216,14 @@ def export(options: argparse.Namespace) -> int:
 
 
 @renamed_keys_printed()
+def play(options: argparse.Namespace) -> int:
+    """Let a page steer a simulated robot in real time."""
+    from hsp_control.cli import play as plays
+
+    return plays.play(options)
+
+
+@renamed_keys_printed()
 def sweep(options: argparse.Namespace) -> int:
     """Run a configuration many times."""
     from hsp_control.cli import sweep as sweeps

@@ -31,8 +31,5 @@ def compiling_shown(console: Console) -> Iterator[None]:
             status.stop()
             done += 1
 
-    kernels.watch(shown)
-    try:
+    with kernels.watched(shown):
         yield
-    finally:
-        kernels.watch(None)

@@ -12,7 +12,7 @@ from hsp_control.common.exceptions import HspControlError
 from hsp_control.common.resources import bundled_configs, bundled_robots
 from hsp_control.common.version import __version__
 
-_OWN_INTERRUPTS = {"bench", "export", "sweep", "view"}
+_OWN_INTERRUPTS = {"bench", "export", "play", "sweep", "view"}
 """Commands that must close processes and pages, or save rows, at Ctrl-C."""
 FAILURE = 2
 """Exit status after any error."""
@@ -95,6 +95,20 @@ def _parser() -> argparse.ArgumentParser:
 
     check = _command(commands, "check", "check a configuration without running it")
     _add_configuration(check)
+
+    play = _command(commands, "play", "touch a simulated robot in a browser")
+    _add_configuration(play, "a robot's name, or ")
+    play.add_argument(
+        "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
+    )
+    play.add_argument(
+        "--host",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="the address of this computer at which another one, or a phone, opens the "
+        "page; default: only this computer may",
+    )
+    _add_page(play)
 
     view = _command(commands, "view", "play logs in a browser, one or several together")
     view.add_argument(
@@ -372,11 +386,12 @@ def _add_live(live: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_configuration(parser: argparse.ArgumentParser) -> None:
+def _add_configuration(parser: argparse.ArgumentParser, or_else: str = "") -> None:
     config = parser.add_argument(
         "config",
         metavar="CONFIG",
-        help="a bundled name such as paper/4_moving_obstacle, a YAML file, or a log",
+        help=f"{or_else}a bundled name such as paper/4_moving_obstacle, a YAML file, "
+        "or a log",
     )
     _complete(config, bundled_configs)
     _add_overrides(parser)

@@ -7,8 +7,8 @@ debugging and coverage, and Numba is not even imported.
 """
 
 import os
-from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import partial
 from typing import Any, TypeVar, cast
 
@@ -81,9 +81,14 @@ def callback(signature: Any, function: Callable[..., Any]) -> Any:
 _watchers: list[Callable[[], AbstractContextManager[None]]] = []
 
 
-def watch(watcher: Callable[[], AbstractContextManager[None]] | None) -> None:
-    """Enter a context around each compilation that is not found on disk; None: none."""
-    _watchers[:] = [] if watcher is None else [watcher]
+@contextmanager
+def watched(watcher: Callable[[], AbstractContextManager[None]]) -> Iterator[None]:
+    """Enter the watcher's context around each compilation not found on disk."""
+    _watchers.append(watcher)
+    try:
+        yield
+    finally:
+        _watchers.remove(watcher)
 
 
 def _watched(compile_it: Callable[[], Any]) -> Any:

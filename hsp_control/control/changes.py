@@ -20,6 +20,7 @@ from hsp_control.control.setup import (
     planned_terms,
 )
 from hsp_control.declaration import AnyOf, Part, within
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import Flag, Gain, NonNegative, Number
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
@@ -337,7 +338,17 @@ class MoveObstacle(Change, type="obstacle"):
     obstacle: str
     """Name of the obstacle in the scene."""
     center: Trajectory
-    """The new trajectory of its frame's origin in the world [m]."""
+    """The new trajectory of its frame's origin in the world [m]; a stream begins where
+    the obstacle is."""
+
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change with a stream that begins where the obstacle is."""
+        if not any(True for _ in parts_within(self.center, Streamed)):
+            return self
+        with within("obstacle"):
+            old = setup.start.scene[self.obstacle]
+        here = old.center.sample(max(self.at, start.state.t)).position
+        return replace(self, center=self.center.anchored(here))
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the obstacle wherever it counts; see `Change.apply`."""
@@ -372,11 +383,16 @@ def _exchanged(part: Holder, old: Obstacle, new: Obstacle) -> Holder:
     """Return a part in which one obstacle is replaced by another one."""
     changes: dict[str, Any] = {}
     for name, value in part.all_fields().items():
-        if value == old:
+        if _is(value, old):
             changes[name] = new
-        elif isinstance(value, tuple) and old in value:
-            changes[name] = tuple(new if each == old else each for each in value)
+        elif isinstance(value, tuple) and any(_is(each, old) for each in value):
+            changes[name] = tuple(new if _is(each, old) else each for each in value)
     return replace(part, **changes) if changes else part  # type: ignore[type-var]
+
+
+def _is(value: object, obstacle: Obstacle) -> bool:
+    # Not `==` alone: values that hold arrays have no truth of being equal.
+    return isinstance(value, Obstacle) and value == obstacle
 
 
 class ChangeLimits(Change, type="limits"):

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import fields, is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import TYPE_CHECKING, Any, cast
 
@@ -94,7 +95,7 @@ class AnyOf:
     As an annotation: ``Annotated[PoseTrajectory | Trajectory, AnyOf(PoseTrajectory,
     Trajectory)]``. The members that exist when a value is checked count, not those that
     exist when the field is declared. If a type name is in several families, the first
-    one counts.
+    one counts that has all keys which are given.
     """
 
     def __init__(self, *bases: "type[Part]") -> None:
@@ -123,7 +124,7 @@ class AnyOf:
             for base in self.bases:
                 assert base.family is not None
                 base.family.load(value.get("type"))
-        members = self.members
+        members = self.members | self._fitting(value)
         if isinstance(value, dict) and (member := members.get(str(value.get("type")))):
             _check_admitted(str(value["type"]), member.__module__)
             _check_complete(str(value["type"]), member)
@@ -131,6 +132,20 @@ class AnyOf:
             self._checked = members
             self._validator = SchemaValidator(_union(members))
         return self._validator.validate_python(plain(value))
+
+    def _fitting(self, value: object) -> "dict[str, type[Part]]":
+        """Return the member of the value's type that has its keys, if there is one."""
+        if not isinstance(value, dict):
+            return {}
+        name, keys = str(value.get("type")), set(value) - {"type"}
+        families = [base.family.members for base in self.bases if base.family]
+        named = [members[name] for members in families if name in members]
+        fitting = [
+            member
+            for member in named
+            if is_dataclass(member) and keys <= {each.name for each in fields(member)}
+        ]
+        return {name: fitting[0]} if fitting else {}
 
     def core_schema(self) -> CoreSchema:
         """Return pydantic's schema."""

@@ -31,9 +31,11 @@ def _in_space(center: Trajectory) -> Trajectory:
     """Return the trajectory of a point in the world.
 
     Raises:
-        SceneError: If it is relative to a start, streamed, or its dimension is not 3.
+        SceneError: If it is relative to a start, a stream that does not run, or its
+            dimension is not 3.
     """
-    _refuse_streams(center)
+    if _streamed(center):
+        return center
     try:
         center = center.anchored(None)
     except TrajectoryError as error:
@@ -43,13 +45,20 @@ def _in_space(center: Trajectory) -> Trajectory:
     return center
 
 
-def _refuse_streams(trajectory: Part) -> None:
-    """Raise for a stream: a scene is no part of a run, and has no memory of one."""
-    if any(True for _ in parts_within(trajectory, Streamed)):
+def _streamed(trajectory: Part) -> bool:
+    """Return whether a trajectory has a stream, which then runs already.
+
+    Raises:
+        SceneError: If it does not run: a scene is no part of a run, and has no memory
+            of one. A change while the controller runs is one, see `MoveObstacle`.
+    """
+    streams = list(parts_within(trajectory, Streamed))
+    if not all(stream.is_placed for stream in streams):
         raise SceneError(
-            "a stream cannot move an obstacle; while the controller runs, "
-            "controller.at(t).obstacle(name, center) moves it on another trajectory"
+            "a stream cannot move an obstacle from the start; while the controller "
+            "runs, controller.at(t).obstacle(name, stream) does"
         )
+    return bool(streams)
 
 
 def _or_world_axes(orientation: Any) -> Any:
@@ -58,7 +67,8 @@ def _or_world_axes(orientation: Any) -> Any:
 
 
 def _from_world_axes(orientation: OrientationTrajectory) -> OrientationTrajectory:
-    _refuse_streams(orientation)
+    if _streamed(orientation):
+        return orientation
     return orientation.anchored(np.eye(3))
 
 

@@ -1,4 +1,4 @@
-"""Pushes: external wrenches of given size, frame and time."""
+"""Pushes: external wrenches of given size, frame and time, and springs of a hand."""
 
 from collections.abc import Sequence
 
@@ -32,8 +32,39 @@ class Push(Part, error=SimulationError):
         return self.start <= t < self.start + self.duration
 
 
+class Spring:
+    """A spring from a point of a link to a hand that moves: f = k (hand - point).
+
+    Attributes:
+        joint: Index of the link's joint.
+        point: The point in the joint's frame, shape (3,) [m].
+        hand: Where the hand is in the world, shape (3,) [m].
+        stiffness: k [N/m].
+        largest: Largest force [N].
+    """
+
+    def __init__(
+        self, joint: int, point: Array, hand: Array, stiffness: float, largest: float
+    ) -> None:
+        """Set all of them."""
+        self.joint, self.point, self.hand = joint, point, hand
+        self.stiffness, self.largest = stiffness, largest
+
+    def force(self, point: Array) -> Array:
+        """Return the force on the point, shape (3,) [N], where it is in the world."""
+        force = self.stiffness * (self.hand - point)
+        size = float(np.linalg.norm(force))
+        return force * min(1.0, self.largest / size) if size > 0.0 else force
+
+
 class Pushes:
-    """All pushes on a robot, as a generalised effort."""
+    """All pushes on a robot, as a generalised effort.
+
+    Attributes:
+        pushes: The pushes that were declared.
+        spring: That of somebody who pulls now; None: nobody does.
+        reachable: Whether somebody may pull, so that an integrator must ask again.
+    """
 
     def __init__(self, robot: Robot, pushes: Sequence[Push] = ()) -> None:
         """Set the robot and the pushes.
@@ -43,15 +74,17 @@ class Pushes:
         """
         self.robot = robot
         self.pushes = tuple(pushes)
+        self.spring: Spring | None = None
+        self.reachable = False
         self._frames = {}
         for k, push in enumerate(pushes):
             with within("pushes", k, "frame"):
                 self._frames[push.frame] = robot.frame_id(push.frame)
-        self._data = robot.model.createData() if pushes else None
+        self._data = robot.model.createData()
 
     def any_active(self, t: float, end: float) -> bool:
         """Return whether a push acts at some time from t to ``end`` [s]."""
-        return any(
+        return self.spring is not None or any(
             push.start <= end and t < push.start + push.duration for push in self.pushes
         )
 
@@ -68,4 +101,14 @@ class Pushes:
                     pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
                 )
                 total += matrix_view(J).T @ np.concatenate([push.force, push.moment])
+        if self.spring is not None:
+            total += self._pulled(self.spring, q)
         return total
+
+    def _pulled(self, spring: Spring, q: Array) -> Array:
+        J = matrix_view(
+            pin.computeJointJacobian(self.robot.model, self._data, q, spring.joint)
+        )
+        place = self._data.oMi[spring.joint]
+        force = place.rotation.T @ spring.force(place.act(spring.point))
+        return np.asarray(J.T @ np.concatenate([force, np.cross(spring.point, force)]))

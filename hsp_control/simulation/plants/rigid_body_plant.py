@@ -35,7 +35,8 @@ class RigidBodyPlant(ContinuousPlant):
     def bind(self, q: Array, v: Array, tau: Array) -> Callable[[float], Array]:
         """Return t ↦ v'; see `ContinuousPlant.bind`."""
         changed = type(self).acceleration is not RigidBodyPlant.acceleration
-        if self.pushes.pushes or changed:  # a subclass has another one
+        pushed = self.pushes.pushes or self.pushes.reachable
+        if pushed or changed:  # a subclass has another one
             return super().bind(q, v, tau)
         forward_dynamics = self.robot.bind_forward_dynamics(q, v, tau)
         return lambda t: forward_dynamics()

@@ -200,6 +200,11 @@ class Streamed(Part, error=TrajectoryError):
         }
 
     @property
+    def is_placed(self) -> bool:
+        """Whether it is a controller's, and goes on from run to run."""
+        return bool(vars(self).get("_is_placed", False))
+
+    @property
     def live(self) -> bool:
         """Whether another process feeds it, in real time."""
         return self.source is not None and self.source.startswith(SCHEME)
@@ -291,7 +296,7 @@ class Streamed(Part, error=TrajectoryError):
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Return the value itself; once it is placed, one that goes on by itself."""
-        if not vars(self).get("_is_placed", False):
+        if not self.is_placed:
             return self
         copy: Self | None = memo.get(id(self))
         if copy is None:
@@ -304,7 +309,7 @@ class Streamed(Part, error=TrajectoryError):
         """Return a stream that hears the same, but counts as heard for itself alone."""
         copy = self._shared(replace(self))
         vars(copy)["_previews"] = True
-        vars(copy)["_is_placed"] = vars(self).get("_is_placed", False)
+        vars(copy)["_is_placed"] = self.is_placed
         return copy
 
     def _start(self) -> State:

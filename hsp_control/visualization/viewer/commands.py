@@ -12,7 +12,7 @@ from hsp_control.visualization.viewer.latest_commands import key_of
 
 Json = dict[str, Any]
 
-CAMERA, CAPTION, CLIP = "/camera", "/caption", "/clip"
+CAMERA, CAPTION, CLIP, PLAY = "/camera", "/caption", "/clip", "/play"
 
 
 class Command(NamedTuple):
@@ -143,6 +143,17 @@ def set_status(text: str) -> Command:
 def clip_command(kind: str, name: str, **fields: Any) -> Command:
     """Return a command for the clip: see `hsp_control.visualization.viewer.clip`."""
     return _command(kind, CLIP, name, **fields)
+
+
+def play_command(kind: str, name: str, **fields: Any) -> Command:
+    """Return a command for a page that is played with: see `hsp_control.play`.
+
+    Args:
+        kind: What it is, such as ``play_setup``; see ``page/play.js``.
+        name: What it replaces: an earlier command of the same name.
+        fields: What it says.
+    """
+    return _command(kind, PLAY, name, **fields)
 
 
 def forget_clip() -> Command:

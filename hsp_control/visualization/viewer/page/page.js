@@ -12,7 +12,7 @@ const player = new Player(viewer);
 new Controls(player, document.body);
 
 const commandHandlers = {camera, caption, time, status, ghost, trail, trail_more, clip, still,
-                         seek, ask, set_object, nothing() {}};
+                         seek, ask, set_object, pose, nothing() {}};
 viewer.handle_command = (command) => {
   if (Array.isArray(command)) command.forEach(viewer.handle_command);
   else (commandHandlers[command.type] ?? meshcat)(command);
@@ -157,6 +157,9 @@ function clip(command) {
 
 // Remove the clip; from now on the program moves the scene.
 function still() { player.unload(); }
+
+// Show one instant of tracks, without a clip.
+function pose({tracks}) { player.pose(tracks); }
 
 function seek({time}) {
   player.pause();

@@ -140,6 +140,15 @@ class Player extends EventTarget {
     this._emit("state");
   }
 
+  // Show one instant of some tracks, which replaces what they show now.
+  pose(tracks) {
+    for (const {path, property, values} of tracks) {
+      const node = this._node(path);
+      if (node) new Track(path, property, [0], values).apply(node, 0);
+    }
+    this.viewer.set_dirty();
+  }
+
   // Show the current time again, after the scene has changed.
   refresh() {
     for (const track of this.tracks.values()) {

@@ -1,0 +1,219 @@
+"""What can be dragged: the targets of tasks, and obstacles.
+
+Whoever takes hold of one lets a stream take over from its trajectory, with a crossfade
+as in any change while running. So whatever is dragged, however wildly, the law sees a
+C² reference within bounds, and the log repeats it.
+"""
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HspControlError, StreamError
+from hsp_control.control.controller import Controller
+from hsp_control.geometry.scene import Obstacle
+from hsp_control.robot import RobotState
+from hsp_control.tasks import FrameOrientation, FramePose, FramePosition, Task
+from hsp_control.trajectories import Stream, StreamOrientation, StreamPose
+from hsp_control.trajectories.crossfade import AnyReference
+from hsp_control.trajectories.streams.stream import Streamed
+
+RAMP = 0.2
+"""Time over which a stream takes over, and a path of its own comes back [s]."""
+_SPEED, _ACCELERATION, _JERK = 1.0, 8.0, 200.0
+"""Bounds of what is dragged [m/s, m/s², m/s³]: those of a quick hand."""
+_DELAY = 0.03
+"""Time to a target that is dragged [s]: about two of a page's pictures."""
+
+
+class Grip(ABC):
+    """Something that can be dragged.
+
+    Attributes:
+        name: Its name.
+        held: Whether a stream leads it.
+    """
+
+    def __init__(self, name: str, controller: Controller) -> None:
+        """Begin on its own path."""
+        self.name = name
+        self.held = False
+        self._controller = controller
+        self._stream: Streamed | None = None
+
+    def move(self, value: Any, t: float) -> None:
+        """Lead it somewhere from time t on [s].
+
+        Raises:
+            HspControlError: If the value is none of this kind.
+        """
+        wanted = self._wanted(np.asarray(value, dtype=float))
+        if self._stream is None:
+            stream = self._make_stream()
+            self._let_follow(stream, t)
+            self._stream = stream
+        self.held = True
+        self._stream.send(wanted)
+
+    def resume(self, t: float) -> None:
+        """Let it return to its own path from time t on [s]."""
+        if self._stream is not None:
+            self._return(t)
+        self._stream, self.held = None, False
+
+    @abstractmethod
+    def describe(self, state: RobotState) -> dict[str, Any]:
+        """Return what a page must know of it."""
+
+    @abstractmethod
+    def where(self, state: RobotState) -> list[float]:
+        """Return where it is now: x, y, z and a quaternion, or less."""
+
+    @abstractmethod
+    def _make_stream(self) -> Streamed: ...
+
+    @abstractmethod
+    def _wanted(self, value: Array) -> Array: ...
+
+    @abstractmethod
+    def _let_follow(self, stream: Streamed, t: float) -> None: ...
+
+    @abstractmethod
+    def _return(self, t: float) -> None: ...
+
+
+class TargetGrip(Grip):
+    """The target of a frame's position, orientation or pose."""
+
+    def __init__(self, task: Task, controller: Controller) -> None:
+        """Remember the task's own path."""
+        super().__init__(task.name, controller)
+        self._kind = type(task)
+        self._frame = task.frame  # type: ignore[attr-defined]
+        self._own = task.followed
+        axes = task.axes if isinstance(task, FramePosition) else "xyz"
+        self._axes = [axis in axes for axis in "xyz"]
+        self._tracked = ["xyz".index(axis) for axis in axes]
+
+    def describe(self, state: RobotState) -> dict[str, Any]:
+        """Return its name, its kind, its axes and its pose."""
+        kinds = {FramePose: "pose", FramePosition: "position"}
+        return {
+            "name": self.name,
+            "kind": kinds.get(self._kind, "orientation"),
+            "axes": self._axes,
+            "pose": self.where(state),
+        }
+
+    def where(self, state: RobotState) -> list[float]:
+        """Return the reference: x, y, z and a quaternion.
+
+        What the task does not control is the frame's own.
+        """
+        frame = state.frame(self._frame)
+        pose = pin.SE3ToXYZQUAT(pin.SE3(frame.rotation, frame.position))
+        task = self._task()
+        if task is not None:
+            reference, _ = task.measure(state)
+            if self._kind is FramePosition:
+                pose[self._tracked] = reference
+            elif self._kind is FrameOrientation:
+                pose[3:] = reference
+            else:
+                pose[:] = reference
+        return [float(x) for x in pose]
+
+    def _task(self) -> Task | None:
+        found = [each for each in self._controller.tasks if each.name == self.name]
+        return found[0] if found else None
+
+    def _make_stream(self) -> Streamed:
+        moving = {"speed": _SPEED, "acceleration": _ACCELERATION, "jerk": _JERK}
+        if self._kind is FramePosition:
+            return Stream(**moving, delay=_DELAY)  # type: ignore[arg-type]
+        if self._kind is FrameOrientation:
+            return StreamOrientation(delay=_DELAY)
+        return StreamPose(**moving, delay=_DELAY)  # type: ignore[arg-type]
+
+    def _wanted(self, value: Array) -> Array:
+        if value.shape != (7,) or not np.isfinite(value).all():
+            raise StreamError(f"a pose is x, y, z and a quaternion; got {value}")
+        if self._kind is FramePosition:
+            return value[self._tracked]
+        return value[3:] if self._kind is FrameOrientation else value
+
+    def _let_follow(self, stream: Streamed, t: float) -> None:
+        self._refer(stream, t)  # type: ignore[arg-type]
+
+    def _return(self, t: float) -> None:
+        assert self._own is not None
+        self._refer(self._own, t)
+
+    def _refer(self, reference: AnyReference, t: float) -> None:
+        self._controller.at(t).ramp(RAMP).reference(self.name, reference)
+
+
+class ObstacleGrip(Grip):
+    """An obstacle of the scene; it keeps its orientation."""
+
+    def __init__(self, obstacle: Obstacle, controller: Controller) -> None:
+        """Remember the obstacle's own path."""
+        super().__init__(obstacle.name, controller)
+        self._obstacle = obstacle
+
+    def describe(self, state: RobotState) -> dict[str, Any]:
+        """Return its name, its position and its size."""
+        radius = self._obstacle.shape.bounding_radius
+        return {
+            "name": self.name,
+            "position": self.where(state),
+            "radius": radius if np.isfinite(radius) else 0.0,
+        }
+
+    def where(self, state: RobotState) -> list[float]:
+        """Return the position of its frame."""
+        place = self._controller.scene[self.name].placement(state.t)
+        return [float(x) for x in place.translation]
+
+    def _make_stream(self) -> Streamed:
+        return Stream(
+            speed=_SPEED, acceleration=_ACCELERATION, jerk=_JERK, delay=_DELAY
+        )
+
+    def _wanted(self, value: Array) -> Array:
+        if value.shape != (3,) or not np.isfinite(value).all():
+            raise StreamError(f"a position is x, y and z; got {value}")
+        return value
+
+    def _let_follow(self, stream: Streamed, t: float) -> None:
+        assert isinstance(stream, Stream)
+        self._controller.at(t).ramp(RAMP).obstacle(self.name, stream)
+
+    def _return(self, t: float) -> None:
+        own = self._obstacle.center
+        self._controller.at(t).ramp(RAMP).obstacle(self.name, own)
+
+
+def targets_of(controller: Controller) -> dict[str, TargetGrip]:
+    """Return the grips of the tasks whose targets can be dragged, by name."""
+    kinds = FramePose, FramePosition, FrameOrientation
+    return {
+        task.name: TargetGrip(task, controller)
+        for task in controller.tasks
+        if isinstance(task, kinds) and task.followed is not None
+    }
+
+
+def obstacles_of(controller: Controller) -> dict[str, ObstacleGrip]:
+    """Return the grips of the obstacles that have a place, by name."""
+    found = {}
+    for obstacle in controller.scene.values():
+        try:
+            ObstacleGrip(obstacle, controller).where(controller.state)
+        except HspControlError:
+            continue
+        found[obstacle.name] = ObstacleGrip(obstacle, controller)
+    return found

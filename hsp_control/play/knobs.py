@@ -1,0 +1,172 @@
+"""What can be turned while the robot moves: each knob makes changes of the controller.
+
+A knob knows its present value and makes the change to another one; what the change does
+to the robot, and what is refused, is the controller's business (`Controller.at`).
+"""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hsp_control.control.changes import Changes
+from hsp_control.control.controller import Controller
+from hsp_control.null_space.fields import NullSpaceField, Rest
+from hsp_control.null_space.fields.field import terms_of
+from hsp_control.tasks import Gains, Impedance
+from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.tasks.task import SecondOrderTask
+
+RAMP = 0.2
+"""Time that a change takes [s]."""
+_REACH = 10.0
+"""A slider goes from a tenth of a setting to ten times it, within what is borne."""
+_BORNE = 0.2
+"""Largest rate times period that a slider offers; see `rate_check.RULE`."""
+
+
+class Knob(NamedTuple):
+    """One control of the page.
+
+    Attributes:
+        id: Its name among the knobs.
+        group: Heading under which it is shown.
+        label: What it is called there.
+        unit: Its unit.
+        value: What it is now: a number, or whether it is on.
+        low: Smallest number.
+        high: Largest number.
+        turn: Makes the change to a value, with what `Controller.at` returns.
+    """
+
+    id: str
+    group: str
+    label: str
+    unit: str
+    value: float | bool
+    low: float
+    high: float
+    turn: Callable[[Changes, Any], object]
+
+    def describe(self) -> dict[str, Any]:
+        """Return what a page must know of it."""
+        on_off = isinstance(self.value, bool)
+        return {
+            "id": self.id,
+            "group": self.group,
+            "label": self.label,
+            "unit": self.unit,
+            "kind": "switch" if on_off else "slider",
+            "value": self.value,
+            "low": self.low,
+            "high": self.high,
+            "log": self.low > 0.0 and self.high / self.low > 20.0,
+            "options": [],
+        }
+
+    def checked(self, value: object) -> float | bool:
+        """Return a value that a page sent, within the bounds.
+
+        Raises:
+            ValueError: If it is none.
+        """
+        if isinstance(self.value, bool):
+            if not isinstance(value, bool):
+                raise ValueError(f"{self.id} is on or off; got {value!r}")
+            return value
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ValueError(f"{self.id} is a number; got {value!r}")
+        if not np.isfinite(value):
+            raise ValueError(f"{self.id} is {value}; needs a finite number")
+        return float(np.clip(value, self.low, self.high))
+
+
+def knobs_of(controller: Controller, period: float) -> dict[str, Knob]:
+    """Return the knobs of a controller, by their ids.
+
+    Args:
+        controller: The controller, before any change by a knob.
+        period: The control period [s].
+    """
+    found = [*_null_space(controller, period), *_tasks(controller, period)]
+    return {knob.id: knob for knob in found}
+
+
+def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
+    field, group = controller.field, "Null space"
+    if not field.controls:
+        return
+    terms = [term for term in terms_of(field) if not isinstance(term, Rest)]
+    if terms:
+        turn = partial(_switch_field, terms)
+        yield Knob("field", group, "field", "", True, 0.0, 1.0, turn)
+    K = controller.null_space_gain
+    gain = float(np.diag(K).mean())
+    if np.allclose(K, gain * np.eye(len(K))):
+        low, high = _span(gain, period)
+        yield Knob("null_space_gain", group, "K_N", "1/s", gain, low, high, _set_gain)
+    names = [term.name for term in terms]
+    for term in terms:
+        weight, name = term.weight, term.name
+        if isinstance(weight, int | float) and weight and names.count(name) == 1:
+            turn, label = partial(_weigh, name), f"{name}, weight"
+            most = 5.0 * weight
+            yield Knob(
+                f"weight.{name}", group, label, "", float(weight), 0.0, most, turn
+            )
+
+
+def _tasks(controller: Controller, period: float) -> Iterator[Knob]:
+    for task in controller.tasks:
+        if not isinstance(task, SecondOrderTask):
+            continue
+        name, impedance = task.name, impedance_of(task)
+        if impedance is not None:
+            low, high, turn = 1.0 / _REACH, _REACH, partial(_stiffen, name, impedance)
+            id_ = f"stiffness.{name}"
+            yield Knob(id_, name, "stiffness", "×", 1.0, low, high, turn)
+            continue
+        Kp, Kv = task.gains.matrices(task.rows)
+        frequency = float(np.sqrt(np.diag(Kp).mean()))
+        if np.allclose(Kp, frequency**2 * np.eye(len(Kp))):
+            ratio = float(np.diag(Kv).mean() / (2.0 * frequency))
+            (low, high), turn = _span(frequency, period), partial(_tune, name, ratio)
+            id_, label = f"frequency.{name}", "natural frequency"
+            yield Knob(id_, name, label, "rad/s", frequency, low, high, turn)
+
+
+def _span(rate: float, period: float) -> tuple[float, float]:
+    """Return from where to where a rate [1/s] may be turned."""
+    return rate / _REACH, min(_REACH * rate, max(_BORNE / period, rate))
+
+
+def _switch_field(terms: list[NullSpaceField], at: Changes, on: bool) -> None:
+    at.field(*(terms if on else ()))
+
+
+def _set_gain(at: Changes, gain: float) -> None:
+    at.null_space_gain(gain)
+
+
+def _weigh(name: str, at: Changes, weight: float) -> None:
+    at.weight(name, weight)
+
+
+def _tune(name: str, ratio: float, at: Changes, frequency: float) -> None:
+    at.gains(name, Gains(natural_frequency=frequency, damping_ratio=ratio))
+
+
+def _stiffen(name: str, impedance: Impedance, at: Changes, factor: float) -> None:
+    at.impedance(name, _scaled(impedance, factor))
+
+
+def _scaled(impedance: Impedance, factor: float) -> Impedance:
+    """Return an impedance with a multiple of the stiffness, and the same ratio."""
+    damping = impedance.damping
+    return Impedance(
+        factor * np.asarray(impedance.stiffness, dtype=float),
+        damping=None if damping is None else np.sqrt(factor) * np.asarray(damping),
+        damping_ratio=impedance.damping_ratio,
+        largest_error=impedance.largest_error,
+    )

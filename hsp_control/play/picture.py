@@ -1,0 +1,263 @@
+"""What the page of a session shows: the scene, its handles, its knobs and its plots."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.play.session import Session
+from hsp_control.simulation import Rollout
+from hsp_control.visualization.palette import SERIES
+from hsp_control.visualization.viewer import Viewer
+from hsp_control.visualization.viewer.commands import (
+    Command,
+    delete,
+    play_command,
+    typed_array,
+)
+from hsp_control.visualization.viewer.layer import Layer
+from hsp_control.visualization.viewer.motion import Motion
+from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers
+
+FRAME = 1.0 / 30.0
+"""Time between two pictures [s]."""
+_NOT_LIVE = {"paths", "self_motion"}
+"""Layers that are not drawn: they show a whole run, or ask the controller again."""
+_FIELD_LAYERS = ("influence", "distances")
+_BATCHES = 64
+"""Batches of samples that wait for a page at most; what is older is left out."""
+_JOINTS = 8
+"""Most joints whose efforts have a curve each."""
+
+
+class Curve(NamedTuple):
+    """One curve of a plot.
+
+    Attributes:
+        name: What it shows.
+        column: Column of the log.
+        rows: Which components, of which the norm is shown.
+    """
+
+    name: str
+    column: str
+    rows: slice
+
+
+class Plot(NamedTuple):
+    """One plot.
+
+    Attributes:
+        title: What it shows.
+        unit: The unit.
+        log: Whether its scale is logarithmic.
+        curves: Its curves.
+    """
+
+    title: str
+    unit: str
+    log: bool
+    curves: list[Curve]
+
+
+class Picture:
+    """Draws a session on the pages of a viewer."""
+
+    def __init__(self, session: Session, viewer: Viewer) -> None:
+        """Draw the session as it is, with all that can be touched."""
+        self._session, self._viewer = session, viewer
+        self._batch = 0
+        self.begin()
+
+    def begin(self) -> None:
+        """Draw the scene anew: the session has begun anew."""
+        session, viewer = self._session, self._viewer
+        self._sent = 0
+        self._meta = session.recorder.meta("", "")
+        self._field = session.controller.field
+        motion = self._motion()
+        self._shown = viewer.view.show.all_fields()
+        self._run = RunDrawing(
+            viewer.drawing, motion, self._layers(motion), shown=self._shown
+        )
+        title = session.experiment.scenario.title or session.experiment.robot.name
+        self._size = viewer.set_stage(self._run, title)
+        self._plots = list(_plots(session))
+        viewer.transport.send([self._setup(title), *self.frame(running=True, rate=1.0)])
+
+    def _layers(self, motion: Motion) -> dict[str, Layer]:
+        robot, controller = self._session.experiment.robot, self._session.controller
+        layers = all_layers(robot, motion, controller, dark=self._viewer.dark)
+        return {name: each for name, each in layers.items() if name not in _NOT_LIVE}
+
+    def draw(self, *, running: bool, rate: float) -> None:
+        """Send a picture of the present instant.
+
+        Args:
+            running: Whether the session goes on by itself.
+            rate: Seconds of the session per second.
+
+        Raises:
+            ViewerError: If the server has ended.
+        """
+        self._viewer.transport.send(self.frame(running=running, rate=rate))
+
+    def frame(self, *, running: bool, rate: float) -> list[Command]:
+        """Return the commands of a picture; see `draw`."""
+        session, state = self._session, self._session.controller.state
+        changed = list(self._changed_field())
+        tracks = [
+            {
+                "path": track.path,
+                "property": track.property,
+                "values": typed_array(track.values, np.float32),
+            }
+            for track in self._run.tracks(self._motion())
+        ]
+        poses = {name: grip.where(state) for name, grip in session.targets.items()}
+        places = {name: grip.where(state) for name, grip in session.obstacles.items()}
+        text = session.over or session.message
+        return [
+            *changed,
+            play_command("pose", "pose", tracks=tracks),
+            play_command("play_targets", "targets", poses=poses, obstacles=places),
+            play_command(
+                "play_state", "state", t=session.t, running=running, rate=rate,
+                message=text, level="warning" if session.warning or session.over
+                else "info",
+            ),
+            play_command("play_values", "values", values=session.values),
+            self._force(),
+            *self._samples(),
+        ]  # fmt: skip
+
+    def _changed_field(self) -> Iterator[Command]:
+        """Draw the field's layers again, if there is another field."""
+        controller = self._session.controller
+        if controller.field is self._field:
+            return
+        self._field = controller.field
+        self._meta = self._session.recorder.meta("", "")
+        layers = self._layers(self._motion())
+        for name in _FIELD_LAYERS:
+            yield delete(f"/{name}")
+            self._run.layers.pop(name, None)
+            if name in layers:
+                self._run.layers[name] = layers[name]
+                yield from layers[name].draw(self._size)
+
+    def _motion(self) -> Motion:
+        """Return the present row as a log."""
+        recorder = self._session.recorder
+        columns = {name: column[-1:] for name, column in recorder.rows(0).items()}
+        return Motion(self._session.experiment.robot, Rollout(columns, self._meta))
+
+    def _setup(self, title: str) -> Command:
+        session, state = self._session, self._session.controller.state
+        obstacles = [
+            {**grip.describe(state), "path": f"/obstacles/{name}"}
+            for name, grip in session.obstacles.items()
+        ]
+        plots = []
+        for k, plot in enumerate(self._plots):
+            series = [
+                {"name": curve.name, "color": SERIES[i % len(SERIES)]}
+                for i, curve in enumerate(plot.curves)
+            ]
+            plots.append(
+                {
+                    "id": f"plot{k}",
+                    "title": plot.title,
+                    "unit": plot.unit,
+                    "log": plot.log,
+                    "series": series,
+                }
+            )
+        return play_command(
+            "play_setup",
+            "setup",
+            title=title,
+            targets=[grip.describe(state) for grip in session.targets.values()],
+            obstacles=obstacles,
+            controls=[knob.describe() for knob in session.knobs.values()],
+            plots=plots,
+            pull=session.pushes is not None,
+            period_ms=1e3 * session.period,
+        )
+
+    def _force(self) -> Command:
+        pull = self._session.pull()
+        if pull is None:
+            zero = [0.0, 0.0, 0.0]
+            return play_command(
+                "play_force", "force", visible=False, newtons=0.0,
+                **{"from": zero, "to": zero},
+            )  # fmt: skip
+        point, hand, newtons = pull
+        return play_command(
+            "play_force", "force", visible=True, newtons=newtons,
+            **{"from": point.tolist(), "to": hand.tolist()},
+        )  # fmt: skip
+
+    def _samples(self) -> Iterator[Command]:
+        """Yield the rows of the plots since the last picture."""
+        rows = self._session.recorder.rows(self._sent)
+        times = rows["t"]
+        if not len(times):
+            return
+        self._sent += len(times)
+        self._batch += 1
+        values = np.column_stack(
+            [_values(rows, curve) for plot in self._plots for curve in plot.curves]
+            or [np.zeros((len(times), 0))]
+        )
+        yield play_command(
+            "play_samples",
+            f"samples {self._batch % _BATCHES}",
+            number=self._batch,
+            times=typed_array(times, np.float64),
+            values=typed_array(values, np.float32),
+        )
+
+
+def _values(rows: dict[str, Array], curve: Curve) -> Array:
+    """Return the values of a curve, shape (N,); NaN where there is none."""
+    column = rows.get(curve.column)
+    if column is None:
+        return np.full(len(rows["t"]), np.nan)
+    if column.ndim == 1:
+        return column
+    part = column[:, curve.rows]
+    return part[:, 0] if part.shape[1] == 1 else np.linalg.norm(part, axis=1)
+
+
+def _plots(session: Session) -> Iterator[Plot]:
+    """Yield the plots of a session."""
+    controller = session.controller
+    errors: dict[str, list[Curve]] = {}
+    for task in controller.tasks:
+        first = 0
+        for part in task.error_parts:
+            one = len(task.error_parts) == 1
+            name = task.name if one else f"{task.name}, {part.name}"
+            rows = slice(first, first + part.size)
+            curve = Curve(name, f"task.{task.name}.error", rows)
+            errors.setdefault(part.unit, []).append(curve)
+            first += part.size
+    for unit, curves in errors.items():
+        yield Plot("Task error", unit, True, curves)
+    if controller.field.controls:
+        norm = Curve("‖e_N‖", "null_space_norm", slice(0, 1))
+        unit = "/".join((dict.fromkeys(controller.robot.units), "s")[1:])
+        yield Plot("Null-space error", unit or "rad/s", True, [norm])
+    names = [name for name in session.recorder.rows(0) if name.startswith("distance.")]
+    if names:
+        curves = [Curve(n.removeprefix("distance."), n, slice(0, 1)) for n in names]
+        yield Plot("Smallest distance", "m", False, curves)
+    dofs = controller.robot.dof_names
+    if len(dofs) <= _JOINTS:
+        curves = [Curve(n, "tau", slice(k, k + 1)) for k, n in enumerate(dofs)]
+    else:
+        curves = [Curve("‖τ‖", "tau", slice(0, len(dofs)))]
+    yield Plot("Effort", "N·m", False, curves)

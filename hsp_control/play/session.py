@@ -1,0 +1,286 @@
+"""A simulation that goes on and on, and whoever plays with it; without a picture."""
+
+import logging
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HspControlError, SimulationError
+from hsp_control.config import Experiment
+from hsp_control.control.compensation import Command
+from hsp_control.control.controller import Controller
+from hsp_control.live.simulated_robot import sampled
+from hsp_control.play.grips import Grip, obstacles_of, targets_of
+from hsp_control.play.knobs import RAMP, Knob, knobs_of
+from hsp_control.robot import Robot
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.loops import Instant, sampled_loop
+from hsp_control.simulation.plants import Plant
+from hsp_control.simulation.plants.push import Pushes, Spring
+from hsp_control.simulation.recorder import Recorder
+from hsp_control.visualization.viewer.scene_path import path_element
+
+ROW = 0.01
+"""Time between two rows of the log, at which messages are taken [s]; whole periods."""
+LONGEST = 1200.0
+"""Longest time that is recorded [s]."""
+LARGEST_LOG = 3e8
+"""Largest log [bytes]."""
+KNOB_PERIOD = 0.1
+"""Time between two changes by one knob [s]: a slider says much more."""
+PULL = 300.0
+"""Stiffness of the spring of somebody who pulls at a link [N/m]."""
+LARGEST_PULL = 100.0
+"""Largest force of that spring [N]."""
+
+_REHEARSED = 40
+"""Rows of a rehearsal: beyond the ramps of changes."""
+
+_log = logging.getLogger(__name__)
+
+
+class Session:
+    """A robot that moves in its simulated world, and changes as it is told to.
+
+    It is the sampled loop of `simulate`, row by row: between two rows, messages of a
+    page become streams, changes of the controller and forces. All but the forces are
+    in the log, which repeats the run.
+
+    Attributes:
+        experiment: What is simulated.
+        period: The control period [s].
+        row: Time between two rows [s].
+        instant: The present instant; the next row overwrites it.
+        recorder: The rows so far.
+        message: What there is to say.
+        warning: Whether that is a warning.
+        over: Why it goes on no more, until it is reset; empty: it does.
+    """
+
+    def __init__(self, experiment: Experiment) -> None:
+        """Begin at the experiment's start.
+
+        Args:
+            experiment: The experiment; it has a control period, and its log period is a
+                multiple of it. See `playable`.
+
+        Raises:
+            SimulationError: If it has no control period.
+        """
+        settings = experiment.scenario.simulation
+        if settings.control_period is None:
+            raise SimulationError("a session needs a control period")
+        self.experiment = experiment
+        self.period, self.row = settings.control_period, settings.log_period
+        self._plant = sampled(
+            experiment.plant, experiment.integrator, settings.control_period
+        )
+        self.pushes = pushes_of(self._plant)
+        if self.pushes is not None:
+            self.pushes.reachable = True
+        self._point: Array | None = None
+        self.stiffness = PULL
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew: the robot at its start, and all as it was declared."""
+        experiment, robot = self.experiment, self.experiment.robot
+        memo: dict[int, Any] = {id(robot): robot}
+        self.controller: Controller = deepcopy(experiment.controller, memo)
+        command = Command(self.controller, experiment.compensation)
+        self.let_go()
+        self._pulled = False
+        rows = self._rows()
+        times = [k * self.row for k in range(rows)]
+        self._loop: Iterator[Instant] = sampled_loop(
+            command, self._plant, round(self.row / self.period), times,
+            experiment.q0, experiment.v0,
+        )  # fmt: skip
+        self.recorder = Recorder(self.controller, self.controller.scene, rows)
+        self.message, self.warning, self.over = "", False, ""
+        self._turned: dict[str, float] = {}
+        self._wanted: dict[str, float | bool] = {}
+        self.instant: Instant | None = None
+        self.advance()
+        self.targets = targets_of(self.controller)
+        self.obstacles = obstacles_of(self.controller)
+        self.knobs = knobs_of(self.controller, self.period)
+        self.values: dict[str, float | bool] = {
+            name: knob.value for name, knob in self.knobs.items()
+        }
+
+    def rehearse(self) -> None:
+        """Do everything once, and begin anew: no kernel is compiled in the play."""
+        state = self.controller.state
+        for name, grip in self.targets.items():
+            self.take({"do": "move", "target": name, "pose": grip.where(state)})
+        for name, obstacle in self.obstacles.items():
+            where = obstacle.where(state)
+            self.take({"do": "obstacle", "name": name, "position": where})
+        for name, value in self.values.items():
+            off = not value if isinstance(value, bool) else value
+            self.take({"do": "set", "id": name, "value": off})
+        for _ in range(_REHEARSED):
+            self.advance()
+        self.reset()
+
+    @property
+    def t(self) -> float:
+        """The time of the present row [s]."""
+        return self.controller.state.t
+
+    def advance(self) -> None:
+        """Go on to the next row; what goes wrong ends the run, and not the session."""
+        if self.over:
+            return
+        try:
+            instant = next(self._loop, None)
+            if instant is None:
+                self.over = f"the log is full at t = {self.t:.0f} s; reset to go on"
+                return
+            self.instant = instant
+            state, output, tau, own = instant
+            others = self._plant.log_channels(state.t, state.q, state.v, tau)
+            self.recorder.record(state, output, tau, {**own, **others})
+            self._turn_knobs()
+        except HspControlError as error:
+            self.over = f"{error}; reset to go on"
+            _log.warning("%s", error)
+
+    # -- messages ---------------------------------------------------------------------
+
+    def take(self, message: Mapping[str, Any]) -> None:
+        """Do what a page says; what is wrong is answered in `message`.
+
+        ``move`` and ``resume`` a target, move an ``obstacle``, ``pull`` at a link and
+        ``let_go``, ``set`` a knob. Other messages are not the session's.
+        """
+        try:
+            match message:
+                case {"do": "move", "target": str(name), "pose": list(pose)}:
+                    self._grip(self.targets, name).move(pose, self.t)
+                case {"do": "resume", "target": str(name)}:
+                    self._grip(self.targets, name).resume(self.t)
+                case {"do": "obstacle", "name": str(name), "position": list(where)}:
+                    self._grip(self.obstacles, name).move(where, self.t)
+                case {"do": "pull", "path": str(path), "point": list(point),
+                      "to": list(hand)}:  # fmt: skip
+                    self._pull(path, _vector(point), _vector(hand))
+                case {"do": "let_go" | "left"}:
+                    self.let_go()
+                case {"do": "set", "id": str(name), "value": value}:
+                    self._wanted[name] = self._knob(name).checked(value)
+                case {"do": "release", "target": str()}:
+                    pass  # it stays where it is
+                case _:
+                    raise ValueError(f"cannot do {str(dict(message))[:200]}")
+        except (HspControlError, ValueError, TypeError, OverflowError) as error:
+            self.message, self.warning = str(error), True
+
+    def _grip(self, among: Mapping[str, Grip], name: str) -> Grip:
+        if name not in among:
+            raise ValueError(f"there is no {name!r} to drag")
+        return among[name]
+
+    def _knob(self, name: str) -> Knob:
+        if name not in self.knobs:
+            raise ValueError(f"there is no knob {name!r}")
+        return self.knobs[name]
+
+    def _turn_knobs(self) -> None:
+        """Make the changes that knobs ask for; each knob's not too often."""
+        for name in list(self._wanted):
+            if self.t - self._turned.get(name, -np.inf) < KNOB_PERIOD:
+                continue
+            value, self._turned[name] = self._wanted.pop(name), self.t
+            try:
+                self.knobs[name].turn(self.controller.at(self.t).ramp(RAMP), value)
+                self.values[name] = value
+                self.message, self.warning = "", False
+            except HspControlError as error:
+                self.message, self.warning = str(error), True
+
+    # -- pulling ----------------------------------------------------------------------
+
+    def _pull(self, path: str, point: Array, hand: Array) -> None:
+        if self.pushes is None:
+            raise ValueError("in this simulated world nobody can pull at the robot")
+        if self._point is None or not np.array_equal(point, self._point):
+            joint = _joint_of(self.experiment.robot, path)
+            place = self.controller.state.data.oMi[joint]
+            self._point, self._pulled = point, True
+            self.pushes.spring = Spring(
+                joint, place.actInv(point), hand, self.stiffness, LARGEST_PULL
+            )
+        spring = self.pushes.spring
+        assert spring is not None
+        spring.hand = hand
+
+    def let_go(self) -> None:
+        """Pull no more."""
+        self._point = None
+        if self.pushes is not None:
+            self.pushes.spring = None
+
+    def pull(self) -> tuple[Array, Array, float] | None:
+        """Return where somebody pulls, the hand, both (3,) [m], and the force [N]."""
+        spring = None if self.pushes is None else self.pushes.spring
+        if spring is None:
+            return None
+        place: pin.SE3 = self.controller.state.data.oMi[spring.joint]
+        point = np.asarray(place.act(spring.point))
+        return point, spring.hand, float(np.linalg.norm(spring.force(point)))
+
+    # -- the log ----------------------------------------------------------------------
+
+    def rollout(self) -> Rollout:
+        """Return the log so far; `hsp run` repeats it, unless somebody pulled."""
+        experiment = self.experiment
+        config = experiment.config
+        if config is not None:
+            config["simulation"]["duration"] = max(self.t, self.row)
+        lost = {"changes_lost": "somebody pulled at a link"} if self._pulled else {}
+        return self.recorder.rollout(
+            "completed",
+            self.over,
+            name=f"{experiment.name}, played",
+            title=experiment.scenario.title,
+            config=config,
+            **lost,
+        )
+
+    def _rows(self) -> int:
+        probe = Recorder(self.controller, self.controller.scene, 1)
+        size = sum(8 * int(np.prod(a.shape[1:])) for a in probe.rows(0).values())
+        return int(min(LONGEST / self.row, LARGEST_LOG / size)) + 1
+
+
+def pushes_of(plant: Plant) -> Pushes | None:
+    """Return what pushes at the robot in a plant, or in the one that it contains."""
+    inner: object = plant
+    while inner is not None:
+        pushes = getattr(inner, "pushes", None)
+        if isinstance(pushes, Pushes):
+            return pushes
+        inner = getattr(inner, "plant", None)
+    return None
+
+
+def _vector(values: list[Any]) -> Array:
+    vector = np.array(values, dtype=float)
+    if vector.shape != (3,) or not (np.abs(vector) < 1e3).all():
+        raise ValueError(f"a point is x, y and z in metres; got {values}")
+    return vector
+
+
+def _joint_of(robot: Robot, path: str) -> int:
+    """Return the joint of a node of the scene, ``/robot/JOINT/...``."""
+    names = [path_element(name) for name in robot.model.names]
+    parts = path.strip("/").split("/")
+    if len(parts) < 2 or parts[0] != "robot" or parts[1] not in names[1:]:
+        raise ValueError(f"{path!r} is no link that could move")
+    return names.index(parts[1])
