@@ -34,13 +34,11 @@ class Grip(ABC):
 
     Attributes:
         name: Its name.
-        held: Whether a stream leads it.
     """
 
     def __init__(self, name: str, controller: Controller) -> None:
         """Begin on its own path."""
         self.name = name
-        self.held = False
         self._controller = controller
         self._stream: Streamed | None = None
 
@@ -51,18 +49,17 @@ class Grip(ABC):
             HspControlError: If the value is none of this kind.
         """
         wanted = self._wanted(np.asarray(value, dtype=float))
+        stream = self._stream or self._make_stream()
+        stream.send(wanted)  # before it leads: it may refuse
         if self._stream is None:
-            stream = self._make_stream()
             self._let_follow(stream, t)
             self._stream = stream
-        self.held = True
-        self._stream.send(wanted)
 
     def resume(self, t: float) -> None:
         """Let it return to its own path from time t on [s]."""
         if self._stream is not None:
             self._return(t)
-        self._stream, self.held = None, False
+        self._stream = None
 
     @abstractmethod
     def describe(self, state: RobotState) -> dict[str, Any]:

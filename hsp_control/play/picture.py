@@ -10,20 +10,22 @@ from hsp_control.play.session import Session
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
+from hsp_control.visualization.viewer.appearance import CHALK, INK
 from hsp_control.visualization.viewer.commands import (
     Command,
     delete,
     play_command,
     typed_array,
 )
+from hsp_control.visualization.viewer.distances import Distances
+from hsp_control.visualization.viewer.influence import Influence
 from hsp_control.visualization.viewer.layer import Layer
 from hsp_control.visualization.viewer.motion import Motion
+from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
 from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers
 
 FRAME = 1.0 / 30.0
 """Time between two pictures [s]."""
-_NOT_LIVE = {"paths", "self_motion"}
-"""Layers that are not drawn: they show a whole run, or ask the controller again."""
 _FIELD_LAYERS = ("influence", "distances")
 _BATCHES = 64
 """Batches of samples that wait for a page at most; what is older is left out."""
@@ -87,9 +89,20 @@ class Picture:
         viewer.transport.send([self._setup(title), *self.frame(running=True, rate=1.0)])
 
     def _layers(self, motion: Motion) -> dict[str, Layer]:
+        """Return the layers of the present instant, those of the present field too.
+
+        Not those of a whole run: what a controller was at its start is not drawn.
+        """
         robot, controller = self._session.experiment.robot, self._session.controller
-        layers = all_layers(robot, motion, controller, dark=self._viewer.dark)
-        return {name: each for name, each in layers.items() if name not in _NOT_LIVE}
+        dark = self._viewer.dark
+        layers = all_layers(robot, motion, None, dark=dark)
+        del layers["paths"]
+        obstacles = layers["obstacles"]
+        assert isinstance(obstacles, ObstacleLayer)
+        field, ink = controller.field, CHALK if dark else INK
+        layers["influence"] = Influence(field, obstacles.shapes, "/influence")
+        layers["distances"] = Distances(controller, "/distances", ink)
+        return layers
 
     def draw(self, *, running: bool, rate: float) -> None:
         """Send a picture of the present instant.
@@ -142,10 +155,8 @@ class Picture:
         layers = self._layers(self._motion())
         for name in _FIELD_LAYERS:
             yield delete(f"/{name}")
-            self._run.layers.pop(name, None)
-            if name in layers:
-                self._run.layers[name] = layers[name]
-                yield from layers[name].draw(self._size)
+            self._run.layers[name] = layers[name]
+            yield from layers[name].draw(self._size)
 
     def _motion(self) -> Motion:
         """Return the present row as a log."""

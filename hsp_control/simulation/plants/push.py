@@ -106,9 +106,11 @@ class Pushes:
         return total
 
     def _pulled(self, spring: Spring, q: Array) -> Array:
+        model, data = self.robot.model, self._data
+        pin.computeJointJacobians(model, data, q)
         J = matrix_view(
-            pin.computeJointJacobian(self.robot.model, self._data, q, spring.joint)
+            pin.getJointJacobian(model, data, spring.joint, pin.ReferenceFrame.LOCAL)
         )
-        place = self._data.oMi[spring.joint]
+        place = data.oMi[spring.joint]
         force = place.rotation.T @ spring.force(place.act(spring.point))
         return np.asarray(J.T @ np.concatenate([force, np.cross(spring.point, force)]))

@@ -1,0 +1,368 @@
+"""A session that is played with, without a page: what is said becomes motion."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+
+import hsp_control as hsp
+from hsp_control.common.exceptions import ConfigError, SceneError
+from hsp_control.play import Picture, Session, play
+from hsp_control.play.playable import playable
+from hsp_control.simulation.plants import RigidBody
+from hsp_control.simulation.plants.push import Push, Pushes, Spring
+from hsp_control.visualization.viewer import Recorder, Viewer
+
+Array = NDArray[np.float64]
+PANDA = "panda_obstacle"
+
+
+@pytest.fixture(scope="module")
+def experiment() -> hsp.Experiment:
+    return playable(PANDA, "simulation.log_period=0.01")
+
+
+@pytest.fixture
+def session(experiment: hsp.Experiment) -> Session:
+    return Session(experiment)
+
+
+def go(session: Session, seconds: float) -> None:
+    for _ in range(round(seconds / session.row)):
+        session.advance()
+    assert not session.over
+
+
+def pose_of(session: Session, name: str = "hand") -> Array:
+    return np.array(session.targets[name].where(session.controller.state))
+
+
+def test_what_is_dragged_is_reached_and_the_log_repeats_it(
+    session: Session, tmp_path: Path
+) -> None:
+    go(session, 0.5)
+    wanted = pose_of(session)
+    for k in range(20):  # a drag, picture by picture
+        wanted[:3] += [0.002, -0.004, 0.005]
+        session.take({"do": "move", "target": "hand", "pose": wanted.tolist()})
+        session.take(
+            {"do": "obstacle", "name": "ball", "position": [0.1, 0.3, 0.7 - 0.005 * k]}
+        )
+        go(session, 0.03)
+    session.take({"do": "release", "target": "hand"})
+    session.take({"do": "set", "id": "null_space_gain", "value": 20.0})
+    session.take({"do": "set", "id": "weight.target_posture", "value": 3.0})
+    session.take({"do": "set", "id": "frequency.hand", "value": 15.0})
+    go(session, 1.5)
+    assert not session.message
+    frame = session.controller.state.frame("panda_tcp")
+    np.testing.assert_allclose(frame.position, wanted[:3], atol=1e-4)
+    ball = session.controller.scene["ball"].placement(session.t).translation
+    np.testing.assert_allclose(ball, [0.1, 0.3, 0.605], atol=1e-9)
+    assert session.values["frequency.hand"] == 15.0
+    log = session.rollout()
+    # The error of the law is that of a held effort, however the hand was dragged.
+    assert np.abs(log["task.hand.error"][log.t > 0.5]).max() < 1e-3
+    log.save(tmp_path / "played.npz")
+    again = hsp.load_experiment(tmp_path / "played.npz").run()
+    np.testing.assert_array_equal(again.q, log.q)
+    np.testing.assert_array_equal(again.tau, log.tau)
+
+
+def test_its_own_path_comes_back(session: Session) -> None:
+    untouched = Session(session.experiment)
+    go(session, 0.5)
+    pose = pose_of(session)
+    pose[2] += 0.1
+    session.take({"do": "move", "target": "hand", "pose": pose.tolist()})
+    session.take({"do": "obstacle", "name": "ball", "position": [0.5, 0.5, 0.5]})
+    go(session, 0.5)
+    assert abs(pose_of(session)[2] - pose[2]) < 1e-3
+    session.take({"do": "resume", "target": "hand"})
+    session.obstacles["ball"].resume(session.t)
+    go(session, 1.0)
+    go(untouched, 2.0)
+    np.testing.assert_allclose(pose_of(session), pose_of(untouched), atol=1e-9)
+    for each in (session, untouched):
+        assert each.controller.scene["ball"].placement(2.0).translation[2] < 0.9
+    session.take({"do": "move", "target": "hand", "pose": pose.tolist()})  # once more
+    go(session, 0.8)
+    np.testing.assert_allclose(pose_of(session)[:3], pose[:3], atol=1e-3)
+
+
+def test_without_the_field_self_motion_comes_to_rest(session: Session) -> None:
+    go(session, 0.3)
+    session.take({"do": "set", "id": "field", "value": False})
+    go(session, 1.5)
+    assert session.controller.field.name == "rest"
+    session.take({"do": "set", "id": "field", "value": True})
+    go(session, 0.5)
+    names = session.controller.field.name
+    assert "obstacle_clearance" in names
+    assert "target_posture" in names
+
+
+BAD: list[dict[str, Any]] = [
+    {"do": "move", "target": "foot", "pose": [0.0] * 7},
+    {"do": "move", "target": "hand", "pose": [0.4, 0.0, 0.4]},
+    {"do": "move", "target": "hand", "pose": [0.4, 0.0, 0.4, 0.0, 0.0, 0.0, 0.0]},
+    {"do": "move", "target": "hand", "pose": [1e9, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0]},
+    {"do": "move", "target": "hand", "pose": ["a"] * 7},
+    {"do": "move", "target": "hand"},
+    {"do": "obstacle", "name": "ball", "position": [1.0, 2.0]},
+    {"do": "obstacle", "name": "ball", "position": [10**400, 0, 0]},
+    {"do": "pull", "path": "/robot/nothing", "point": [0, 0, 0], "to": [0, 0, 0]},
+    {"do": "pull", "path": "/obstacles/ball", "point": [0, 0, 0], "to": [0, 0, 0]},
+    {"do": "pull", "path": "/robot/panda_joint4", "point": [0, 0, 0], "to": [0, 0]},
+    {"do": "set", "id": "null_space_gain", "value": True},
+    {"do": "set", "id": "null_space_gain", "value": "fast"},
+    {"do": "set", "id": "field", "value": 1.0},
+    {"do": "set", "id": "nothing", "value": 1.0},
+    {"do": "dance"},
+    {},
+]
+
+
+@pytest.mark.parametrize("message", BAD, ids=repr)
+def test_nonsense_is_answered_and_moves_nothing(
+    session: Session, message: dict[str, Any]
+) -> None:
+    session.take(message)
+    assert session.message
+    assert session.warning
+    assert not session.controller.changes
+    assert session.pull() is None
+    go(session, 0.05)
+
+
+def test_a_knob_goes_no_further_than_the_period_bears(session: Session) -> None:
+    session.take({"do": "set", "id": "frequency.hand", "value": 1e9})
+    go(session, 0.5)
+    assert session.values["frequency.hand"] == pytest.approx(100.0)  # ten times
+    assert np.abs(session.rollout().v).max() < 5.0
+
+
+def test_a_slider_that_is_dragged_makes_few_changes(session: Session) -> None:
+    for k in range(100):
+        session.take({"do": "set", "id": "null_space_gain", "value": 10.0 + 0.1 * k})
+        session.advance()
+    go(session, 0.2)
+    assert session.values["null_space_gain"] == pytest.approx(19.9)
+    assert len(session.controller.changes) <= 12
+
+
+@pytest.mark.parametrize("joint", [2, 4, 7])
+def test_a_spring_pulls_at_its_point(experiment: hsp.Experiment, joint: int) -> None:
+    """Its effort is the slope of its energy, for small differences of q."""
+    robot, q = experiment.robot, experiment.q0
+    data = robot.model.createData()
+    point, hand = np.array([0.02, -0.05, 0.1]), np.array([0.5, 0.2, 0.6])
+    spring = Spring(joint, point, hand, 200.0, np.inf)
+    pushes = Pushes(robot)
+    pushes.spring = spring
+
+    def energy(q: Array) -> float:
+        pin.forwardKinematics(robot.model, data, q)
+        away = hand - data.oMi[joint].act(point)
+        return float(100.0 * away @ away)
+
+    step = 1e-6
+    slope = [
+        (energy(robot.integrate(q, step * d)) - energy(robot.integrate(q, -step * d)))
+        / (2.0 * step)
+        for d in np.eye(robot.nv)
+    ]
+    assert pushes.any_active(0.0, 0.0)
+    np.testing.assert_allclose(pushes.effort(0.0, q), -np.array(slope), atol=1e-6)
+    spring.largest = 10.0
+    assert np.linalg.norm(spring.force(np.zeros(3))) == pytest.approx(10.0)
+    assert not spring.force(hand).any()
+
+
+def test_somebody_pulls_at_the_elbow_and_the_hand_goes_on(
+    session: Session, tmp_path: Path
+) -> None:
+    go(session, 0.2)
+    q = session.controller.state.q.copy()
+    place = session.controller.state.data.oMi[4]
+    point = np.array(place.translation)
+    path = "/robot/panda_joint4/panda_link4"
+    hand = point + np.array([0.0, 0.15, 0.0])
+    message = {"do": "pull", "path": path, "point": point.tolist()}
+    for _ in range(100):
+        session.take(message | {"to": hand.tolist()})
+        session.advance()
+    pull = session.pull()
+    assert pull is not None
+    at, hand, newtons = pull
+    assert newtons == pytest.approx(300.0 * np.linalg.norm(hand - at))
+    assert 1.0 < newtons < 45.0
+    moved = session.controller.state.data.oMi[4].translation
+    assert moved[1] - point[1] > 0.01
+    assert np.abs(session.controller.state.q - q).max() > 0.05
+    session.take({"do": "let_go"})
+    assert session.pull() is None
+    go(session, 0.5)
+    log = session.rollout().save(tmp_path / "pulled.npz")
+    with pytest.raises(ConfigError, match="somebody pulled at a link"):
+        hsp.load_experiment(log)
+
+
+def test_it_begins_anew(session: Session) -> None:
+    go(session, 0.3)
+    first = session.rollout().q
+    session.take({"do": "set", "id": "null_space_gain", "value": 30.0})
+    session.take({"do": "obstacle", "name": "ball", "position": [0.4, 0.4, 0.4]})
+    go(session, 0.3)
+    session.reset()
+    assert session.values["null_space_gain"] == 10.0
+    assert not session.controller.changes
+    go(session, 0.3)
+    np.testing.assert_array_equal(session.rollout().q, first)
+    session.rehearse()
+    go(session, 0.3)
+    np.testing.assert_array_equal(session.rollout().q, first)
+
+
+def test_what_goes_wrong_ends_the_run_and_not_the_session(
+    experiment: hsp.Experiment,
+) -> None:
+    push = "{type: rigid_body, pushes: [{frame: panda_tcp, force: [1.0e9, 0, 0]}]}"
+    wild = playable(PANDA, f"plant={push}")
+    session = Session(wild)
+    for _ in range(50):
+        session.advance()
+    assert "diverged" in session.over or "finite" in session.over
+    rows = len(session.rollout())
+    session.advance()
+    assert len(session.rollout()) == rows
+    session.reset()
+    assert not session.over
+
+
+def test_the_log_has_an_end(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hsp_control.play.session.LONGEST", 0.1)
+    session.reset()
+    for _ in range(20):
+        session.advance()
+    assert session.over == "the log is full at t = 0 s; reset to go on"
+    assert len(session.rollout()) == 11
+
+
+# --- the picture and the loop --------------------------------------------------------
+
+
+def test_the_picture_follows_what_is_dragged(session: Session) -> None:
+    viewer = Viewer(session.experiment.robot, transport=Recorder())
+    picture = Picture(session, viewer)
+    recorder = viewer.transport
+    assert isinstance(recorder, Recorder)
+    setup = recorder.command("/play", "setup")
+    assert setup is not None
+    assert [each["name"] for each in setup["targets"]] == ["hand"]
+    assert [each["name"] for each in setup["obstacles"]] == ["ball"]
+    assert [each["title"] for each in setup["plots"]] == [
+        "Task error", "Task error", "Null-space error", "Smallest distance", "Effort",
+    ]  # fmt: skip
+    assert {each["id"] for each in setup["controls"]} == set(session.knobs)
+    session.take({"do": "obstacle", "name": "ball", "position": [0.2, 0.4, 0.5]})
+    go(session, 1.5)
+    picture.draw(running=True, rate=1.0)
+    pose = recorder.command("/play", "pose")
+    assert pose is not None
+    shown = {(t["path"], t["property"]): t["values"] for t in pose["tracks"]}
+    for path in ("/obstacles/ball", "/influence/ball"):
+        np.testing.assert_allclose(shown[path, "position"], [0.2, 0.4, 0.5], atol=1e-6)
+    elbow = session.controller.state.data.oMi[4].translation
+    np.testing.assert_allclose(
+        shown["/robot/panda_joint4", "position"], elbow, atol=1e-6
+    )
+    targets = recorder.command("/play", "targets")
+    assert targets is not None
+    np.testing.assert_allclose(targets["poses"]["hand"], pose_of(session))
+    samples = recorder.command("/play", "samples 2")
+    assert samples is not None
+    assert len(samples["times"]) == 150
+    session.take({"do": "set", "id": "field", "value": False})
+    go(session, 1.5)  # past the ramp, and the second for which changes are kept
+    picture.draw(running=True, rate=1.0)
+    assert not recorder.paths("/influence")
+
+
+def test_the_loop_does_what_the_page_says_about_time(session: Session) -> None:
+    viewer = Viewer(session.experiment.robot, transport=Recorder())
+    said: list[list[dict[str, Any]]] = [
+        [{"do": "pause"}],
+        [],
+        [{"do": "step"}],
+        [{"do": "step"}],
+        [{"do": "save"}],
+        [{"do": "go"}],
+    ]
+    times: list[float] = []
+    saved: list[float] = []
+
+    def messages() -> list[dict[str, Any]]:
+        times.append(session.t)
+        return said.pop(0) if said else []
+
+    def save() -> str:
+        saved.append(session.t)
+        return "saved"
+
+    play(session, Picture(session, viewer), messages, save,
+         end=lambda: session.t > 0.05)  # fmt: skip
+    assert times[:6] == pytest.approx([0.0, 0.0, 0.0, 0.01, 0.02, 0.02])
+    assert saved == pytest.approx([0.02])
+    assert session.t > 0.05
+
+
+# --- what can be played with ---------------------------------------------------------
+
+
+def test_any_fixed_robot_is_a_playground() -> None:
+    experiment = playable("ur5", "null_space.gain=4")
+    assert experiment.controller.null_space_gain[0, 0] == 4.0
+    assert experiment.scenario.simulation.control_period == 0.001
+    session = Session(experiment)
+    assert list(session.targets) == ["hand"]
+    assert list(session.obstacles) == ["ball"]
+
+
+def test_a_configuration_without_a_period_gets_one() -> None:
+    experiment = playable("paper/4_moving_obstacle")
+    settings = experiment.scenario.simulation
+    assert (settings.control_period, settings.log_period) == (0.001, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("talos", "talos has a free-flyer root, which needs contacts: give a "
+                  "configuration, for example whole_body/"),
+        ("pandaa", "no configuration 'pandaa'"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_played_with_is_said(source: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        playable(source)
+
+
+def test_a_stream_moves_an_obstacle_only_while_the_controller_runs() -> None:
+    with pytest.raises(SceneError, match="from the start; while the controller runs"):
+        hsp.Obstacle("ball", hsp.Sphere(0.1), hsp.Stream([0.0, 0.0, 0.0]))
+
+
+def test_pushes_that_were_declared_go_on_beside_a_pull() -> None:
+    robot = hsp.Robot.load("panda")
+    plant = RigidBody(pushes=[Push("panda_tcp", [1.0, 0.0, 0.0], duration=1.0)])
+    pushes = plant.build(robot, hsp.Experiment("panda", [hsp.FramePose()]).integrator)
+    found = pushes.pushes  # type: ignore[attr-defined]
+    alone = found.effort(0.0, robot.home())
+    found.spring = Spring(4, np.zeros(3), np.ones(3), 10.0, 5.0)
+    both = found.effort(0.0, robot.home())
+    found.pushes = ()
+    np.testing.assert_allclose(both - alone, found.effort(0.0, robot.home()))
