@@ -11,11 +11,12 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.config import Experiment
-from hsp_control.control.compensation import Command
+from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
 from hsp_control.live.simulated_robot import sampled
 from hsp_control.play.grips import Grip, obstacles_of, targets_of
 from hsp_control.play.knobs import RAMP, Knob, knobs_of
+from hsp_control.play.operational_space import ComparedCommand
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.loops import Instant, sampled_loop
@@ -91,13 +92,13 @@ class Session:
         experiment, robot = self.experiment, self.experiment.robot
         memo: dict[int, Any] = {id(robot): robot}
         self.controller: Controller = deepcopy(experiment.controller, memo)
-        command = Command(self.controller, experiment.compensation)
+        self._command = ComparedCommand(self.controller, experiment.compensation)
         self.let_go()
-        self._pulled = False
+        self._unrepeatable = ""
         rows = self._rows()
         times = [k * self.row for k in range(rows)]
         self._loop: Iterator[Instant] = sampled_loop(
-            command, self._plant, round(self.row / self.period), times,
+            self._command, self._plant, round(self.row / self.period), times,
             experiment.q0, experiment.v0,
         )  # fmt: skip
         self.recorder = Recorder(self.controller, self.controller.scene, rows)
@@ -109,6 +110,12 @@ class Session:
         self.targets = targets_of(self.controller)
         self.obstacles = obstacles_of(self.controller)
         self.knobs = knobs_of(self.controller, self.period)
+        law = Knob(
+            "operational", "Null space", "operational-space law instead", "", False,
+            0.0, 1.0, self._compare,
+        )  # fmt: skip
+        if self.controller.field.controls:
+            self.knobs[law.id] = law
         self.values: dict[str, float | bool] = {
             name: knob.value for name, knob in self.knobs.items()
         }
@@ -204,6 +211,12 @@ class Session:
             except HspControlError as error:
                 self.message, self.warning = str(error), True
 
+    def _compare(self, _at: Changes, operational: bool) -> None:
+        """Follow another law; it is no part of the controller, nor of its log."""
+        self._command.operational = operational
+        if operational:
+            self._unrepeatable = "the operational-space law was tried"
+
     # -- pulling ----------------------------------------------------------------------
 
     def _pull(self, path: str, point: Array, hand: Array) -> None:
@@ -212,7 +225,7 @@ class Session:
         if self._point is None or not np.array_equal(point, self._point):
             joint = _joint_of(self.experiment.robot, path)
             place = self.controller.state.data.oMi[joint]
-            self._point, self._pulled = point, True
+            self._point, self._unrepeatable = point, "somebody pulled at a link"
             self.pushes.spring = Spring(
                 joint, place.actInv(point), hand, self.stiffness, LARGEST_PULL
             )
@@ -243,7 +256,7 @@ class Session:
         config = experiment.config
         if config is not None:
             config["simulation"]["duration"] = max(self.t, self.row)
-        lost = {"changes_lost": "somebody pulled at a link"} if self._pulled else {}
+        lost = {"changes_lost": self._unrepeatable} if self._unrepeatable else {}
         return self.recorder.rollout(
             "completed",
             self.over,

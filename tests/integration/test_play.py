@@ -366,3 +366,24 @@ def test_pushes_that_were_declared_go_on_beside_a_pull() -> None:
     both = found.effort(0.0, robot.home())
     found.pushes = ()
     np.testing.assert_allclose(both - alone, found.effort(0.0, robot.home()))
+
+
+def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
+    experiment: hsp.Experiment,
+) -> None:
+    """Both laws meet the tasks; the moving field is followed by the exact one alone."""
+    logs = []
+    for operational in (False, True):
+        session = Session(experiment)
+        session.take({"do": "set", "id": "operational", "value": operational})
+        go(session, 3.0)
+        logs.append(session.rollout())
+    exact, compared = logs
+    for log in logs:
+        assert np.abs(log["task.hand.error"]).max() < 2e-3
+    late = exact.t > 1.5
+    # What is left of the exact one is the effort that is held for a millisecond.
+    assert exact["null_space_norm"][late].max() < 0.02
+    assert compared["null_space_norm"][late].max() > 0.3
+    assert "operational" in compared.meta["changes_lost"]
+    assert "changes_lost" not in exact.meta

@@ -1,5 +1,7 @@
 """Check the view's server: to this machine alone, and it leaves nothing behind."""
 
+import asyncio
+import json
 import logging
 import os
 import signal
@@ -19,7 +21,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pages import Page
+from pages import Page, scene_request
+from tornado.httpclient import HTTPClientError, HTTPRequest
+from tornado.websocket import websocket_connect
 
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.common.exceptions import ViewerError
@@ -340,6 +344,151 @@ def test_its_files_are_for_this_machine_alone(started: Server) -> None:
         with connection.getresponse() as answer:
             assert answer.status == status
         connection.close()
+
+
+def test_a_connection_names_host_and_origin(started: Server) -> None:
+    """No page of another site, no name that resolves here, no program without both."""
+    assert started.url is not None
+    with pytest.raises(HTTPClientError) as refused:
+        asyncio.run(connect(started.url, Host="evil.example"))
+    assert refused.value.code == 403
+    with pytest.raises(HTTPClientError) as refused:
+        asyncio.run(connect(started.url, Origin="http://evil.example"))
+    assert refused.value.code == 403
+    request = scene_request(started.url)
+    del request.headers["Origin"]
+    with pytest.raises(HTTPClientError) as refused:
+        asyncio.run(opened(request))
+    assert refused.value.code == 403
+
+
+async def connect(url: str, **headers: str) -> None:
+    await opened(scene_request(url, **headers))
+
+
+async def opened(request: HTTPRequest) -> None:
+    (await websocket_connect(request)).close()
+
+
+# --- pages that steer ----------------------------------------------------------------
+
+
+@pytest.fixture
+def steered() -> Iterator[Server]:
+    with_process = Server(steerable=True)
+    yield with_process
+    with_process.close()
+
+
+class Steering(Page):
+    """A page that says things."""
+
+    def say(self, **message: Any) -> None:
+        self.send(json.dumps(message))
+
+    def send(self, text: str) -> None:
+        async def write() -> None:
+            await self.socket.write_message(text)
+
+        asyncio.run_coroutine_threadsafe(write(), self.loop).result(10.0)
+
+    def drives(self) -> tuple[bool, bool] | None:
+        said = [c for c in self.commands if c["type"] == "play_drive"]
+        return (said[-1]["mine"], said[-1]["taken"]) if said else None
+
+
+def heard(server: Server, last: str) -> list[dict[str, Any]]:
+    """What the pages say, up to a message of a kind."""
+    found: list[dict[str, Any]] = []
+    wait_until(
+        lambda: found.extend(server.messages()) or (found and found[-1]["do"] == last),
+        20.0,
+    )
+    return found
+
+
+def test_the_page_that_steers_needs_the_key(steered: Server) -> None:
+    assert steered.url is not None
+    address, key = steered.url.split("?key=")
+    assert len(key) >= 20
+    with urllib.request.urlopen(steered.url) as answer:
+        assert answer.headers["Referrer-Policy"] == "no-referrer"
+        assert "connect();" in answer.read().decode()
+    for query in ("", "?key=", "?key=x", f"?key={key[:-1]}", f"?k={key}"):
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(address + query)
+        refused.value.close()
+        assert refused.value.code == 403
+        with pytest.raises(HTTPClientError):
+            asyncio.run(connect(address + query))
+    asyncio.run(connect(steered.url))
+    other = Server(steerable=True)
+    assert other.url is not None
+    assert other.url.split("?key=")[1] != key
+    other.close()
+
+
+def test_one_page_steers_at_a_time(steered: Server) -> None:
+    assert steered.url is not None
+    first = Steering(steered.url)
+    assert wait_until(lambda: first.drives() == (True, True))
+    second = Steering(steered.url)
+    assert wait_until(lambda: second.drives() == (False, True))
+    second.say(do="pause")  # it may not
+    first.say(do="go")
+    assert heard(steered, "go") == [{"do": "go"}]
+    second.say(do="take_over")
+    assert heard(steered, "left") == [{"do": "left"}]
+    assert wait_until(lambda: first.drives() == (False, True))
+    assert wait_until(lambda: second.drives() == (True, True))
+    second.say(do="step")
+    assert heard(steered, "step") == [{"do": "step"}]
+    second.leave()
+    assert heard(steered, "left") == [{"do": "left"}]
+    assert wait_until(lambda: first.drives() == (False, False))
+    third = Steering(steered.url)
+    assert wait_until(lambda: third.drives() == (True, True))
+
+
+def test_a_flood_is_no_more_than_its_newest_words(steered: Server) -> None:
+    """10,000 messages while nobody listens: the last of each kind is what counts."""
+    assert steered.url is not None
+    page = Steering(steered.url)
+    assert wait_until(lambda: page.drives() == (True, True))
+    for k in range(10_000):
+        page.say(do="move", target="hand", pose=[k] * 7)
+    page.say(do="obstacle", name="ball", position=[1, 2, 3])
+    assert steered.url  # the pipe is full long since, and the server answers:
+    with urllib.request.urlopen(steered.url) as answer:
+        assert answer.status == 200
+    found = heard(steered, "obstacle")
+    assert found[-1] == {"do": "obstacle", "name": "ball", "position": [1, 2, 3]}
+    moves = [each for each in found if each["do"] == "move"]
+    assert moves[-1]["pose"] == [9999] * 7
+    assert len(moves) < 5000
+
+
+@pytest.mark.parametrize(
+    "text", ["{", "[]", '{"do": 1}', '{"do": NaN}', '{"x": 1}', "jump", "{" * 5000]
+)
+def test_what_is_no_message_closes_the_page(steered: Server, text: str) -> None:
+    assert steered.url is not None
+    page = Steering(steered.url)
+    assert wait_until(lambda: page.drives() == (True, True))
+    page.send(text)
+    page.join(10.0)
+    assert not page.is_alive()
+    assert heard(steered, "left") == [{"do": "left"}]
+
+
+def test_pages_of_a_view_say_nothing(started: Server) -> None:
+    assert started.url is not None
+    page = Steering(started.url)
+    assert wait_until(lambda: hasattr(page, "socket"))
+    page.say(do="pause")
+    page.join(10.0)
+    assert not page.is_alive()
+    assert started.messages() == []
 
 
 def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,56 @@
+"""The operational-space law, to compare: what most controllers of peers do.
+
+    a = J# (a_x - J'v) + (I - J# J) K_N (g - v),    J# = W⁻¹Jᵀ(J W⁻¹Jᵀ)⁻¹
+
+With W = M it is Khatib's (1987); here W is the metric of the controller, so that both
+laws project alike, with the same tasks, field and gains. The tasks obey the same
+equation. What is missing is the motion of the null space: with P = I - J# J, nothing
+cancels P' and g', so that the null-space velocity follows a field that moves only with
+an error, and no theorem says how large it is.
+"""
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.compensation import Command
+from hsp_control.control.output import ControlOutput
+from hsp_control.robot import RobotState
+
+
+class ComparedCommand(Command):
+    """A command that can follow the operational-space law instead.
+
+    Attributes:
+        operational: Whether it does.
+    """
+
+    operational = False
+
+    def _law(self, state: RobotState) -> ControlOutput:
+        if not self.operational:
+            return super()._law(state)
+        return self.controller.compute(state, modifier=self._compared)
+
+    def _compared(
+        self, state: RobotState, active: ActiveStack, a: Array
+    ) -> tuple[Array, Array | None]:
+        return self._modify(state, active, operational_space(state, active))
+
+
+def operational_space(state: RobotState, active: ActiveStack) -> Array:
+    """Return the law's acceleration, shape (nv,).
+
+    Tasks of all priorities count alike; near a singularity it is not damped.
+
+    Args:
+        state: The state.
+        active: The tasks and contacts, resolved at the state.
+    """
+    J, J_dot = active.rows.jacobian, active.rows.jacobian_dot
+    problem = active.resolution.problem
+    W_inv_Jt = np.linalg.solve(problem.metric.W, J.T)
+    inverse = W_inv_Jt @ np.linalg.pinv(J @ W_inv_Jt, rcond=1e-9)
+    wanted = active.rows.acceleration - J_dot @ state.v
+    towards = problem.gain @ (problem.field.g - state.v)
+    return np.asarray(towards + inverse @ (wanted - J @ towards))
