@@ -1,6 +1,7 @@
 """A page as the server sees it, without a browser; for tests."""
 
 import asyncio
+import json
 import threading
 from typing import Any
 from urllib.parse import urlsplit
@@ -55,3 +56,20 @@ class Page(threading.Thread):
             for command in reversed(self.commands)
             if (command["type"], command.get("path")) == (kind, path)
         )
+
+
+class Steering(Page):
+    """A page that says things."""
+
+    def say(self, **message: Any) -> None:
+        self.send(json.dumps(message))
+
+    def send(self, text: str) -> None:
+        async def write() -> None:
+            await self.socket.write_message(text)
+
+        asyncio.run_coroutine_threadsafe(write(), self.loop).result(10.0)
+
+    def drives(self) -> tuple[bool, bool] | None:
+        said = [c for c in self.commands if c["type"] == "play_drive"]
+        return (said[-1]["mine"], said[-1]["taken"]) if said else None

@@ -1,7 +1,6 @@
 """Check the view's server: to this machine alone, and it leaves nothing behind."""
 
 import asyncio
-import json
 import logging
 import os
 import signal
@@ -21,7 +20,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pages import Page, scene_request
+from pages import Page, Steering, scene_request
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
@@ -378,23 +377,6 @@ def steered() -> Iterator[Server]:
     with_process = Server(steerable=True)
     yield with_process
     with_process.close()
-
-
-class Steering(Page):
-    """A page that says things."""
-
-    def say(self, **message: Any) -> None:
-        self.send(json.dumps(message))
-
-    def send(self, text: str) -> None:
-        async def write() -> None:
-            await self.socket.write_message(text)
-
-        asyncio.run_coroutine_threadsafe(write(), self.loop).result(10.0)
-
-    def drives(self) -> tuple[bool, bool] | None:
-        said = [c for c in self.commands if c["type"] == "play_drive"]
-        return (said[-1]["mine"], said[-1]["taken"]) if said else None
 
 
 def heard(server: Server, last: str) -> list[dict[str, Any]]:

@@ -75,6 +75,11 @@ class Server:
         """
         if port is not None and not 1 <= port <= 65535:
             raise ViewerError(f"port {port} is not between 1 and 65535")
+        if host in {"", "0.0.0.0"}:
+            raise ViewerError(
+                f"host {host!r} is every address of this computer; give the one at "
+                "which the page is opened, such as 192.168.1.20"
+            )
         self.url: str | None = None
         self._lock = threading.Lock()
         self._unsent = b""
