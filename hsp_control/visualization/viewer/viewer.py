@@ -27,6 +27,7 @@ from hsp_control.visualization.viewer.commands import (
     set_time,
 )
 from hsp_control.visualization.viewer.comparison import ComparedRun, Comparison
+from hsp_control.visualization.viewer.meshcat_transport import MeshcatTransport
 from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.obstacle_drawing import ObstacleDrawing
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
@@ -61,6 +62,7 @@ class Viewer:
         open_browser: bool = False,
         transport: Transport | None = None,
         port: int | None = None,
+        meshcat: Any = None,
         **view: Any,
     ) -> None:
         """Show the robot at its home posture.
@@ -71,13 +73,16 @@ class Viewer:
             transport: A `Recorder`, to store the commands and show nothing; None: a new
                 server on the loopback address.
             port: The server's port; None: the first free one from 7000.
+            meshcat: A `meshcat.Visualizer`, or the address of its server, such as
+                ``tcp://127.0.0.1:6000``: the scene is put there, beside what others
+                have drawn, and no server is started; see `MeshcatTransport`.
             view: Fields of `ViewSettings`, the keys of a configuration's ``view``:
                 ``camera`` and ``target`` [m], ``background``,
                 ``show={"ellipsoid": True}``, ...
 
         Raises:
             ViewerError: If a view has no such field, a value is not valid, Meshcat is
-                not installed, or the server cannot start.
+                not installed, the server cannot start, or Meshcat's does not answer.
         """
         self.robot = robot
         self.view = ViewSettings(**view)
@@ -85,6 +90,8 @@ class Viewer:
         self._data = robot.model.createData()
         self._obstacles: ObstacleDrawing | None = None
         self._others: list[str] = []
+        if meshcat is not None:
+            transport = MeshcatTransport(meshcat)
         self.transport = Server(port) if transport is None else transport
         try:
             self.transport.send(self.drawing.draw())
