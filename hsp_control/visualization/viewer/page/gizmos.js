@@ -225,8 +225,8 @@ class Gizmo {
     const {SphereGeometry, CylinderGeometry, TorusGeometry} = MeshCat.THREE;
     const {BALL, ARROW: [start, tip], RING} = Gizmo;
     const head = 17;
-    this._part({kind: "ball"}, new SphereGeometry(BALL + 2.2, 32, 20), "#FFFFFF", 1004, 0.5);
-    this._part(this.parts[0].handle, new SphereGeometry(BALL, 32, 20), Gizmo.BALL_COLOR, 1005, 0.7);
+    this._part({kind: "ball"}, new SphereGeometry(BALL + 2.2, 32, 20), "#FFFFFF", 1004, 0.8);
+    this._part(this.parts[0].handle, new SphereGeometry(BALL, 32, 20), Gizmo.BALL_COLOR, 1005, 0.9);
     for (const axis of [0, 1, 2]) {
       if (!this.follows(axis)) continue;
       const handle = {kind: "arrow", axis}, color = Gizmo.COLORS[axis];
