@@ -191,6 +191,7 @@ def desktop(chromium: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
 def page(desktop: tuple[Any, list[str]]) -> Iterator[Any]:
     page, wrong = desktop
     begin(page)
+    page.evaluate("play.panel.setOpen(true); viewer.render()")
     yield page
     page.mouse.up()
     page.mouse.move(5, 500)
@@ -232,10 +233,11 @@ def pixel(page: Any, point: list[float]) -> np.ndarray:
 
 def drag(page: Any, start: Any, end: Any) -> None:
     """Press at a pixel and move to another one; the button stays down."""
-    page.mouse.move(*start)
+    first, last = np.array(start, float), np.array(end, float)
+    page.mouse.move(*first)
     page.mouse.down()
-    page.mouse.move(*(0.5 * (np.array(start) + np.array(end))))
-    page.mouse.move(*end)
+    page.mouse.move(*(0.5 * (first + last)))
+    page.mouse.move(*last)
 
 
 def lies_under(page: Any, point: list[float], pointer: Any) -> bool:
@@ -285,7 +287,7 @@ def test_an_arrow_moves_along_its_axis(page: Any, axis: int) -> None:
     page.mouse.up()
     pose = until_sent(page, "move")[-1]["pose"]
     expected = [HAND[k] + 0.1 * (k == axis) for k in range(3)]
-    assert pose[axis] == pytest.approx(expected[axis], abs=0.01)
+    assert pose[axis] == pytest.approx(expected[axis], abs=0.02)
     others = [k for k in range(3) if k != axis]
     np.testing.assert_allclose(
         np.array(pose)[others], np.array(HAND)[others], atol=1e-12
@@ -305,7 +307,7 @@ def test_a_ring_turns_about_its_axis(page: Any, axis: int) -> None:
     # In the target's own axes: the conjugate of its turn, times the new one.
     _, b, _, a = TURN
     local = np.array([a * x - b * z, a * y - b * w, a * z + b * x])
-    assert a * w + b * y < 0.999
+    assert a * w + b * y < 1.0 - 1e-5  # it has turned
     assert np.delete(local, axis) == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
@@ -472,7 +474,7 @@ def test_a_refused_value_goes_back(page: Any) -> None:
     assert shown.inner_text() == "400 N/m"
     page.evaluate("sent.length = 0")
     page.get_by_role("switch", name="Friction").click()
-    page.get_by_text("posture", exact=True).click()
+    page.get_by_role("radio", name="posture").click()
     until_sent(page, "set", 2)
     assert [message["value"] for message in sent(page)] == [True, "posture"]
     tell(page, "play_values", values={"friction": False, "field": "off"})
@@ -522,7 +524,7 @@ def test_a_closed_panel_draws_nothing(page: Any) -> None:
     page.locator(".play-bar .panel").click()
     assert page.locator(".play-panel").is_hidden()
     assert page.evaluate("viewer.dom_element.offsetWidth === innerWidth")
-    page.evaluate("{ play.plots.draw = () => { throw new Error('drawn'); }; }")
+    page.evaluate("() => { play.plots.draw = () => { throw new Error('drawn'); }; }")
     page.evaluate(SAMPLES, [20.0, 20.01])
     assert page.evaluate("play.plots.waiting") is False
     page.evaluate("delete play.plots.draw")
