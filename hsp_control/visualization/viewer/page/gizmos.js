@@ -20,7 +20,7 @@ class Gizmo {
     this.target = target;
     this.position = new Vector3();
     this.turn = new Quaternion();
-    this.enlarged = matchMedia("(pointer: coarse)").matches ? 1.2 : 1;
+    this.enlarged = this.usual = matchMedia("(pointer: coarse)").matches ? 1.2 : 1;
     this.group = new Group();
     this.rings = new Group();
     this.group.add(this.rings);
@@ -50,6 +50,8 @@ class Gizmo {
 
   // Fit its size to the camera.
   layOut(sight) {
+    // In a low picture, as above a phone's open sheet, the handles would hide the robot.
+    this.enlarged = this.usual * Math.min(Math.max(sight.box.height / 450, 0.65), 1);
     this.group.position.copy(this.position);
     this.group.scale.setScalar(sight.pixel(this.position) * this.enlarged);
     this.rings.quaternion.copy(this.turn);
@@ -222,10 +224,12 @@ class Gizmo {
   }
 
   _build() {
-    const {SphereGeometry, CylinderGeometry, TorusGeometry} = MeshCat.THREE;
+    const {SphereGeometry, CylinderGeometry, TorusGeometry, BackSide} = MeshCat.THREE;
     const {BALL, ARROW: [start, tip], RING} = Gizmo;
     const head = 17;
     this._part({kind: "ball"}, new SphereGeometry(BALL + 2.2, 32, 20), "#FFFFFF", 1004, 0.8);
+    // Its rim is the far half of a larger ball, which never hides the ball itself.
+    for (const {material} of this.parts[0].meshes) material.side = BackSide;
     this._part(this.parts[0].handle, new SphereGeometry(BALL, 32, 20), Gizmo.BALL_COLOR, 1005, 0.9);
     for (const axis of [0, 1, 2]) {
       if (!this.follows(axis)) continue;

@@ -85,6 +85,7 @@ class Play {
     this.bar.showState(this.state);
     // The scene is beside the panel now: place the camera again.
     if (first && lastView) placeCamera(lastView);
+    this.viewer.set_3d_pane_size();
   }
 
   build() {
@@ -101,6 +102,16 @@ class Play {
     this.hand = new PlayHand(this, this.viewer);
     this.keys = new PlayKeys(this);
     this.viewer.scene.onBeforeRender = () => this.layOut();
+    const fit = this.viewer.set_3d_pane_size.bind(this.viewer);
+    this.viewer.set_3d_pane_size = (width, height = this.sceneHeight()) => fit(width, height);
+  }
+
+  // On a phone the picture ends where the bar, or the open sheet, begins.
+  sceneHeight() {
+    const {panel, bar} = this;
+    if (!panel.narrow.matches) return innerHeight;
+    const sheet = panel.open ? panel.box.offsetHeight - 18 : 0;  // behind its round corners
+    return Math.max(120, innerHeight - bar.row.offsetHeight - sheet);
   }
 
   // After a reset the plots are the same: they keep what is shown alone.

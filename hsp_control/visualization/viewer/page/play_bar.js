@@ -37,6 +37,7 @@ class PlayBar {
     const part = (selector) => this.box.querySelector(selector);
     [this.status, this.watching, this.clock, this.rate, this.toggle, this.panel] =
       [".play-status", ".play-watching", ".clock", ".rate", ".toggle", ".panel"].map(part);
+    this.row = part(".play-bar");
     this.acting = ["toggle", "step", "reset", "save"].map((name) => part(`.${name}`));
     this.toggle.onclick = () => play.toggle();
     for (const name of ["step", "reset", "save"]) part(`.${name}`).onclick = () => play.act(name);
