@@ -270,7 +270,10 @@ class LivePlot {
       }
     }
     if (!(low <= high)) return log ? [-3, 0] : [0, 1];
-    if (log) return [Math.floor(low - 0.05), Math.max(Math.ceil(high + 0.05), Math.floor(low) + 1)];
+    if (log) {
+      const least = Math.floor(low - 0.05);
+      return [least, Math.max(Math.ceil(high + 0.05), least + 1)];
+    }
     const least = Math.max(1e-9, 0.02 * Math.max(Math.abs(low), Math.abs(high)));
     const room = Math.max(high - low, least);
     const known = this.range;
