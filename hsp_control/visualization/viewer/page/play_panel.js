@@ -1,0 +1,195 @@
+// The panel beside the scene: the targets, the controls in their groups, the live plots.
+//
+// A value is the program's: a change is sent, and the value that the program then reports
+// is shown, so a refused one goes back. While a slider is held it stays with the pointer.
+"use strict";
+
+class PlayPanel {
+  constructor(play, parent) {
+    this.play = play;
+    this.open = false;
+    this.narrow = matchMedia("(max-width: 560px)");
+    this.box = document.createElement("aside");
+    this.box.className = "play-panel";
+    this.box.setAttribute("aria-label", "Controls and plots");
+    this.box.innerHTML = `
+      <header><h2></h2><button type="button" aria-label="Close the panel" title="Close">
+        <svg viewBox="0 0 24 24" aria-hidden="true"><path d="M6.4 5 12 10.6 17.6 5 19 6.4 13.4
+          12l5.6 5.6-1.4 1.4-5.6-5.6L6.4 19 5 17.6l5.6-5.6L5 6.4z"/></svg></button></header>
+      <div class="play-content"><fieldset class="play-controls"></fieldset>
+        <div class="play-plots"></div>
+        <p class="play-help">Drag a handle, an obstacle or a link; drag beside them to turn
+          the view. <kbd>Tab</kbd> selects, <kbd>← → ↑ ↓</kbd> <kbd>Page ↑ ↓</kbd> move by
+          1 cm, with <kbd>Shift</kbd> by 1 mm. <kbd>Space</kbd> pauses, <kbd>.</kbd> steps,
+          <kbd>R</kbd> resets, <kbd>S</kbd> saves.</p></div>`;
+    this.title = this.box.querySelector("h2");
+    this.controls = this.box.querySelector(".play-controls");
+    this.plots = this.box.querySelector(".play-plots");
+    this.box.querySelector("header button").onclick = () => this.setOpen(false);
+    parent.append(this.box);
+    this.setters = new Map();
+  }
+
+  setOpen(open) {
+    this.open = open;
+    this.box.inert = !open;
+    document.body.classList.toggle("with-panel", open);
+    this.play.bar.showPanel(open);
+    this.play.plots?.schedule();
+    this.play.viewer.set_3d_pane_size();
+  }
+
+  build({title, targets, controls}) {
+    this.title.textContent = title || "Play";
+    this.setters.clear();
+    const groups = new Map();
+    for (const control of controls) {
+      const group = control.group || "Settings";
+      if (!groups.has(group)) groups.set(group, []);
+      groups.get(group).push(control);
+    }
+    this.resume = new Map();
+    const sections = [...groups].map(([name, own]) =>
+      PlayPanel.section(name, own.map((control) => this.control(control))));
+    if (targets.length) {
+      sections.unshift(PlayPanel.section("Targets", targets.map((one) => this.target(one))));
+    }
+    this.controls.replaceChildren(...sections);
+  }
+
+  static section(name, rows) {
+    const section = document.createElement("section");
+    const heading = document.createElement("h3");
+    heading.textContent = name;
+    section.append(heading, ...rows);
+    return section;
+  }
+
+  // A target's name, which selects it, and the way back to its own path.
+  target({name, kind}) {
+    const row = PlayPanel.row("target", `<button type="button" class="select"><i></i>
+      <span></span><small></small></button>
+      <button type="button" class="resume">Back to its path</button>`);
+    const [select, resume] = row.querySelectorAll("button");
+    row.querySelector("span").textContent = name;
+    row.querySelector("small").textContent = kind;
+    select.setAttribute("aria-label", `Select ${name}`);
+    resume.setAttribute("aria-label", `${name}: back to its own path`);
+    select.onclick = () => {
+      this.play.overlay.buttons.get(PlayHand.targetKey(name))?.focus();
+      if (this.narrow.matches) this.setOpen(false);
+    };
+    resume.onclick = () => this.play.resume(name);
+    this.resume.set(name, row);
+    return row;
+  }
+
+  // Show that a target was moved away from its path, or is on it again.
+  showMoved(name, moved) { this.resume.get(name)?.classList.toggle("moved", moved); }
+
+  showSelected(key) {
+    for (const [name, row] of this.resume) {
+      row.classList.toggle("selected", key === PlayHand.targetKey(name));
+    }
+  }
+
+  control(control) {
+    const make = {slider: this.slider, switch: this.switch, choice: this.choice}[control.kind];
+    return make.call(this, control);
+  }
+
+  slider({id, label, unit, value, low, high, log}) {
+    const row = PlayPanel.row("slider", `<label><span></span><output></output></label>
+      <input type="range" min="0" max="1" step="0.001">`);
+    const [input, shown] = ["input", "output"].map((tag) => row.querySelector(tag));
+    row.querySelector("span").textContent = label;
+    row.querySelector("label").htmlFor = input.id = `play-${id}`;
+    const place = (x) => log ? Math.log(x / low) / Math.log(high / low) : (x - low) / (high - low);
+    const value_at = (share) => log ? low * (high / low) ** share : low + share * (high - low);
+    const show = (x, move = true) => {
+      if (move) input.value = place(x);
+      const words = `${PlayPanel.number(x)}${unit && unit !== "–" ? ` ${unit}` : ""}`;
+      shown.textContent = words;
+      input.setAttribute("aria-valuetext", words);
+      input.style.setProperty("--share", `${100 * Math.min(Math.max(place(x), 0), 1)}%`);
+    };
+    let held = false, reported = null;
+    input.oninput = () => {
+      const next = PlayPanel.rounded(value_at(Number(input.value)), low, high);
+      reported = null;
+      show(next, false);
+      this.play.set(id, next);
+    };
+    const let_go = () => {
+      held = false;
+      if (reported !== null) show(reported);
+    };
+    input.onpointerdown = () => { held = true; };
+    for (const type of ["pointerup", "pointercancel", "change", "blur"]) {
+      input.addEventListener(type, let_go);
+    }
+    this.setters.set(id, (x) => {
+      reported = x;
+      if (!held) show(x);
+    });
+    show(value);
+    return row;
+  }
+
+  switch({id, label, value}) {
+    const row = PlayPanel.row("switch", `<label><span></span>
+      <input type="checkbox" role="switch"></label>`);
+    const input = row.querySelector("input");
+    row.querySelector("span").textContent = label;
+    input.checked = value;
+    input.onchange = () => this.play.set(id, input.checked);
+    this.setters.set(id, (on) => { input.checked = on; });
+    return row;
+  }
+
+  choice({id, label, unit, value, options}) {
+    const row = PlayPanel.row("choice", `<span></span><div role="radiogroup"></div>`);
+    const group = row.querySelector("div");
+    row.querySelector("span").textContent = unit && unit !== "–" ? `${label} [${unit}]` : label;
+    group.setAttribute("aria-label", label);
+    const inputs = options.map((option) => {
+      const entry = document.createElement("label");
+      const input = document.createElement("input");
+      Object.assign(input, {type: "radio", name: `play-${id}`, checked: option === value});
+      input.onchange = () => this.play.set(id, option);
+      const text = document.createElement("span");
+      text.textContent = String(option);
+      entry.append(input, text);
+      group.append(entry);
+      return input;
+    });
+    this.setters.set(id, (next) => {
+      options.forEach((option, k) => { inputs[k].checked = option === next; });
+    });
+    return row;
+  }
+
+  setValues(values) {
+    for (const [id, value] of Object.entries(values)) this.setters.get(id)?.(value);
+  }
+
+  setDisabled(disabled) { this.controls.disabled = disabled; }
+
+  static row(kind, content) {
+    const row = document.createElement("div");
+    row.className = `play-row ${kind}`;
+    row.innerHTML = content;
+    return row;
+  }
+
+  // Three significant digits are enough to set a gain, and its ends are exact.
+  static rounded(value, low, high) {
+    return Math.min(Math.max(Number(value.toPrecision(3)), low), high);
+  }
+
+  static number(value) {
+    const text = value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e5)
+      ? value.toExponential(1) : String(Number(value.toPrecision(3)));
+    return text.replace(/-/g, "−");
+  }
+}

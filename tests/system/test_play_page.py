@@ -1,0 +1,603 @@
+"""The page of `hsp play` in a real browser: what the hand moves, and what it tells.
+
+Chromium without a window; where there is none these tests are skipped, but not in CI.
+The page is that of a real server. Its commands come from the tests, which also keep
+what it answers.
+"""
+
+import json
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hsp_control import Robot
+from hsp_control.visualization.viewer import Viewer
+
+pytestmark = pytest.mark.browser
+
+sync_api = pytest.importorskip("playwright.sync_api")
+
+OPTIONS = [
+    "--headless",
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+HARMLESS = "GPU stall due to ReadPixels"  # a remark of the software renderer
+PATIENCE = 200.0  # s; only ends a test that hangs
+TURN = [0.0, np.sin(0.2), 0.0, np.cos(0.2)]
+HAND, ELBOW, BALL = [0.9, 0.3, 0.25, *TURN], [0.2, 0.9, 0.1, *TURN], [-0.4, 0.5, 0.3]
+SETUP: dict[str, Any] = {
+    "type": "play_setup",
+    "path": "/play",
+    "title": "three joints",
+    "targets": [
+        {"name": "hand", "kind": "pose", "axes": [True] * 3, "pose": HAND},
+        {
+            "name": "elbow",
+            "kind": "position",
+            "axes": [True, True, False],
+            "pose": ELBOW,
+        },
+    ],
+    "obstacles": [
+        {"name": "ball", "path": "/obstacles/ball", "position": BALL, "radius": 0.1}
+    ],
+    "controls": [
+        {
+            "id": "stiffness",
+            "group": "Hand",
+            "label": "Stiffness",
+            "unit": "N/m",
+            "kind": "slider",
+            "value": 400.0,
+            "low": 10.0,
+            "high": 4000.0,
+            "log": True,
+        },
+        {
+            "id": "friction",
+            "group": "Robot",
+            "label": "Friction",
+            "kind": "switch",
+            "value": False,
+        },
+        {
+            "id": "field",
+            "group": "Robot",
+            "label": "Field",
+            "kind": "choice",
+            "value": "off",
+            "options": ["off", "posture"],
+        },
+    ],
+    "plots": [
+        {
+            "id": "error",
+            "title": "Error",
+            "unit": "mm",
+            "log": True,
+            "series": [{"name": "hand", "color": "#0072B2"}],
+        },
+        {
+            "id": "torque",
+            "title": "Torque",
+            "unit": "N m",
+            "log": False,
+            "series": [
+                {"name": "q1", "color": "#0072B2"},
+                {"name": "q2", "color": "#22272B"},
+            ],
+        },
+    ],
+    "pull": True,
+    "period_ms": 1.0,
+}
+
+# Keep what the page says; the server gets only what it knows.
+LISTEN = """() => {
+  window.sent = [];
+  const {connection} = viewer, send = connection.send.bind(connection);
+  connection.send = (text) => {
+    if (text[0] === "{") sent.push(text); else send(text);
+  };
+}"""
+PIXEL = """(point) => {
+  const {x, y} = play.sight.update().project(new MeshCat.THREE.Vector3(...point));
+  return [x, y];
+}"""
+# A point of a handle that no other one covers: [x, y].
+HANDLE = """([name, kind, axis]) => {
+  const gizmo = play.gizmos.get(`target ${name}`);
+  const {left, top, width, height} = play.sight.update().box;
+  for (let y = top; y < top + height; y += 2) {
+    for (let x = left; x < left + width; x += 2) {
+      const found = gizmo.find(play.sight, x, y, "mouse");
+      const {handle, gap} = found ?? {};
+      if (handle?.kind === kind && handle.axis === axis && gap < 1.5) return [x, y];
+    }
+  }
+  return null;
+}"""
+LINK = """() => {
+  const {left, top, width, height} = play.sight.update().box;
+  for (let y = top; y < top + height; y += 5) {
+    for (let x = left; x < left + width; x += 5) {
+      if (play.hand.find(x, y, "mouse")?.path) return [x, y];
+    }
+  }
+  return null;
+}"""
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    found = shutil.which("chromium") or shutil.which("google-chrome")
+    if found is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("CI needs Chromium: apt-get install chromium")
+        pytest.skip("there is no Chromium on the path")
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=found, args=OPTIONS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def viewer() -> Iterator[Viewer]:
+    robot = Robot.load("planar3r")
+    with Viewer(robot, camera=[1.5, -4.5, 3.0], target=[0.4, 0.2, 0.0]) as viewer:
+        viewer.show(robot.integrate(robot.neutral(), np.array([0.4, 0.5, 0.3])))
+        yield viewer
+
+
+def opened(chromium: Any, viewer: Viewer, **options: Any) -> tuple[Any, list[str]]:
+    page = chromium.new_page(**options)
+    page.set_default_timeout(1000.0 * PATIENCE)
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on(
+        "console",
+        lambda said: (
+            wrong.append(said.text)
+            if said.type in {"error", "warning"} and HARMLESS not in said.text
+            else None
+        ),
+    )
+    page.goto(viewer.url)
+    assert viewer.wait_for_browser(PATIENCE)
+    page.evaluate(LISTEN)
+    return page, wrong
+
+
+@pytest.fixture(scope="module")
+def desktop(chromium: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
+    page, wrong = opened(chromium, viewer, viewport={"width": 1280, "height": 800})
+    yield page, wrong
+    page.close()
+
+
+@pytest.fixture
+def page(desktop: tuple[Any, list[str]]) -> Iterator[Any]:
+    page, wrong = desktop
+    begin(page)
+    page.evaluate("play.panel.setOpen(true); viewer.render()")
+    yield page
+    page.mouse.up()
+    page.mouse.move(5, 500)
+    assert wrong == []
+
+
+def begin(page: Any) -> None:
+    tell(page, "play_drive", mine=True, taken=True)
+    page.evaluate("(command) => viewer.handle_command(command)", SETUP)
+    tell(page, "play_state", t=1.5, running=True, rate=1.0, message="", level="info")
+    page.evaluate("play.keys.escape(); viewer.render(); sent.length = 0")
+
+
+def tell(page: Any, kind: str, **fields: Any) -> None:
+    command = {"type": kind, "path": "/play", **fields}
+    page.evaluate("(command) => viewer.handle_command(command)", command)
+
+
+def sent(page: Any, do: str | None = None) -> list[dict[str, Any]]:
+    messages = [json.loads(text) for text in page.evaluate("sent")]
+    return [message for message in messages if do in (None, message["do"])]
+
+
+def until(page: Any, expression: str) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not page.evaluate(expression):
+        assert time.monotonic() < deadline, f"never: {expression}"
+        time.sleep(0.02)
+
+
+def until_sent(page: Any, do: str, number: int = 1) -> list[dict[str, Any]]:
+    until(page, f"sent.filter((t) => JSON.parse(t).do === '{do}').length >= {number}")
+    return sent(page, do)
+
+
+def pixel(page: Any, point: list[float]) -> np.ndarray:
+    return np.array(page.evaluate(PIXEL, point[:3]))
+
+
+def drag(page: Any, start: Any, end: Any) -> None:
+    """Press at a pixel and move to another one; the button stays down."""
+    first, last = np.array(start, float), np.array(end, float)
+    page.mouse.move(*first)
+    page.mouse.down()
+    page.mouse.move(*(0.5 * (first + last)))
+    page.mouse.move(*last)
+
+
+def lies_under(page: Any, point: list[float], pointer: Any) -> bool:
+    """Whether a point's picture is within 1 mm of a pixel."""
+    x, y, z = point[:3]
+    size = page.evaluate(f"play.sight.pixel(new MeshCat.THREE.Vector3({x}, {y}, {z}))")
+    return float(np.linalg.norm(pixel(page, point) - pointer)) * size < 1e-3
+
+
+def test_the_ball_stays_under_the_pointer(page: Any) -> None:
+    start = pixel(page, HAND)
+    end = start + np.array([70.0, -45.0])
+    drag(page, start, end)
+    until_sent(page, "move")
+    # While it is held, the program's word on it is not shown; on the others it is.
+    elsewhere = {"hand": [0, 0, 0, 0, 0, 0, 1], "elbow": [0.3, *ELBOW[1:]]}
+    tell(page, "play_targets", poses=elsewhere)
+    held, free = page.evaluate("[...play.gizmos.values()].map((one) => one.pose())")
+    assert lies_under(page, held, end)
+    assert free == pytest.approx(elsewhere["elbow"])
+    page.mouse.up()
+    *moves, last = sent(page)
+    assert last == {"do": "release", "target": "hand"}
+    assert {message["do"] for message in moves} == {"move"}
+    assert moves[-1]["target"] == "hand"
+    assert lies_under(page, moves[-1]["pose"], end)
+    assert moves[-1]["pose"][3:] == pytest.approx(TURN)
+    assert page.evaluate("viewer.controls.enabled") is True
+
+
+def test_a_coordinate_that_is_not_followed_stays(page: Any) -> None:
+    start = pixel(page, ELBOW)
+    drag(page, start, start + np.array([40.0, 25.0]))
+    pose = until_sent(page, "move")[-1]["pose"]
+    assert pose[2] == ELBOW[2]
+    page.mouse.up()
+    assert lies_under(
+        page, sent(page, "move")[-1]["pose"], start + np.array([40.0, 25.0])
+    )
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_an_arrow_moves_along_its_axis(page: Any, axis: int) -> None:
+    start = np.array(page.evaluate(HANDLE, ["hand", "arrow", axis]))
+    along = pixel(page, [HAND[k] + 0.1 * (k == axis) for k in range(3)])
+    drag(page, start, start + (along - pixel(page, HAND)))
+    page.mouse.up()
+    pose = until_sent(page, "move")[-1]["pose"]
+    expected = [HAND[k] + 0.1 * (k == axis) for k in range(3)]
+    assert pose[axis] == pytest.approx(expected[axis], abs=0.02)
+    others = [k for k in range(3) if k != axis]
+    np.testing.assert_allclose(
+        np.array(pose)[others], np.array(HAND)[others], atol=1e-12
+    )
+    assert pose[3:] == pytest.approx(TURN)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_ring_turns_about_its_axis(page: Any, axis: int) -> None:
+    start = np.array(page.evaluate(HANDLE, ["hand", "ring", axis]))
+    spoke = start - pixel(page, HAND)
+    drag(page, start, start + 0.5 * spoke[::-1] * [-1.0, 1.0])
+    page.mouse.up()
+    pose = np.array(until_sent(page, "move")[-1]["pose"])
+    assert pose[:3] == pytest.approx(HAND[:3], abs=1e-12)
+    x, y, z, w = pose[3:]
+    # In the target's own axes: the conjugate of its turn, times the new one.
+    _, b, _, a = TURN
+    local = np.array([a * x - b * z, a * y - b * w, a * z + b * x])
+    assert a * w + b * y < 1.0 - 1e-5  # it has turned
+    assert np.delete(local, axis) == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_a_click_moves_nothing(page: Any) -> None:
+    page.mouse.click(*pixel(page, HAND))
+    assert page.evaluate("play.selected") == "target hand"
+    assert sent(page) == []
+
+
+def test_the_keyboard_moves_by_a_centimetre(page: Any) -> None:
+    page.keyboard.press("1")
+    assert page.evaluate("document.activeElement.ariaLabel").startswith("Target hand")
+    page.evaluate("viewer.render()")
+    assert page.locator(".play-label.name").inner_text() == "hand"
+    before = np.array(HAND[:3])
+    # The camera stands at negative y: x to the right, y away from it, z up.
+    for key, axis, step in (
+        ("ArrowRight", 0, 0.01),
+        ("ArrowRight", 0, 0.01),
+        ("ArrowLeft", 0, -0.01),
+        ("ArrowUp", 1, 0.01),
+        ("ArrowDown", 1, -0.01),
+        ("PageUp", 2, 0.01),
+        ("Shift+PageDown", 2, -0.001),
+        ("Shift+ArrowUp", 1, 0.001),
+    ):
+        page.evaluate("sent.length = 0")
+        page.keyboard.press(key)
+        until_sent(page, "release")
+        move, release = sent(page)
+        assert release == {"do": "release", "target": "hand"}
+        after = np.array(move["pose"][:3])
+        expected = step * (np.arange(3) == axis)
+        np.testing.assert_allclose(after - before, expected, atol=1e-12)
+        before = after
+    page.keyboard.press("Tab")
+    assert page.evaluate("play.selected") == "target elbow"
+    page.keyboard.press("3")
+    page.evaluate("sent.length = 0")
+    page.keyboard.press("ArrowRight")
+    (moved,) = until_sent(page, "obstacle")
+    assert moved["position"] == pytest.approx([BALL[0] + 0.01, *BALL[1:]], abs=1e-12)
+    page.keyboard.press("Escape")
+    assert page.evaluate("play.selected") is None
+
+
+def test_keys_steer_the_run(page: Any) -> None:
+    for key, do in ((" ", "pause"), (".", "step"), ("r", "reset"), ("s", "save")):
+        page.keyboard.press(key)
+        until_sent(page, do)
+    tell(page, "play_state", t=2.0, running=False, rate=0.0, message="", level="info")
+    page.keyboard.press(" ")
+    until_sent(page, "go")
+    assert page.locator(".play-bar .toggle").get_attribute("aria-label") == "Go"
+    page.locator(".play-bar .step").click()
+    until_sent(page, "step", 2)
+    page.keyboard.press(" ")  # not the button again
+    until_sent(page, "go", 2)
+    assert len(sent(page, "step")) == 2
+
+
+def test_an_obstacle_is_dragged(page: Any) -> None:
+    start = pixel(page, BALL)
+    end = start + np.array([-30.0, -50.0])
+    drag(page, start, end)
+    page.mouse.up()
+    moved = until_sent(page, "obstacle")[-1]
+    assert moved["name"] == "ball"
+    assert lies_under(page, moved["position"], end)
+    assert {message["do"] for message in sent(page)} == {"obstacle"}
+
+
+def test_a_link_is_pulled(page: Any) -> None:
+    start = page.evaluate(LINK)
+    end = np.array(start) + np.array([-60.0, -60.0])
+    drag(page, start, end)
+    first = until_sent(page, "pull")[0]
+    assert first["path"].startswith("/robot/joint")
+    distance = """({path, point}) => {
+      const {Box3, Vector3} = MeshCat.THREE;
+      const at = new Vector3(...point).applyMatrix4(viewer.scene.matrixWorld);
+      return new Box3().setFromObject(node(path)).distanceToPoint(at);
+    }"""
+    assert page.evaluate(distance, first) < 1e-6
+    assert lies_under(page, first["point"], start)
+    until(page, "play.outbox.pending.size === 0")
+    assert lies_under(page, sent(page, "pull")[-1]["to"], end)
+    force = {"from": first["point"], "to": first["point"]}
+    tell(page, "play_force", visible=True, newtons=23.4, **force)
+    page.evaluate("viewer.render()")
+    assert page.locator(".play-label.force").inner_text() == "23 N"
+    page.mouse.up()
+    assert sent(page)[-1] == {"do": "let_go"}
+    page.evaluate("viewer.render()")
+    assert page.locator(".play-label.force").is_hidden()
+
+
+CANCEL = """viewer.dom_element.dispatchEvent(new PointerEvent("pointercancel",
+  {pointerId: play.hand.grip.pointer, bubbles: true}))"""
+HIDE = """() => {
+  Object.defineProperty(document, "hidden", {value: true, configurable: true});
+  document.dispatchEvent(new Event("visibilitychange"));
+  delete document.hidden;
+}"""
+
+
+@pytest.mark.parametrize("loss", [CANCEL, HIDE])
+def test_a_lost_pointer_lets_go(page: Any, loss: str) -> None:
+    start = pixel(page, HAND)
+    drag(page, start, start + 30.0)
+    page.evaluate(loss)
+    # The last move is not lost: it comes before the release.
+    assert [message["do"] for message in sent(page)][-2:] == ["move", "release"]
+    page.mouse.up()
+    page.evaluate("sent.length = 0")
+    start = page.evaluate(LINK)
+    drag(page, start, np.array(start) + 30.0)
+    page.evaluate(loss)
+    assert [message["do"] for message in sent(page)][-2:] == ["pull", "let_go"]
+    assert page.evaluate("viewer.controls.enabled") is True
+    page.mouse.up()
+
+
+def test_beside_all_handles_the_camera_turns(page: Any) -> None:
+    before = page.evaluate("viewer.camera.position.toArray()")
+    drag(page, [60.0, 600.0], [160.0, 600.0])
+    page.mouse.up()
+    assert page.evaluate("viewer.camera.position.toArray()") != before
+    assert sent(page) == []
+    page.evaluate("placeCamera(lastView)")
+
+
+def test_a_page_that_watches_says_nothing(page: Any) -> None:
+    start = pixel(page, HAND)
+    drag(page, start, start + 20.0)
+    until_sent(page, "move")
+    tell(page, "play_drive", mine=False, taken=True)
+    page.evaluate("sent.length = 0")
+    page.mouse.move(*(start + 40.0))
+    page.mouse.up()
+    drag(page, start, start + 30.0)
+    page.mouse.up()
+    for key in ("1", "ArrowRight", " ", ".", "r", "s"):
+        page.keyboard.press(key)
+    page.evaluate("new Promise(requestAnimationFrame)")
+    assert sent(page) == []
+    for name in (".play-bar .toggle", ".play-bar .reset", "#play-stiffness"):
+        assert page.locator(name).is_disabled()
+    page.get_by_role("button", name="Take over").click()
+    assert sent(page) == [{"do": "take_over"}]
+    tell(page, "play_drive", mine=True, taken=True)
+    assert page.locator(".play-watching").is_hidden()
+    page.evaluate("placeCamera(lastView)")
+
+
+def test_a_refused_value_goes_back(page: Any) -> None:
+    slider, shown = page.locator("#play-stiffness"), page.locator(".slider output")
+    before = slider.input_value()
+    slider.fill("0.5")  # the middle, on a logarithmic scale
+    assert until_sent(page, "set")[-1] == {"do": "set", "id": "stiffness", "value": 200}
+    assert shown.inner_text() == "200 N/m"
+    tell(page, "play_values", values={"stiffness": 400.0})
+    assert slider.input_value() == before
+    assert shown.inner_text() == "400 N/m"
+    page.evaluate("sent.length = 0")
+    page.get_by_role("switch", name="Friction").click()
+    page.get_by_role("radio", name="posture").click()
+    until_sent(page, "set", 2)
+    assert [message["value"] for message in sent(page)] == [True, "posture"]
+    tell(page, "play_values", values={"friction": False, "field": "off"})
+    assert page.get_by_role("switch", name="Friction").is_checked() is False
+    assert page.get_by_role("radio", name="off").is_checked()
+
+
+def test_a_target_returns_to_its_path(page: Any) -> None:
+    page.get_by_role("button", name="elbow: back to its own path").click()
+    assert sent(page) == [{"do": "resume", "target": "elbow"}]
+
+
+SAMPLES = """(times) => viewer.handle_command({
+  type: "play_samples", path: "/play", number: 1,
+  times: Float64Array.from(times),
+  values: Float32Array.from(times.flatMap((t) => [1 + t, Math.sin(t), -t]))})"""
+
+
+def test_the_plots_keep_the_last_seconds(page: Any) -> None:
+    times = [0.01 * k for k in range(400)]
+    page.evaluate(SAMPLES, times)
+    page.evaluate(SAMPLES, [time + 6.0 for time in times])  # the page had stalled
+    assert page.evaluate("play.plots.count") == 800
+    gaps = """[...Array(play.plots.count - 1).keys()].filter((row) =>
+      play.plots.isGap(play.plots.time(row + 1) - play.plots.time(row)))"""
+    assert page.evaluate(gaps) == [399]
+    outputs = page.locator(".play-plots output")
+    until(
+        page,
+        "document.querySelector('.play-plots output').textContent === '10.99'"
+        " || document.querySelector('.play-plots output').textContent === '11.0'",
+    )
+    assert outputs.nth(2).inner_text() == "−9.990"
+    box = page.locator(".play-plots canvas").nth(1).bounding_box()
+    page.mouse.move(box["x"] + 60, box["y"] + 40)  # 0.3 s into the plot
+    until(page, "document.querySelectorAll('.play-plots time')[1].textContent !== ''")
+    entry = page.locator(".play-plots li button").nth(1)
+    entry.click()
+    assert entry.get_attribute("aria-pressed") == "true"
+    entry.click()
+    assert entry.get_attribute("aria-pressed") == "false"
+    rows = page.evaluate("LivePlots.ROWS")
+    page.evaluate(SAMPLES, [10.0 + 1e-3 * k for k in range(rows + 500)])
+    assert page.evaluate("play.plots.count") == rows
+    assert page.evaluate("play.plots.end") == pytest.approx(10 + 1e-3 * (rows + 499))
+    page.evaluate(SAMPLES, [0.0, 0.01])  # after a reset
+    assert page.evaluate("play.plots.count") == 2
+
+
+def test_a_closed_panel_draws_nothing(page: Any) -> None:
+    page.locator(".play-bar .panel").click()
+    assert page.locator(".play-panel").is_hidden()
+    assert page.evaluate("viewer.dom_element.offsetWidth === innerWidth")
+    page.evaluate("() => { play.plots.draw = () => { throw new Error('drawn'); }; }")
+    page.evaluate(SAMPLES, [20.0, 20.01])
+    assert page.evaluate("play.plots.waiting") is False
+    page.evaluate("delete play.plots.draw")
+    page.locator(".play-bar .panel").click()
+    assert page.locator(".play-panel").is_visible()
+
+
+def test_a_warning_is_read(page: Any) -> None:
+    words = "Stiffness 9000 N/m is too stiff for this period."
+    tell(
+        page,
+        "play_state",
+        t=2.0,
+        running=True,
+        rate=0.5,
+        message=words,
+        level="warning",
+    )
+    status = page.locator(".play-status")
+    assert status.inner_text() == words
+    assert "warning" in status.get_attribute("class")
+    assert page.locator(".play-bar .rate").inner_text().startswith("0.50 ×")
+
+
+def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:
+    page, wrong = opened(
+        chromium,
+        viewer,
+        viewport={"width": 390, "height": 844},
+        is_mobile=True,
+        has_touch=True,
+    )
+    begin(page)
+    assert page.locator(".play-panel").is_hidden()
+    page.locator(".play-bar .panel").tap()
+    until(
+        page, "getComputedStyle(document.querySelector('.play-panel')).opacity === '1'"
+    )
+    assert page.evaluate("innerWidth") == 390
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    for thing in page.locator(
+        ":is(.play-foot button, .play-panel button, .play-panel input):visible"
+    ).all():
+        thing.scroll_into_view_if_needed()
+        box = thing.bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 390
+        if thing.get_attribute("role") != "switch":  # its whole row is
+            assert box["height"] >= 40, thing.evaluate("(it) => it.outerHTML")
+    page.get_by_role("button", name="Close the panel").tap()
+    until(
+        page, "getComputedStyle(document.querySelector('.play-panel')).opacity === '0'"
+    )
+    # A finger that drags the ball; it may miss it by 20 pixels.
+    start = pixel(page, HAND)
+    touch = page.context.new_cdp_session(page)
+
+    def finger(kind: str, *places: np.ndarray) -> None:
+        points = [{"x": float(x), "y": float(y)} for x, y in places]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    page.evaluate("sent.length = 0")
+    finger("touchStart", start + np.array([0.0, 12.0]))
+    finger("touchMove", start + np.array([10.0, -10.0]))
+    finger("touchMove", start + np.array([30.0, -40.0]))
+    finger("touchEnd")
+    until_sent(page, "release")
+    *_, move, release = sent(page)
+    assert (move["do"], release["do"]) == ("move", "release")
+    page.close()
+    assert wrong == []
