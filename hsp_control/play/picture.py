@@ -97,6 +97,8 @@ class Picture:
         dark = self._viewer.dark
         layers = all_layers(robot, motion, None, dark=dark)
         del layers["paths"]
+        if set(self._session.targets) >= {t.name for t in controller.tasks if t.drawn}:
+            del layers["targets"]  # the handles are there
         obstacles = layers["obstacles"]
         assert isinstance(obstacles, ObstacleLayer)
         field, ink = controller.field, CHALK if dark else INK
@@ -260,8 +262,8 @@ def _plots(session: Session) -> Iterator[Plot]:
         yield Plot("Task error", unit, True, curves)
     if controller.field.controls:
         norm = Curve("‖e_N‖", "null_space_norm", slice(0, 1))
-        unit = "/".join((dict.fromkeys(controller.robot.units), "s")[1:])
-        yield Plot("Null-space error", unit or "rad/s", True, [norm])
+        unit = " or ".join(f"{unit}/s" for unit in dict.fromkeys(controller.robot.units))
+        yield Plot("Null-space error", unit, True, [norm])
     names = [name for name in session.recorder.rows(0) if name.startswith("distance.")]
     if names:
         curves = [Curve(n.removeprefix("distance."), n, slice(0, 1)) for n in names]
