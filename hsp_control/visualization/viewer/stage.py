@@ -16,6 +16,7 @@ from hsp_control.visualization.viewer.commands import (
     set_property,
     set_transform,
 )
+from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.poses import pose_at
 
 _LIGHT_FROM = np.array([0.5, -0.45, 1.6])
@@ -39,6 +40,14 @@ def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Comm
     yield from _lights(center, size, view.light)
     yield from _floor(center, size, floor)
     yield set_property("/floor/grid", "visible", view.show.grid)
+
+
+def stage_legend(view: ViewSettings) -> list[LegendEntry]:
+    """Return the legend's entries of what lies on the floor."""
+    return [
+        LegendEntry("grid", GRID, ("/floor/grid",), view.show.grid),
+        LegendEntry("shadow", palette.SHADOW, ("/floor/shadow",)),
+    ]
 
 
 def is_dark(color: str) -> bool:

@@ -6,16 +6,25 @@ const meshcat = viewer.handle_command.bind(viewer);
 
 // The scene brings its own lights, floor and grid, which fit the robot.
 for (const name of ["Lights", "Grid", "Axes"]) viewer.delete_path([name]);
-viewer.gui.removeFolder(viewer.animator.folder);  // the scene has its own player
+// Its own controls go, too: the legend has the switches, the player the time. The scene tree
+// needs them, but nobody has to see them.
+viewer.gui.domElement.remove();
 
 const player = new Player(viewer);
 new Controls(player, document.body);
+const layers = new Layers(viewer, document.getElementById("caption"));
+const lengthLabels = new LengthLabels(viewer);
+const drawScene = viewer.render.bind(viewer);
+viewer.render = () => {
+  drawScene();
+  lengthLabels.update();
+};
 
 const commandHandlers = {camera, caption, time, status, ghost, trail, trail_more, clip, still,
-                         seek, ask, set_object, nothing() {}};
+                         seek, ask, set_object, length_label, nothing() {}};
 viewer.handle_command = (command) => {
-  if (Array.isArray(command)) command.forEach(viewer.handle_command);
-  else (commandHandlers[command.type] ?? meshcat)(command);
+  for (const each of [command].flat(Infinity)) (commandHandlers[each.type] ?? meshcat)(each);
+  layers.apply();  // nodes that were drawn again
   viewer.set_dirty();
 };
 
@@ -78,10 +87,16 @@ function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
 
 // Shares of the picture's height that are reserved for the player's bar and the title.
 const BAR = 0.1, TITLE = 0.06;
+let barHeight = 64;  // what the player's bar covers at the bottom of the picture [px]
+
+// The last camera of the program, and where it was placed then.
+let placed = null;
 
 // Look at a target from an eye, or along a direction from a distance at which all balls
-// around the points are visible.
-function camera({target, eye, direction, up, points, radius, field_of_view}) {
+// around the points are visible. In a window that is higher than wide, an eye moves back
+// until as much is seen to the left and to the right as in a square one.
+function camera(command) {
+  const {target, eye, direction, up, points, radius, field_of_view} = command;
   const center = vector(target);
   const toEye = vector(eye ?? direction);
   if (eye) toEye.sub(center);
@@ -89,39 +104,60 @@ function camera({target, eye, direction, up, points, radius, field_of_view}) {
   toEye.normalize();
   const tall = Math.tan(field_of_view * Math.PI / 360);
   const {clientWidth, clientHeight} = viewer.dom_element;
-  const wide = tall * (clientWidth / clientHeight || 1.5);
+  const aspect = clientWidth / clientHeight || 1.5;
+  const wide = tall * aspect;
+  const bar = Math.max(BAR, barHeight / (clientHeight || 640));
+  const title = Math.max(TITLE, layers.covered / (clientHeight || 640));
   const right = vector(up).cross(toEye).normalize();
   const above = toEye.clone().cross(right);
   const needed = (point) => {
     const offset = vector(point).sub(center);
     const x = Math.abs(offset.dot(right)) + radius, y = Math.abs(offset.dot(above)) + radius;
-    return offset.dot(toEye) + Math.max(x / wide, y / (tall * (1 - BAR - TITLE)));
+    return offset.dot(toEye) + Math.max(x / wide, y / (tall * (1 - bar - title)));
   };
-  const away = distance || Math.max(...points.map(needed));
+  const away = distance / Math.min(aspect, 1) || Math.max(...points.map(needed));
   const lens = viewer.camera;
   lens.fov = field_of_view;
   lens.near = away / 100;
   lens.far = away * 100;
   lens.up.copy(vector(up));
   lens.position.copy(center).addScaledVector(toEye, away);
-  lens.setViewOffset(1, 1, 0, (BAR - TITLE) / 2, 1, 1);
+  lens.setViewOffset(1, 1, 0, (bar - title) / 2, 1, 1);
   viewer.set_3d_pane_size();
   viewer.controls.dispose();
   viewer.set_camera(lens);  // new controls, which orbit about the new up direction
   viewer.controls.target.copy(center);
+  placed = {command, position: lens.position.clone(), target: center, slack: 1e-3 * away};
 }
+
+// Place the camera again for another size of the window, unless the user has moved it.
+function refit() {
+  viewer.set_3d_pane_size();
+  const {camera: lens, controls} = viewer;
+  const untouched = placed && lens.position.distanceTo(placed.position) < placed.slack
+    && controls.target.distanceTo(placed.target) < placed.slack;
+  if (untouched) camera(placed.command);
+  viewer.set_dirty();
+}
+
+// Meshcat takes the window's height; here the element's counts, which may be a part of it.
+const fitPane = viewer.set_3d_pane_size.bind(viewer);
+viewer.set_3d_pane_size = () => {
+  const {clientWidth, clientHeight} = viewer.dom_element;
+  if (clientWidth && clientHeight) fitPane(clientWidth, clientHeight);
+};
+new ResizeObserver(refit).observe(viewer.dom_element);
 
 function caption({title, legend, dark}) {
   document.title = title;
   document.body.classList.toggle("dark", dark);
   document.querySelector("#caption h1").textContent = title;
-  document.querySelector("#caption ul").replaceChildren(...legend.map(({name, color}) => {
-    const entry = document.createElement("li");
-    entry.textContent = name;
-    entry.style.setProperty("--color", color);
-    return entry;
-  }));
+  layers.show(legend);
+  if (layers.covered) refit();  // the title's height is known now
 }
+
+// Label a bar with its length.
+function length_label({path}) { lengthLabels.add(path); }
 
 // Tint a node and all nodes below it, and make them translucent.
 function ghost({path, color, opacity}) {
