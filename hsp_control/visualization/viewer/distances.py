@@ -105,7 +105,7 @@ class Distances:
         """Return the legend's entries."""
         kinds = {
             "minimum distance": _PairDistance,
-            "distance of a joint to the obstacle's centre": _FrameDistance,
+            "distance to the obstacle's centre": _FrameDistance,
         }
         return [
             LegendEntry(name, self._color, paths)

@@ -16,7 +16,7 @@ from hsp_control.visualization.viewer.commands import (
     set_property,
     set_transform,
 )
-from hsp_control.visualization.viewer.legend import LegendEntry
+from hsp_control.visualization.viewer.legend import LegendEntry, translucent
 from hsp_control.visualization.viewer.poses import pose_at
 
 _LIGHT_FROM = np.array([0.5, -0.45, 1.6])
@@ -46,7 +46,7 @@ def stage_legend(view: ViewSettings) -> list[LegendEntry]:
     """Return the legend's entries of what lies on the floor."""
     return [
         LegendEntry("grid", GRID, ("/floor/grid",), view.show.grid),
-        LegendEntry("shadow", palette.SHADOW, ("/floor/shadow",)),
+        LegendEntry("shadow", translucent(palette.MUTED, 0.4), ("/floor/shadow",)),
     ]
 
 

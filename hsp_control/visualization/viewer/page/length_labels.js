@@ -9,7 +9,7 @@
 
 class LengthLabels {
   static MOST = 8;  // more would hide the scene: then the shortest bars have labels
-  static BESIDE = 12;  // px from a bar's middle
+  static GAP = 7;  // between a bar and its label [px]
 
   constructor(viewer) {
     this.viewer = viewer;
@@ -54,7 +54,7 @@ class LengthLabels {
     return bars.sort((one, other) => one.length - other.length).slice(0, LengthLabels.MOST);
   }
 
-  // Put a label beside the middle of a bar, on the side to which the bar does not run.
+  // Put a label beside the middle of a bar, so that it does not cover the bar.
   place(label, bar) {
     const {clientWidth, clientHeight} = this.viewer.dom_element;
     const seen = (z) => {
@@ -62,13 +62,17 @@ class LengthLabels {
       point.project(this.viewer.camera);
       return [(point.x + 1) / 2 * clientWidth, (1 - point.y) / 2 * clientHeight, point.z];
     };
-    const [x, y, depth] = seen(0.5);
-    const [x0, y0] = seen(0), [x1, y1] = seen(1);
+    const [x0, y0] = seen(0), [x1, y1] = seen(1), [x, y, depth] = seen(0.5);
     if (Math.abs(depth) > 1) label.hidden = true;  // behind the camera
-    // Beside a steep bar, above a level one.
-    const steep = Math.abs(y1 - y0) > Math.abs(x1 - x0);
-    const shift = steep ? `${x + LengthLabels.BESIDE}px, calc(${y}px - 50%)`
-      : `calc(${x}px - 50%), calc(${y - LengthLabels.BESIDE}px - 100%)`;
-    label.style.transform = `translate(${shift})`;
+    const length = Math.hypot(x1 - x0, y1 - y0) || 1;
+    // Normal to the bar, and to the right, or up if the bar is level.
+    let across = [(y0 - y1) / length, (x1 - x0) / length];
+    if (across[0] < -1e-3 || (across[0] < 1e-3 && across[1] > 0)) across = across.map((c) => -c);
+    const {offsetWidth, offsetHeight} = label;
+    const away = LengthLabels.GAP + Math.abs(across[0]) * offsetWidth / 2
+      + Math.abs(across[1]) * offsetHeight / 2;
+    const left = x + away * across[0] - offsetWidth / 2;
+    const top = y + away * across[1] - offsetHeight / 2;
+    label.style.transform = `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
   }
 }

@@ -87,14 +87,15 @@ function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
 
 // Shares of the picture's height that are reserved for the player's bar and the title.
 const BAR = 0.1, TITLE = 0.06;
+const WIDE = 16 / 9;  // width over height
 let barHeight = 64;  // what the player's bar covers at the bottom of the picture [px]
 
 // The last camera of the program, and where it was placed then.
 let placed = null;
 
 // Look at a target from an eye, or along a direction from a distance at which all balls
-// around the points are visible. In a window that is higher than wide, an eye moves back
-// until as much is seen to the left and to the right as in a square one.
+// around the points are visible. An eye is chosen for a wide window: in a narrower one it
+// moves back until the points are in sight, or as much of them as in the wide one.
 function camera(command) {
   const {target, eye, direction, up, points, radius, field_of_view} = command;
   const center = vector(target);
@@ -113,9 +114,11 @@ function camera(command) {
   const needed = (point) => {
     const offset = vector(point).sub(center);
     const x = Math.abs(offset.dot(right)) + radius, y = Math.abs(offset.dot(above)) + radius;
-    return offset.dot(toEye) + Math.max(x / wide, y / (tall * (1 - bar - title)));
+    const across = x / wide, upwards = eye ? 0 : y / (tall * (1 - bar - title));
+    return offset.dot(toEye) + Math.max(across, upwards);
   };
-  const away = distance / Math.min(aspect, 1) || Math.max(...points.map(needed));
+  let away = Math.max(...points.map(needed));
+  if (eye) away = Math.min(Math.max(away, distance), distance * Math.max(WIDE / aspect, 1));
   const lens = viewer.camera;
   lens.fov = field_of_view;
   lens.near = away / 100;
