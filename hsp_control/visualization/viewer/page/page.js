@@ -90,6 +90,20 @@ const BAR = 0.1, TITLE = 0.06;
 const WIDE = 16 / 9;  // width over height
 let barHeight = 64;  // what the player's bar covers at the bottom of the picture [px]
 
+// Half the width of the robot's widest link [m]: the points are those of its skeleton.
+function girth() {
+  const size = new MeshCat.THREE.Vector3(), scale = new MeshCat.THREE.Vector3();
+  let widest = 0;
+  layers.find("/robot")?.traverse((mesh) => {
+    if (!mesh.geometry?.isBufferGeometry) return;
+    mesh.geometry.boundingBox ?? mesh.geometry.computeBoundingBox();
+    mesh.geometry.boundingBox.getSize(size).multiply(mesh.getWorldScale(scale));
+    const [, width] = size.toArray().sort((one, other) => one - other);  // the middle one of its edges
+    if (width / 2 > widest) widest = width / 2;
+  });
+  return widest;
+}
+
 // The last camera of the program, and where it was placed then.
 let placed = null;
 
@@ -97,7 +111,8 @@ let placed = null;
 // around the points are visible. An eye is chosen for a wide window: in a narrower one it
 // moves back until the points are in sight, or as much of them as in the wide one.
 function camera(command) {
-  const {target, eye, direction, up, points, radius, field_of_view} = command;
+  const {target, eye, direction, up, points, field_of_view} = command;
+  const radius = Math.max(command.radius, girth());
   const center = vector(target);
   const toEye = vector(eye ?? direction);
   if (eye) toEye.sub(center);
