@@ -15,7 +15,6 @@ class LengthLabels {
     this.viewer = viewer;
     this.paths = new Set();
     this.labels = [];
-    viewer.dom_element.style.position ||= "relative";
   }
 
   add(path) { this.paths.add(path); }
