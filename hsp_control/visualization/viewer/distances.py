@@ -47,8 +47,8 @@ class Distances:
     """One bar per obstacle, from the closest link, while the field is active there.
 
     Bars and the balls at their ends are seen through all else: a link's drawn mesh lies
-    inside the hull whose distance the field evaluates, so that a bar may start beside
-    the mesh, and the paper's cost measures from a joint to an obstacle's centre.
+    inside the capsule or hull whose distance the field evaluates, so that a bar may
+    start beside the mesh; and the paper's cost measures from a joint to a centre.
     """
 
     def __init__(self, controller: Controller, root: str, color: str) -> None:

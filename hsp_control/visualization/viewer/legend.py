@@ -12,12 +12,15 @@ class LegendEntry(NamedTuple):
         color: Its colour, ``#RRGGBB`` or, if it is translucent, ``#RRGGBBAA``.
         paths: The nodes of the scene tree that the row shows and hides.
         shown: Whether they are shown at first.
+        plain: Whether the row is only a switch, as what it names explains itself: films
+            leave it out.
     """
 
     name: str
     color: str
     paths: tuple[str, ...]
     shown: bool = True
+    plain: bool = False
 
 
 def translucent(color: str, opacity: float) -> str:

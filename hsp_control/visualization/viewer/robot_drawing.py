@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 
 def robot_entry(root: str = ROOT) -> LegendEntry:
     """Return the legend's entry of a robot whose node is ``root``."""
-    return LegendEntry("robot", LINK, (root,))
+    return LegendEntry("robot", LINK, (root,), plain=True)
 
 
 class RobotDrawing:

@@ -21,6 +21,7 @@ from hsp_control.visualization.viewer.poses import pose_at
 
 _LIGHT_FROM = np.array([0.5, -0.45, 1.6])
 _FINE = 1e-3
+_SHADOW = translucent(palette.MUTED, 0.4)
 
 
 def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Command]:
@@ -45,8 +46,8 @@ def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Comm
 def stage_legend(view: ViewSettings) -> list[LegendEntry]:
     """Return the legend's entries of what lies on the floor."""
     return [
-        LegendEntry("grid", GRID, ("/floor/grid",), view.show.grid),
-        LegendEntry("shadow", translucent(palette.MUTED, 0.4), ("/floor/shadow",)),
+        LegendEntry("grid", GRID, ("/floor/grid",), view.show.grid, plain=True),
+        LegendEntry("shadow", _SHADOW, ("/floor/shadow",), plain=True),
     ]
 
 

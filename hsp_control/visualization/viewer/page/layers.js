@@ -77,6 +77,7 @@ class Layers {
       this.set(entry.paths, button.getAttribute("aria-pressed") !== "true");
       if (event.detail) button.blur();  // a click of the mouse: space remains the player's
     };
+    item.classList.toggle("plain", entry.plain);
     item.append(button);
     return {entry, item, button};
   }
