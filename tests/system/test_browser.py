@@ -438,7 +438,7 @@ def test_on_a_phone_the_legend_waits_behind_a_button_and_all_is_in_sight(
         assert page.locator("meta[name=viewport]").count() == 1
         assert page.evaluate("document.documentElement.scrollWidth") == PHONE[0]
         assert not page.locator("#layers").is_visible()
-        button = page.locator("#caption .toggle")
+        button = page.locator("#caption .layers-toggle")
         assert button.get_attribute("aria-expanded") == "false"
         left, right, top, bottom = spread(watched)
         heading = page.locator("#caption h1").bounding_box()

@@ -19,7 +19,7 @@ class Layers {
     this.choices = new Map();  // path -> whether the user wants to see it
     this.rows = [];
     this.toggle = document.createElement("button");
-    this.toggle.className = "toggle";
+    this.toggle.className = "layers-toggle";
     this.toggle.type = "button";
     this.toggle.title = "Show or hide the legend, whose rows are switches";
     this.toggle.setAttribute("aria-controls", "layers");
