@@ -113,6 +113,13 @@ class Layers {
     return node?.object;
   }
 
+  // How far the legend reaches into the picture from the left [px].
+  get reach() {
+    if (!this.open || this.small.matches || !this.rows.length) return 0;
+    return this.list.getBoundingClientRect().right
+      - this.viewer.dom_element.getBoundingClientRect().left;
+  }
+
   // The height of what the caption covers at the top of the picture [px].
   get covered() {
     const heading = this.caption.querySelector("h1");

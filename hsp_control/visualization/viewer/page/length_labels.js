@@ -72,6 +72,7 @@ class LengthLabels {
       + Math.abs(across[1]) * offsetHeight / 2;
     const left = x + away * across[0] - offsetWidth / 2;
     const top = y + away * across[1] - offsetHeight / 2;
-    label.style.transform = `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
+    // Whole pixels: else the same time may give another image.
+    label.style.transform = `translate(${Math.round(left)}px, ${Math.round(top)}px)`;
   }
 }

@@ -104,6 +104,15 @@ function girth() {
   return widest;
 }
 
+// How far the scene moves to the right to be beside the legend, if there is space for it.
+// Positions in the picture are from -1, its left edge, to 1.
+function sidestep(spans) {
+  const left = Math.min(...spans.map(([start]) => start));
+  const right = Math.max(...spans.map(([, end]) => end));
+  const legend = 2 * layers.reach / (viewer.dom_element.clientWidth || Infinity) - 1;
+  return Math.max(Math.min(legend - left, 1 - right), 0);
+}
+
 // The last camera of the program, and where it was placed then.
 let placed = null;
 
@@ -140,7 +149,12 @@ function camera(command) {
   lens.far = away * 100;
   lens.up.copy(vector(up));
   lens.position.copy(center).addScaledVector(toEye, away);
-  lens.setViewOffset(1, 1, 0, (bar - title) / 2, 1, 1);
+  const shift = eye ? 0 : sidestep(points.map((point) => {
+    const offset = vector(point).sub(center);
+    const half = (away - offset.dot(toEye)) * wide;  // of the picture's width, at the point
+    return [(offset.dot(right) - radius) / half, (offset.dot(right) + radius) / half];
+  }));
+  lens.setViewOffset(1, 1, -shift / 2, (bar - title) / 2, 1, 1);
   viewer.set_3d_pane_size();
   viewer.controls.dispose();
   viewer.set_camera(lens);  // new controls, which orbit about the new up direction
@@ -171,7 +185,7 @@ function caption({title, legend, dark}) {
   document.body.classList.toggle("dark", dark);
   document.querySelector("#caption h1").textContent = title;
   layers.show(legend);
-  if (layers.covered) refit();  // the title's height is known now
+  refit();  // now it is known what title and legend cover
 }
 
 // Label a bar with its length.
