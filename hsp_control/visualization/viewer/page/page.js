@@ -14,8 +14,12 @@ const player = new Player(viewer);
 new Controls(player, document.body);
 const layers = new Layers(viewer, document.getElementById("caption"));
 const lengthLabels = new LengthLabels(viewer);
+let placed = null;  // the last camera of the program, and where it was placed then
 const drawScene = viewer.render.bind(viewer);
 viewer.render = () => {
+  // Meshcat's controls round the position anew each time: begin from the same, so that the
+  // same time gives the same image.
+  if (untouched()) viewer.camera.position.copy(placed.position);
   drawScene();
   lengthLabels.update();
 };
@@ -113,9 +117,6 @@ function sidestep(spans) {
   return Math.max(Math.min(legend - left, 1 - right), 0);
 }
 
-// The last camera of the program, and where it was placed then.
-let placed = null;
-
 // Look at a target from an eye, or along a direction from a distance at which all balls
 // around the points are visible. An eye is chosen for a wide window: in a narrower one it
 // moves back until the points are in sight, or as much of them as in the wide one.
@@ -159,16 +160,20 @@ function camera(command) {
   viewer.controls.dispose();
   viewer.set_camera(lens);  // new controls, which orbit about the new up direction
   viewer.controls.target.copy(center);
-  placed = {command, position: lens.position.clone(), target: center, slack: 1e-3 * away};
+  placed = {command, position: lens.position.clone(), target: center.clone(), slack: 1e-9 * away};
+}
+
+// Whether the camera is where the program placed it.
+function untouched() {
+  const {camera: lens, controls} = viewer;
+  return placed !== null && lens.position.distanceTo(placed.position) < placed.slack
+    && controls.target.distanceTo(placed.target) < placed.slack;
 }
 
 // Place the camera again for another size of the window, unless the user has moved it.
 function refit() {
   viewer.set_3d_pane_size();
-  const {camera: lens, controls} = viewer;
-  const untouched = placed && lens.position.distanceTo(placed.position) < placed.slack
-    && controls.target.distanceTo(placed.target) < placed.slack;
-  if (untouched) camera(placed.command);
+  if (untouched()) camera(placed.command);
   viewer.set_dirty();
 }
 
