@@ -17,7 +17,7 @@ Color = Annotated[str, Field(pattern="^#[0-9A-Fa-f]{6}$")]
 
 
 class ShownItems(Part, error=ViewerError):
-    """What is shown at first; the page's scene tree can switch each item."""
+    """What is shown at first; the rows of the page's legend switch each."""
 
     _: KW_ONLY
     paths: Flag = True

@@ -130,7 +130,7 @@ def test_a_log_is_viewed_as_its_configuration_says(
     begin = recorder.command(CLIP, "begin")
     assert begin is not None
     assert begin["speed"] == 20.0
-    hidden = recorder.command("/paths", "visible")
+    hidden = recorder.command("/paths/tip/actual", "visible")
     assert hidden is not None
     assert hidden["value"] is False
     assert recorder.command("/targets", "visible") is None

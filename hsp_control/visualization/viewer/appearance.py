@@ -24,6 +24,8 @@ INK, CHALK = palette.INK, palette.WALL
 """Colour of lines on a light and on a dark background."""
 BAR_RADIUS = 0.003
 """Radius of a distance bar, over the size of the scene."""
+BAR_END_RADIUS = 0.0075
+"""Radius of the balls at its ends, over the size of the scene."""
 ELLIPSOID, ELLIPSOID_OPACITY = palette.TASK, 0.3
 FIELD, FIELD_OPACITY = palette.FIELD, 0.4
 ARROW_RADIUS = 0.007

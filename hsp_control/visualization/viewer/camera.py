@@ -35,21 +35,23 @@ def look_at(
     Args:
         robot: The robot.
         points: The points that must be visible [m], shape (K, 3).
-        eye: The camera's position [m]; None: far enough to see all points.
+        eye: The camera's position [m], farther in a narrow window; None: far enough to
+            see all points.
         target: The point that it looks at [m]; None: the middle of the points.
         fit: Keep only the direction of ``eye``, and move away to see all points.
     """
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     center = middle if target is None or fit else np.asarray(target, float)
     direction = viewing_direction(robot, eye, center if target is None else target)
-    view: dict[str, object] = {}
+    stride = max(1, len(points) // _MAX_POINTS)
+    view: dict[str, object] = {
+        "points": points[::stride].tolist(),
+        "radius": _THICKNESS * scene_size(points),
+    }
     if eye is not None and not fit:
         view["eye"] = np.asarray(eye, float).tolist()
     else:
-        stride = max(1, len(points) // _MAX_POINTS)
         view["direction"] = direction.tolist()
-        view["points"] = points[::stride].tolist()
-        view["radius"] = _THICKNESS * scene_size(points)
     steep = abs(direction[2]) > _COS_STEEP * np.linalg.norm(direction)
     return set_camera(
         **view,

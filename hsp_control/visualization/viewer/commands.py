@@ -9,6 +9,7 @@ import umsgpack  # type: ignore[import-untyped]
 
 from hsp_control.common.arrays import Array
 from hsp_control.visualization.viewer.latest_commands import key_of
+from hsp_control.visualization.viewer.legend import LegendEntry
 
 Json = dict[str, Any]
 
@@ -104,6 +105,15 @@ def extend_trail(path: str, points: Array, number: int) -> Command:
     return _command("trail_more", path, f"more {number}", points=more)
 
 
+def set_length_label(path: str) -> Command:
+    """Return the command that labels a bar with its length [m], however it moves.
+
+    Args:
+        path: The node of a bar of length 1 along z: its scale in z is its length.
+    """
+    return _command("length_label", path, "length label")
+
+
 def delete(path: str) -> Command:
     """Return the command that deletes a node and all nodes below it."""
     return _command("delete", path, "delete")._replace(deletes=True)
@@ -115,16 +125,16 @@ def set_camera(**view: Any) -> Command:
 
 
 def set_caption(
-    title: str, legend: list[tuple[str, str]], *, dark: bool = False
+    title: str, legend: list[LegendEntry], *, dark: bool = False
 ) -> Command:
     """Return the command that sets the title and the legend beside the scene.
 
     Args:
         title: The title.
-        legend: Names and colours ``#RRGGBB``.
+        legend: Its rows; each is also a switch.
         dark: Whether the background is dark.
     """
-    entries = [{"name": name, "color": color} for name, color in legend]
+    entries = [{**entry._asdict(), "paths": list(entry.paths)} for entry in legend]
     return _command(
         "caption", CAPTION, "caption", title=title, legend=entries, dark=dark
     )

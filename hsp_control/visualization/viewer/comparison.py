@@ -13,6 +13,7 @@ from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.appearance import ACTUAL
 from hsp_control.visualization.viewer.clip import Clip
 from hsp_control.visualization.viewer.commands import Command, set_ghost, set_transform
+from hsp_control.visualization.viewer.legend import LegendEntry, merged
 from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.poses import pose_at
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
@@ -133,14 +134,23 @@ class Comparison:
         """Return the runs' names."""
         return (" | " if self._beside is not None else " and ").join(self._names)
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
         if self._beside is not None:
-            return list(dict.fromkeys(e for run in self._runs for e in run.legend()))
-        named = [(self._names[0], ACTUAL)]
-        named += [(name, _color(k)) for k, name in enumerate(self._names) if k]
-        rest = [entry for entry in self._runs[0].legend() if entry[1] != ACTUAL]
-        return named + rest
+            return merged(entry for run in self._runs for entry in run.legend())
+        # A ghost is all below its node; the first run is its robot and actual path.
+        entries = self._runs[0].legend()
+        first = [e for e in entries if e.color == ACTUAL or e.name == "robot"]
+        paths = tuple(path for entry in first for path in entry.paths)
+        return [
+            LegendEntry(self._names[0], ACTUAL, paths),
+            *(
+                LegendEntry(name, _color(k), (self.roots[k],))
+                for k, name in enumerate(self._names)
+                if k
+            ),
+            *(entry for entry in entries if entry not in first),
+        ]
 
     def _compute_offsets(self) -> list[Array]:
         """Return the offset of each run [m], shape (3,) each."""

@@ -11,6 +11,7 @@ from hsp_control.visualization.viewer.appearance import ARROW_RADIUS, CONTACT
 from hsp_control.visualization.viewer.arrows import arrow_tracks, unit_arrow
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object
+from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.materials import always_visible, material
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.scene_path import path_element
@@ -66,9 +67,10 @@ class Contacts:
             shown = touches.astype(float)[:, None]
             yield Track(self._path(name, "point"), "visible", times, shown)
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
-        return [("contact force", CONTACT)] if self._names else []
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
+        name = LegendEntry("contact force", CONTACT, (self._root,))
+        return [name] if self._names else []
 
     def _path(self, name: str, kind: str) -> str:
         return f"{self._root}/{path_element(name)}/{kind}"

@@ -1,4 +1,4 @@
-"""The minimum distances that the null-space field evaluates, as bars."""
+"""The minimum distances that the null-space field evaluates, as labelled bars."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -10,16 +10,23 @@ from hsp_control.control.controller import Controller
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.null_space.fields import Clearance, PointDistance
 from hsp_control.robot import RobotState
-from hsp_control.visualization.viewer.appearance import BAR_RADIUS
+from hsp_control.visualization.viewer import threejs
+from hsp_control.visualization.viewer.appearance import BAR_END_RADIUS, BAR_RADIUS
 from hsp_control.visualization.viewer.arrows import bar_tracks, unit_bar
 from hsp_control.visualization.viewer.clip import Track
-from hsp_control.visualization.viewer.commands import Command, set_object
+from hsp_control.visualization.viewer.commands import (
+    Command,
+    set_length_label,
+    set_object,
+)
 from hsp_control.visualization.viewer.controller_analysis import terms_of_type
-from hsp_control.visualization.viewer.materials import unlit_material
+from hsp_control.visualization.viewer.legend import LegendEntry
+from hsp_control.visualization.viewer.materials import always_visible, unlit_material
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.scene_path import path_element
 
 _SELF = "self"
+_ENDS = ("start", "end")
 
 
 class ClosestPoints(NamedTuple):
@@ -37,7 +44,12 @@ class ClosestPoints(NamedTuple):
 
 
 class Distances:
-    """One bar per obstacle, from the closest link, while the field is active there."""
+    """One bar per obstacle, from the closest link, while the field is active there.
+
+    Bars and the balls at their ends are seen through all else: a link's drawn mesh lies
+    inside the capsule or hull whose distance the field evaluates, so that a bar may
+    start beside the mesh; and the paper's cost measures from a joint to a centre.
+    """
 
     def __init__(self, controller: Controller, root: str, color: str) -> None:
         """Find the distances that the controller's field evaluates.
@@ -64,8 +76,14 @@ class Distances:
     def draw(self, size: float) -> Iterator[Command]:
         """Yield the commands that draw it in a scene of the given size [m]."""
         for name in self._distances:
-            bar = unit_bar(unlit_material(self._color), BAR_RADIUS * size)
-            yield set_object(self._path(name), bar)
+            surface = always_visible(unlit_material(self._color))
+            bar = unit_bar(surface, BAR_RADIUS * size)
+            yield set_object(self._path(name, "bar"), bar)
+            ball = threejs.sphere(BAR_END_RADIUS * size)
+            for end in _ENDS:
+                thing = threejs.group([threejs.mesh(ball, surface, shadow=False)])
+                yield set_object(self._path(name, end), thing)
+            yield set_length_label(self._path(name, "bar"))
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
         """Yield its tracks along the run."""
@@ -75,14 +93,34 @@ class Distances:
                 found[name].append(distance.closest_points(state))
         for name, rows in found.items():
             start, end, active = map(np.array, zip(*rows, strict=True))
-            yield from bar_tracks(self._path(name), motion.times, start, end, active)
+            times, bar = motion.times, self._path(name, "bar")
+            yield from bar_tracks(bar, times, start, end, active)
+            shown = np.asarray(active, float)[:, None]
+            for place, points in zip(_ENDS, (start, end), strict=True):
+                path = self._path(name, place)
+                yield Track(path, "position", times, points)
+                yield Track(path, "visible", times, shown)
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
-        return [("minimum distance", self._color)] if self._distances else []
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
+        kinds = {
+            "minimum distance": _PairDistance,
+            "distance to the obstacle's centre": _FrameDistance,
+        }
+        return [
+            LegendEntry(name, self._color, paths)
+            for name, kind in kinds.items()
+            if (
+                paths := tuple(
+                    f"{self._root}/{path_element(key)}"
+                    for key, distance in self._distances.items()
+                    if isinstance(distance, kind)
+                )
+            )
+        ]
 
-    def _path(self, name: str) -> str:
-        return f"{self._root}/{path_element(name)}"
+    def _path(self, name: str, part: str) -> str:
+        return f"{self._root}/{path_element(name)}/{part}"
 
 
 class _PairDistance:

@@ -13,6 +13,7 @@ from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.appearance import ELLIPSOID, ELLIPSOID_OPACITY
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object
+from hsp_control.visualization.viewer.legend import LegendEntry, translucent
 from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.scene_path import path_element
@@ -58,9 +59,11 @@ class Ellipsoid:
             yield Track(path, "quaternion", motion.times, turns)
             yield Track(path, "scale", motion.times, SECONDS * np.array(axes))
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
-        return [("manipulability", ELLIPSOID)]
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
+        paths = tuple(map(self._path, self._frames))
+        color = translucent(ELLIPSOID, 2.0 * ELLIPSOID_OPACITY)
+        return [LegendEntry("manipulability", color, paths)]
 
     def _path(self, frame: str) -> str:
         return f"{self._root}/{path_element(frame)}"

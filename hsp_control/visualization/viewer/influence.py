@@ -17,12 +17,16 @@ from hsp_control.visualization.viewer.appearance import OBSTACLE, ZONE_OPACITY
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, Json, set_object
 from hsp_control.visualization.viewer.controller_analysis import terms_of_type
+from hsp_control.visualization.viewer.legend import LegendEntry, translucent
 from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_layer import obstacle_tracks
 from hsp_control.visualization.viewer.obstacle_shapes import facets, triangles_of
 from hsp_control.visualization.viewer.poses import pose_at
 from hsp_control.visualization.viewer.scene_path import path_element
+
+_SWATCH_OPACITY = 0.35
+"""Opacity of its colour in the legend: as pale as the zone would be invisible."""
 
 
 class Influence:
@@ -55,9 +59,22 @@ class Influence:
         for name in self._zones:
             yield from obstacle_tracks(self._path(name), name, motion)
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return no entry: the zone has the obstacle's colour."""
-        return []
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries: one for each distance at which a zone begins."""
+        reaches = sorted({reach for _, reach in self._zones.values()})
+        color = translucent(OBSTACLE, _SWATCH_OPACITY)
+        return [
+            LegendEntry(
+                f"influence zone {reach:g} m",
+                color,
+                tuple(
+                    self._path(name)
+                    for name, (_, own) in self._zones.items()
+                    if own == reach
+                ),
+            )
+            for reach in reaches
+        ]
 
     def _path(self, name: str) -> str:
         return f"{self._root}/{path_element(name)}"

@@ -5,6 +5,7 @@ from typing import Protocol
 
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command
+from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.motion import Motion
 
 
@@ -17,5 +18,5 @@ class Layer(Protocol):
     def tracks(self, motion: Motion) -> Iterator[Track]:
         """Yield its tracks along a run, or along a part of one."""
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""

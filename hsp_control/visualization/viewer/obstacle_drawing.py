@@ -10,10 +10,14 @@ from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import Shape
 from hsp_control.visualization.viewer.appearance import OBSTACLE
 from hsp_control.visualization.viewer.commands import Command, set_object, set_transform
+from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.obstacle_shapes import obstacle
+from hsp_control.visualization.viewer.robot_drawing import robot_entry
 from hsp_control.visualization.viewer.scene_path import path_element
 
 ROOT = "/obstacles"
+_TOLD = 3
+"""Number of obstacles that the legend names."""
 
 
 def draw_obstacle(name: str, shape: Shape, extent: float) -> Command:
@@ -39,10 +43,20 @@ def enclosing_corners(shape: Shape, center: Array) -> list[Array]:
     return [center - reach, center + reach]
 
 
-def obstacle_legend(names: Iterable[str]) -> list[tuple[str, str]]:
-    """Return the legend of the obstacles: one entry, as all have the same colour."""
-    text = ", ".join(names)
-    return [(text, OBSTACLE)] if text else []
+def obstacle_legend(names: Iterable[str], root: str = ROOT) -> list[LegendEntry]:
+    """Return the legend of the obstacles: one entry, as all have the same colour.
+
+    Args:
+        names: Their names; of many, only the first are told.
+        root: The path of their parent node.
+    """
+    known = list(names)
+    if not known:
+        return []
+    told, more = known[:_TOLD], len(known) - _TOLD
+    word = "obstacle" if len(known) == 1 else "obstacles"
+    rest = f" and {more} more" if more > 0 else ""
+    return [LegendEntry(f"{word} {', '.join(told)}{rest}", OBSTACLE, (root,))]
 
 
 class ObstacleDrawing:
@@ -75,9 +89,9 @@ class ObstacleDrawing:
         ]
         return np.reshape(corners, (-1, 3))
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
-        return obstacle_legend(self._scene)
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
+        return [*obstacle_legend(self._scene), robot_entry()]
 
 
 def _path(name: str) -> str:

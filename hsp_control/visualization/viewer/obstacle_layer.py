@@ -7,6 +7,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, set_object
+from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_drawing import (
     enclosing_corners,
@@ -52,9 +53,9 @@ class ObstacleLayer:
         ]
         return np.concatenate([np.zeros((0, 3)), *clouds])
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
-        return obstacle_legend(self.shapes)
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
+        return obstacle_legend(self.shapes, self._root)
 
     def _path(self, name: str) -> str:
         return f"{self._root}/{path_element(name)}"

@@ -14,6 +14,7 @@ from hsp_control.visualization.viewer.appearance import (
 )
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, extend_trail, set_trail
+from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.materials import color_number
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.scene_path import path_element
@@ -53,15 +54,12 @@ class Paths:
         radius = PATH_RADIUS * size
         thickness = GHOST_NARROWING if self._ghost else 1.0
         actual, desired = color_number(self._color), color_number(DESIRED)
-        for name, (desired_points, actual_points) in self._paths.items():
-            # A desired position that does not move is shown by its target marker.
-            if not self._ghost and self._moves(desired_points):
-                wide = DESIRED_WIDENING * radius
-                path = self._path(name, "desired")
-                yield set_trail(path, desired_points, wide, desired, sleeve=True)
-            if self._moves(actual_points):
-                path = self._path(name, "actual")
-                yield set_trail(path, actual_points, thickness * radius, actual)
+        for name in self._drawn_desired():
+            wide, path = DESIRED_WIDENING * radius, self._path(name, "desired")
+            yield set_trail(path, self._paths[name][0], wide, desired, sleeve=True)
+        for name in self._drawn_actual():
+            path, points = self._path(name, "actual"), self._paths[name][1]
+            yield set_trail(path, points, thickness * radius, actual)
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
         """Yield its tracks along the run."""
@@ -71,17 +69,35 @@ class Paths:
             path = self._path(name, "actual")
             yield Track(path, "length", self._ring_times, rings)
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
-        paths = self._paths.values()
-        if not any(self._moves(desired) for desired, _ in paths):
-            return []
-        return [("desired path", DESIRED), ("actual path", self._color)]
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
+        drawn = {
+            ("desired path", "desired", DESIRED): self._drawn_desired(),
+            ("actual path", "actual", self._color): self._drawn_actual(),
+        }
+        return [
+            LegendEntry(name, color, tuple(self._path(path, kind) for path in paths))
+            for (name, kind, color), paths in drawn.items()
+            if paths
+        ]
 
     def points(self) -> Array:
         """Return points of the desired paths [m], shape (K, 3)."""
         desired = [points for points, _ in self._paths.values()]
         return np.concatenate([np.zeros((0, 3)), *desired])
+
+    def _drawn_desired(self) -> list[str]:
+        """Return the tasks whose desired path is drawn."""
+        # A desired position that does not move is shown by its target marker.
+        return [
+            name
+            for name, (desired, _) in self._paths.items()
+            if not self._ghost and self._moves(desired)
+        ]
+
+    def _drawn_actual(self) -> list[str]:
+        """Return the tasks whose actual path is drawn."""
+        return [name for name, (_, path) in self._paths.items() if self._moves(path)]
 
     def _moves(self, path: Array) -> bool:
         """Return whether a path is longer than it is thick."""
@@ -123,6 +139,10 @@ class GrowingPaths(Paths):
             if target.name in self._rings:
                 path = self._path(target.name, "actual")
                 yield extend_trail(path, target.actual, self._pieces)
+
+    def _drawn_actual(self) -> list[str]:
+        """Return all tasks: each path may yet grow."""
+        return list(self._paths)
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
         """Yield its tracks along a part of the run."""

@@ -9,6 +9,7 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.robot import Robot
 from hsp_control.visualization.viewer import threejs
+from hsp_control.visualization.viewer.appearance import LINK
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import (
     Command,
@@ -16,6 +17,7 @@ from hsp_control.visualization.viewer.commands import (
     set_object,
     set_transform,
 )
+from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.mesh_files import collada_object, mesh_geometry
 from hsp_control.visualization.viewer.motion import Motion
@@ -27,7 +29,13 @@ from hsp_control.visualization.viewer.visuals import Visual, read_visuals
 ROOT = "/robot"
 """Default node of a robot in the scene tree."""
 
+
 _log = logging.getLogger(__name__)
+
+
+def robot_entry(root: str = ROOT) -> LegendEntry:
+    """Return the legend's entry of a robot whose node is ``root``."""
+    return LegendEntry("robot", LINK, (root,), plain=True)
 
 
 class RobotDrawing:

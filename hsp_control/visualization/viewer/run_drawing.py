@@ -16,10 +16,11 @@ from hsp_control.visualization.viewer.distances import Distances
 from hsp_control.visualization.viewer.ellipsoid import Ellipsoid
 from hsp_control.visualization.viewer.influence import Influence
 from hsp_control.visualization.viewer.layer import Layer
+from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
 from hsp_control.visualization.viewer.paths import Paths
-from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
+from hsp_control.visualization.viewer.robot_drawing import RobotDrawing, robot_entry
 from hsp_control.visualization.viewer.self_motion import SelfMotion
 from hsp_control.visualization.viewer.target_markers import TargetMarkers
 
@@ -33,7 +34,7 @@ LAYERS = (
     "self_motion",
     "contacts",
 )
-"""The layers: nodes of the scene tree, and keys of ``view: show``."""
+"""The layers: nodes of the scene tree, and keys of ``view: show``, in their order."""
 
 
 def all_layers(
@@ -119,7 +120,9 @@ class RunDrawing:
         for name, layer in self.layers.items():
             yield from layer.draw(size)
             if not self._shown[name]:
-                yield set_property(f"{self._root}/{name}", "visible", False)
+                # Not the layer's own node: each row of the legend is one switch.
+                for path in (path for entry in layer.legend() for path in entry.paths):
+                    yield set_property(path, "visible", False)
 
     def clip(self) -> Clip:
         """Return the clip of robot and layers."""
@@ -143,14 +146,14 @@ class RunDrawing:
         """Return points that enclose the obstacles in the run [m], shape (K, 3)."""
         return ObstacleLayer(self.motion, "").points()
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return the legend's entries of the layers that are shown."""
-        return [
-            entry
-            for name, layer in self.layers.items()
-            if self._shown[name]
-            for entry in layer.legend()
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries of all layers, and the robot's."""
+        entries = [
+            entry._replace(shown=self._shown[name])
+            for name in sorted(self.layers, key=LAYERS.index)
+            for entry in self.layers[name].legend()
         ]
+        return [*entries, robot_entry(f"{self._root}/robot")]
 
 
 def clear() -> Iterator[Command]:

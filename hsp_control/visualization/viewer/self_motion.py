@@ -21,6 +21,7 @@ from hsp_control.visualization.viewer.controller_analysis import (
     from_the_start,
     null_space_projector,
 )
+from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.materials import always_visible, material
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.scene_path import path_element
@@ -97,11 +98,12 @@ class SelfMotion:
                     radius,
                 )
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
         if not self._joints:
             return []
-        return [(f"self-motion in {self.seconds:g} s (pale: the field's)", FIELD)]
+        name = f"self-motion in {self.seconds:g} s (pale: the field's)"
+        return [LegendEntry(name, FIELD, (self._root,))]
 
     def _velocities(self, motion: Motion) -> tuple[Array, Array, Array]:
         """Return the joints' positions [m] and velocities due to P v and P g [m/s].

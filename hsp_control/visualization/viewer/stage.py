@@ -16,10 +16,12 @@ from hsp_control.visualization.viewer.commands import (
     set_property,
     set_transform,
 )
+from hsp_control.visualization.viewer.legend import LegendEntry, translucent
 from hsp_control.visualization.viewer.poses import pose_at
 
 _LIGHT_FROM = np.array([0.5, -0.45, 1.6])
 _FINE = 1e-3
+_SHADOW = translucent(palette.MUTED, 0.4)
 
 
 def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Command]:
@@ -39,6 +41,14 @@ def draw_stage(points: Array, floor: float, view: ViewSettings) -> Iterator[Comm
     yield from _lights(center, size, view.light)
     yield from _floor(center, size, floor)
     yield set_property("/floor/grid", "visible", view.show.grid)
+
+
+def stage_legend(view: ViewSettings) -> list[LegendEntry]:
+    """Return the legend's entries of what lies on the floor."""
+    return [
+        LegendEntry("grid", GRID, ("/floor/grid",), view.show.grid, plain=True),
+        LegendEntry("shadow", _SHADOW, ("/floor/shadow",), plain=True),
+    ]
 
 
 def is_dark(color: str) -> bool:

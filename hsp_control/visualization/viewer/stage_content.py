@@ -5,6 +5,7 @@ from typing import Protocol
 
 from hsp_control.common.arrays import Array
 from hsp_control.visualization.viewer.commands import Command
+from hsp_control.visualization.viewer.legend import LegendEntry
 
 
 class StageContent(Protocol):
@@ -19,5 +20,5 @@ class StageContent(Protocol):
     def obstacle_points(self) -> Array:
         """Return points that enclose the obstacles [m], shape (L, 3); L may be 0."""
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return the legend's entries: (name, colour ``#RRGGBB``)."""
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""

@@ -8,6 +8,7 @@ from hsp_control.visualization.viewer import threejs
 from hsp_control.visualization.viewer.appearance import AXES, DESIRED, PATH_RADIUS
 from hsp_control.visualization.viewer.clip import Track
 from hsp_control.visualization.viewer.commands import Command, Json, set_object
+from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.poses import pose_along, quaternions_along
@@ -41,9 +42,11 @@ class TargetMarkers:
                 turned = quaternions_along(target.direction)
                 yield Track(path, "quaternion", times, turned)
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Return no entry: a target has the colour of its path."""
-        return []
+    def legend(self) -> list[LegendEntry]:
+        """Return the legend's entries."""
+        name = "target" if len(self._targets) == 1 else "targets"
+        paths = tuple(map(self._path, self._targets))
+        return [LegendEntry(name, DESIRED, paths)] if paths else []
 
     def _path(self, target: Target) -> str:
         return f"{self._root}/{path_element(target.name)}"

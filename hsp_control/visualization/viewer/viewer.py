@@ -38,6 +38,7 @@ from hsp_control.visualization.viewer.stage import (
     in_sight,
     is_dark,
     scene_size,
+    stage_legend,
 )
 from hsp_control.visualization.viewer.stage_content import StageContent
 from hsp_control.visualization.viewer.transport import Transport
@@ -296,7 +297,11 @@ class Viewer:
         run = self._run(rollout, controller)
         playing = self._playing(None, None)
         clip = set_clip(run.clip(), play=True, keep=True, **playing)
-        self.transport.send([*clear(), *run.draw(size), *clip, set_status(status)])
+        # Now also the layers that were not computed meanwhile have their switches.
+        caption = self._caption(run, rollout.meta.get("title"))
+        self.transport.send(
+            [*clear(), *run.draw(size), *clip, caption, set_status(status)]
+        )
 
     def _run(self, rollout: Rollout, controller: Controller | None) -> RunDrawing:
         _check(self.robot, rollout, controller)
@@ -346,12 +351,17 @@ class Viewer:
             *draw_stage(points, floor, view),
             *scene.draw(scene_size(points)),
             look_at(self.robot, points, view.camera, view.target, fit=fit),
-            set_caption(title or self.robot.name, scene.legend(), dark=self.dark),
+            self._caption(scene, title),
             set_time(""),
             set_status(""),
         ]
         self._others = []
         return commands
+
+    def _caption(self, scene: StageContent, title: str | None) -> Command:
+        """Return the command that sets the title and the legend; None: its name."""
+        legend = [*scene.legend(), *stage_legend(self.view)]
+        return set_caption(title or self.robot.name, legend, dark=self.dark)
 
     def _subject(self, moving: Array) -> Array:
         """Return the points that must be visible [m], shape (K, 3)."""

@@ -45,6 +45,7 @@ from hsp_control.visualization.viewer.controller_analysis import (
 from hsp_control.visualization.viewer.ellipsoid import SECONDS, principal_axes
 from hsp_control.visualization.viewer.influence import zone
 from hsp_control.visualization.viewer.motion import drawn_times, motion_of
+from hsp_control.visualization.viewer.obstacle_drawing import obstacle_legend
 from hsp_control.visualization.viewer.run_drawing import LAYERS
 
 PLANAR, SPATIAL = "paper/4_moving_obstacle", "panda_obstacle"
@@ -73,10 +74,28 @@ def drawn(experiment: Experiment, rollout: Rollout, recorder: Recorder) -> Clip:
     return Clip(recorder)
 
 
-def names(recorder: Recorder) -> list[str]:
+def legend(recorder: Recorder) -> list[dict[str, Any]]:
     caption = recorder.command(CAPTION, "caption")
     assert caption is not None
-    return [entry["name"] for entry in caption["legend"]]
+    return list(caption["legend"])
+
+
+def names(recorder: Recorder) -> list[str]:
+    return [entry["name"] for entry in legend(recorder)]
+
+
+def bar_of(clip: Clip) -> str:
+    """Return the path of the only distance bar; it has a ball at both of its ends."""
+    (bar, end, start) = sorted(clip.paths("/distances"))
+    parent = bar.rpartition("/")[0]
+    assert [bar, end, start] == [f"{parent}/{x}" for x in ("bar", "end", "start")]
+    for time in (clip.start, clip.end):
+        assert clip.value(start, "visible", time) == clip.value(bar, "visible", time)
+        origin = clip.value(bar, "position", time)
+        np.testing.assert_allclose(clip.value(start, "position", time), origin)
+        there = clip.value(end, "position", time)
+        np.testing.assert_allclose(there, tip(clip, bar, time), atol=1e-5)
+    return bar
 
 
 def tip(clip: Clip, path: str, time: float) -> np.ndarray:
@@ -223,7 +242,8 @@ def test_bars_are_as_long_as_the_distances_in_the_log(
 ) -> None:
     experiment, rollout = spatial
     clip = drawn(experiment, rollout, recorder)
-    (path,) = clip.paths("/distances")
+    path = bar_of(clip)
+    assert recorder.command(path, "length label") is not None
     logged = rollout["distance.obstacle_clearance"]
     for row in (0, 20, 50):
         t = float(rollout.t[row])
@@ -240,7 +260,8 @@ def test_the_papers_cost_is_shown_from_the_nearest_joint_to_the_centre(
 ) -> None:
     experiment, rollout = planar
     clip = drawn(experiment, rollout, recorder)
-    (path,) = clip.paths("/distances")
+    path = bar_of(clip)
+    assert "distance to the obstacle's centre" in names(recorder)
     for row in (0, 75, 150):
         t = float(rollout.t[row])
         length = clip.value(path, "scale", t)[2]
@@ -417,12 +438,42 @@ def test_each_layer_can_be_switched(
     off = dict.fromkeys([*LAYERS, "grid"], False)
     viewer = Viewer(experiment.robot, transport=recorder, show=off)
     viewer.play(rollout, controller=experiment.controller)
-    for layer in (*LAYERS, "floor/grid"):
-        command = recorder.command(f"/{layer}", "visible")
-        assert command is not None
-        assert command["value"] is False
-    assert names(recorder) == []
+    rows = {entry["name"]: entry for entry in legend(recorder)}
+    on = {name for name, row in rows.items() if row["shown"]}
+    assert on == {"robot", "shadow"}  # these have no setting
+    for row in rows.values():
+        assert row["paths"]
+        for path in row["paths"]:
+            command = recorder.command(path, "visible")
+            assert row["shown"] == (command is None)
+            assert command is None or command["value"] is False
     assert Clip(recorder).paths("/self_motion")  # there, to be switched on
+
+
+def test_all_that_is_drawn_has_its_row(
+    spatial: tuple[Experiment, Rollout],
+    planar: tuple[Experiment, Rollout],
+    recorder: Recorder,
+) -> None:
+    for experiment, rollout in (spatial, planar):
+        drawn(experiment, rollout, recorder)
+        switched = [path for entry in legend(recorder) for path in entry["paths"]]
+        for path in recorder.paths("/"):
+            if recorder.command(path, "object") and not path.startswith("/lights"):
+                above = [p for p in switched if f"{path}/".startswith(f"{p}/")]
+                assert len(above) == 1, path
+
+
+def test_the_legend_tells_where_zones_begin_and_whose_obstacles_they_are(
+    spatial: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    drawn(*spatial, recorder)
+    rows = {entry["name"]: entry for entry in legend(recorder)}
+    assert rows["influence zone 0.4 m"]["paths"] == ["/influence/ball"]
+    assert rows["obstacle ball"]["paths"] == ["/obstacles"]
+    told = [entry.name for entry in obstacle_legend(["a", "b", "c", "d", "e"])]
+    assert told == ["obstacles a, b, c and 2 more"]
+    assert obstacle_legend([]) == []
 
 
 def test_dark_backgrounds_have_light_words(recorder: Recorder) -> None:
@@ -470,7 +521,11 @@ def test_runs_of_one_robot_lie_over_each_other_as_ghosts(
         np.testing.assert_allclose(shown, expected, atol=1e-6)
     last = clip.pose("/without/robot/joint2", 1.5)  # it waits for the longer run
     np.testing.assert_array_equal(last, clip.pose("/without/robot/joint2", 0.5))
-    assert names(recorder)[:2] == ["with", "without"]
+    first, second, *others = legend(recorder)
+    assert (first["name"], second["name"]) == ("with", "without")
+    assert set(first["paths"]) == {"/paths/tip/actual", "/robot"}
+    assert second["paths"] == ["/without"]
+    assert "robot" not in {entry["name"] for entry in others}
 
 
 def test_side_by_side_they_keep_clear_of_each_other(
@@ -505,6 +560,9 @@ def test_runs_of_different_robots_stand_side_by_side(
     assert recorder.paths("/b/robot/panda_joint7")
     (seconds,) = {n for n in names(recorder) if n.startswith("self-motion")}
     assert seconds  # one scale for both
+    rows = {entry["name"]: entry["paths"] for entry in legend(recorder)}
+    assert rows["robot"] == ["/robot", "/b/robot"]
+    assert rows["actual path"] == ["/paths/tip/actual", "/b/paths/hand/actual"]
     viewer.play(planar[1])
     assert not recorder.paths("/b")
 
@@ -588,6 +646,8 @@ def test_what_is_hidden_costs_the_run_nothing(monkeypatch: pytest.MonkeyPatch) -
     assert not [c for c in transport.sent if c["type"] == "trail_more"]
     view.finish(rollout)  # and then it is there, to be switched on
     assert "/paths/tip/actual" in transport.paths("/paths")
+    rows = {entry["name"]: entry for entry in legend(transport)}
+    assert rows["actual path"]["shown"] is False
 
 
 def test_drawing_leaves_rows_out_so_that_it_stays_cheap(

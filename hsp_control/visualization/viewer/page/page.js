@@ -6,16 +6,29 @@ const meshcat = viewer.handle_command.bind(viewer);
 
 // The scene brings its own lights, floor and grid, which fit the robot.
 for (const name of ["Lights", "Grid", "Axes"]) viewer.delete_path([name]);
-viewer.gui.removeFolder(viewer.animator.folder);  // the scene has its own player
+// Its own controls go, too: the legend has the switches, the player the time. The scene tree
+// needs them, but nobody has to see them.
+viewer.gui.domElement.remove();
 
 const player = new Player(viewer);
 new Controls(player, document.body);
+const layers = new Layers(viewer, document.getElementById("caption"));
+const lengthLabels = new LengthLabels(viewer);
+let placed = null;  // the last camera of the program, and where it was placed then
+const drawScene = viewer.render.bind(viewer);
+viewer.render = () => {
+  // Meshcat's controls round the position anew each time: begin from the same, so that the
+  // same time gives the same image.
+  if (untouched()) viewer.camera.position.copy(placed.position);
+  drawScene();
+  lengthLabels.update();
+};
 
 const commandHandlers = {camera, caption, time, status, ghost, trail, trail_more, clip, still,
-                         seek, ask, set_object, pose, nothing() {}};
+                         seek, ask, set_object, pose, length_label, nothing() {}};
 viewer.handle_command = (command) => {
-  if (Array.isArray(command)) command.forEach(viewer.handle_command);
-  else (commandHandlers[command.type] ?? meshcat)(command);
+  for (const each of [command].flat(Infinity)) (commandHandlers[each.type] ?? meshcat)(each);
+  layers.apply();  // nodes that were drawn again
   viewer.set_dirty();
 };
 
@@ -78,10 +91,38 @@ function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
 
 // Shares of the picture's height that are reserved for the player's bar and the title.
 const BAR = 0.1, TITLE = 0.06;
+const WIDE = 16 / 9;  // width over height
+let barHeight = 64;  // what the player's bar covers at the bottom of the picture [px]
+
+// Half the width of the robot's widest link [m]: the points are those of its skeleton.
+function girth() {
+  const size = new MeshCat.THREE.Vector3(), scale = new MeshCat.THREE.Vector3();
+  let widest = 0;
+  layers.find("/robot")?.traverse((mesh) => {
+    if (!mesh.geometry?.isBufferGeometry) return;
+    mesh.geometry.boundingBox ?? mesh.geometry.computeBoundingBox();
+    mesh.geometry.boundingBox.getSize(size).multiply(mesh.getWorldScale(scale));
+    const [, width] = size.toArray().sort((one, other) => one - other);  // the middle one of its edges
+    if (width / 2 > widest) widest = width / 2;
+  });
+  return widest;
+}
+
+// How far the scene moves to the right to be beside the legend, if there is space for it.
+// Positions in the picture are from -1, its left edge, to 1.
+function sidestep(spans) {
+  const left = Math.min(...spans.map(([start]) => start));
+  const right = Math.max(...spans.map(([, end]) => end));
+  const legend = 2 * layers.reach / (viewer.dom_element.clientWidth || Infinity) - 1;
+  return Math.max(Math.min(legend - left, 1 - right), 0);
+}
 
 // Look at a target from an eye, or along a direction from a distance at which all balls
-// around the points are visible.
-function camera({target, eye, direction, up, points, radius, field_of_view}) {
+// around the points are visible. An eye is chosen for a wide window: in a narrower one it
+// moves back until the points are in sight, or as much of them as in the wide one.
+function camera(command) {
+  const {target, eye, direction, up, points, field_of_view} = command;
+  const radius = Math.max(command.radius, girth());
   const center = vector(target);
   const toEye = vector(eye ?? direction);
   if (eye) toEye.sub(center);
@@ -89,39 +130,71 @@ function camera({target, eye, direction, up, points, radius, field_of_view}) {
   toEye.normalize();
   const tall = Math.tan(field_of_view * Math.PI / 360);
   const {clientWidth, clientHeight} = viewer.dom_element;
-  const wide = tall * (clientWidth / clientHeight || 1.5);
+  const aspect = clientWidth / clientHeight || 1.5;
+  const wide = tall * aspect;
+  const bar = Math.max(BAR, barHeight / (clientHeight || 640));
+  const title = Math.max(TITLE, layers.covered / (clientHeight || 640));
   const right = vector(up).cross(toEye).normalize();
   const above = toEye.clone().cross(right);
   const needed = (point) => {
     const offset = vector(point).sub(center);
     const x = Math.abs(offset.dot(right)) + radius, y = Math.abs(offset.dot(above)) + radius;
-    return offset.dot(toEye) + Math.max(x / wide, y / (tall * (1 - BAR - TITLE)));
+    const across = x / wide, upwards = eye ? 0 : y / (tall * (1 - bar - title));
+    return offset.dot(toEye) + Math.max(across, upwards);
   };
-  const away = distance || Math.max(...points.map(needed));
+  let away = Math.max(...points.map(needed));
+  if (eye) away = Math.min(Math.max(away, distance), distance * Math.max(WIDE / aspect, 1));
   const lens = viewer.camera;
   lens.fov = field_of_view;
   lens.near = away / 100;
   lens.far = away * 100;
   lens.up.copy(vector(up));
   lens.position.copy(center).addScaledVector(toEye, away);
-  lens.setViewOffset(1, 1, 0, (BAR - TITLE) / 2, 1, 1);
+  const shift = eye ? 0 : sidestep(points.map((point) => {
+    const offset = vector(point).sub(center);
+    const half = (away - offset.dot(toEye)) * wide;  // of the picture's width, at the point
+    return [(offset.dot(right) - radius) / half, (offset.dot(right) + radius) / half];
+  }));
+  lens.setViewOffset(1, 1, -shift / 2, (bar - title) / 2, 1, 1);
   viewer.set_3d_pane_size();
   viewer.controls.dispose();
   viewer.set_camera(lens);  // new controls, which orbit about the new up direction
   viewer.controls.target.copy(center);
+  placed = {command, position: lens.position.clone(), target: center.clone(), slack: 1e-9 * away};
 }
+
+// Whether the camera is where the program placed it.
+function untouched() {
+  const {camera: lens, controls} = viewer;
+  return placed !== null && lens.position.distanceTo(placed.position) < placed.slack
+    && controls.target.distanceTo(placed.target) < placed.slack;
+}
+
+// Place the camera again for another size of the window, unless the user has moved it.
+function refit() {
+  viewer.set_3d_pane_size();
+  if (untouched()) camera(placed.command);
+  viewer.set_dirty();
+}
+
+// Meshcat takes the window's height; here the element's counts, which may be a part of it.
+const fitPane = viewer.set_3d_pane_size.bind(viewer);
+viewer.set_3d_pane_size = () => {
+  const {clientWidth, clientHeight} = viewer.dom_element;
+  if (clientWidth && clientHeight) fitPane(clientWidth, clientHeight);
+};
+new ResizeObserver(refit).observe(viewer.dom_element);
 
 function caption({title, legend, dark}) {
   document.title = title;
   document.body.classList.toggle("dark", dark);
   document.querySelector("#caption h1").textContent = title;
-  document.querySelector("#caption ul").replaceChildren(...legend.map(({name, color}) => {
-    const entry = document.createElement("li");
-    entry.textContent = name;
-    entry.style.setProperty("--color", color);
-    return entry;
-  }));
+  layers.show(legend);
+  refit();  // now it is known what title and legend cover
 }
+
+// Label a bar with its length.
+function length_label({path}) { lengthLabels.add(path); }
 
 // Tint a node and all nodes below it, and make them translucent.
 function ghost({path, color, opacity}) {

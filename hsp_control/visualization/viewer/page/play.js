@@ -83,18 +83,10 @@ class Play {
     this.select(this.selected);
     this.showDrive();
     this.bar.showState(this.state);
-    // The scene is beside the panel now: place the camera again.
-    if (first && lastView) placeCamera(lastView);
-    this.viewer.set_3d_pane_size();
+    this.fit();
   }
 
   build() {
-    if (!document.querySelector("meta[name=viewport]")) {
-      const meta = document.createElement("meta");
-      meta.name = "viewport";
-      meta.content = "width=device-width, initial-scale=1";
-      document.head.append(meta);
-    }
     document.body.classList.add("play");
     this.overlay = new PlayOverlay(document.body);
     this.bar = new PlayBar(this, document.body);
@@ -102,16 +94,16 @@ class Play {
     this.hand = new PlayHand(this, this.viewer);
     this.keys = new PlayKeys(this);
     this.viewer.scene.onBeforeRender = () => this.layOut();
-    const fit = this.viewer.set_3d_pane_size.bind(this.viewer);
-    this.viewer.set_3d_pane_size = (width, height = this.sceneHeight()) => fit(width, height);
+    addEventListener("resize", () => this.fit());
   }
 
-  // On a phone the picture ends where the bar, or the open sheet, begins.
-  sceneHeight() {
+  // On a phone the picture ends where the bar, or the open sheet, begins; the camera follows
+  // the picture's size.
+  fit() {
     const {panel, bar} = this;
-    if (!panel.narrow.matches) return innerHeight;
     const sheet = panel.open ? panel.box.offsetHeight - 18 : 0;  // behind its round corners
-    return Math.max(120, innerHeight - bar.row.offsetHeight - sheet);
+    const height = Math.max(120, innerHeight - bar.row.offsetHeight - sheet);
+    this.viewer.dom_element.style.height = panel.narrow.matches ? `${height}px` : "";
   }
 
   // After a reset the plots are the same: they keep what is shown alone.
@@ -285,12 +277,7 @@ class Play {
 
 const play = new Play(viewer);
 
-// The last view that the program has set, for when the scene's share of the page changes.
-let lastView = null;
-const placeCamera = commandHandlers.camera;
-
 Object.assign(commandHandlers, {
-  camera(command) { placeCamera(lastView = command); },
   play_setup(command) { play.setUp(command); },
   play_targets(command) { if (play.ready) play.showTargets(command); },
   play_state({t, running, rate, message, level}) {

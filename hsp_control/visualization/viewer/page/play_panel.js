@@ -36,7 +36,7 @@ class PlayPanel {
     document.body.classList.toggle("with-panel", open);
     this.play.bar.showPanel(open);
     this.play.plots?.schedule();
-    this.play.viewer.set_3d_pane_size();
+    this.play.fit();
   }
 
   build({title, targets, controls}) {

@@ -6,31 +6,11 @@ const side = document.createElement("aside");
 stage.id = "stage";
 side.id = "side";
 document.body.append(stage, side);
-for (const part of document.querySelectorAll("#meshcat-pane, .dg.main, #caption, .player")) {
+for (const part of document.querySelectorAll("#meshcat-pane, #caption, .player")) {
   stage.append(part);
 }
 
-// Meshcat uses the whole window; here the scene has only a part of it.
-const fitPane = viewer.set_3d_pane_size.bind(viewer);
-viewer.set_3d_pane_size = () => {
-  const {clientWidth, clientHeight} = viewer.dom_element;
-  if (clientWidth && clientHeight) fitPane(clientWidth, clientHeight);
-};
-
-// When the window changes, keep the whole scene visible, until the user moves the camera.
-let lastCamera = null;
-const placeCamera = commandHandlers.camera;
-commandHandlers.camera = (command) => {
-  lastCamera = command;
-  placeCamera(command);
-  viewer.controls.addEventListener("start", () => { lastCamera = null; });
-};
-function refit() {
-  viewer.set_3d_pane_size();
-  if (lastCamera) commandHandlers.camera(lastCamera);
-  viewer.set_dirty();
-}
-new ResizeObserver(refit).observe(viewer.dom_element);
+barHeight = 0;  // the bar is below the picture
 
 commandHandlers.show = ({arrays, commands, plots, about}) => {
   const unpacked = arrays.map(unpackArray);
