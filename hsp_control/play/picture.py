@@ -262,7 +262,8 @@ def _plots(session: Session) -> Iterator[Plot]:
         yield Plot("Task error", unit, True, curves)
     if controller.field.controls:
         norm = Curve("‖e_N‖", "null_space_norm", slice(0, 1))
-        unit = " or ".join(f"{unit}/s" for unit in dict.fromkeys(controller.robot.units))
+        units = dict.fromkeys(controller.robot.units)
+        unit = " or ".join(f"{unit}/s" for unit in units)
         yield Plot("Null-space error", unit, True, [norm])
     names = [name for name in session.recorder.rows(0) if name.startswith("distance.")]
     if names:

@@ -9,6 +9,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.common.resources import bundled_configs, bundled_robots
 from hsp_control.config import Experiment
+from hsp_control.config.document import Document
 from hsp_control.config.experiment import build, read_document
 from hsp_control.play.session import ROW
 from hsp_control.robot import Robot
@@ -37,7 +38,7 @@ def playable(
         HspControlError: See `load_experiment`.
     """
     if str(source) not in bundled_configs() and _is_robot(str(source)):
-        document = read_document(_for_robot(str(source)))
+        document = Document(_for_robot(str(source)), {}, str(source))
     else:
         document = read_document(source, strict=strict, **reading)
     for assignment in overrides:
