@@ -6,36 +6,19 @@ what it answers.
 """
 
 import json
-import os
-import shutil
-import time
 from collections.abc import Iterator
 from typing import Any
 
+import browsers
 import numpy as np
 import pytest
+from browsers import PATIENCE, until
 
 from hsp_control import Robot
 from hsp_control.visualization.viewer import Viewer
 
 pytestmark = pytest.mark.browser
 
-sync_api = pytest.importorskip("playwright.sync_api")
-
-OPTIONS = [
-    "--headless",
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-HARMLESS = "GPU stall due to ReadPixels"  # a remark of the software renderer
-PATIENCE = 200.0  # s; only ends a test that hangs
 TURN = [0.0, np.sin(0.2), 0.0, np.cos(0.2)]
 HAND, ELBOW, BALL = [0.9, 0.3, 0.25, *TURN], [0.2, 0.9, 0.1, *TURN], [-0.4, 0.5, 0.3]
 SETUP: dict[str, Any] = {
@@ -143,15 +126,7 @@ LINK = """() => {
 
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
-    found = shutil.which("chromium") or shutil.which("google-chrome")
-    if found is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail("CI needs Chromium: apt-get install chromium")
-        pytest.skip("there is no Chromium on the path")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=found, args=OPTIONS)
-        yield browser
-        browser.close()
+    yield from browsers.started()
 
 
 @pytest.fixture(scope="module")
@@ -163,19 +138,7 @@ def viewer() -> Iterator[Viewer]:
 
 
 def opened(chromium: Any, viewer: Viewer, **options: Any) -> tuple[Any, list[str]]:
-    page = chromium.new_page(**options)
-    page.set_default_timeout(1000.0 * PATIENCE)
-    wrong: list[str] = []
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on(
-        "console",
-        lambda said: (
-            wrong.append(said.text)
-            if said.type in {"error", "warning"} and HARMLESS not in said.text
-            else None
-        ),
-    )
-    page.goto(viewer.url)
+    page, wrong = browsers.opened(chromium, str(viewer.url), **options)
     assert viewer.wait_for_browser(PATIENCE)
     page.evaluate(LISTEN)
     return page, wrong
@@ -214,13 +177,6 @@ def tell(page: Any, kind: str, **fields: Any) -> None:
 def sent(page: Any, do: str | None = None) -> list[dict[str, Any]]:
     messages = [json.loads(text) for text in page.evaluate("sent")]
     return [message for message in messages if do in (None, message["do"])]
-
-
-def until(page: Any, expression: str) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not page.evaluate(expression):
-        assert time.monotonic() < deadline, f"never: {expression}"
-        time.sleep(0.02)
 
 
 def until_sent(page: Any, do: str, number: int = 1) -> list[dict[str, Any]]:

@@ -1,0 +1,52 @@
+"""A browser without a window, for tests of pages."""
+
+import os
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from hsp_control.visualization.viewer.export.chromium import (
+    find_browser,
+    headless_browser,
+)
+
+PATIENCE = 200.0  # s; only ends a test that hangs
+HARMLESS = "GPU stall due to ReadPixels"  # a remark of the software renderer
+
+
+def started() -> Iterator[Any]:
+    """The body of a fixture: a browser; where there is none, the test is skipped."""
+    if find_browser() is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("CI needs Chromium: apt-get install chromium")
+        pytest.skip("there is no Chromium on the path")
+    with headless_browser() as browser:
+        yield browser
+
+
+def opened(browser: Any, url: str, **options: Any) -> tuple[Any, list[str]]:
+    """A page at an address, and the list of what its console finds wrong."""
+    page = browser.new_page(**options)
+    page.set_default_timeout(1000.0 * PATIENCE)
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on(
+        "console",
+        lambda said: (
+            wrong.append(said.text)
+            if said.type in {"error", "warning"} and HARMLESS not in said.text
+            else None
+        ),
+    )
+    page.goto(url)
+    return page, wrong
+
+
+def until(page: Any, expression: str) -> None:
+    """Wait until an expression is true; playwright's own way needs eval."""
+    deadline = time.monotonic() + PATIENCE
+    while not page.evaluate(expression):
+        assert time.monotonic() < deadline, f"never: {expression}"
+        time.sleep(0.02)
