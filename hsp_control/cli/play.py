@@ -1,6 +1,7 @@
 """``hsp play``: a simulated robot that a page steers, in real time."""
 
 import argparse
+import gc
 import signal
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -36,6 +37,8 @@ def play(options: argparse.Namespace) -> int:
             session = Session(experiment)
             session.rehearse()
             picture = Picture(session, viewer)
+        gc.collect()
+        gc.freeze()  # what is there now stays: no collection looks at it in a row
         stack.enter_context(_stop_at_termination())
         log = options.out / f"{experiment.name}-play.npz"
 
