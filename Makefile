@@ -100,6 +100,7 @@ screenshots: $(STAMP) ## photograph the page of every configuration, into out/sc
 
 animations: $(STAMP) ## film the README's animations anew, into docs/figures (needs Chromium)
 	@$(BIN)/python docs/make_animations.py
+	@$(BIN)/python docs/make_play_picture.py
 
 format: $(STAMP) ## let ruff format the code and fix what it can, strip the notebooks
 	@$(BIN)/ruff check --fix --quiet || true

@@ -23,8 +23,15 @@ from hsp_control.trajectories.streams.stream import Streamed
 
 RAMP = 0.2
 """Time over which a stream takes over, and a path of its own comes back [s]."""
-_SPEED, _ACCELERATION, _JERK = 1.0, 8.0, 200.0
-"""Bounds of what is dragged [m/s, m/s², m/s³]: those of a quick hand."""
+_MOVING: dict[str, Any] = {"speed": 0.5, "acceleration": 3.0, "jerk": 60.0}
+"""Bounds of what is dragged [m/s, m/s², m/s³]: those that arms bear, whose limits then
+rarely bind."""
+_TURNING: dict[str, Any] = {
+    "angular_speed": 1.5,
+    "angular_acceleration": 8.0,
+    "angular_jerk": 200.0,
+}
+"""The same for turning [rad/s, rad/s², rad/s³]."""
 _DELAY = 0.03
 """Time to a target that is dragged [s]: about two of a page's pictures."""
 
@@ -128,12 +135,11 @@ class TargetGrip(Grip):
         return found[0] if found else None
 
     def _make_stream(self) -> Streamed:
-        moving = {"speed": _SPEED, "acceleration": _ACCELERATION, "jerk": _JERK}
         if self._kind is FramePosition:
-            return Stream(**moving, delay=_DELAY)  # type: ignore[arg-type]
+            return Stream(**_MOVING, delay=_DELAY)
         if self._kind is FrameOrientation:
-            return StreamOrientation(delay=_DELAY)
-        return StreamPose(**moving, delay=_DELAY)  # type: ignore[arg-type]
+            return StreamOrientation(**_TURNING, delay=_DELAY)
+        return StreamPose(**_MOVING, **_TURNING, delay=_DELAY)
 
     def _wanted(self, value: Array) -> Array:
         if value.shape != (7,) or not np.isfinite(value).all():
@@ -176,9 +182,7 @@ class ObstacleGrip(Grip):
         return [float(x) for x in place.translation]
 
     def _make_stream(self) -> Streamed:
-        return Stream(
-            speed=_SPEED, acceleration=_ACCELERATION, jerk=_JERK, delay=_DELAY
-        )
+        return Stream(**_MOVING, delay=_DELAY)
 
     def _wanted(self, value: Array) -> Array:
         if value.shape != (3,) or not np.isfinite(value).all():
