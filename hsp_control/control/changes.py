@@ -54,6 +54,7 @@ __all__ = [
     "ChangeReference",
     "ChangeWeight",
     "Changes",
+    "ExchangeField",
     "MoveObstacle",
     "RemoveTask",
 ]
@@ -276,24 +277,61 @@ class ChangeWeight(Change, type="weight"):
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the weight; see `Change.apply`."""
-        there = {
-            each.field.name: k
-            for k, each in enumerate(setup.terms)
-            if each.presence.target > 0.0
-        }
-        if self.field not in there:
-            raise ControllerError(
-                f"there is no field {self.field!r}{did_you_mean(self.field, there)} "
-                f"(there are {listing(there) or 'none'})"
-            )
-        terms, k = list(setup.terms), there[self.field]
-        old = terms[k]
+        k = _find_field(setup, self.field)
         # The old weight fades out, and the same field fades in with the new weight:
         # so weights that are ramps or functions of the state work alike.
-        terms[k] = PlannedTerm(old.field, old.presence.then(self.at, self.ramp, 0.0))
-        new = replace(old.field, weight=self.weight)
-        terms.append(PlannedTerm(new, ABSENT.then(self.at, self.ramp, 1.0)))
-        return replace(setup, terms=tuple(terms))
+        new = replace(setup.terms[k].field, weight=self.weight)
+        return _with_field(setup, k, new, self)
+
+
+class ExchangeField(Change, type="exchange_field"):
+    """One field is replaced by another one, which keeps its weight; the others stay."""
+
+    field: str
+    """Name of the field that goes."""
+    by: NullSpaceField
+    """The field that comes; its own weight does not count."""
+
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change with its field placed."""
+        with within("by"):
+            return replace(self, by=self.by.placed(start))
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the other field; see `Change.apply`."""
+        k = _find_field(setup, self.field)
+        if not self.by.controls:
+            raise ControllerError("an uncontrolled null space replaces no other field")
+        new = replace(self.by, weight=setup.terms[k].field.weight)
+        return _with_field(setup, k, new, self)
+
+
+def _find_field(setup: Setup, name: str) -> int:
+    """Return the index of the term that has a name and is to stay.
+
+    Raises:
+        ControllerError: If there is none.
+    """
+    there = {
+        each.field.name: k
+        for k, each in enumerate(setup.terms)
+        if each.presence.target > 0.0
+    }
+    if name not in there:
+        raise ControllerError(
+            f"there is no field {name!r}{did_you_mean(name, there)} "
+            f"(there are {listing(there) or 'none'})"
+        )
+    return there[name]
+
+
+def _with_field(setup: Setup, index: int, new: NullSpaceField, change: Change) -> Setup:
+    """Return the setup in which a term fades out while another one fades in."""
+    terms, at, ramp = list(setup.terms), change.at, change.ramp
+    old = terms[index]
+    terms[index] = PlannedTerm(old.field, old.presence.then(at, ramp, 0.0))
+    terms.append(PlannedTerm(new, ABSENT.then(at, ramp, 1.0)))
+    return replace(setup, terms=tuple(terms))
 
 
 class ChangeNullSpaceGain(Change, type="null_space_gain"):
@@ -462,6 +500,10 @@ class Changes:
     def weight(self, field: str, weight: float) -> Self:
         """Change the weight of a field; see `ChangeWeight`."""
         return self._do(ChangeWeight(field, weight, at=self._at, ramp=self._ramp))
+
+    def exchange(self, field: str, by: NullSpaceField) -> Self:
+        """Replace one field by another one; see `ExchangeField`."""
+        return self._do(ExchangeField(field, by, at=self._at, ramp=self._ramp))
 
     def null_space_gain(self, gain: Gain) -> Self:
         """Change the null-space gain; see `ChangeNullSpaceGain`."""

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     ControllerError,
+    FieldError,
     ImmutableError,
     NonFiniteError,
 )
@@ -46,7 +47,7 @@ from hsp_control.control.setup import (
 )
 from hsp_control.control.stiffening import changes_impedance, next_numbers
 from hsp_control.declaration import within
-from hsp_control.declaration.nested import with_parts_replaced
+from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.law import Outcome, Resolution
@@ -202,6 +203,7 @@ class Controller:
         fields = []
         for k, term in enumerate(terms_of(self._declared_field)):
             with within("null_space", "fields", k):
+                _refuse_streams(term)
                 fields.append(PlannedTerm(term.placed(start), PRESENT))
         contacts = []
         for contact in self._declared_contacts:
@@ -234,6 +236,7 @@ class Controller:
                 placed.append(self._changes[k].placed(start, setup))
                 setup = placed[-1].apply(setup)
         self._stacks.clear()
+        self._field = Rest()  # an equal one may have a stream of the last run
         self._install(setup)
         self._open = tuple(placed)
 
@@ -904,6 +907,19 @@ _DECLARED = (
     "_threshold",
 )
 """The attributes from which all others are made."""
+
+
+def _refuse_streams(field: NullSpaceField) -> None:
+    """Raise for a field that a stream leads from the start: only a change's is logged.
+
+    Raises:
+        FieldError: If there is one.
+    """
+    if any(True for _ in parts_within(field, Streamed)):
+        raise FieldError(
+            "a stream cannot lead a field from the start; while the controller runs, "
+            "controller.at(t).field(...) with a stream does"
+        )
 
 
 def _in_order(changes: Iterable[Change]) -> tuple[Change, ...]:

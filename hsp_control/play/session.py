@@ -17,6 +17,7 @@ from hsp_control.live.simulated_robot import sampled
 from hsp_control.play.grips import Grip, obstacles_of, targets_of
 from hsp_control.play.knobs import RAMP, Knob, knobs_of
 from hsp_control.play.operational_space import ComparedCommand
+from hsp_control.play.posture_grip import posture_of
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.loops import Instant, sampled_loop
@@ -107,7 +108,10 @@ class Session:
         self._wanted: dict[str, float | bool] = {}
         self.instant: Instant | None = None
         self.advance()
-        self.targets = targets_of(self.controller)
+        self.targets: dict[str, Grip] = {
+            **targets_of(self.controller),
+            **posture_of(self.controller),
+        }
         self.obstacles = obstacles_of(self.controller)
         self.knobs = knobs_of(self.controller, self.period)
         law = Knob(

@@ -97,7 +97,7 @@ def test_the_readme_s_commands_exist() -> None:
     ]
     assert {command[0] for command in commands} == {
         "run", "view", "plot", "export", "check", "robots", "schema", "sweep", "bench",
-        "live",
+        "live", "play",
     }  # fmt: skip
     for command in commands:
         _parser().parse_args(command)

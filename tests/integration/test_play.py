@@ -93,6 +93,33 @@ def test_its_own_path_comes_back(session: Session) -> None:
     np.testing.assert_allclose(pose_of(session)[:3], pose[:3], atol=1e-3)
 
 
+def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
+    """The elbow follows as the theorem says, the hand does not notice; and back."""
+    session = Session(playable("panda"))
+    go(session, 0.3)
+    start = pose_of(session, "posture")
+    wanted, elbow = start.copy(), session.controller.state.data.oMi[3].copy()
+    for _ in range(20):
+        wanted[1] += 0.005
+        session.take({"do": "move", "target": "posture", "pose": wanted.tolist()})
+        go(session, 0.03)
+    go(session, 2.0)
+    # The elbow stays at its distance from the shoulder: not quite there.
+    np.testing.assert_allclose(pose_of(session, "posture")[1], wanted[1], atol=0.01)
+    moved = session.controller.state.data.oMi[3].translation - elbow.translation
+    assert moved[1] > 0.05
+    log = session.rollout()
+    assert np.abs(log["task.hand.error"]).max() < 1e-4
+    assert log["null_space_norm"].max() < 0.05  # of a motion of 1 rad/s, held for 1 ms
+    session.take({"do": "resume", "target": "posture"})
+    go(session, 2.0)
+    np.testing.assert_allclose(pose_of(session, "posture"), start, atol=1e-9)
+    log = session.rollout()
+    log.save(tmp_path / "led.npz")
+    again = hsp.load_experiment(tmp_path / "led.npz").run()
+    np.testing.assert_array_equal(again.q, log.q)
+
+
 def test_without_the_field_self_motion_comes_to_rest(session: Session) -> None:
     go(session, 0.3)
     session.take({"do": "set", "id": "field", "value": False})
@@ -262,7 +289,7 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     assert isinstance(recorder, Recorder)
     setup = recorder.command("/play", "setup")
     assert setup is not None
-    assert [each["name"] for each in setup["targets"]] == ["hand"]
+    assert [each["name"] for each in setup["targets"]] == ["hand", "posture"]
     assert [each["name"] for each in setup["obstacles"]] == ["ball"]
     assert [each["title"] for each in setup["plots"]] == [
         "Task error", "Task error", "Null-space error", "Smallest distance", "Effort",
@@ -328,7 +355,7 @@ def test_any_fixed_robot_is_a_playground() -> None:
     assert experiment.controller.null_space_gain[0, 0] == 4.0
     assert experiment.scenario.simulation.control_period == 0.001
     session = Session(experiment)
-    assert list(session.targets) == ["hand"]
+    assert list(session.targets) == ["hand", "posture"]
     assert list(session.obstacles) == ["ball"]
 
 

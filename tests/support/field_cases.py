@@ -35,6 +35,7 @@ from field_oracles import (
     spectrum_oracle,
     spread,
     state_weight,
+    swaying,
     swirl_field,
     swirl_oracle,
     target,
@@ -142,6 +143,10 @@ MEMBERS: dict[str, Member] = {
     "target_posture, weights": Member(
         lambda n: posture(n, weights=spread(load(n).nv, 0, 3)),
         lambda n: [(1.0, posture_oracle(n, spread(load(n).nv, 0, 3)), True)],
+    ),
+    "target_posture, moving": Member(
+        lambda n: posture(n, displacement=swaying(n)),
+        lambda n: [(1.0, posture_oracle(n, sways=True), True)],
     ),
     "equal_joint_angles": Member(
         lambda n: FieldSum([EqualJointAngles(JOINTS[ROBOTS[n][0]], weight=5.0)]),

@@ -153,14 +153,25 @@ def target(name: str) -> Array:
     return robot.integrate(robot.neutral(), spread(robot.nv, -0.7, 0.9))
 
 
-def posture_oracle(name: str, weights: Any = 1.0) -> CostOracle:
+def swaying(name: str) -> Lissajous:
+    """A displacement of a posture, for each degree of freedom another one."""
+    nv = load(name).nv
+    k = np.arange(nv)
+    return Lissajous(0.2 + 0.05 * k, 1.0 + 0.3 * k, 0.5 * k, np.full(nv, 0.1))
+
+
+def posture_oracle(name: str, weights: Any = 1.0, *, sways: bool = False) -> CostOracle:
     model, goal = load(name).model, plain(name).angles(target(name))
 
     def f(t: float, q: Array) -> float:
         total = 0.0
         for joint in list(model.joints)[1:]:
             if joint.nv == 1:
-                d = plain(name).angles(q)[joint.idx_v] - goal[joint.idx_v]
+                i = joint.idx_v
+                d = plain(name).angles(q)[i] - goal[i]
+                if sways:
+                    k = float(i)
+                    d -= 0.1 + (0.2 + 0.05 * k) * np.sin((1.0 + 0.3 * k) * t + 0.5 * k)
                 w = np.broadcast_to(weights, model.nv)[joint.idx_v]
                 total += w * (1.0 - np.cos(d) if joint.nq == 2 else 0.5 * d * d)
         return total

@@ -314,8 +314,15 @@ MUTANTS = (
     Mutant(
         "target posture: rate without cos d",
         FIELDS + "target_posture.py",
-        "rate[i] = weights[i] * cos(d) * v[i]",
-        "rate[i] = weights[i] * v[i]",
+        "rate[i] = weights[i] * cos(d) * d_dot",
+        "rate[i] = weights[i] * d_dot",
+        EVERY_FIELD + "target_posture",
+    ),
+    Mutant(
+        "target posture: its motion has no rate",
+        FIELDS + "target_posture.py",
+        "d, d_dot = gradient[i] - moved[i], v[i] - moved_rate[i]",
+        "d, d_dot = gradient[i] - moved[i], v[i]",
         EVERY_FIELD + "target_posture",
     ),
     Mutant(

@@ -60,7 +60,7 @@ class Line:
 
     def _change(self, t: float) -> Change:
         rng, when = self.rng, {"at": t, "ramp": float(self.rng.uniform(0.1, 0.5))}
-        kinds = ["gains", "weight", "field", "gain", "add"]
+        kinds = ["gains", "weight", "field", "exchange", "gain", "add"]
         if len(self.there) > 1:
             kinds += ["remove", "remove"]
         match rng.choice(kinds):
@@ -81,6 +81,14 @@ class Line:
                     hsp.TargetPosture("home", name=self.terms[1], weight=0.5),
                 ]
                 return hsp.changes.ChangeField(fields, **when)
+            case "exchange":
+                name = str(rng.choice(self.terms))
+                nv = self.robot.nv
+                sway = hsp.trajectories.Lissajous(
+                    0.1 * rng.standard_normal(nv), np.ones(nv), None, np.zeros(nv)
+                )
+                other = hsp.TargetPosture("home", name=name, displacement=sway)
+                return hsp.changes.ExchangeField(name, other, **when)
             case "gain":
                 gain = float(rng.uniform(2.0, 20.0))
                 return hsp.changes.ChangeNullSpaceGain(gain, **when)
@@ -329,6 +337,17 @@ def test_a_name_can_be_used_again(panda: Trial) -> None:
         (lambda c: c.at(1).gains("hand", hsp.Gains([1, 2], 1)), "kp has shape"),
         (lambda c: c.at(1).weight("rets", 2), r"no field 'rets'; did you mean 'rest'"),
         (lambda c: c.at(1).weight("rest", -2), r"weight: -2 is negative"),
+        (lambda c: c.at(1).exchange("rets", hsp.Rest()), "no field 'rets'; did you"),
+        (
+            lambda c: c.at(1).exchange("rest", hsp.fields.Uncontrolled()),
+            "replaces no other field",
+        ),
+        (
+            lambda c: c.at(1).exchange(
+                "rest", hsp.TargetPosture(displacement=hsp.Hold([1.0, 2.0]))
+            ),
+            r"by\.displacement: point has 2 coordinates",
+        ),
         (lambda c: c.at(1).ramp(-1).remove("hand"), "ramp: -1 is negative"),
         (lambda c: c.at(1).contact("foot", bears=True), "no contact 'foot'"),
         (lambda c: c.at(1).null_space_gain(-1), "gain: "),

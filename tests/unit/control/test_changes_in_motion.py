@@ -52,7 +52,7 @@ from hsp_control.null_space.metrics import (
 )
 from hsp_control.robot.integrators import Dop853
 from hsp_control.simulation.recorder import Recorder
-from hsp_control.trajectories import HoldOrientation, Spin
+from hsp_control.trajectories import HoldOrientation, Lissajous, Spin
 from hsp_control.trajectories.timing import smooth_step
 
 Array = NDArray[np.float64]
@@ -73,7 +73,7 @@ def panda() -> Robot:
     return Robot.load("panda")
 
 
-def posture() -> NullSpaceField:
+def posture() -> TargetPosture:
     q = panda().home().copy()
     q[2] += 0.5
     return TargetPosture(q, weight=2.0)
@@ -149,6 +149,21 @@ def test_the_rate_of_what_is_in_between_is_exact(t: float, seed: int) -> None:
     )
 
 
+def swaying() -> TargetPosture:
+    """A posture that moves in time."""
+    sway = Lissajous(np.full(7, 0.2), np.linspace(1.0, 4.0, 7), None, np.zeros(7))
+    return replace(posture(), displacement=sway)
+
+
+def test_one_field_of_several_is_exchanged_and_keeps_its_weight() -> None:
+    law = controller()
+    law.at(0.0).ramp(0.1).field(posture(), JointCentering(weight=0.5))
+    law.at(0.5).ramp(0.1).exchange(posture().name, replace(posture(), name="other"))
+    law.compute(0.6 + KEPT + 1e-9, panda().home(), np.zeros(7))
+    found = {term.name: term.weight for term in terms_of(law.field)}
+    assert found == {"joint_centering": 0.5, "other": 2.0}
+
+
 CHANGES: dict[str, Callable[[Controller], Any]] = {
     "field": lambda law: law.at(START).ramp(RAMP).field(Manipulability("panda_tcp")),
     "several fields": lambda law: (
@@ -156,6 +171,9 @@ CHANGES: dict[str, Callable[[Controller], Any]] = {
     ),
     "rest": lambda law: law.at(START).ramp(RAMP).field(),
     "weight": lambda law: law.at(START).ramp(RAMP).weight("joint_centering", 3.0),
+    "exchange": lambda law: (
+        law.at(START).ramp(RAMP).exchange("joint_centering", swaying())
+    ),
     "gains": lambda law: law.at(START).ramp(RAMP).gains("hand", COUPLED),
     "all": lambda law: (
         law.at(START).ramp(RAMP).field(posture(), Rest()).gains("hand", COUPLED)
