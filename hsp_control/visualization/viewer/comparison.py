@@ -176,7 +176,7 @@ class Comparison:
 
 def run_roots(names: Sequence[str]) -> list[str]:
     """Return the root node of each run; "" for the first."""
-    taken = {"robot", "stage", *LAYERS}  # nodes of the first run
+    taken = {"robot", "floor", "lights", *LAYERS}
     elements = map(path_element, names[1:])
     return ["", *(f"/run {e}" if e in taken else f"/{e}" for e in elements)]
 

@@ -124,10 +124,6 @@ def _panels(rollout: Rollout, controller: Controller | None) -> Iterator[Panel]:
 
 
 def _null_space(rollout: Rollout, controller: Controller | None) -> Iterator[Series]:
-    floor = expected_floor(rollout, controller)
-    if floor is not None:
-        name = "held effort: expected floor"
-        yield Series(name, floor, palette.MUTED, predicted=True, band=True)
     decay = predicted_decay(rollout)
     for predicted, gain in zip((decay.slow, decay.fast), decay.gains, strict=True):
         if predicted is not None:
@@ -141,6 +137,10 @@ def _null_space(rollout: Rollout, controller: Controller | None) -> Iterator[Ser
             if decay.fast is decay.slow:
                 break
     yield Series("‖e_N‖", rollout["null_space_norm"], palette.FIELD)
+    floor = expected_floor(rollout, controller)
+    if floor is not None:
+        name = "held effort: expected floor"
+        yield Series(name, floor, palette.MUTED, predicted=True, band=True)
 
 
 def _lines(values: Array, names: Sequence[str]) -> list[Series]:
