@@ -7,6 +7,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.robot import RobotState
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_series import held_period
 from hsp_control.visualization.viewer.controller_analysis import (
     from_the_start,
     null_space_projector,
@@ -14,14 +15,6 @@ from hsp_control.visualization.viewer.controller_analysis import (
 
 _COARSEST = 1.0
 """Largest K_N times the time between two rows: else the rows miss what decays."""
-
-
-def held_period(rollout: Rollout) -> float | None:
-    """Return how long each effort of a run was held [s]; None if that is not known."""
-    settings = (rollout.config or {}).get("simulation")
-    period = settings.get("control_period") if isinstance(settings, dict) else None
-    known = isinstance(period, int | float) and 0.0 < period < float("inf")
-    return float(period) if known else None
 
 
 def expected_floor(rollout: Rollout, controller: Controller | None) -> Array | None:
@@ -78,8 +71,8 @@ def _solve(
         step = round(float(rollout.t[row + 1] - rollout.t[row]), 9)
         if step not in decays:
             decay = expm(-K_N * step)
-            rest = np.linalg.solve(K_N, np.eye(nv) - decay) / step if step else decay
-            decays[step] = decay, rest
+            rest = np.linalg.solve(K_N, np.eye(nv) - decay) / max(step, 1e-9)
+            decays[step] = decay, np.asarray(rest)
         decay, rest = decays[step]
         state.update(float(rollout.t[row]), rollout.q[row], rollout.v[row])
         change = np.linalg.solve(

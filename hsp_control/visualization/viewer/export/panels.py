@@ -10,10 +10,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.simulation import Rollout, log_series
 from hsp_control.simulation.decay import predicted_decay
 from hsp_control.visualization import palette
-from hsp_control.visualization.viewer.export.held_effort import (
-    expected_floor,
-    held_period,
-)
+from hsp_control.visualization.viewer.export.held_effort import expected_floor
 
 _MAX_CURVES, _SELECTED = 14, 7
 """Of more than 14 curves, only the 7 that vary most are shown."""
@@ -82,7 +79,7 @@ def _panels(rollout: Rollout, controller: Controller | None) -> Iterator[Panel]:
     units = ", ".join(dict.fromkeys(p.unit for p in log_series.task_errors(rollout)))
     if errors:
         yield Panel("Task error ‖e‖", units, errors, logarithmic=True)
-    period = held_period(rollout)
+    period = log_series.held_period(rollout)
     yield Panel(
         "Null-space error ‖e_N‖",
         log_series.column_unit(rollout, "null_space_norm"),

@@ -101,7 +101,13 @@ class Plots {
 class Plot {
   static MOVED = 4;  // a pointer that moves less is a click [px]
   static NEAR = 7;  // where the cursor can be taken [px]
-  static LINES = ["none", "0.1 3.6", "7 3 0.1 3"];  // of the first run, the second, ...
+
+  // The dashes of a curve, which tell the runs apart: solid, dotted, dashes and dots.
+  static dashes(run, dashed) {
+    if (!run) return dashed ? "5 3" : "none";
+    const dots = run % 2 ? "0.1 3.6" : "0.1 3.6 0.1 3.6 8 3.6";
+    return dashed ? `5 3.6 ${dots}` : dots;
+  }
 
   constructor(plots, parent, panel, name) {
     Object.assign(this, {plots, panel, name, pointers: new Map(), action: null, range: null});
@@ -262,8 +268,7 @@ class Plot {
     svg("polyline", {points: points.join(" "), fill: "none", stroke: color,
                      "stroke-width": band ? 1 : run ? 1.9 : 1.6, "stroke-linejoin": "round",
                      "stroke-linecap": run ? "round" : "butt",
-                     "stroke-dasharray": run ? Plot.LINES[(run - 1) % 2 + 1]
-                       : dashed ? "5 3" : "none"}, group);
+                     "stroke-dasharray": Plot.dashes(run, dashed)}, group);
   }
 
   // A vertical line with a dot on each curve; hidden until it has a time.
@@ -271,10 +276,11 @@ class Plot {
     const {top} = PlotAxes.MARGIN;
     const group = svg("g", {class: kind, visibility: "hidden"}, this.picture);
     svg("line", {y1: top, y2: top + this.height, stroke: this.plots.colors.ink}, group);
-    const dots = this.entries.flatMap(({curves}, place) => curves.map((curve) => ({
-      curve, place, dot: svg("circle", {r: 3.2, fill: curve.color, stroke: "#FFFFFF",
-                                        "stroke-width": 1.2}, group),
-    })));
+    const dots = this.entries.flatMap(({curves}, place) => curves
+      .filter(({band}) => !band).map((curve) => ({
+        curve, place, dot: svg("circle", {r: 3.2, fill: curve.color, stroke: "#FFFFFF",
+                                          "stroke-width": 1.2}, group),
+      })));
     return {group, dots};
   }
 

@@ -49,7 +49,7 @@ class RunSwitch {
     const picture = svg("svg", {viewBox: "0 0 22 8", "aria-hidden": "true"});
     svg("line", {x1: 2, x2: 20, y1: 4, y2: 4, stroke: "currentColor", "stroke-width": 2.2,
                  "stroke-linecap": run ? "round" : "butt",
-                 "stroke-dasharray": run ? Plot.LINES[(run - 1) % 2 + 1] : "none"}, picture);
+                 "stroke-dasharray": Plot.dashes(run)}, picture);
     return picture;
   }
 
