@@ -616,7 +616,7 @@ def test_the_document_s_film(
     del browser
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
-    snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)[1]
+    snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)[-1]
     columns = {name: column[:101] for name, column in planar.columns.items()}
     exec(snippet, {"rollout": Rollout(columns, planar.meta)})
     with Image.open(tmp_path / "out" / "film.webp") as film:
