@@ -1,17 +1,22 @@
-"""``hsp export``: write a log as a page for offline use, or as films."""
+"""``hsp export``: write logs as a page for offline use, or one as films."""
 
 import argparse
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hsp_control.cli.consoles import errors, out
 from hsp_control.common.exceptions import ExportError
-from hsp_control.simulation import Rollout
+
+if TYPE_CHECKING:
+    from hsp_control.visualization.viewer.comparison import ComparedRun
+
+_LONGEST = 24
+"""Longest title that is a name in the switch between runs."""
 
 
 def export(options: argparse.Namespace) -> int:
@@ -21,7 +26,7 @@ def export(options: argparse.Namespace) -> int:
         export_film,
         export_html,
     )
-    from hsp_control.visualization.viewer.replay import access_for, rebuild_run
+    from hsp_control.visualization.viewer.replay import access_for, load_runs
 
     films = [path for path in (options.mp4, options.gif, options.webp) if path]
     if not options.html and not films:
@@ -30,11 +35,15 @@ def export(options: argparse.Namespace) -> int:
         )
     for kind in ("mp4", "gif", "webp"):
         _check_ending(getattr(options, kind), f".{kind}")
-    rollout = Rollout.load(options.log)
-    access = access_for(
-        [options.log], options.strict or bool(options.allow), options.allow
-    )
-    run = rebuild_run(rollout, options.log.name, access)
+    if films and len(options.logs) > 1:
+        raise ExportError(
+            f"a film shows one run, {len(options.logs)} logs are given: give one log, "
+            "or --html for a page with a switch between them"
+        )
+    strict = options.strict or bool(options.allow)
+    access = access_for(options.logs, strict, options.allow)
+    runs = _titled(load_runs(options.logs, access))
+    run = runs[0]
     style = FilmStyle(
         size=options.size,
         frame_rate=options.fps,
@@ -46,12 +55,12 @@ def export(options: argparse.Namespace) -> int:
     )
 
     def page(path: Path) -> Path:
-        return export_html(rollout, path, robot=run.robot, controller=run.controller)
+        return export_html(runs, path)
 
     def film(path: Path) -> Path:
         with _Bar(path.name) as bar:
             return export_film(
-                rollout,
+                run.rollout,
                 path,
                 style=style,
                 robot=run.robot,
@@ -61,6 +70,20 @@ def export(options: argparse.Namespace) -> int:
 
     wanted = [(options.html, page)] if options.html else []
     return _write([*wanted, *((path, film) for path in films)])
+
+
+def _titled(runs: list["ComparedRun"]) -> list["ComparedRun"]:
+    """Return several runs by the titles of their logs, if those can be their names.
+
+    They cannot if two have the same one, as runs of one configuration have, or if one
+    is too long for a switch.
+    """
+    titles = [str(run.rollout.meta.get("title") or "") for run in runs]
+    if len(set(titles)) < len(titles):
+        return runs
+    if not all(0 < len(title) <= _LONGEST for title in titles):
+        return runs
+    return [run._replace(name=title) for run, title in zip(runs, titles, strict=True)]
 
 
 def _write(wanted: list[tuple[Path, Callable[[Path], Path]]]) -> int:

@@ -169,7 +169,7 @@ def _parser() -> argparse.ArgumentParser:
         "--out", type=Path, metavar="FILE", help="default: LOG's name, -salvaged.npz"
     )
 
-    _add_export(_command(commands, "export", "write a log as a page or as a film"))
+    _add_export(_command(commands, "export", "write logs as a page, or one as a film"))
     _add_sweep(_command(commands, "sweep", "run a configuration many times"))
     _add_bench(_command(commands, "bench", "measure a control loop on this machine"))
     _add_live(
@@ -199,7 +199,13 @@ def _command(
 
 
 def _add_export(export: argparse.ArgumentParser) -> None:
-    export.add_argument("log", type=Path, metavar="LOG", help="written by hsp run")
+    export.add_argument(
+        "logs",
+        type=Path,
+        nargs="+",
+        metavar="LOG",
+        help="written by hsp run; several logs make one page with a switch",
+    )
     _add_strict(export)
     files = {
         "html": "a page that plays offline, with the plots",

@@ -160,6 +160,15 @@ def distances(rollout: Rollout) -> list[str]:
     return [name.removeprefix("distance.") for name in names]
 
 
+def held_period(rollout: Rollout) -> float | None:
+    """Return how long each effort of a run was held [s]; None if that is not known."""
+    settings = (rollout.config or {}).get("simulation")
+    period = settings.get("control_period") if isinstance(settings, dict) else None
+    if isinstance(period, int | float) and 0.0 < period < float("inf"):
+        return float(period)
+    return None
+
+
 def column_unit(rollout: Rollout, name: str) -> str:
     """Return the unit of a column in the log; a dash if it has none."""
     unit = str(rollout.meta.get("columns", {}).get(name, {}).get("unit", "-"))

@@ -134,15 +134,16 @@ def test_the_export_s_document_is_true(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
-    (commands,) = blocks(text, "sh")
-    for command in commands.splitlines():
+    for command in "".join(blocks(text, "sh")).splitlines():
         _parser().parse_args(command.split("#")[0].split()[1:])
     known = _parser().parse_args(["export", "log.npz"])
     for option in re.findall(r"`--(?:no-)?(\w+)`", text):
         assert {"from": "first", "to": "last"}.get(option, option) in vars(known)
-    page, _ = blocks(text, "python")  # the film is taken in test_browser.py
-    exec(compile(page, "export.md", "exec"), {})
+    *pages, _ = blocks(text, "python")  # the film is taken in test_browser.py
+    for page in pages:
+        exec(compile(page, "export.md", "exec"), {})
     assert (tmp_path / "out" / "page.html").is_file()
+    assert (tmp_path / "out" / "effect.html").is_file()
 
 
 def test_the_law_in_the_document_is_the_law_of_the_code() -> None:

@@ -221,9 +221,12 @@ def test_timeline_plots_and_robot_move_together(
     watched = exported(watch, planar_page, at="#t=2")
     page = watched.page
     assert page.evaluate("[player.time, player.playing]") == [2.0, False]
-    left, right = 50.0, page.evaluate(
-        "document.querySelector('#side svg').clientWidth - 12"
-    )  # fmt: skip
+    left, right = page.evaluate(
+        """() => {
+          const {left, right} = PlotAxes.MARGIN;
+          return [left, document.querySelector('#side svg').clientWidth - right];
+        }"""
+    )
 
     def expect(moment: float) -> None:
         at = left + moment / 4.0 * (right - left)
@@ -241,12 +244,13 @@ def test_timeline_plots_and_robot_move_together(
     numbers = [float(text.replace("−", "-")) for text in shown]
     np.testing.assert_allclose(numbers, angles, atol=0.02)
 
-    # To press in a plot goes there, to drag follows.
+    # A click in a plot goes there; the cursor can be taken, and follows.
     box = page.locator("#side svg").nth(1).bounding_box()
-    page.mouse.move(box["x"] + left + 0.25 * (right - left), box["y"] + 40)
-    page.mouse.down()
+    quarter = left + 0.25 * (right - left)
+    page.mouse.click(box["x"] + quarter, box["y"] + 40)
     assert page.evaluate("player.time") == pytest.approx(1.0, abs=0.02)
-    page.mouse.move(box["x"] + left + 0.5 * (right - left), box["y"] + 45)
+    page.mouse.down()
+    page.mouse.move(box["x"] + left + 0.5 * (right - left), box["y"] + 45, steps=3)
     page.mouse.up()
     released = page.evaluate("player.time")
     assert released == pytest.approx(2.0, abs=0.02)
@@ -612,7 +616,7 @@ def test_the_document_s_film(
     del browser
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
-    snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)[1]
+    snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)[-1]
     columns = {name: column[:101] for name, column in planar.columns.items()}
     exec(snippet, {"rollout": Rollout(columns, planar.meta)})
     with Image.open(tmp_path / "out" / "film.webp") as film:

@@ -77,7 +77,7 @@ def pictures(notebook: Any) -> list[bytes]:
 def the_law(said: str) -> None:
     (torque,) = re.findall(r"relative difference in torque: (\S+)", said)
     assert float(torque) < 1e-10
-    errors = re.findall(r"\|e - promised\| ≤ (\S+) m", said)
+    errors = re.findall(r"\|e - predicted\| ≤ (\S+) m", said)
     assert len(errors) == 3
     assert max(map(float, errors)) < 1e-11
     departures = re.findall(r"departure from the exponential (\S+)", said)

@@ -9,6 +9,7 @@ from hsp_control.simulation.log_series import (
     column_unit,
     distances,
     field_terms,
+    held_period,
     position_unit,
 )
 from hsp_control.visualization import palette
@@ -57,6 +58,8 @@ def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
     )
     if decay.why_not:
         note(axes, decay.why_not)
+    if period := held_period(rollout):
+        note(axes, f"effort held for {1e3 * period:g} ms")
     mark_damped(axes, rollout)
     log_scale(axes, norm, top=1e-6)
     axes.set_ylabel(rf"$\Vert e_N \Vert_W$ [{_norm_unit(rollout)}]")

@@ -1,4 +1,4 @@
-"""Several runs in one scene: overlaid as ghosts, or side by side."""
+"""Several runs in one scene: overlaid, the others as ghosts or not, or side by side."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -18,6 +18,7 @@ from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.poses import pose_at
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.run_drawing import (
+    LAYERS,
     RunDrawing,
     all_layers,
     ghost_layers,
@@ -28,7 +29,8 @@ from hsp_control.visualization.viewer.stage import in_sight
 
 GHOSTS = (palette.TASK, palette.SERIES[4], palette.WARNING)
 """Colours of the second run, the third and so on."""
-_OPACITY = 0.38
+GHOST_OPACITY = 0.38
+"""Opacity of a ghost."""
 _GAP = 0.35
 """Gap between two robots, over the width of one."""
 
@@ -64,6 +66,7 @@ class Comparison:
         shown: Mapping[str, bool],
         beside: Array | None,
         dark: bool,
+        ghosts: bool = True,
     ) -> None:
         """Read the logs.
 
@@ -74,10 +77,13 @@ class Comparison:
             beside: The direction in which the runs stand side by side, a unit vector of
                 shape (3,); None: overlaid, all but the first as ghosts.
             dark: Whether the background is dark.
+            ghosts: Whether overlaid runs after the first are ghosts, with no more than
+                their paths; else each has all layers, for a page with a switch.
         """
         self._names = [run.name for run in runs]
-        self.roots = ["", *(f"/{path_element(run.name)}" for run in runs[1:])]
+        self.roots = run_roots(self._names)
         self._beside = beside
+        self._ghosts = ghosts and beside is None
         self._drawings = [drawing]
         self._runs: list[RunDrawing] = []
         for number, (run, root) in enumerate(zip(runs, self.roots, strict=True)):
@@ -85,8 +91,8 @@ class Comparison:
                 self._drawings.append(RobotDrawing(run.robot, f"{root}/robot"))
             motion = motion_of(run.robot, run.rollout)
             layers = (
-                ghost_layers(motion, _color(number), root)
-                if number and beside is None
+                ghost_layers(motion, ghost_color(number), root)
+                if number and self._ghosts
                 else all_layers(run.robot, motion, run.controller, root=root, dark=dark)
             )
             drawing = self._drawings[-1]
@@ -108,8 +114,8 @@ class Comparison:
             if not number:
                 continue
             yield set_transform(root, pose_at(self._offsets[number]))
-            if self._beside is None:
-                yield set_ghost(f"{root}/robot", _color(number), _OPACITY)
+            if self._ghosts:
+                yield set_ghost(f"{root}/robot", ghost_color(number), GHOST_OPACITY)
 
     def clip(self) -> Clip:
         """Return the clip of all runs; a run that ends early keeps its last pose."""
@@ -136,7 +142,7 @@ class Comparison:
 
     def legend(self) -> list[LegendEntry]:
         """Return the legend's entries."""
-        if self._beside is not None:
+        if not self._ghosts:
             return merged(entry for run in self._runs for entry in run.legend())
         # A ghost is all below its node; the first run is its robot and actual path.
         entries = self._runs[0].legend()
@@ -145,7 +151,7 @@ class Comparison:
         return [
             LegendEntry(self._names[0], ACTUAL, paths),
             *(
-                LegendEntry(name, _color(k), (self.roots[k],))
+                LegendEntry(name, ghost_color(k), (self.roots[k],))
                 for k, name in enumerate(self._names)
                 if k
             ),
@@ -168,5 +174,19 @@ class Comparison:
         return offsets
 
 
-def _color(number: int) -> str:
+def run_roots(names: Sequence[str]) -> list[str]:
+    """Return the root node of each run; "" for the first."""
+    taken = {"robot", "floor", "lights", *LAYERS}
+    elements = map(path_element, names[1:])
+    return ["", *(f"/run {e}" if e in taken else f"/{e}" for e in elements)]
+
+
+def run_parts(names: Sequence[str]) -> list[list[str]]:
+    """Return the nodes of each run that together hold all that is drawn of it."""
+    first = [f"/{name}" for name in ("robot", *LAYERS)]
+    return [first, *([root] for root in run_roots(names)[1:])]
+
+
+def ghost_color(number: int) -> str:
+    """Return the colour of a run's ghost; runs are numbered from 0."""
     return GHOSTS[(number - 1) % len(GHOSTS)]

@@ -85,6 +85,24 @@ def rebuild_run(rollout: Rollout, name: str, access: Access = ANYWHERE) -> Compa
     return ComparedRun(name, experiment.robot, rollout, experiment.controller)
 
 
+def load_runs(logs: Sequence[Path], access: Access = ANYWHERE) -> list[ComparedRun]:
+    """Return logs with their robots and controllers, by distinct names.
+
+    The names are those of the files.
+
+    Args:
+        logs: The files.
+        access: Which files they may read.
+
+    Raises:
+        LogError: If a log cannot be read.
+        ViewerError: If a log has no configuration, or its robot cannot be rebuilt.
+        AccessError: If it names a file that is not allowed.
+    """
+    names = zip(logs, _names(logs), strict=True)
+    return [_load(path, name, access) for path, name in names]
+
+
 def view_logs(
     logs: Sequence[Path],
     *,
@@ -115,9 +133,7 @@ def view_logs(
         ViewerError: If a log is empty, its robot cannot be rebuilt, or the view cannot
             be opened.
     """
-    access = access_for(logs, strict, allow)
-    names = zip(logs, _names(logs), strict=True)
-    runs = [_load(path, name, access) for path, name in names]
+    runs = load_runs(logs, access_for(logs, strict, allow))
     first = runs[0]
     view = (first.rollout.config or {}).get("view", {})
     viewer = Viewer(first.robot, port=port, transport=transport, **view)

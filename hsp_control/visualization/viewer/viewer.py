@@ -183,6 +183,7 @@ class Viewer:
         runs: Sequence[ComparedRun],
         *,
         beside: bool | None = None,
+        ghosts: bool = True,
         speed: float | None = None,
         loop: bool | None = None,
     ) -> None:
@@ -193,6 +194,8 @@ class Viewer:
                 other robots.
             beside: True: side by side; False: overlaid, all but the first as ghosts.
                 None: overlaid if all robots have the same name.
+            ghosts: False: overlaid, each with all its layers, as an exported page with
+                a switch needs them.
             speed: Seconds of the runs per second of real time; None: the view's
                 setting.
             loop: Repeat the runs; None: the view's setting.
@@ -216,6 +219,7 @@ class Viewer:
             shown=view.show.all_fields(),
             beside=right,
             dark=self.dark,
+            ghosts=ghosts,
         )
         stage = self._stage(comparison, comparison.title(), fit=beside)
         clip = set_clip(comparison.clip(), play=True, **playing)

@@ -42,7 +42,11 @@ from hsp_control.visualization.viewer.export.keyframes import (
 )
 from hsp_control.visualization.viewer.export.meshes import read_mesh
 from hsp_control.visualization.viewer.export.packing import ArrayTable
-from hsp_control.visualization.viewer.export.panels import CURVE_BOUND, pack_panels
+from hsp_control.visualization.viewer.export.plot_packing import (
+    CURVE_BOUND,
+    PlottedRun,
+    pack_panels,
+)
 from hsp_control.visualization.viewer.export.scene_reduction import VERTEX_STEP
 from hsp_control.visualization.viewer.export.screenshots import frame_times
 from hsp_control.visualization.viewer.export.triangle_meshes import (
@@ -507,7 +511,7 @@ def test_the_page_needs_nothing_from_anywhere(planar: Rollout, tmp_path: Path) -
 
 def test_the_plots_are_the_logs(panda: Rollout) -> None:
     table = ArrayTable()
-    packed = pack_panels(panda, table)
+    packed = pack_panels([PlottedRun("", panda)], table)
     arrays = [unpacked(entry) for entry in table.entries]
     assert (packed["start"], packed["end"]) == (0.0, 10.0)
     panels = {panel["title"]: panel for panel in packed["panels"]}
@@ -546,7 +550,8 @@ def test_where_the_law_is_bounded_the_plots_say_so(planar: Rollout) -> None:
     changed = Rollout({**planar.columns, "damped": damped}, planar.meta)
     t = planar.t
     expected = [[t[10], t[12]], [t[50], t[50]], [t[-3], t[-1]]]
-    assert pack_panels(changed, ArrayTable())["damped"] == expected
+    packed = pack_panels([PlottedRun("", changed)], ArrayTable())
+    assert packed["damped"] == [expected]
 
 
 @pytest.mark.parametrize("values", [[np.nan] * 4, [0.0] * 4, [1.0, np.inf, 0.5, -1.0]])
@@ -560,7 +565,8 @@ def test_what_cannot_be_drawn_does_not_break_the_page(
         )
         columns[name] = columns[name].reshape(planar[name][:4].shape)
     table = ArrayTable()
-    for panel in pack_panels(Rollout(columns, planar.meta), table)["panels"]:
+    run = PlottedRun("", Rollout(columns, planar.meta))
+    for panel in pack_panels([run], table)["panels"]:
         assert np.isfinite([panel["low"], panel["high"]]).all()
         assert panel["low"] < panel["high"]
     assert all(np.isfinite(unpacked(entry)).all() for entry in table.entries)

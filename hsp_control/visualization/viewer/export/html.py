@@ -1,5 +1,6 @@
-"""Exports a run to a page that plays it offline."""
+"""Exports runs to a page that plays them offline."""
 
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,18 @@ from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer.commands import Json, unpack
+from hsp_control.visualization.viewer.comparison import (
+    GHOST_OPACITY,
+    ComparedRun,
+    ghost_color,
+    run_parts,
+)
 from hsp_control.visualization.viewer.export.packing import ArrayTable
 from hsp_control.visualization.viewer.export.page import assemble
-from hsp_control.visualization.viewer.export.panels import pack_panels
+from hsp_control.visualization.viewer.export.plot_packing import (
+    PlottedRun,
+    pack_panels,
+)
 from hsp_control.visualization.viewer.export.scene_reduction import reduce_scene
 from hsp_control.visualization.viewer.recorder import Recorder
 from hsp_control.visualization.viewer.replay import rebuild_run
@@ -19,7 +29,7 @@ from hsp_control.visualization.viewer.viewer import Viewer
 
 
 def export_html(
-    rollout: Rollout,
+    rollout: Rollout | Sequence[ComparedRun],
     path: str | Path,
     *,
     robot: Robot | None = None,
@@ -28,25 +38,30 @@ def export_html(
 ) -> Path:
     """Write a page that plays a run offline, with its plots beside the scene.
 
+    A page of several runs has a switch between them, and their curves in the same
+    plots. Runs of one robot are overlaid; different robots stand side by side.
+
     The page needs no server and loads no other file; it needs a browser of 2023 or
     newer.
 
     Args:
-        rollout: The run.
+        rollout: The run; or several of different names, each with its robot and its
+            controller. The view is that of the first.
         path: The file to write.
-        robot: The robot; None: it and its controller are rebuilt from the configuration
-            in the log.
-        controller: The run's controller: see `Viewer.play`.
+        robot: The robot of a single run; None: it and its controller are rebuilt from
+            the configuration in the log.
+        controller: The controller of a single run: see `Viewer.play`.
         view: Settings that replace those of the log's ``view``: see `Viewer`.
 
     Raises:
-        ViewerError: If the robot cannot be rebuilt, the run is empty or of another
-            robot, a view has no such field, or a value is not valid.
-        ExportError: If a mesh cannot be read, the library for it is not installed, or
-            the file cannot be written.
+        ViewerError: If the robot cannot be rebuilt, a run is empty or of another robot,
+            a view has no such field, or a value is not valid.
+        ExportError: If there is no run, two have the same name, a robot or a controller
+            is given for several, a mesh cannot be read, the library for it is not
+            installed, or the file cannot be written.
     """
     path = Path(path)
-    text = page_of(rollout, robot, controller, view)
+    text = page_of(_runs(rollout, robot, controller), view)
     part = path.with_name(f".{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -61,32 +76,59 @@ def export_html(
     return path
 
 
-def page_of(
-    rollout: Rollout,
-    robot: Robot | None,
-    controller: Controller | None,
-    view: dict[str, Any],
-) -> str:
+def page_of(runs: Sequence[ComparedRun], view: dict[str, Any]) -> str:
     """Return the page that `export_html` writes."""
-    if robot is None:
-        _, robot, _, controller = rebuild_run(rollout, "the log")
+    first, names = runs[0], [run.name for run in runs]
     recorder, arrays = Recorder(), ArrayTable()
-    own = (rollout.config or {}).get("view", {})
-    with Viewer(robot, transport=recorder, **{**own, **view}) as viewer:
-        viewer.play(rollout, controller=controller)
+    own = (first.rollout.config or {}).get("view", {})
+    beside = len({run.robot.name for run in runs}) > 1
+    with Viewer(first.robot, transport=recorder, **{**own, **view}) as viewer:
+        if len(runs) == 1:
+            viewer.play(first.rollout, controller=first.controller)
+        else:
+            viewer.compare(runs, beside=beside, ghosts=False)
     commands = [unpack(packed) for _, _, packed in recorder.scene.items()]
+    plotted = [PlottedRun(run.name, run.rollout, run.controller) for run in runs]
     content: Json = {
         "type": "show",
         "commands": reduce_scene(commands, arrays),
-        "plots": pack_panels(rollout, arrays),
-        "about": _about(rollout),
+        "plots": pack_panels(plotted, arrays),
+        "about": [_about(run) for run in runs],
     }
-    title = str(rollout.meta.get("title") or robot.name)
+    if len(runs) > 1:
+        content["runs"] = {
+            "names": names,
+            "parts": [] if beside else run_parts(names),
+            "colors": [ghost_color(number) for number in range(len(runs))],
+            "opacity": GHOST_OPACITY,
+        }
+    title = " and ".join(names) if len(runs) > 1 else ""
+    title = title or str(first.rollout.meta.get("title") or first.robot.name)
     return assemble(title, {**content, "arrays": arrays.entries})
 
 
-def _about(rollout: Rollout) -> Json:
-    """Return the description and the facts at the foot of the page."""
+def _runs(
+    rollout: Rollout | Sequence[ComparedRun],
+    robot: Robot | None,
+    controller: Controller | None,
+) -> Sequence[ComparedRun]:
+    if isinstance(rollout, Rollout):
+        if robot is None:
+            return [rebuild_run(rollout, "the log")]
+        return [ComparedRun("the log", robot, rollout, controller)]
+    if robot is not None or controller is not None:
+        raise ExportError("each of several runs has its own robot and controller")
+    names = [run.name for run in rollout]
+    if not names:
+        raise ExportError("there is no run to export")
+    if len(set(names)) < len(names):
+        raise ExportError(f"runs must have different names, not {', '.join(names)}")
+    return rollout
+
+
+def _about(run: ComparedRun) -> Json:
+    """Return the description and the facts of a run, at the foot of the page."""
+    rollout = run.rollout
     meta, config = rollout.meta, rollout.config or {}
     facts = [
         ("robot", meta["robot"]["name"]),
@@ -97,6 +139,7 @@ def _about(rollout: Rollout) -> Json:
     if rollout.status != "completed":
         facts.insert(0, (rollout.status, meta.get("message", "")))
     return {
+        "name": run.name,
         "text": " ".join(str(config.get("description") or "").split()),
         "facts": [[name, str(value)] for name, value in facts if value],
     }

@@ -1,4 +1,4 @@
-"""The plots beside the scene: curves of a log, reduced to few points."""
+"""The plots beside the scene: which curves of a log they show."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -6,22 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.control.controller import Controller
 from hsp_control.simulation import Rollout, log_series
 from hsp_control.simulation.decay import predicted_decay
 from hsp_control.visualization import palette
-from hsp_control.visualization.viewer.commands import Json
-from hsp_control.visualization.viewer.export.clip_reduction import CLOCK_STEP
-from hsp_control.visualization.viewer.export.keyframes import (
-    distance_error,
-    keyframe_rows,
-    linear,
-)
-from hsp_control.visualization.viewer.export.packing import ArrayTable
+from hsp_control.visualization.viewer.export.held_effort import expected_floor
 
-CURVE_BOUND = 1 / 500
-"""Maximum error of a curve, over the height of its plot."""
-_FLOOR, _TOP = 1e-17, 1e-6
-"""Values up to the floor are rounding errors; a logarithmic axis reaches the top."""
 _MAX_CURVES, _SELECTED = 14, 7
 """Of more than 14 curves, only the 7 that vary most are shown."""
 
@@ -35,6 +25,7 @@ class Series(NamedTuple):
         color: Its colour, ``#RRGGBB``.
         dashed: Draw it dashed.
         predicted: It is a prediction, not measured: the axis need not reach it.
+        band: Fill the plot below it.
     """
 
     name: str
@@ -42,6 +33,7 @@ class Series(NamedTuple):
     color: str
     dashed: bool = False
     predicted: bool = False
+    band: bool = False
 
 
 class Panel(NamedTuple):
@@ -53,6 +45,7 @@ class Panel(NamedTuple):
         series: The curves.
         logarithmic: Whether its axis is logarithmic.
         zero: Whether the axis includes zero, drawn as a line that means contact.
+        note: A remark beside the title, or "".
     """
 
     title: str
@@ -60,41 +53,20 @@ class Panel(NamedTuple):
     series: Sequence[Series]
     logarithmic: bool = False
     zero: bool = False
+    note: str = ""
 
 
-def panels_of(rollout: Rollout) -> list[Panel]:
-    """Return the plots of a log, without those whose columns it lacks."""
-    return list(_panels(rollout))
-
-
-def pack_panels(rollout: Rollout, arrays: ArrayTable) -> Json:
-    """Return the plots of a log in the page's format: see ``plots.js``.
+def panels_of(rollout: Rollout, controller: Controller | None = None) -> list[Panel]:
+    """Return the plots of a log, without those whose columns it lacks.
 
     Args:
         rollout: The log.
-        arrays: The table that stores the numbers.
+        controller: Its controller, for what is expected of held efforts.
     """
-    damped = np.concatenate([[False], rollout["damped"] > 0.0, [False]])
-    edges = np.flatnonzero(np.diff(damped)).reshape(-1, 2)
-    return {
-        "start": float(rollout.t[0]),
-        "end": float(rollout.t[-1]),
-        "damped": [
-            [float(rollout.t[first]), float(rollout.t[stop - 1])]
-            for first, stop in edges
-        ],
-        "panels": [_packed(panel, rollout.t, arrays) for panel in panels_of(rollout)],
-        "colors": {
-            "ink": palette.INK,
-            "muted": palette.MUTED,
-            "grid": palette.GRID,
-            "contact": palette.OBSTACLE,
-            "warning": palette.WARNING,
-        },
-    }
+    return list(_panels(rollout, controller))
 
 
-def _panels(rollout: Rollout) -> Iterator[Panel]:
+def _panels(rollout: Rollout, controller: Controller | None) -> Iterator[Panel]:
     errors = [
         Series(
             f"{part.label} [{part.unit}]",
@@ -107,22 +79,27 @@ def _panels(rollout: Rollout) -> Iterator[Panel]:
     units = ", ".join(dict.fromkeys(p.unit for p in log_series.task_errors(rollout)))
     if errors:
         yield Panel("Task error ‖e‖", units, errors, logarithmic=True)
+    period = log_series.held_period(rollout)
     yield Panel(
         "Null-space error ‖e_N‖",
         log_series.column_unit(rollout, "null_space_norm"),
-        list(_null_space(rollout)),
+        list(_null_space(rollout, controller)),
         logarithmic=True,
+        note=f"effort held for {1e3 * period:g} ms" if period else "",
     )
     watched = log_series.distances(rollout)
     if watched:
         values = np.column_stack([rollout[f"distance.{name}"] for name in watched])
         names = [name.replace("_", " ") for name in watched]
         yield Panel("Minimum distance", "m", _lines(values, names), zero=True)
+    joints = log_series.joint_names(rollout)
+    some = f"{_SELECTED} of {len(joints)}" if len(joints) > _MAX_CURVES else ""
     positions, what = log_series.joint_positions(rollout)
     yield Panel(
         what.capitalize() + "s",
         log_series.position_unit(rollout),
-        _lines(positions, log_series.joint_names(rollout)),
+        _lines(positions, joints),
+        note=some,
     )
     manipulability = Series("det(J W⁻¹ Jᵀ)", rollout["manipulability"], palette.TASK)
     yield Panel(
@@ -138,11 +115,12 @@ def _panels(rollout: Rollout) -> Iterator[Panel]:
     yield Panel(
         "Efforts τ",
         log_series.effort_unit(rollout),
-        _lines(rollout.tau, log_series.joint_names(rollout)),
+        _lines(rollout.tau, joints),
+        note=some,
     )
 
 
-def _null_space(rollout: Rollout) -> Iterator[Series]:
+def _null_space(rollout: Rollout, controller: Controller | None) -> Iterator[Series]:
     decay = predicted_decay(rollout)
     for predicted, gain in zip((decay.slow, decay.fast), decay.gains, strict=True):
         if predicted is not None:
@@ -156,6 +134,10 @@ def _null_space(rollout: Rollout) -> Iterator[Series]:
             if decay.fast is decay.slow:
                 break
     yield Series("‖e_N‖", rollout["null_space_norm"], palette.FIELD)
+    floor = expected_floor(rollout, controller)
+    if floor is not None:
+        name = "held effort: expected floor"
+        yield Series(name, floor, palette.MUTED, predicted=True, band=True)
 
 
 def _lines(values: Array, names: Sequence[str]) -> list[Series]:
@@ -171,59 +153,3 @@ def _lines(values: Array, names: Sequence[str]) -> list[Series]:
         )
         for place, column in enumerate(sorted(order.tolist()))
     ]
-
-
-def _packed(panel: Panel, times: Array, arrays: ArrayTable) -> Json:
-    all_values = [np.asarray(series.values, float) for series in panel.series]
-    measured = [s.values for s in panel.series if not s.predicted]
-    low, high = _range(panel, np.concatenate(measured))
-    bound = CURVE_BOUND * (high - low)
-    curves = []
-    for series, values in zip(panel.series, all_values, strict=True):
-        shown = values
-        if panel.logarithmic:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                shown = np.log10(values)
-        # All values outside the axis are clipped to one height beyond its end.
-        span = high - low
-        shown = np.nan_to_num(shown, nan=low - span).clip(low - span, high + span)
-        shown = shown[:, None]
-        step = bound / 8.0
-        rounded = step * np.rint(shown / step)
-        keys = keyframe_rows(times, shown, rounded, linear, distance_error(bound))
-        curves.append(
-            {
-                "name": series.name,
-                "color": series.color,
-                "dashed": series.dashed,
-                "times": arrays.numbers(times[keys], CLOCK_STEP, np.float64),
-                "values": arrays.numbers(rounded[keys], step),
-            }
-        )
-    return {
-        "title": panel.title,
-        "unit": panel.unit,
-        "logarithmic": panel.logarithmic,
-        "zero": panel.zero,
-        "low": low,
-        "high": high,
-        "series": curves,
-    }
-
-
-def _range(panel: Panel, values: Array) -> tuple[float, float]:
-    """Return the limits of the axis; as powers of ten if it is logarithmic."""
-    shown = values[np.isfinite(values)]
-    if panel.logarithmic:
-        shown = shown[shown > _FLOOR]
-        high = max(float(shown.max(initial=_TOP)), _TOP)
-        # A norm that crosses zero has dips at single rows; the axis ignores them.
-        low = float(np.quantile(shown, 0.005)) if shown.size else high
-        return float(np.log10(0.4 * low)), float(np.log10(3.0 * high))
-    low, high = float(shown.min(initial=np.inf)), float(shown.max(initial=-np.inf))
-    if not low <= high:
-        return 0.0, 1.0
-    if panel.zero:
-        low, high = min(low, 0.0), max(high, 0.0)
-    room = 0.06 * (high - low) or max(0.05 * abs(low), 0.5)
-    return low - room, high + room

@@ -48,7 +48,9 @@ class LengthLabels {
       }
       const drawn = node?.children["<object>"]?.object;
       if (!drawn) this.paths.delete(path);  // the node was deleted
-      else if (seen && drawn.visible) bars.push({bar: node.object, length: node.object.scale.z});
+      else if (seen && drawn.visible && drawn.layers.test(this.viewer.camera.layers)) {
+        bars.push({bar: node.object, length: node.object.scale.z});
+      }
     }
     return bars.sort((one, other) => one.length - other.length).slice(0, LengthLabels.MOST);
   }

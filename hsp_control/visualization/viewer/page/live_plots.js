@@ -1,4 +1,5 @@
-// The live plots: the last seconds of every curve, in the style of export/page/plots.js.
+// The live plots: the last seconds of every curve, in the style of export/page/plots.js:
+// both are made of plot_parts.js.
 //
 //   const plots = new LivePlots(parent, definitions, () => isOpen);
 //   plots.add(times, values);     // rows of all series of all plots, in order
@@ -119,38 +120,18 @@ class LivePlots {
 }
 
 class LivePlot {
-  static HEIGHT = 118;
-  static MARGIN = {left: 50, right: 12, top: 6, bottom: 20};
-
   constructor(plots, definition, first) {
-    const {title, unit, series} = definition;
-    Object.assign(this, {plots, definition, first, inSight: false, alone: null, pointer: null});
-    this.box = document.createElement("section");
-    const heading = document.createElement("h3");
-    const small = document.createElement("small");
-    small.textContent = unit === "–" ? "" : unit;
-    this.moment = document.createElement("time");
-    heading.append(title, " ", small, this.moment);
+    const {title, series} = definition;
+    Object.assign(this, {plots, definition, first, inSight: false, pointer: null, range: null});
     this.canvas = document.createElement("canvas");
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", `${title}, the last ${LivePlots.SPAN} s`);
-    const legend = document.createElement("ul");
-    this.outputs = series.map(({name, color}, k) => {
-      const entry = document.createElement("li");
-      const button = document.createElement("button");
-      button.type = "button";
-      button.title = "Show it alone, or all";
-      button.setAttribute("aria-pressed", "false");
-      button.style.setProperty("--color", color);
-      const value = document.createElement("output");
-      value.setAttribute("aria-live", "off");
-      button.append(Object.assign(document.createElement("span"), {textContent: name}), value);
-      button.onclick = () => this.isolate(this.alone === k ? null : k);
-      entry.append(button);
-      legend.append(entry);
-      return value;
-    });
-    this.box.append(heading, this.canvas, legend);
+    this.frame = new PlotBox("h3", {title, series}, this.canvas);
+    this.box = this.frame.box;
+    this.frame.onisolate = () => {
+      this.range = null;
+      plots.schedule();
+    };
     const follow = ({clientX}) => {
       this.pointer = clientX - this.canvas.getBoundingClientRect().left;
       plots.schedule();
@@ -162,17 +143,6 @@ class LivePlot {
     };
   }
 
-  isolate(series) {
-    this.alone = series;
-    this.range = null;
-    this.outputs.forEach((output, k) => {
-      const button = output.parentElement;
-      button.setAttribute("aria-pressed", series === k);
-      button.classList.toggle("off", series !== null && series !== k);
-    });
-    this.plots.schedule();
-  }
-
   value(row, series) {
     const {plots, first} = this;
     const value = plots.values[plots.at(row) * plots.width + first + series];
@@ -181,14 +151,14 @@ class LivePlot {
 
   draw(colors) {
     const {canvas, plots, definition} = this;
-    const {left, right, top, bottom} = LivePlot.MARGIN;
+    const {left, right, top, bottom} = PlotAxes.MARGIN;
     const full = canvas.clientWidth, ratio = devicePixelRatio;
     if (!full) return;
     if (canvas.width !== Math.round(full * ratio)) {
       canvas.width = Math.round(full * ratio);
-      canvas.height = Math.round(LivePlot.HEIGHT * ratio);
+      canvas.height = Math.round(PlotAxes.HEIGHT * ratio);
     }
-    const width = full - left - right, height = LivePlot.HEIGHT - top - bottom;
+    const width = full - left - right, height = PlotAxes.HEIGHT - top - bottom;
     const end = Math.max(plots.end, LivePlots.SPAN), start = end - LivePlots.SPAN;
     const from = Math.max(0, plots.find(start) - 1), until = plots.count;
     const [low, high] = this.limits(from, until);
@@ -196,7 +166,7 @@ class LivePlot {
     const y = (value) => top + (high - value) / (high - low) * height;
     const pen = canvas.getContext("2d");
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    pen.clearRect(0, 0, full, LivePlot.HEIGHT);
+    pen.clearRect(0, 0, full, PlotAxes.HEIGHT);
     this.drawAxes(pen, colors, {x, y, low, high, start, end, width, height});
     pen.save();
     pen.beginPath();
@@ -204,7 +174,7 @@ class LivePlot {
     pen.clip();
     pen.lineJoin = "round";
     definition.series.forEach(({color}, k) => {
-      if (this.alone !== null && this.alone !== k) return;
+      if (!this.frame.shows(k)) return;
       pen.strokeStyle = LivePlot.inkOf(color, colors);
       pen.lineWidth = 1.6;
       pen.stroke(this.curve(k, from, until, x, y, width));
@@ -262,7 +232,7 @@ class LivePlot {
     const every = Math.max(1, Math.floor((until - from) / 2000));
     for (let row = from; row < until; row += every) {
       for (let k = 0; k < series.length; k++) {
-        if (this.alone !== null && this.alone !== k) continue;
+        if (!this.frame.shows(k)) continue;
         const value = this.value(row, k);
         if (!Number.isFinite(value)) continue;
         low = Math.min(low, value);
@@ -287,7 +257,7 @@ class LivePlot {
   }
 
   drawAxes(pen, {muted, grid}, {x, y, low, high, start, end, width, height}) {
-    const {left, top} = LivePlot.MARGIN;
+    const {left, top} = PlotAxes.MARGIN;
     const line = (x1, y1, x2, y2, color) => {
       pen.strokeStyle = color;
       pen.lineWidth = 1;
@@ -296,27 +266,37 @@ class LivePlot {
       pen.lineTo(x2, y2);
       pen.stroke();
     };
-    pen.font = '10.5px system-ui, "Segoe UI", "Helvetica Neue", Arial, sans-serif';
+    pen.font = PlotAxes.FONT;
     pen.fillStyle = muted;
     pen.textAlign = "right";
     const {ticks, label} = this.definition.log
-      ? LivePlot.decades(low, high) : LivePlot.steps(low, high, 4);
+      ? PlotAxes.decades(low, high) : PlotAxes.steps(low, high, 4);
     for (const tick of ticks) {
       const at = Math.round(y(tick)) + 0.5;
       line(left, at, left + width, at, grid);
       pen.fillText(label(tick), left - 7, at + 3.5);
     }
     pen.textAlign = "center";
-    const clock = LivePlot.steps(start, end, Math.max(2, Math.min(6, width / 70)));
-    const edge = left + width - 14;
+    const clock = PlotAxes.clock(start, end, width);
     for (const tick of clock.ticks) {
-      if (x(tick) < edge - 4 && x(tick) > left + 2) {
-        pen.fillText(clock.label(tick), x(tick), LivePlot.HEIGHT - 6);
-      }
+      if (x(tick) > left + 2) pen.fillText(clock.label(tick), x(tick), PlotAxes.HEIGHT - 6);
     }
     pen.textAlign = "right";
-    pen.fillText("s", left + width, LivePlot.HEIGHT - 6);
+    pen.fillText("t [s]", left + width, PlotAxes.HEIGHT - 6);
+    this.drawUnit(pen, top + height / 2);
     line(left, top + height + 0.5, left + width, top + height + 0.5, muted);
+  }
+
+  // The unit, upright beside the axis.
+  drawUnit(pen, middle) {
+    const {unit} = this.definition;
+    if (unit === "–") return;
+    pen.save();
+    pen.translate(9, middle);
+    pen.rotate(-Math.PI / 2);
+    pen.textAlign = "center";
+    pen.fillText(`[${unit}]`, 0, 0);
+    pen.restore();
   }
 
   // The values under the pointer, or else the present ones.
@@ -339,13 +319,13 @@ class LivePlot {
         pen.stroke();
       }
     }
-    this.moment.textContent = hovered ? `t = ${plots.time(row).toFixed(2)} s` : "";
+    this.frame.moment.textContent = hovered ? `t = ${plots.time(row).toFixed(2)} s` : "";
     this.definition.series.forEach(({color}, k) => {
       const value = row >= 0 ? this.value(row, k) : NaN;
       const shown = this.definition.log ? 10 ** value : value;
-      this.outputs[k].textContent = Number.isFinite(shown) ? LivePlot.number(shown) : "–";
+      this.frame.outputs[k].textContent = PlotAxes.number(shown);
       if (row < 0 || !(value >= low && value <= high)) return;
-      if (this.alone !== null && this.alone !== k) return;
+      if (!this.frame.shows(k)) return;
       pen.beginPath();
       pen.arc(x(plots.time(row)), y(value), hovered ? 3.2 : 2.6, 0, 2 * Math.PI);
       pen.fillStyle = LivePlot.inkOf(color, colors);
@@ -355,34 +335,4 @@ class LivePlot {
 
   // The palette's ink is that of the page, light on dark.
   static inkOf(color, {ink}) { return color.toUpperCase() === "#22272B" ? ink : color; }
-
-  // About `count` round numbers from low to high.
-  static steps(low, high, count) {
-    const raw = (high - low) / count, power = 10 ** Math.floor(Math.log10(raw));
-    const step = power * [1, 2, 5, 10].find((factor) => factor * power >= raw * 0.999);
-    const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-    const ticks = [];
-    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
-      ticks.push(k * step);
-    }
-    const label = (tick) => Math.abs(tick) < step / 2 ? "0"
-      : digits > 4 ? tick.toExponential(1) : tick.toFixed(digits);
-    return {ticks, label: (tick) => label(tick).replace(/-/g, "−")};
-  }
-
-  // Powers of ten between two exponents, at most five.
-  static decades(low, high) {
-    const every = Math.max(1, Math.ceil((high - low) / 4.5));
-    const ticks = [];
-    for (let k = every * Math.ceil(low / every); k <= high; k += every) ticks.push(k);
-    const raised = (text) => [...text].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("");
-    return {ticks, label: (tick) => tick === 0 ? "1" : `10${raised(String(tick))}`};
-  }
-
-  static number(value) {
-    const size = Math.abs(value);
-    const text = size !== 0 && (size < 1e-3 || size >= 1e5)
-      ? value.toExponential(1) : value.toFixed(size < 10 ? 3 : size < 1000 ? 1 : 0);
-    return text.replace(/-/g, "−");
-  }
 }

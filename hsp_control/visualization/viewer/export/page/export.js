@@ -12,22 +12,33 @@ for (const part of document.querySelectorAll("#meshcat-pane, #caption, .player")
 
 barHeight = 0;  // the bar is below the picture
 
-commandHandlers.show = ({arrays, commands, plots, about}) => {
+commandHandlers.show = ({arrays, commands, plots, about, runs}) => {
   const unpacked = arrays.map(unpackArray);
   viewer.set_3d_pane_size();
   viewer.handle_command(withArrays(commands, unpacked));
-  new Plots(player, side, withArrays(plots, unpacked));
+  const drawn = new Plots(player, side, withArrays(plots, unpacked));
+  if (runs) new RunSwitch(viewer, stage, drawn, runs);
   addFooter(about);
 };
 
-// The description and the facts of the run, below the plots.
-function addFooter({text, facts}) {
+// The descriptions and the facts of the runs, below the plots.
+function addFooter(runs) {
   const foot = document.createElement("footer");
-  if (text) foot.append(Object.assign(document.createElement("p"), {textContent: text}));
-  const list = document.createElement("p");
-  list.className = "facts";
-  list.textContent = facts.map(([name, value]) => `${name} ${value}`).join("  ·  ");
-  foot.append(list);
+  const add = (textContent, className = "") => {
+    foot.append(Object.assign(document.createElement("p"), {textContent, className}));
+  };
+  const help = matchMedia("(pointer: coarse)").matches
+    ? "In the plots: tap or drag to a time, pinch to zoom; tap a name to see it alone."
+    : "In the plots: click to go to a time, drag to zoom, Esc for the whole run; click a name "
+      + "to see it alone.";
+  add(help, "help");
+  let last = "";
+  for (const {name, text, facts} of runs) {
+    if (text && text !== last) add(text);
+    last = text;
+    const list = facts.map(([what, value]) => `${what} ${value}`);
+    add((runs.length > 1 ? [name, ...list] : list).join("  ·  "), "facts");
+  }
   side.append(foot);
 }
 

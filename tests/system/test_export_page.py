@@ -1,0 +1,310 @@
+"""In a real browser: the plots of an exported page, and its switch between two runs."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hsp_control import load_experiment
+from hsp_control.visualization.viewer import ComparedRun, export_html
+from hsp_control.visualization.viewer.export.chromium import (
+    find_browser,
+    headless_browser,
+    open_page,
+)
+
+pytestmark = pytest.mark.browser
+
+pytest.importorskip("playwright.sync_api")
+
+PLANAR = "paper/4_moving_obstacle"
+JOINTS = 3  # the place of the plot of joint positions
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    if find_browser() is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("CI needs Chromium: apt-get install chromium")
+        pytest.skip("there is no Chromium on the path")
+    with headless_browser() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page of two runs of 4 s, with efforts that are held."""
+    runs = []
+    for name, weight in (("with", 1.0), ("without", 0.0)):
+        experiment = load_experiment(
+            PLANAR,
+            "simulation.duration=4",
+            "simulation.control_period=0.002",
+            f"null_space.fields.1.weight={weight}",
+        )
+        run = experiment.run()
+        runs.append(ComparedRun(name, experiment.robot, run, experiment.controller))
+    return export_html(runs, tmp_path_factory.mktemp("page") / "two.html")
+
+
+@pytest.fixture
+def page(browser: Any, page_file: Path) -> Iterator[Any]:
+    opened = open_page(browser, page_file, (1280, 800))
+    wrong: list[str] = []
+    opened.on("pageerror", lambda error: wrong.append(str(error)))
+    opened.evaluate("player.pause(); player.seek(1)")
+    yield opened
+    opened.close()
+    assert wrong == []
+
+
+def place(page: Any, plot: int, moment: float) -> tuple[float, float]:
+    """Where a time is on the screen, in a plot that shows the whole run."""
+    page.locator("#side svg").nth(plot).scroll_into_view_if_needed()
+    box = page.locator("#side svg").nth(plot).bounding_box()
+    left, right = page.evaluate("[PlotAxes.MARGIN.left, PlotAxes.MARGIN.right]")
+    share = moment / 4.0
+    return box["x"] + left + share * (box["width"] - left - right), box["y"] + 50
+
+
+def drag(page: Any, plot: int, start: float, end: float) -> None:
+    (x0, y), (x1, _) = place(page, plot, start), place(page, plot, end)
+    page.mouse.move(x0, y)
+    page.mouse.down()
+    page.mouse.move(x1, y, steps=5)
+    page.mouse.up()
+
+
+def ticks(page: Any, plot: int) -> list[str]:
+    texts = page.locator("#side svg").nth(plot).locator("text[text-anchor=middle]")
+    return [text for text in texts.all_text_contents() if "[" not in text]
+
+
+def zoom_label(page: Any) -> str | None:
+    label = page.locator(".whole-run")
+    return label.inner_text().split("✕")[0].strip() if label.is_visible() else None
+
+
+def outputs(page: Any, plot: int) -> list[str]:
+    return page.locator("#side section").nth(plot).locator("output").all_inner_texts()
+
+
+def test_axes_have_units(page: Any) -> None:
+    units = page.locator("#side svg").nth(JOINTS).locator(".unit").all_text_contents()
+    assert sorted(units) == ["[rad]", "t [s]"]
+    assert ticks(page, JOINTS) == ["0", "1", "2", "3"]
+
+
+def test_the_pointer_shows_values_in_all_plots_and_leaves_the_time(page: Any) -> None:
+    before = outputs(page, JOINTS)
+    page.mouse.move(*place(page, JOINTS, 3.0))
+    section = page.locator("#side section").nth(JOINTS)
+    assert section.locator("time").inner_text() == "t = 3.00 s"
+    shown = page.locator("#side .pointed[visibility=visible]")
+    assert shown.count() == page.locator("#side svg").count()
+    hovered = outputs(page, JOINTS)
+    assert hovered != before
+    assert all(len(text.split(" | ")) == 2 for text in hovered)  # of both runs
+    assert page.evaluate("player.time") == 1
+    page.mouse.move(200, 200)
+    assert outputs(page, JOINTS) == before
+    assert shown.count() == 0
+    page.mouse.click(*place(page, JOINTS, 3.0))
+    assert page.evaluate("player.time") == pytest.approx(3.0, abs=0.02)
+    page.mouse.move(200, 200)
+    assert outputs(page, JOINTS) == hovered
+
+
+def test_all_plots_zoom_together_and_back(page: Any) -> None:
+    first = ticks(page, 0)
+    drag(page, JOINTS, 2.0, 3.0)
+    assert page.evaluate("player.time") == 1  # a span is no click
+    assert zoom_label(page) == "2.00 – 3.00 s"
+    assert ticks(page, 0) == ticks(page, JOINTS)
+    assert ticks(page, 0)[:2] == ["2.0", "2.2"]
+    assert page.locator("#side .cursor[visibility=visible]").count() == 0
+    page.keyboard.press("Escape")
+    assert zoom_label(page) is None
+    assert ticks(page, 0) == first
+
+    for back in ("double click", "button"):
+        drag(page, 1, 0.5, 2.5)
+        assert zoom_label(page) == "0.50 – 2.50 s"
+        if back == "button":
+            page.locator(".whole-run").click()
+        else:
+            page.mouse.dblclick(*place(page, 1, 3.0))
+        assert zoom_label(page) is None
+
+    # A wheel scrolls; with ctrl it zooms, and the time under the pointer stays.
+    page.mouse.move(*place(page, 1, 2.0))
+    page.mouse.wheel(0, -1)
+    assert zoom_label(page) is None
+    page.mouse.move(*place(page, 1, 2.0))
+    page.keyboard.down("Control")
+    page.mouse.wheel(0, -120)
+    page.keyboard.up("Control")
+    page.wait_for_selector(".whole-run:not([hidden])")
+    label = zoom_label(page)
+    assert label is not None
+    start, end = map(float, label.removesuffix(" s").split(" – "))
+    assert (start + end) / 2 == pytest.approx(2.0, abs=0.03)
+    assert end - start == pytest.approx(4.0 * np.exp(-0.6), abs=0.03)
+
+
+def test_a_name_shows_its_curve_alone(page: Any) -> None:
+    section = page.locator("#side section").nth(JOINTS)
+    curves = section.locator("polyline")
+    low_to_high = section.locator("svg text[text-anchor=end]")
+    all_of_them, labels = curves.count(), low_to_high.all_text_contents()
+    assert all_of_them == 6  # three joints of two runs
+    section.locator("li button").nth(1).click()
+    assert curves.count() == 2
+    assert low_to_high.all_text_contents() != labels  # its own axis
+    assert section.locator("li button.off").count() == 2
+    page.keyboard.press("Space")  # the keyboard is the player's again
+    assert page.evaluate("player.playing")
+    page.keyboard.press("Space")
+    section.locator("li button").nth(1).focus()
+    page.keyboard.press("Enter")
+    assert not page.evaluate("player.playing")
+    assert curves.count() == all_of_them
+    assert low_to_high.all_text_contents() == labels
+
+
+def test_a_plot_is_used_with_the_keyboard(page: Any) -> None:
+    picture = page.locator("#side svg").first
+    picture.focus()
+    speed = page.evaluate("player.speed")
+    page.keyboard.press("+")
+    assert zoom_label(page) == "0.50 – 2.50 s"  # about the cursor, at 1 s
+    page.keyboard.press("+")
+    assert zoom_label(page) == "0.75 – 1.75 s"
+    assert page.evaluate("player.speed") == speed
+    page.keyboard.press("Shift+ArrowRight")
+    assert page.evaluate("player.time") == 2
+    assert zoom_label(page) == "1.50 – 2.50 s"  # the cursor stays in sight
+    assert picture.get_attribute("aria-valuenow") == "2"
+    assert "t = 2.00 s: " in picture.get_attribute("aria-valuetext")
+    page.keyboard.press("-")
+    assert zoom_label(page) == "1.00 – 3.00 s"
+    page.keyboard.press("Home")
+    assert zoom_label(page) is None
+    assert page.evaluate("player.time") == 2
+    page.keyboard.press("Home")
+    assert page.evaluate("player.time") == 0
+
+
+def test_fingers_pinch_and_move_the_time(browser: Any, page_file: Path) -> None:
+    context = browser.new_context(
+        viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True
+    )
+    page = context.new_page()
+    page.goto(page_file.resolve().as_uri() + "#t=1")
+    page.wait_for_selector("body[data-ready]", state="attached")
+    page.locator("#side svg").nth(1).scroll_into_view_if_needed()
+    camera = context.new_cdp_session(page)
+
+    def touch(kind: str, *moments: float) -> None:
+        points = [dict(zip("xy", place(page, 1, t), strict=True)) for t in moments]
+        points = [{**point, "id": k} for k, point in enumerate(points)]
+        camera.send(
+            "Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": points}
+        )
+
+    touch("Start", 1.0)
+    touch("Move", 2.0)
+    touch("Move", 3.0)
+    touch("End")
+    assert page.evaluate("player.time") == pytest.approx(3.0, abs=0.05)
+    touch("Start", 1.5)
+    touch("Start", 1.5, 2.5)
+    touch("Move", 1.0, 3.0)
+    touch("End")
+    label = zoom_label(page)
+    assert label is not None
+    start, end = map(float, label.removesuffix(" s").split(" – "))
+    assert (start, end) == pytest.approx((1.0, 3.0), abs=0.05)
+    page.locator(".whole-run").tap()
+    assert zoom_label(page) is None
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    context.close()
+
+
+def seen(page: Any, path: str) -> bool:
+    """Whether a camera sees what is below a node."""
+    return page.evaluate(
+        """(path) => {
+          const meshes = [];
+          layers.find(path).traverse((thing) => {
+            if (thing.isMesh) meshes.push(thing);
+          });
+          return meshes.some((mesh) => mesh.layers.test(viewer.camera.layers));
+        }""",
+        path,
+    )
+
+
+def test_the_switch_shows_one_run_or_both(page: Any) -> None:
+    def state() -> tuple[str, bool, bool, bool]:
+        pressed = page.locator(".run-switch [aria-pressed=true]").inner_text()
+        paths = ("/robot", "/without/robot", "/without/targets")
+        return (pressed, *(seen(page, path) for path in paths))  # type: ignore[return-value]
+
+    def opacities() -> set[float]:
+        found = page.evaluate(
+            """() => {
+              const found = [];
+              const robot = layers.find("/without/robot");
+              eachMaterial(robot, ({opacity}) => found.push(opacity));
+              return found;
+            }"""
+        )
+        return set(found)
+
+    def pale() -> set[tuple[str, str]]:
+        groups = page.locator("#side section").nth(JOINTS).locator("g[data-run]")
+        return {(g.get_attribute("data-run"), g.get_attribute("opacity"))
+                for g in groups.all()}  # fmt: skip
+
+    names = page.locator(".run-switch button").all_inner_texts()
+    assert names == ["with", "without", "both"]
+    assert state() == ("both", True, True, False)
+    assert opacities() == {0.38}
+    assert pale() == {("0", "1"), ("1", "1")}
+    page.keyboard.press("w")
+    assert state() == ("with", True, False, False)
+    assert pale() == {("0", "1"), ("1", "0.3")}
+    assert all(" | " not in text for text in outputs(page, JOINTS))
+    page.keyboard.press("w")
+    assert state() == ("without", False, True, True)
+    assert opacities() == {1}
+    # The legend's switches keep their meaning: they hide robots of both runs.
+    row = page.locator("#layers button").get_by_text("robot", exact=True)
+    assert row.get_attribute("aria-pressed") == "true"
+    row.click()
+    page.keyboard.press("w")
+    assert row.get_attribute("aria-pressed") == "false"
+    assert not page.evaluate("layers.find('/without/robot').visible")
+    row.click()
+    page.locator(".run-switch button").first.click()
+    assert state() == ("with", True, False, False)
+    page.keyboard.press("Space")
+    assert page.evaluate("player.playing")
+
+
+def test_the_floor_is_drawn_where_the_effort_is_held(page: Any) -> None:
+    section = page.locator("#side section").nth(1)
+    assert section.locator("small").inner_text() == "effort held for 2 ms"
+    names = section.locator("li span").all_inner_texts()
+    assert names[-1] == "held effort: expected floor"
+    assert section.locator("polygon").count() == 2  # of both runs
+    page.evaluate("player.seek(3.5)")
+    *_, actual, floor = outputs(page, 1)
+    for one, other in zip(actual.split(" | "), floor.split(" | "), strict=True):
+        assert float(one.replace("−", "-")) == pytest.approx(
+            float(other.replace("−", "-")), rel=0.3
+        )
