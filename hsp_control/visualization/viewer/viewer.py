@@ -16,6 +16,7 @@ from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer import browser
+from hsp_control.visualization.viewer.bands import bands_of
 from hsp_control.visualization.viewer.camera import look_at, right_direction
 from hsp_control.visualization.viewer.clip import remove_clip, set_clip
 from hsp_control.visualization.viewer.commands import (
@@ -308,7 +309,8 @@ class Viewer:
         motion = motion_of(self.robot, rollout)
         layers = all_layers(self.robot, motion, controller, dark=self.dark)
         shown = self.view.show.all_fields()
-        return RunDrawing(self.drawing, motion, layers, shown=shown)
+        bands = bands_of(rollout, controller)
+        return RunDrawing(self.drawing, motion, layers, shown=shown, bands=bands)
 
     def _draw_run(
         self, rollout: Rollout, controller: Controller | None, **playing: Any
