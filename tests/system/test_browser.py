@@ -279,7 +279,7 @@ def test_the_plots_can_be_put_away_and_narrow_screens_stack(
     watched = exported(watch, planar_page, at="#t=1")
     page = watched.page
     width = page.locator("#meshcat-pane canvas").bounding_box()["width"]
-    page.keyboard.press("p")
+    page.keyboard.press("g")
     watched.until(f"document.querySelector('canvas').clientWidth === {SIZE[0]}")
     assert width < SIZE[0]
     assert not page.locator("#side").is_visible()

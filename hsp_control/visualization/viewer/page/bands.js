@@ -26,8 +26,10 @@ class Bands {
     for (const kind of ["pointerout", "focusout"]) {
       this.rows.addEventListener(kind, () => this.showName(document.activeElement));
     }
-    this.rows.addEventListener("click", ({target}) => {
-      if (target.dataset.start) player.seek(Number(target.dataset.start));
+    this.rows.addEventListener("click", ({target, pointerType}) => {
+      if (!target.dataset.start) return;
+      player.seek(Number(target.dataset.start));
+      if (pointerType === "mouse") target.blur();  // a finger's tap keeps the name in sight
     });
     player.addEventListener("state", () => this.draw());
     player.addEventListener("time", () => this.showTime());

@@ -16,6 +16,7 @@ commandHandlers.show = ({arrays, commands, plots, about}) => {
   const unpacked = arrays.map(unpackArray);
   viewer.set_3d_pane_size();
   viewer.handle_command(withArrays(commands, unpacked));
+  if (!plots) return document.body.classList.add("alone", "without-plots");
   new Plots(player, side, withArrays(plots, unpacked));
   addFooter(about);
 };
@@ -44,6 +45,7 @@ sideButton.innerHTML = '<svg viewBox="0 0 24 24"><path d="M4 4h1.8v14.2H20V20H4z
 sideButton.onclick = toggleSide;
 document.querySelector(".player .present").before(sideButton);
 addEventListener("keydown", (event) => {
+  if (document.body.classList.contains("without-plots")) return;
   if (event.key !== "g" || event.ctrlKey || event.metaKey || event.altKey) return;
   toggleSide();
 });
