@@ -3,6 +3,8 @@
 //   space       play, pause               home, end   to the start, to the end
 //   ← →         1/30 s (with shift 1 s)   + -         faster, slower
 //   l           repeat, or play once
+//
+// bands.js draws into it, presentation.js adds its own key.
 "use strict";
 
 class Controls {

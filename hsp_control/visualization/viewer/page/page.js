@@ -185,7 +185,8 @@ viewer.set_3d_pane_size = () => {
   if (clientWidth && clientHeight) fitPane(clientWidth, clientHeight);
 };
 new ResizeObserver(refit).observe(viewer.dom_element);
-const presentation = new Presentation(controls.bar, refit);
+const presentation = new Presentation(refit);
+presentation.addButton(controls.bar);
 
 function caption({title, legend, dark}) {
   document.title = title;

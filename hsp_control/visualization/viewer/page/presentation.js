@@ -1,6 +1,7 @@
 // Presenting: the scene, its title and what happens now, as large as the screen.
 //
-//   new Presentation(document.querySelector(".player"), refit);
+//   const presentation = new Presentation(refit);    // called when there is more or less space
+//   presentation.addButton(bar);
 //
 //   p        begins and ends it             escape   ends it
 //
@@ -11,24 +12,11 @@
 class Presentation {
   static REST = 2000;  // ms
 
-  // `bar` gets a button; `changed()` is called when there is more or less space.
-  constructor(bar, changed) {
+  constructor(changed) {
     this.changed = changed;
     this.on = this.full = false;
     this.at = [NaN, NaN];
-    this.button = document.createElement("button");
-    this.button.className = "present";
-    this.button.type = "button";
-    this.button.title = "Present (p)";
-    this.button.setAttribute("aria-label", "Present");
-    this.button.setAttribute("aria-pressed", "false");
-    this.button.innerHTML = `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="M4 4h6v2.2H6.2V10H4z
-      M14 4h6v6h-2.2V6.2H14zM4 14h2.2v3.8H10V20H4zM17.8 14H20v6h-6v-2.2h3.8z"/></svg>`;
-    this.button.onclick = ({detail}) => {
-      if (detail) this.button.blur();  // return the keyboard to the player
-      this.toggle();
-    };
-    bar.append(this.button);
+    this.buttons = [];
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("pointermove", ({clientX, clientY}) => {
       // A browser also tells of a pointer that rests while the page moves below it.
@@ -41,6 +29,24 @@ class Presentation {
       if (document.fullscreenElement) this.full = true;
       else if (this.full) this.set(false);  // its Escape goes to the browser, not to the page
     });
+  }
+
+  // Add a button to a bar, which goes with the pointer while presenting.
+  addButton(bar) {
+    const button = document.createElement("button");
+    button.className = "present";
+    button.type = "button";
+    button.title = "Present (p)";
+    button.setAttribute("aria-label", "Present");
+    button.setAttribute("aria-pressed", this.on);
+    button.innerHTML = `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="M4 4h6v2.2H6.2V10H4z
+      M14 4h6v6h-2.2V6.2H14zM4 14h2.2v3.8H10V20H4zM17.8 14H20v6h-6v-2.2h3.8z"/></svg>`;
+    button.onclick = ({detail}) => {
+      if (detail) button.blur();  // return the keyboard to the player
+      this.toggle();
+    };
+    bar.append(button);
+    this.buttons.push(button);
   }
 
   key(event) {
@@ -57,7 +63,7 @@ class Presentation {
     if (on === this.on) return;
     this.on = on;
     document.body.classList.toggle("presenting", on);
-    this.button.setAttribute("aria-pressed", on);
+    for (const button of this.buttons) button.setAttribute("aria-pressed", on);
     // It may not be allowed, such as in a frame: then the window is all there is.
     if (on) document.documentElement.requestFullscreen?.().catch(() => {});
     else if (document.fullscreenElement) document.exitFullscreen().catch(() => {});
