@@ -132,7 +132,7 @@ def test_runs_are_shown_without_any_server(
     second = hsp.show(rollout, robot=experiment.robot, height=300, background="#14202B")
     assert repr(first).startswith("InlineView(0.")
     assert f"{first.size / 1e6:.1f} MB in this notebook" in first._repr_html_()
-    assert "href" not in first._repr_html_()
+    assert "127.0.0.1" not in first._repr_html_()
     notebook = Notebook(browser, tmp_path, *(v._repr_html_() for v in (first, second)))
     one, other = notebook.views
     assert one.evaluate("[player.speed, player.playing]") == [0.5, False]
@@ -159,5 +159,5 @@ def test_a_posture_needs_no_player(
     assert view.locator(".player").is_hidden()
     height = view.locator("canvas").bounding_box()["height"]
     assert height == view.evaluate("innerHeight")
-    assert turn(view) == pytest.approx(0.5, abs=1e-6)
+    assert turn(view) == pytest.approx(0.5, abs=1e-4)  # packed
     notebook.close()
