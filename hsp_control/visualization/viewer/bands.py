@@ -1,4 +1,4 @@
-"""Bands on the time line: when a limit, a singularity or an obstacle acts on the law."""
+"""Bands on the time line: when a limit, a singularity or an obstacle acts."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
-from hsp_control.null_space.fields import Clearance, SelfClearance
+from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearance
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import logged_terms
 from hsp_control.visualization import palette
+from hsp_control.visualization.viewer.controller_analysis import from_the_start
 
 CLOSED_SHARE = 1 / 200
 """Gaps up to this share of the whole run are closed: nobody would see them."""
@@ -48,8 +49,8 @@ def bands_of(
     times = rollout.t
     whole = float(times[-1] - times[0]) if duration is None else duration
     bands = [
-        Band(*about, spans_of(times, active, CLOSED_SHARE * whole))
-        for *about, active in _activities(rollout, controller)
+        band._replace(spans=spans_of(times, active, CLOSED_SHARE * whole))
+        for band, active in _activities(rollout, controller)
     ]
     return [band for band in bands if band.spans]
 
@@ -78,17 +79,17 @@ def spans_of(
 
 def _activities(
     rollout: Rollout, controller: Controller | None
-) -> Iterator[tuple[str, str, str, NDArray[np.bool_]]]:
-    """Yield name, caption, colour, and in which rows it is active."""
-    never = np.zeros(len(rollout), bool)
+) -> Iterator[tuple[Band, NDArray[np.bool_]]]:
+    """Yield the bands without intervals, and in which rows each is active."""
     if "status" in rollout:
-        limited = rollout["status"] >= _LIMITED
-        yield "limit active", "a limit is active", palette.DESIRED, limited
+        limit = Band("limit active", "a limit is active", palette.DESIRED, [])
+        yield limit, rollout["status"] >= _LIMITED
     if "damped" in rollout:
         words = "bounded at a singularity"
-        yield words, f"the law is {words}", palette.WARNING, rollout["damped"] > 0.0
-    obstacle, itself = never, never
-    for name, field in logged_terms(controller).items() if controller else ():
+        singular = Band(words, f"the law is {words}", palette.WARNING, [])
+        yield singular, rollout["damped"] > 0.0
+    obstacle = itself = np.zeros(len(rollout), bool)
+    for name, field in _fields(controller).items():
         if isinstance(field, Clearance) and f"distance.{name}" in rollout:
             near = rollout[f"distance.{name}"] < field.influence
             if isinstance(field, SelfClearance):
@@ -96,6 +97,13 @@ def _activities(
             else:
                 obstacle = obstacle | near
     words = "inside an influence zone"
-    yield words, f"a link is {words}", palette.OBSTACLE, obstacle
+    yield Band(words, f"a link is {words}", palette.OBSTACLE, []), obstacle
     words = "links near each other"
-    yield words, words, palette.SERIES[4], itself
+    yield Band(words, words, palette.SERIES[4], []), itself
+
+
+def _fields(controller: Controller | None) -> dict[str, NullSpaceField]:
+    """Return the fields at the run's start and now, by their names in the log."""
+    if controller is None:
+        return {}
+    return logged_terms(from_the_start(controller)) | logged_terms(controller)

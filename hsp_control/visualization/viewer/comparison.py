@@ -93,9 +93,7 @@ class Comparison:
             drawing = self._drawings[-1]
             bands = _bands_named(run)
             self._runs.append(
-                RunDrawing(
-                    drawing, motion, layers, root=root, shown=shown, bands=bands
-                )
+                RunDrawing(drawing, motion, layers, root=root, shown=shown, bands=bands)
             )
         self._offsets = self._compute_offsets()
         moving = [run.layers.get("self_motion") for run in self._runs]

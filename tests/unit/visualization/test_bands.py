@@ -119,7 +119,9 @@ def test_bands_grow_with_a_run_that_is_computed(
     while (more := recorder.command("/clip", f"more {len(parts)}")) is not None:
         parts.append(more)
     assert len(parts) > 3
-    spans = [span for part in parts if part for b in part["bands"] for span in b["spans"]]
+    spans = [
+        span for part in parts if part for b in part["bands"] for span in b["spans"]
+    ]
     starts, ends = (np.array(times) for times in zip(*spans, strict=True))
     assert (starts[1:] <= ends[:-1]).all()
     assert ends[-1] == pytest.approx(0.3)
