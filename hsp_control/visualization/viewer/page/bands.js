@@ -43,6 +43,8 @@ class Bands {
     if (drawn !== this.drawn) {
       this.drawn = drawn;
       const share = (seconds) => `${100 * seconds / (horizon - start || 1)}%`;
+      // The rows of a comparison are many: they share the space below the rail.
+      this.rows.style.setProperty("--pitch", `${Math.min(4, 16 / bands.size)}px`);
       this.rows.replaceChildren(...[...bands.values()].map(({name, color, spans}) => {
         const row = document.createElement("div");
         row.style.setProperty("--color", color);
