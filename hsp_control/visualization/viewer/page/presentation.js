@@ -26,7 +26,8 @@ class Presentation {
     });
     for (const kind of ["pointerdown", "focusin"]) addEventListener(kind, () => this.wake());
     document.addEventListener("fullscreenchange", () => {
-      if (document.fullscreenElement) this.full = true;
+      if (document.fullscreenElement && !this.on) this.leaveFullScreen();  // it came too late
+      else if (document.fullscreenElement) this.full = true;
       else if (this.full) this.set(false);  // its Escape goes to the browser, not to the page
     });
   }
@@ -52,7 +53,8 @@ class Presentation {
   key(event) {
     if (event.key === "Tab") this.wake();
     if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
-    if (event.target.matches?.("select, textarea, input:not([type=range], [type=checkbox])")) return;
+    const editable = "select, textarea, input:not([type=range], [type=checkbox])";
+    if (event.target.matches?.(editable)) return;
     if (event.key === "p") this.toggle();
     else if (event.key === "Escape" && this.on) this.set(false);
   }
@@ -66,11 +68,13 @@ class Presentation {
     for (const button of this.buttons) button.setAttribute("aria-pressed", on);
     // It may not be allowed, such as in a frame: then the window is all there is.
     if (on) document.documentElement.requestFullscreen?.().catch(() => {});
-    else if (document.fullscreenElement) document.exitFullscreen().catch(() => {});
+    else if (document.fullscreenElement) this.leaveFullScreen();
     this.full = Boolean(on && document.fullscreenElement);
     this.wake();
     this.changed();
   }
+
+  leaveFullScreen() { document.exitFullscreen().catch(() => {}); }
 
   // Show the bar and the pointer, for a while.
   wake() {
