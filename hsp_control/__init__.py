@@ -74,6 +74,7 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .trajectories import StreamPose as StreamPose
     from .visualization import viewer as viewer
     from .visualization.viewer import Viewer as Viewer
+    from .visualization.viewer import show as show
 
 _NAMES = {
     "robot": "Robot RobotState",
@@ -93,7 +94,7 @@ _NAMES = {
     "live": "run_loop",
     "config": "Experiment load_experiment",
     "sweeps": "sweep",
-    "visualization.viewer": "Viewer",
+    "visualization.viewer": "Viewer show",
     "common.exceptions": "HspControlError",
 }
 """The public names, by the room from which each is imported at its first use."""

@@ -168,7 +168,7 @@ class Recorder:
     def _add_term_columns(self) -> None:
         """Add the columns of the field's terms; the field may change during the run."""
         controller, probe = self._controller, _probe(self._controller)
-        self._field, self._terms = controller.field, _terms(controller)
+        self._field, self._terms = controller.field, logged_terms(controller)
         shape, unit = (controller.robot.nv,), f"{self._joint_unit}/s"
         for name, field in self._terms.items():
             self._add_column(f"field.{name}.g", shape, unit, "weighted share of g")
@@ -427,7 +427,7 @@ def _changes(controller: Controller) -> dict[str, Any]:
     return {"changes": changes}
 
 
-def _terms(controller: Controller) -> dict[str, NullSpaceField]:
+def logged_terms(controller: Controller) -> dict[str, NullSpaceField]:
     """Return the terms of the controller's field, by names that differ."""
     terms = terms_of(controller.field)
     names = [term.name for term in terms]

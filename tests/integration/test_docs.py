@@ -125,8 +125,9 @@ def test_the_view_s_document_is_true(monkeypatch: pytest.MonkeyPatch) -> None:
     told = re.findall(r"^\| `(\w+)` \| (on|off) \|", text, re.MULTILINE)
     defaults = ShownItems().all_fields()
     assert {name: state == "on" for name, state in told} == defaults
-    (snippet,) = blocks(text, "python")
-    exec(compile(snippet, "view.md", "exec"), {})
+    space: dict = {}
+    for snippet in blocks(text, "python"):
+        exec(compile(snippet, "view.md", "exec"), space)
 
 
 def test_the_export_s_document_is_true(

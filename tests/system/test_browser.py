@@ -283,7 +283,7 @@ def test_the_plots_can_be_put_away_and_narrow_screens_stack(
     watched = exported(watch, planar_page, at="#t=1")
     page = watched.page
     width = page.locator("#meshcat-pane canvas").bounding_box()["width"]
-    page.keyboard.press("p")
+    page.keyboard.press("g")
     watched.until(f"document.querySelector('canvas').clientWidth === {SIZE[0]}")
     assert width < SIZE[0]
     assert not page.locator("#side").is_visible()
@@ -299,6 +299,33 @@ def test_the_plots_can_be_put_away_and_narrow_screens_stack(
     arm = np.argwhere(image.sum(axis=2) < 200)
     assert arm.size
     assert (arm.min(axis=0) > 2).all()  # all of it is in sight
+
+
+def test_a_page_has_its_bands_and_presents(
+    planar: Rollout, tmp_path: Path, watch: Callable[..., Watched]
+) -> None:
+    """On a dark background, on which nothing of it stays light."""
+    damped = np.where((planar.t > 1.0) & (planar.t < 2.0), 1.0, 0.0)
+    bounded = Rollout({**planar.columns, "damped": damped}, planar.meta)
+    page_file = export_html(bounded, tmp_path / "dark.html", background="#14202B")
+    watched = exported(watch, page_file, at="#t=1.5")
+    page = watched.page
+    band = page.locator(".bands button")
+    assert band.get_attribute("aria-label") == "bounded at a singularity 1.01–2.00 s"
+    assert (
+        page.locator(".moments").inner_text() == "the law is bounded at a singularity"
+    )
+    for selector in (".player", "#side"):
+        assert np.median(watched.picture(selector), axis=(0, 1)).max() < 60
+
+    page.keyboard.press("p")
+    watched.until(f"document.querySelector('canvas').clientWidth === {SIZE[0]}")
+    assert page.locator("#side").is_hidden()
+    assert page.locator("#layers").is_hidden()
+    assert page.locator(".moments").is_visible()
+    page.keyboard.press("Escape")
+    watched.until(f"document.querySelector('canvas').clientWidth < {SIZE[0]}")
+    assert page.locator("#side").is_visible()
 
 
 # -- the legend, whose rows are switches ----------------------------------------------

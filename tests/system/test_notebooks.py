@@ -142,7 +142,11 @@ def test_a_notebook_runs_and_keeps_its_promises(name: str, tmp_path: Path) -> No
     for out in outputs(notebook):
         if out.output_type == "stream":
             assert out.name == "stdout", f"{name} wrote to stderr: {out.text}"
-        elif "Viewer" not in out.data.get("text/plain", ""):
+        elif "InlineView" in out.data.get("text/plain", ""):
+            page = out.data["text/html"]
+            assert page.startswith("<iframe srcdoc=")
+            assert len(page) < 2_000_000
+        else:
             # A mere object as a cell's value is a semicolon forgotten.
             assert "image/png" in out.data, out.data
     shown = pictures(notebook)

@@ -394,7 +394,7 @@ def test_beside_all_handles_the_camera_turns(page: Any) -> None:
     page.mouse.up()
     assert page.evaluate("viewer.camera.position.toArray()") != before
     assert sent(page) == []
-    page.evaluate("placeCamera(lastView)")
+    page.evaluate("camera(placed.command)")
 
 
 def test_a_page_that_watches_says_nothing(page: Any) -> None:
@@ -417,7 +417,7 @@ def test_a_page_that_watches_says_nothing(page: Any) -> None:
     assert sent(page) == [{"do": "take_over"}]
     tell(page, "play_drive", mine=True, taken=True)
     assert page.locator(".play-watching").is_hidden()
-    page.evaluate("placeCamera(lastView)")
+    page.evaluate("camera(placed.command)")
 
 
 def test_a_refused_value_goes_back(page: Any) -> None:

@@ -15,6 +15,7 @@ import pytest
 
 from hsp_control import Robot
 from hsp_control.visualization.viewer import Viewer, threejs
+from hsp_control.visualization.viewer.bands import Band
 from hsp_control.visualization.viewer.clip import (
     Clip,
     Track,
@@ -245,6 +246,107 @@ def test_it_is_steered_from_the_page(page: Any) -> None:
     assert player(page, "playing") is True
     page.keyboard.press(" ")  # once, not by the button in focus as well
     assert player(page, "playing") is False
+
+
+BANDS = [
+    Band("limit active", "a limit is active", "#E69F00", [(1.1, 1.4), (2.0, 2.2)]),
+    Band("damped", "the law is damped", "#882255", [(2.1, 2.5)]),
+]
+
+
+def moments(page: Any) -> list[str]:
+    return list(page.locator(".moments span").all_inner_texts())
+
+
+def test_the_time_line_has_bands_and_they_say_what_they_are(
+    page: Any, viewer: Viewer
+) -> None:
+    tell(viewer, set_clip(clip()._replace(bands=BANDS)))
+    bands, name = page.locator(".bands button"), page.locator(".band-name")
+    assert bands.count() == 3
+    line = page.locator(".bands").bounding_box()
+    second = bands.nth(1).bounding_box()
+    share = (second["x"] - line["x"]) / line["width"]
+    assert share == pytest.approx(0.5, abs=0.005)  # from 1 to 3 s
+    assert second["width"] / line["width"] == pytest.approx(0.1, abs=0.005)
+
+    assert name.is_hidden()
+    bands.nth(1).hover()
+    assert name.inner_text() == "limit active 2.00–2.20 s"
+    bands.nth(2).click()
+    assert player(page, "time") == 2.1
+    page.mouse.move(10, 10)
+    assert name.is_hidden()
+    bands.nth(0).focus()
+    assert name.inner_text() == "limit active 1.10–1.40 s"
+    page.keyboard.press("Enter")
+    assert player(page, "time") == 1.1
+    bands.nth(0).blur()
+    assert name.is_hidden()
+
+    for moment, said in (
+        (1.05, []),
+        (1.4, ["a limit is active"]),
+        (2.15, ["a limit is active", "the law is damped"]),
+        (2.3, ["the law is damped"]),
+        (3.0, []),
+    ):
+        page.evaluate("(t) => player.seek(t)", moment)
+        assert moments(page) == said
+
+
+def test_bands_grow_with_their_clip(page: Any, viewer: Viewer) -> None:
+    begun = clip(6, horizon=3.0)._replace(bands=[BANDS[0]._replace(spans=[(1.2, 1.5)])])
+    tell(viewer, set_clip(begun))
+    bands = page.locator(".bands button")
+    bands.first.focus()
+    more = [BANDS[0]._replace(spans=[(1.5, 2.0), (2.4, 2.6)]), BANDS[1]]
+    tell(viewer, [extend_clip(clip()._replace(tracks=[], bands=more), 1)])
+    names = bands.evaluate_all("all => all.map((band) => band.ariaLabel)")
+    assert names == [
+        "limit active 1.20–2.00 s", "limit active 2.40–2.60 s", "damped 2.10–2.50 s",
+    ]  # fmt: skip
+    tell(viewer, set_clip(clip()))
+    assert bands.count() == 0
+    assert moments(page) == []
+
+
+def test_presenting_leaves_the_scene_its_title_and_what_happens(
+    page: Any, viewer: Viewer
+) -> None:
+    tell(viewer, set_clip(clip()._replace(bands=BANDS)))
+    page.evaluate("player.seek(2.15)")
+    height = "document.querySelector('#caption h1').offsetHeight"
+    before = page.evaluate(height)
+    rest = page.evaluate("Presentation.REST")
+    assert rest == 2000  # ms
+    page.evaluate("Presentation.REST = 1e8")  # a slow machine must not miss the bar
+    page.keyboard.press("p")
+    assert page.evaluate("presentation.on")
+    assert page.locator("#layers").is_hidden()
+    assert page.evaluate(height) > before
+    page.mouse.move(300, 300)
+    assert page.locator(".player").is_visible()
+    page.evaluate("Presentation.REST = 10")
+    page.mouse.move(310, 300)
+    until(page, "document.body.classList.contains('resting')")
+    until(page, "getComputedStyle(document.querySelector('.player')).opacity === '0'")
+    assert page.locator(".player").is_hidden()
+    assert moments(page) == ["a limit is active", "the law is damped"]
+    page.evaluate("Presentation.REST = 1e8")
+    page.mouse.move(320, 300)
+    until(page, "getComputedStyle(document.querySelector('.player')).opacity === '1'")
+    page.locator(".present").click()
+    assert not page.evaluate("presentation.on")
+    assert page.locator("#layers").is_visible()
+
+    page.keyboard.press("p")
+    page.keyboard.press("Escape")
+    until(page, "!presentation.on && !document.fullscreenElement")
+    assert page.evaluate(height) == before
+    page.evaluate("(rest) => { Presentation.REST = rest; }", rest)
+    # Nothing is put away later.
+    assert not page.evaluate("document.body.classList.contains('resting')")
 
 
 def test_others_are_told_the_time(page: Any) -> None:

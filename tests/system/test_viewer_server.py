@@ -25,7 +25,7 @@ from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
 from hsp_control import Robot, Rollout, load_experiment
-from hsp_control.common.exceptions import ViewerError
+from hsp_control.common.exceptions import ExportError, ViewerError
 from hsp_control.geometry import Scene
 from hsp_control.visualization.viewer import (
     Recorder,
@@ -34,6 +34,7 @@ from hsp_control.visualization.viewer import (
     server,
 )
 from hsp_control.visualization.viewer.commands import CAMERA, CLIP
+from hsp_control.visualization.viewer.export import inline
 from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
 from hsp_control.visualization.viewer.pipe_protocol import (
     DELETE,
@@ -233,10 +234,25 @@ def test_it_is_known_when_the_last_page_is_closed(
         assert not waiting.is_alive()
 
 
-def test_a_notebook_shows_the_page_in_a_frame(arm: Robot, recorder: Recorder) -> None:
+def test_a_notebook_holds_what_is_shown(arm: Robot, recorder: Recorder) -> None:
     with Viewer(arm) as viewer:
-        assert f'<iframe src="{viewer.url}"' in viewer._repr_html_()
-    assert "has no page" in Viewer(arm, transport=recorder)._repr_html_()
+        shown = viewer._repr_html_()
+    assert shown.startswith("<iframe srcdoc=")
+    assert f'href="{viewer.url}"' in shown
+    assert "127.0.0.1" not in Viewer(arm, transport=recorder)._repr_html_()
+
+
+def test_without_what_reads_meshes_a_notebook_shows_the_live_page(
+    arm: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise ExportError("it needs trimesh <here>")
+
+    monkeypatch.setattr(inline, "reduce_scene", fail)
+    with Viewer(arm) as viewer:
+        shown = viewer._repr_html_()
+        assert f'<iframe src="{viewer.url}"' in shown
+        assert "trimesh &lt;here&gt;" in shown
 
 
 def test_a_dead_or_stopped_server_is_an_error_not_a_wait(

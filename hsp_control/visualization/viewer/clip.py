@@ -1,11 +1,12 @@
 """A clip: an animation of the scene's nodes, played by the page's player."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.visualization.viewer.bands import Band
 from hsp_control.visualization.viewer.commands import (
     Command,
     Json,
@@ -40,12 +41,14 @@ class Clip(NamedTuple):
         end: Last time that can be shown [s].
         tracks: The animated properties.
         horizon: The end of the complete clip [s]; None: ``end``.
+        bands: What the time line marks.
     """
 
     start: float
     end: float
     tracks: list[Track]
     horizon: float | None = None
+    bands: Sequence[Band] = ()
 
     @property
     def open(self) -> bool:
@@ -116,6 +119,7 @@ def _fields(clip: Clip) -> Json:
             }
             for track in clip.tracks
         ],
+        "bands": [band._asdict() for band in clip.bands],
     }
 
 

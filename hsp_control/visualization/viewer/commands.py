@@ -8,7 +8,7 @@ import numpy as np
 import umsgpack  # type: ignore[import-untyped]
 
 from hsp_control.common.arrays import Array
-from hsp_control.visualization.viewer.latest_commands import key_of
+from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
 from hsp_control.visualization.viewer.legend import LegendEntry
 
 Json = dict[str, Any]
@@ -31,6 +31,13 @@ class Command(NamedTuple):
     key: str
     packed: bytes
     deletes: bool = False
+
+    def keep_in(self, scene: LatestCommands) -> None:
+        """Store it in a scene, or remove there what it deletes."""
+        if self.deletes:
+            scene.drop(self.path)
+        else:
+            scene.put(self.key, self.packed)
 
 
 def set_object(path: str, thing: Json) -> Command:

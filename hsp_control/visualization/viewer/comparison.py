@@ -11,6 +11,7 @@ from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.appearance import ACTUAL
+from hsp_control.visualization.viewer.bands import Band, bands_of
 from hsp_control.visualization.viewer.clip import Clip
 from hsp_control.visualization.viewer.commands import Command, set_ghost, set_transform
 from hsp_control.visualization.viewer.legend import LegendEntry, merged
@@ -96,8 +97,9 @@ class Comparison:
                 else all_layers(run.robot, motion, run.controller, root=root, dark=dark)
             )
             drawing = self._drawings[-1]
+            bands = _bands_named(run)
             self._runs.append(
-                RunDrawing(drawing, motion, layers, root=root, shown=shown)
+                RunDrawing(drawing, motion, layers, root=root, shown=shown, bands=bands)
             )
         self._offsets = self._compute_offsets()
         moving = [run.layers.get("self_motion") for run in self._runs]
@@ -124,6 +126,7 @@ class Comparison:
             min(clip.start for clip in clips),
             max(clip.end for clip in clips),
             [track for clip in clips for track in clip.tracks],
+            bands=[band for clip in clips for band in clip.bands],
         )
 
     def points(self) -> Array:
@@ -185,6 +188,16 @@ def run_parts(names: Sequence[str]) -> list[list[str]]:
     """Return the nodes of each run that together hold all that is drawn of it."""
     first = [f"/{name}" for name in ("robot", *LAYERS)]
     return [first, *([root] for root in run_roots(names)[1:])]
+
+
+def _bands_named(run: ComparedRun) -> list[Band]:
+    """Return a run's bands, which begin with its name."""
+    return [
+        band._replace(
+            name=f"{run.name}: {band.name}", caption=f"{run.name}: {band.caption}"
+        )
+        for band in bands_of(run.rollout, run.controller)
+    ]
 
 
 def ghost_color(number: int) -> str:

@@ -12,6 +12,7 @@ from hsp_control.config.experiment import Experiment
 from hsp_control.robot import RobotState
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.recorder import Recorder
+from hsp_control.visualization.viewer.bands import bands_of
 from hsp_control.visualization.viewer.clip import Clip, extend_clip, set_clip
 from hsp_control.visualization.viewer.commands import set_status
 from hsp_control.visualization.viewer.motion import COARSEST, Motion, motion_of
@@ -85,7 +86,7 @@ class LiveView:
         # Not wall time, which other processes, such as the browser, take too.
         before = time.thread_time()
         try:
-            self._send(Rollout(recorder.rows(self._sent), self._meta), now)
+            self._send(recorder, now)
         except ViewerError as error:
             _log.warning("%s; the run continues without a view", error)
             self._next = float("inf")
@@ -108,13 +109,16 @@ class LiveView:
             status=f"computed at {_shown(rate)} × real time",
         )
 
-    def _send(self, rows: Rollout, now: float) -> None:
+    def _send(self, recorder: Recorder, now: float) -> None:
+        rows = Rollout(recorder.rows(self._sent), self._meta)
+        # From the last row sent on, whose bands may go on.
+        joined = Rollout(recorder.rows(max(self._sent - 1, 0)), self._meta)
         rate = self._rate(now, float(rows.t[-1]))
         # Drawn rows per second of computing, times their cost, is drawing's share.
         finest = max(COARSEST, rate * self._cost / DRAWING_SHARE)
         before = time.thread_time()
         motion = motion_of(self._experiment.robot, rows, finest, coarsest=np.inf)
-        self._viewer.transport.send(self._commands(motion, rate))
+        self._viewer.transport.send(self._commands(motion, joined, rate))
         self._cost = (time.thread_time() - before) / len(motion.times)
         self._sent += len(rows)
         self._pieces += 1
@@ -128,13 +132,15 @@ class LiveView:
         then, before = marks[0]
         return (computed - before) / (now - then) if now > then else 0.0
 
-    def _commands(self, motion: Motion, rate: float) -> list[Any]:
+    def _commands(self, motion: Motion, rows: Rollout, rate: float) -> list[Any]:
         first = not self._pieces
+        duration = self._experiment.scenario.simulation.duration
         clip = Clip(
             0.0,
             float(motion.times[-1]),
             list(self._run.tracks(motion)),
-            self._experiment.scenario.simulation.duration,
+            duration,
+            bands_of(rows, self._experiment.controller, duration=duration),
         )
         view = self._viewer.view
         clip_commands = (

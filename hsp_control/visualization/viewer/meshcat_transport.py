@@ -37,7 +37,10 @@ class MeshcatTransport:
 
     Attributes:
         url: The page's address, as the server says it.
+        scene: None: others may have drawn more than is known here.
     """
+
+    scene = None
 
     def __init__(self, meshcat: Any) -> None:
         """Connect.

@@ -26,10 +26,7 @@ class Recorder:
     def send(self, commands: Iterable[Command]) -> None:
         """Store commands."""
         for command in commands:
-            if command.deletes:
-                self.scene.drop(command.path)
-            else:
-                self.scene.put(command.key, command.packed)
+            command.keep_in(self.scene)
 
     def wait_for_page(self, timeout: float) -> bool:
         """Return False at once: there is no page."""

@@ -1,6 +1,6 @@
 """Draws a run: the motion of its robot, and the layers."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.visualization.viewer.appearance import CHALK, INK
+from hsp_control.visualization.viewer.bands import Band
 from hsp_control.visualization.viewer.clip import Clip, Track
 from hsp_control.visualization.viewer.commands import Command, delete, set_property
 from hsp_control.visualization.viewer.contacts import Contacts
@@ -99,6 +100,7 @@ class RunDrawing:
         *,
         root: str = "",
         shown: Mapping[str, bool] | None = None,
+        bands: Sequence[Band] = (),
     ) -> None:
         """Compose the drawing.
 
@@ -108,11 +110,13 @@ class RunDrawing:
             layers: The layers to draw besides the robot.
             root: The path of their parent node.
             shown: Whether each layer is shown initially; default: it is.
+            bands: What the time line marks.
         """
         self.motion = motion
         self.layers = layers
         self._drawing = drawing
         self._root = root
+        self._bands = bands
         self._shown = dict.fromkeys(LAYERS, True) | dict(shown or {})
 
     def draw(self, size: float) -> Iterator[Command]:
@@ -126,8 +130,8 @@ class RunDrawing:
 
     def clip(self) -> Clip:
         """Return the clip of robot and layers."""
-        times = self.motion.times
-        return Clip(float(times[0]), float(times[-1]), list(self.tracks(self.motion)))
+        times, tracks = self.motion.times, list(self.tracks(self.motion))
+        return Clip(float(times[0]), float(times[-1]), tracks, bands=self._bands)
 
     def tracks(self, motion: Motion) -> Iterator[Track]:
         """Yield the tracks of robot and layers along the run, or along a part of it."""

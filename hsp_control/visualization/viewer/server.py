@@ -18,6 +18,7 @@ from typing import Any
 
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.visualization.viewer.commands import Command
+from hsp_control.visualization.viewer.latest_commands import LatestCommands
 from hsp_control.visualization.viewer.pipe_protocol import (
     ASK,
     DELETE,
@@ -54,6 +55,8 @@ class Server:
 
     Attributes:
         url: The page's address; with its key, if pages may steer.
+        scene: The commands that build the scene, for what is made of it without a page;
+            they are kept after the process has ended.
         process: The process.
     """
 
@@ -81,6 +84,7 @@ class Server:
                 "which the page is opened, such as 192.168.1.20"
             )
         self.url: str | None = None
+        self.scene = LatestCommands()
         self._lock = threading.Lock()
         self._unsent = b""
         self._answers = b""
@@ -112,6 +116,7 @@ class Server:
         Raises:
             ViewerError: If the server has ended or no longer reads its input.
         """
+        commands = list(commands)
         records = [
             Record(DELETE, command.path, command.packed)
             if command.deletes
@@ -120,6 +125,8 @@ class Server:
         ]
         with self._lock:
             self._write(b"".join(map(encode, records)))
+            for command in commands:
+                command.keep_in(self.scene)
 
     def messages(self) -> list[dict[str, Any]]:
         """Return what the page that steers has sent since the last call; never waits.

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from hsp_control.visualization.viewer.commands import Command
+from hsp_control.visualization.viewer.latest_commands import LatestCommands
 
 
 class Transport(Protocol):
@@ -12,6 +13,10 @@ class Transport(Protocol):
     @property
     def url(self) -> str | None:
         """The page's address; None where there is no page."""
+
+    @property
+    def scene(self) -> LatestCommands | None:
+        """The commands that build the scene; None if they are not kept."""
 
     def send(self, commands: Iterable[Command]) -> None:
         """Send commands, to be shown together.

@@ -9,13 +9,14 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ViewerError
+from hsp_control.common.exceptions import ExportError, ViewerError
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.control.controller import Controller
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer import browser
+from hsp_control.visualization.viewer.bands import bands_of
 from hsp_control.visualization.viewer.camera import look_at, right_direction
 from hsp_control.visualization.viewer.clip import remove_clip, set_clip
 from hsp_control.visualization.viewer.commands import (
@@ -47,7 +48,8 @@ from hsp_control.visualization.viewer.transport import Transport
 class Viewer:
     """Shows a robot in a browser; pages may be opened, closed and reopened at any time.
 
-    In a notebook, a viewer in the last line of a cell shows its page there.
+    In a notebook, a viewer in the last line of a cell puts what it shows into the
+    notebook, where it stays; `url` is the live page. See also `show`.
 
     Attributes:
         robot: The robot.
@@ -129,7 +131,7 @@ class Viewer:
                 ended.
         """
         if isinstance(scene, Rollout):
-            self._draw_run(scene, controller)
+            self._draw_run(scene, controller, **self._playing(None, None))
         else:
             self._draw_obstacles(scene)
 
@@ -269,12 +271,24 @@ class Viewer:
         self.close()
 
     def _repr_html_(self) -> str:
-        """Return the HTML for a notebook: the page in a frame."""
+        """Return the HTML for a notebook: what is shown now, which needs no server.
+
+        The page of another Meshcat server is shown in a frame; so is this one's, with
+        the reason, where a robot's meshes cannot be read.
+        """
+        from hsp_control.visualization.viewer.export import InlineView  # imports us
+
+        reason = ""
+        if self.transport.scene is not None:
+            try:
+                return InlineView(self.transport.scene, url=self.url)._repr_html_()
+            except ExportError as error:
+                reason = f"<p>Only while the program runs: {escape(str(error))}</p>"
         if self.url is None:
-            return "<p>This viewer has no page: its transport only records.</p>"
+            return reason
         return (
             f'<iframe src="{escape(self.url)}" style="width: 100%; height: 520px; '
-            'border: 0; border-radius: 8px" allowfullscreen></iframe>'
+            f'border: 0; border-radius: 8px" allowfullscreen></iframe>{reason}'
         )
 
     def set_stage(self, run: RunDrawing, title: str | None) -> float:
@@ -312,7 +326,8 @@ class Viewer:
         motion = motion_of(self.robot, rollout)
         layers = all_layers(self.robot, motion, controller, dark=self.dark)
         shown = self.view.show.all_fields()
-        return RunDrawing(self.drawing, motion, layers, shown=shown)
+        bands = bands_of(rollout, controller)
+        return RunDrawing(self.drawing, motion, layers, shown=shown, bands=bands)
 
     def _draw_run(
         self, rollout: Rollout, controller: Controller | None, **playing: Any

@@ -3,6 +3,8 @@
 //   space       play, pause               home, end   to the start, to the end
 //   ← →         1/30 s (with shift 1 s)   + -         faster, slower
 //   l           repeat, or play once
+//
+// bands.js draws into it, presentation.js adds its own key.
 "use strict";
 
 class Controls {
@@ -11,6 +13,7 @@ class Controls {
   // Add the bar to an element of the page; it is hidden while there is no clip.
   constructor(player, parent) {
     this.player = player;
+    this.parent = parent;
     this.bar = document.createElement("div");
     this.bar.className = "player";
     this.bar.hidden = true;
@@ -19,7 +22,8 @@ class Controls {
         <svg viewBox="0 0 24 24"><path d="M6 5h2.4v14H6zM20 5v14L9.6 12z"/></svg></button>
       <button class="toggle" title="Play, pause (space)" aria-label="Play or pause">
         <svg viewBox="0 0 24 24"><path/></svg></button>
-      <input class="timeline" type="range" step="any" aria-label="Time">
+      <div class="track"><input class="timeline" type="range" step="any" aria-label="Time">
+        <div class="bands" role="group" aria-label="Marks on the time line"></div></div>
       <output class="clock"></output>
       <select class="speed" title="Speed (+ and -)" aria-label="Speed"></select>
       <button class="loop" title="Repeat (l)" aria-label="Repeat">
@@ -78,7 +82,7 @@ class Controls {
     const {player, timeline} = this;
     const {time, start, end, horizon} = player;
     timeline.value = time;
-    const share = (t) => `${horizon > start ? 100 * (t - start) / (horizon - start) : 0}%`;
+    const share = (t) => `${horizon > start ? (t - start) / (horizon - start) : 0}`;
     timeline.style.setProperty("--played", share(time));
     timeline.style.setProperty("--available", share(end));
     this.clock.textContent = `${time.toFixed(2)} / ${horizon.toFixed(2)} s`;

@@ -11,7 +11,8 @@ for (const name of ["Lights", "Grid", "Axes"]) viewer.delete_path([name]);
 viewer.gui.domElement.remove();
 
 const player = new Player(viewer);
-new Controls(player, document.body);
+const controls = new Controls(player, document.body);
+new Bands(player, controls);
 const layers = new Layers(viewer, document.getElementById("caption"));
 const lengthLabels = new LengthLabels(viewer);
 let placed = null;  // the last camera of the program, and where it was placed then
@@ -184,6 +185,8 @@ viewer.set_3d_pane_size = () => {
   if (clientWidth && clientHeight) fitPane(clientWidth, clientHeight);
 };
 new ResizeObserver(refit).observe(viewer.dom_element);
+const presentation = new Presentation(refit);
+presentation.addButton(controls.bar);
 
 function caption({title, legend, dark}) {
   document.title = title;

@@ -34,6 +34,7 @@ class PlayBar {
         ${button("panel", "Controls and plots")}
       </div>`;
     parent.append(this.box);
+    presentation.addButton(this.box.querySelector(".play-bar"));
     const part = (selector) => this.box.querySelector(selector);
     [this.status, this.watching, this.clock, this.rate, this.toggle, this.panel] =
       [".play-status", ".play-watching", ".clock", ".rate", ".toggle", ".panel"].map(part);

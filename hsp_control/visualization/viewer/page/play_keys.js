@@ -5,6 +5,8 @@
 //   page up/down  the same vertically                r       reset
 //   escape        let go, select nothing             s       save
 //
+// `p` is that of presentation.js.
+//
 // The arrows follow those of the world's horizontal axes that lie nearest to the picture's;
 // a coordinate that the program does not follow is left out. An orientation is turned, by 1°
 // (shift: 0.1°).

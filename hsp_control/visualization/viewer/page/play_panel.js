@@ -21,7 +21,7 @@ class PlayPanel {
         <p class="play-help">Drag a handle, an obstacle or a link; drag beside them to turn
           the view. <kbd>Tab</kbd> selects, <kbd>← → ↑ ↓</kbd> <kbd>Page ↑ ↓</kbd> move by
           1 cm, with <kbd>Shift</kbd> by 1 mm. <kbd>Space</kbd> pauses, <kbd>.</kbd> steps,
-          <kbd>R</kbd> resets, <kbd>S</kbd> saves.</p></div>`;
+          <kbd>R</kbd> resets, <kbd>S</kbd> saves, <kbd>P</kbd> presents.</p></div>`;
     this.title = this.box.querySelector("h2");
     this.controls = this.box.querySelector(".play-controls");
     this.plots = this.box.querySelector(".play-plots");

@@ -21,6 +21,8 @@
 //                       `clock` is the index of its times, `values` are all rows in one
 //                       Float32Array. Before its first time and after its last one, a
 //                       track keeps its first and its last value.
+//   bands               [{name, caption, color, spans}]: what the time line marks; `spans` are
+//                       [start, end] [s], ascending. See bands.js.
 //
 // Properties: "position" (3), "quaternion" (x, y, z, w), "scale" (3), "color" (red, green,
 // blue from 0 to 1), "opacity" (1) and "length" (1: the number of drawn rings of a trail
@@ -28,7 +30,8 @@
 // (1: 0 or 1) is not interpolated; it acts on the node's object, so that the node's switch
 // in the scene tree remains the user's. A path that is not in the scene is ignored.
 //
-// Attributes (read): time, start, end, horizon, open, playing, speed, loop, loaded.
+// Attributes (read): time, start, end, horizon, open, playing, speed, loop, loaded,
+// bands (by name).
 // Methods: load(clip), extend(clip), unload(), play(), pause(), toggle(), seek(t),
 // step(dt), faster(), slower(), setSpeed(x), setLoop(on), refresh().
 // Events: "time" (detail: {time, start, end}) when another time is shown; "state" when
@@ -49,6 +52,7 @@ class Player extends EventTarget {
   // Remove the clip; the scene does not change.
   unload() {
     this.tracks = new Map();
+    this.bands = new Map();
     this.time = this.start = this.end = this.horizon = 0;
     this.open = this.playing = this.loaded = false;
     this._emit("state");
@@ -58,6 +62,7 @@ class Player extends EventTarget {
   load(clip, keep = false) {
     const {time, playing, loaded} = this;
     this.tracks = new Map();
+    this.bands = new Map();
     this.start = this.end = clip.start;
     if (!(keep && loaded)) {
       this.speed = clip.speed ?? this.speed;
@@ -80,6 +85,7 @@ class Player extends EventTarget {
       if (track) track.append(copies[clock], values);
       else this.tracks.set(key, new Track(path, property, copies[clock], values));
     }
+    for (const band of clip.bands ?? []) this._mark(band);
     this.end = Math.max(this.end, clip.end);
     this.horizon = Math.max(this.end, clip.horizon ?? clip.end);
     this.open = Boolean(clip.open);
@@ -174,6 +180,17 @@ class Player extends EventTarget {
     }
     this.seek(next);
     if (!this.playing) this._emit("state");
+  }
+
+  // Add a band; what goes on where the last interval of its name ended is one with it.
+  _mark({name, caption, color, spans}) {
+    const known = this.bands.get(name)?.spans ?? [];
+    for (const [from, to] of spans) {
+      const last = known.at(-1);
+      if (last && from <= last[1]) last[1] = Math.max(last[1], to);
+      else known.push([from, to]);
+    }
+    this.bands.set(name, {name, caption, color, spans: known});
   }
 
   _node(path) {

@@ -6,7 +6,7 @@ const side = document.createElement("aside");
 stage.id = "stage";
 side.id = "side";
 document.body.append(stage, side);
-for (const part of document.querySelectorAll("#meshcat-pane, #caption, .player")) {
+for (const part of document.querySelectorAll("#meshcat-pane, #caption, .player, .moments")) {
   stage.append(part);
 }
 
@@ -16,6 +16,7 @@ commandHandlers.show = ({arrays, commands, plots, about, runs}) => {
   const unpacked = arrays.map(unpackArray);
   viewer.set_3d_pane_size();
   viewer.handle_command(withArrays(commands, unpacked));
+  if (!plots) return document.body.classList.add("alone", "without-plots");
   const drawn = new Plots(player, side, withArrays(plots, unpacked));
   if (runs) new RunSwitch(viewer, stage, drawn, runs);
   addFooter(about);
@@ -48,14 +49,15 @@ function toggleSide() {
 }
 const sideButton = document.createElement("button");
 sideButton.className = "side";
-sideButton.title = "Plots (p)";
+sideButton.title = "Plots (g)";
 sideButton.setAttribute("aria-label", "Show or hide the plots");
 sideButton.innerHTML = '<svg viewBox="0 0 24 24"><path d="M4 4h1.8v14.2H20V20H4zM7.5 15l3.6-5 '
   + '3.2 3 4.4-7 1.6 1-5.6 9-3.3-3.1-2.5 3.4z"/></svg>';
 sideButton.onclick = toggleSide;
-document.querySelector(".player").append(sideButton);
+document.querySelector(".player .present").before(sideButton);
 addEventListener("keydown", (event) => {
-  if (event.key !== "p" || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (document.body.classList.contains("without-plots")) return;
+  if (event.key !== "g" || event.ctrlKey || event.metaKey || event.altKey) return;
   toggleSide();
 });
 

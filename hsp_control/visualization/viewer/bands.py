@@ -1,0 +1,109 @@
+"""Bands on the time line: when a limit, a singularity or an obstacle acts."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsp_control.common.arrays import Array
+from hsp_control.control.controller import Controller
+from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearance
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.recorder import logged_terms
+from hsp_control.visualization import palette
+from hsp_control.visualization.viewer.controller_analysis import from_the_start
+
+CLOSED_SHARE = 1 / 200
+"""Gaps up to this share of the whole run are closed: nobody would see them."""
+_LIMITED = 2  # the log's status from which on a limit changes the motion
+
+
+class Band(NamedTuple):
+    """When something that the law reacts to is active.
+
+    Attributes:
+        name: Its name before a time, such as ``limit active``.
+        caption: What is shown while the time is inside: ``a limit is active``.
+        color: Its colour, ``#RRGGBB``.
+        spans: Its intervals [s], ascending and apart.
+    """
+
+    name: str
+    caption: str
+    color: str
+    spans: list[tuple[float, float]]
+
+
+def bands_of(
+    rollout: Rollout, controller: Controller | None, *, duration: float | None = None
+) -> list[Band]:
+    """Return the bands of a run, without those that have no interval.
+
+    Args:
+        rollout: The run, or a part of it: all of its rows.
+        controller: Its controller: only it knows from which distance on a clearance
+            field acts; None: no such bands.
+        duration: The time that the whole run takes [s]; None: that of the rows.
+    """
+    times = rollout.t
+    whole = float(times[-1] - times[0]) if duration is None else duration
+    bands = [
+        band._replace(spans=spans_of(times, active, CLOSED_SHARE * whole))
+        for band, active in _activities(rollout, controller)
+    ]
+    return [band for band in bands if band.spans]
+
+
+def spans_of(
+    times: Array, active: NDArray[np.bool_], closed: float = 0.0
+) -> list[tuple[float, float]]:
+    """Return the intervals in which rows are active; each row lasts until the next.
+
+    Args:
+        times: The rows' times [s], ascending, shape (N,).
+        active: Whether each row is active, shape (N,).
+        closed: Gaps up to this length are closed [s].
+    """
+    edges = np.diff(np.concatenate([[False], active, [False]]).astype(np.int8))
+    starts = times[np.flatnonzero(edges > 0)].tolist()
+    stops = times[np.flatnonzero(edges < 0).clip(max=len(times) - 1)].tolist()
+    spans: list[tuple[float, float]] = []
+    for start, stop in zip(starts, stops, strict=True):
+        if spans and start - spans[-1][1] <= closed:
+            spans[-1] = spans[-1][0], stop
+        else:
+            spans.append((start, stop))
+    return spans
+
+
+def _activities(
+    rollout: Rollout, controller: Controller | None
+) -> Iterator[tuple[Band, NDArray[np.bool_]]]:
+    """Yield the bands without intervals, and in which rows each is active."""
+    if "status" in rollout:
+        limit = Band("limit active", "a limit is active", palette.DESIRED, [])
+        yield limit, rollout["status"] >= _LIMITED
+    if "damped" in rollout:
+        words = "bounded at a singularity"
+        singular = Band(words, f"the law is {words}", palette.WARNING, [])
+        yield singular, rollout["damped"] > 0.0
+    obstacle = itself = np.zeros(len(rollout), bool)
+    for name, field in _fields(controller).items():
+        if isinstance(field, Clearance) and f"distance.{name}" in rollout:
+            near = rollout[f"distance.{name}"] < field.influence
+            if isinstance(field, SelfClearance):
+                itself = itself | near
+            else:
+                obstacle = obstacle | near
+    words = "inside an influence zone"
+    yield Band(words, f"a link is {words}", palette.OBSTACLE, []), obstacle
+    words = "links near each other"
+    yield Band(words, words, palette.SERIES[4], []), itself
+
+
+def _fields(controller: Controller | None) -> dict[str, NullSpaceField]:
+    """Return the fields at the run's start and now, by their names in the log."""
+    if controller is None:
+        return {}
+    return logged_terms(from_the_start(controller)) | logged_terms(controller)
