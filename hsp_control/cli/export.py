@@ -29,15 +29,16 @@ def export(options: argparse.Namespace) -> int:
     from hsp_control.visualization.viewer.replay import access_for, load_runs
 
     films = [path for path in (options.mp4, options.gif, options.webp) if path]
-    if not options.html and not films:
+    if not (options.html or options.rrd or films):
         raise ExportError(
-            "nothing to write: give a file with --html, --mp4, --gif or --webp"
+            "nothing to write: give a file with --html, --mp4, --gif, --webp or --rrd"
         )
-    for kind in ("mp4", "gif", "webp"):
+    for kind in ("mp4", "gif", "webp", "rrd"):
         _check_ending(getattr(options, kind), f".{kind}")
-    if films and len(options.logs) > 1:
+    if len(options.logs) > 1 and (films or options.rrd):
         raise ExportError(
-            f"a film shows one run, {len(options.logs)} logs are given: give one log, "
+            f"{'a film' if films else 'a file of Rerun'} shows one run, "
+            f"{len(options.logs)} logs are given: give one log, "
             "or --html for a page with a switch between them"
         )
     strict = options.strict or bool(options.allow)
@@ -68,8 +69,15 @@ def export(options: argparse.Namespace) -> int:
                 progress=bar.update,
             )
 
-    wanted = [(options.html, page)] if options.html else []
-    return _write([*wanted, *((path, film) for path in films)])
+    def rerun(path: Path) -> Path:
+        from hsp_control.visualization.rerun_log import log_to_rerun
+
+        log_to_rerun(run.rollout, run.robot, path=path)
+        return path
+
+    wanted = [(options.html, page), (options.rrd, rerun)]
+    kept = [(path, write) for path, write in wanted if path]
+    return _write([*kept, *((path, film) for path in films)])
 
 
 def _titled(runs: list["ComparedRun"]) -> list["ComparedRun"]:

@@ -212,6 +212,7 @@ def _add_export(export: argparse.ArgumentParser) -> None:
         "mp4": "a film",
         "gif": "an animated GIF",
         "webp": "an animated WebP: smaller than a GIF, in all its colours",
+        "rrd": "a file for Rerun's viewer; needs the extra rerun",
     }
     for name, text in files.items():
         export.add_argument(f"--{name}", type=Path, metavar="FILE", help=text)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 import hsp_control as hsp
+from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError
 from hsp_control.visualization.rerun_log import log_to_rerun
 
@@ -121,6 +122,22 @@ def test_other_shapes_and_links_without_meshes(tmp_path: Path) -> None:
     assert "Capsules3D" in drawn["/obstacles/pill"]
     assert "/obstacles/floor" not in drawn  # it has no end
     assert any("robot/joint2" in path for path in drawn)
+
+
+def test_the_command_writes_it(
+    log: hsp.Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    saved = log.save(tmp_path / "run.npz")
+    path = tmp_path / "run.rrd"
+    assert main(["export", str(saved), "--rrd", str(path)]) == 0
+    assert "MB: " in capsys.readouterr().out
+    assert any(
+        c.entity_path == "/log/null_space_norm" for c in RrdReader(path).stream()
+    )
+    assert main(["export", str(saved), "--rrd", "run.html"]) == 2
+    assert "the name must end with .rrd" in capsys.readouterr().err
+    assert main(["export", str(saved), str(saved), "--rrd", str(path)]) == 2
+    assert "a file of Rerun shows one run" in capsys.readouterr().err
 
 
 def test_what_is_missing_is_said(

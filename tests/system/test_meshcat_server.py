@@ -15,7 +15,7 @@ from browsers import until
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import ViewerError
-from hsp_control.visualization.viewer import Viewer, meshcat_transport
+from hsp_control.visualization.viewer import Viewer, live, meshcat_transport
 
 pytestmark = pytest.mark.process
 
@@ -106,6 +106,24 @@ def test_a_state_and_a_run_are_there_and_what_is_others_is_not_touched(
     assert keys[-1]["time"] == pytest.approx(1.0)
     with pytest.raises(ViewerError, match="the viewer is closed"):
         viewer.show(robot.home())
+
+
+def test_a_live_run_shows_its_last_instant(
+    server: Recorded, experiment: hsp.Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live, "MIN_PERIOD", 0.0)
+    with Viewer(experiment.robot, meshcat=server.address) as viewer:
+        view = live.LiveView(viewer, experiment)
+        log = experiment.run(on_row=view.on_row)
+        shown = server.of("set_property", "/hsp_control/obstacles/disk")
+        where = [each["value"] for each in shown if each["property"] == "position"]
+        assert len(where) > 1
+        path = log["obstacle.disk"]
+        for place in where:  # each is where the disk once was, later and later
+            away = np.linalg.norm(path - place, axis=1)
+            assert away.min() < 1e-6
+        view.finish(log)
+    assert server.of("set_animation", "")
 
 
 def test_beside_a_visualizer_it_is_below_its_path(server: Recorded) -> None:
