@@ -54,6 +54,7 @@ EXAMPLES: dict[str, list[dict[str, Any]]] = {
         COMMON | {"target": np.linspace(-0.5, 0.5, 7), "weights": 2},
         {"target": "home"},
         {"target": np.linspace(-0.4, 0.5, 7)},
+        {"displacement": paths.Hold(np.full(7, 0.1))},
     ],
     "equal_joint_angles": [COMMON | {"joints": ["panda_joint1", "panda_joint3"]}],
     "point_distance": [
