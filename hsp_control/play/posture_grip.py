@@ -21,6 +21,7 @@ from hsp_control.play.grips import RAMP, Grip
 from hsp_control.robot import Robot, RobotState
 from hsp_control.trajectories import Stream
 from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.visualization.palette import FIELD
 
 _MOVING: dict[str, Any] = {"speed": 1.0, "acceleration": 5.0, "jerk": 100.0}
 """Bounds of the target of each joint [1/s, 1/s², 1/s³, in rad or m]."""
@@ -50,6 +51,7 @@ class PostureGrip(Grip):
             "name": self.name,
             "kind": "position",
             "axes": [True, True, True],
+            "color": FIELD,
             "pose": self.where(state),
         }
 

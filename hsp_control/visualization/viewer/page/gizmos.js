@@ -50,8 +50,9 @@ class Gizmo {
 
   // Fit its size to the camera.
   layOut(sight) {
-    // In a low picture, as above a phone's open sheet, the handles would hide the robot.
-    this.enlarged = this.usual * Math.min(Math.max(sight.box.height / 450, 0.65), 1);
+    // In a small picture, as above a phone's open sheet, the handles would hide the robot.
+    const room = Math.min(sight.box.height / 450, sight.box.width / 480);
+    this.enlarged = this.usual * Math.min(Math.max(room, 0.65), 1);
     this.group.position.copy(this.position);
     this.group.scale.setScalar(sight.pixel(this.position) * this.enlarged);
     this.rings.quaternion.copy(this.turn);
@@ -230,7 +231,8 @@ class Gizmo {
     this._part({kind: "ball"}, new SphereGeometry(BALL + 2.2, 32, 20), "#FFFFFF", 1004, 0.8);
     // Its rim is the far half of a larger ball, which never hides the ball itself.
     for (const {material} of this.parts[0].meshes) material.side = BackSide;
-    this._part(this.parts[0].handle, new SphereGeometry(BALL, 32, 20), Gizmo.BALL_COLOR, 1005, 0.9);
+    this._part(this.parts[0].handle, new SphereGeometry(BALL, 32, 20),
+               this.target.color ?? Gizmo.BALL_COLOR, 1005, 0.9);
     for (const axis of [0, 1, 2]) {
       if (!this.follows(axis)) continue;
       const handle = {kind: "arrow", axis}, color = Gizmo.COLORS[axis];

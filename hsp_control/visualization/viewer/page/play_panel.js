@@ -66,13 +66,14 @@ class PlayPanel {
   }
 
   // A target's name, which selects it, and the way back to its own path.
-  target({name, kind}) {
+  target({name, kind, color}) {
     const row = PlayPanel.row("target", `<button type="button" class="select"><i></i>
       <span></span><small></small></button>
       <button type="button" class="resume">Back to its path</button>`);
     const [select, resume] = row.querySelectorAll("button");
     row.querySelector("span").textContent = name;
     row.querySelector("small").textContent = kind;
+    if (color) row.querySelector("i").style.background = color;
     select.setAttribute("aria-label", `Select ${name}`);
     resume.setAttribute("aria-label", `${name}: back to its own path`);
     select.onclick = () => {
