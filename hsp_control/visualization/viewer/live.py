@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import HspControlError, ViewerError
+from hsp_control.common.exceptions import HspControlError, LogError, ViewerError
 from hsp_control.config.experiment import Experiment
 from hsp_control.robot import RobotState
 from hsp_control.simulation import Rollout
@@ -135,7 +135,13 @@ class LiveView:
         before = time.thread_time()
         duration = self._experiment.scenario.simulation.duration
         robot = self._experiment.robot
-        self._viewer.show_plots(plots_so_far(recorder, self._meta, robot, duration))
+        try:
+            plots = plots_so_far(recorder, self._meta, robot, duration)
+        except LogError as error:
+            _log.warning("%s; the run continues without plots", error)
+            self._next_plots = float("inf")
+            return
+        self._viewer.show_plots(plots)
         took = time.thread_time() - before
         self._next_plots = now + max(PLOTS_PERIOD, took / PLOTS_SHARE)
 
