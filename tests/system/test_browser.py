@@ -22,8 +22,8 @@ from places import ROOT, THOROUGH
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.common.resources import bundled_configs
-from hsp_control.visualization.viewer import Viewer
-from hsp_control.visualization.viewer.commands import set_property
+from hsp_control.visualization.viewer import LiveView, Viewer
+from hsp_control.visualization.viewer.commands import PLOTS, set_property
 from hsp_control.visualization.viewer.export import FilmStyle, export_film, export_html
 from hsp_control.visualization.viewer.export.chromium import (
     find_browser,
@@ -35,6 +35,7 @@ from hsp_control.visualization.viewer.export.clip_reduction import (
     POSITION_BOUND,
 )
 from hsp_control.visualization.viewer.export.encoding import find_ffmpeg
+from hsp_control.visualization.viewer.latest_commands import key_of
 
 pytestmark = pytest.mark.browser
 
@@ -583,6 +584,80 @@ def test_the_live_view_draws_and_plays(
             for request in watched.requests
         )
         watched.page.close()
+
+
+def test_the_live_view_has_the_run_s_plots(
+    planar: Rollout, watch: Callable[..., Watched]
+) -> None:
+    """While it is computed and after; they keep what the user has made of them."""
+    experiment = load_experiment(PLANAR, "simulation.duration=4")
+    partial: list[Any] = []
+
+    def on_row(recorder: Any) -> None:
+        live.on_row(recorder)
+        if not partial and recorder.rows(0)["t"][-1] >= 1.0:
+            assert viewer.wait_for_browser(200.0)
+            plot = watched.page.locator("#side svg").first
+            partial.append(plot.get_attribute("aria-valuemax"))
+            watched.page.locator("#side .plot button").first.click()
+
+    with Viewer(experiment.robot) as viewer:
+        watched = watch(viewer.url)
+        page = watched.page
+        live = LiveView(viewer, experiment)
+        assert not page.locator("#side").count()  # there is no run yet
+        log = experiment.run(on_row=on_row)
+        assert partial == ["4"]  # the axis is that of the whole run
+        live.finish(log)
+        assert viewer.wait_for_browser(200.0)
+        assert page.locator("#side .plot").count() == 7
+        alone = page.locator("#side .plot button").first.get_attribute("aria-pressed")
+        assert alone == "true"
+
+        # One command for each picture of the plots: the newest replaces the last.
+        kept = [
+            name for path, name, _ in viewer.transport.scene.items() if path == PLOTS
+        ]
+        assert kept == ["plots"]
+        left, right = page.evaluate(
+            """() => {
+              const {left, right} = PlotAxes.MARGIN;
+              return [left, document.querySelector('#side svg').clientWidth - right];
+            }"""
+        )
+        for moment in (1.0, 3.25):
+            seek(watched, moment)
+            at = left + moment / 4.0 * (right - left)
+            np.testing.assert_allclose(cursors(watched), at, atol=0.02)
+
+        width = page.locator("#meshcat-pane canvas").bounding_box()["width"]
+        assert width < SIZE[0]
+        page.keyboard.press("g")
+        watched.until(f"document.querySelector('canvas').clientWidth === {SIZE[0]}")
+        assert not page.locator("#side").is_visible()
+        page.locator(".player .side").click()
+        watched.until(f"document.querySelector('canvas').clientWidth === {width}")
+
+        viewer.draw_scene(experiment.scene)  # no run, no plots
+        assert viewer.wait_for_browser(200.0)
+        assert not page.locator("#side").is_visible()
+        assert viewer.transport.scene.get(key_of(PLOTS, "plots")) is None
+        viewer.play(planar)
+        assert viewer.wait_for_browser(200.0)
+        assert page.locator("#side").is_visible()
+
+
+def test_on_a_phone_the_plots_of_the_live_view_are_away_at_first(
+    planar: Rollout, watch: Callable[..., Watched]
+) -> None:
+    with Viewer(Robot.load("planar3r")) as viewer:
+        viewer.play(planar)
+        watched = watch(viewer.url, size=PHONE)
+        assert viewer.wait_for_browser(200.0)
+        assert not watched.page.locator("#side").is_visible()
+        watched.page.locator(".player .side").click()
+        assert watched.page.locator("#side").is_visible()
+        assert watched.page.evaluate("document.documentElement.scrollWidth") == PHONE[0]
 
 
 # -- films ----------------------------------------------------------------------------

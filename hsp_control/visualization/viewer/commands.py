@@ -14,6 +14,7 @@ from hsp_control.visualization.viewer.legend import LegendEntry
 Json = dict[str, Any]
 
 CAMERA, CAPTION, CLIP, PLAY = "/camera", "/caption", "/clip", "/play"
+PLOTS = "/plots"
 
 
 class Command(NamedTuple):
@@ -180,6 +181,21 @@ def forget_clip() -> Command:
     """
     packed = umsgpack.packb({"type": "nothing", "path": CLIP})
     return Command(CLIP, key_of(CLIP, "nothing"), packed, deletes=True)
+
+
+def set_plots(plots: Json, arrays: list[Json]) -> Command:
+    """Return the command that shows plots beside the scene, in place of earlier ones.
+
+    Args:
+        plots: The plots, as ``export/plot_packing.py`` packs them.
+        arrays: The packed arrays to which they refer.
+    """
+    return _command("plots", PLOTS, "plots", plots=plots, arrays=arrays)
+
+
+def remove_plots() -> Command:
+    """Return the command that removes the plots, also from the scene."""
+    return _command("no_plots", PLOTS, "plots")._replace(deletes=True)
 
 
 def seek(time: float) -> Command:

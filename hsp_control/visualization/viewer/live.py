@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import HspControlError, ViewerError
+from hsp_control.common.exceptions import HspControlError, LogError, ViewerError
 from hsp_control.config.experiment import Experiment
 from hsp_control.robot import RobotState
 from hsp_control.simulation import Rollout
@@ -18,6 +18,7 @@ from hsp_control.visualization.viewer.commands import set_status
 from hsp_control.visualization.viewer.motion import COARSEST, Motion, motion_of
 from hsp_control.visualization.viewer.paths import GrowingPaths
 from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers
+from hsp_control.visualization.viewer.run_plots import plots_so_far
 from hsp_control.visualization.viewer.viewer import Viewer
 
 MIN_PERIOD = 0.1
@@ -28,6 +29,10 @@ RATE_WINDOW = 2.0
 """Time over which the computing rate is measured [s]."""
 DRAWING_SHARE = 0.03
 """Maximum share of the computing time that drawing takes."""
+PLOTS_SHARE = 0.01
+"""Maximum share of the computing time that the plots take."""
+PLOTS_PERIOD = 1.0
+"""Minimum time between two pictures of the plots [s]."""
 _PREVIEW_ROWS = 60
 
 _log = logging.getLogger(__name__)
@@ -69,7 +74,7 @@ class LiveView:
         self._sent = 0  # rows of the run
         self._pieces = 0
         self._cost = 0.0  # s per drawn row
-        self._next = 0.0
+        self._next = self._next_plots = 0.0
         self._marks: deque[tuple[float, float]] = (
             deque()
         )  # (wall time, time of the run)
@@ -87,11 +92,13 @@ class LiveView:
         before = time.thread_time()
         try:
             self._send(recorder, now)
+            took = time.thread_time() - before
+            if now >= self._next_plots and self._viewer.has_plots:
+                self._send_plots(recorder, now)
         except ViewerError as error:
             _log.warning("%s; the run continues without a view", error)
             self._next = float("inf")
             return
-        took = time.thread_time() - before
         self._next = now + min(max(MIN_PERIOD, took / DRAWING_SHARE), MAX_PERIOD)
 
     def finish(self, rollout: Rollout) -> None:
@@ -122,6 +129,21 @@ class LiveView:
         self._cost = (time.thread_time() - before) / len(motion.times)
         self._sent += len(rows)
         self._pieces += 1
+
+    def _send_plots(self, recorder: Recorder, now: float) -> None:
+        """Send the plots of all rows computed so far, in place of the last ones."""
+        before = time.thread_time()
+        duration = self._experiment.scenario.simulation.duration
+        robot = self._experiment.robot
+        try:
+            plots = plots_so_far(recorder, self._meta, robot, duration)
+        except LogError as error:
+            _log.warning("%s; the run continues without plots", error)
+            self._next_plots = float("inf")
+            return
+        self._viewer.show_plots(plots)
+        took = time.thread_time() - before
+        self._next_plots = now + max(PLOTS_PERIOD, took / PLOTS_SHARE)
 
     def _rate(self, now: float, computed: float) -> float:
         """Return the seconds of the run that are computed per second, recently."""

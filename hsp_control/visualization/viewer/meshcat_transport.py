@@ -21,7 +21,7 @@ TIMEOUT = 5.0
 """Time in which the server must answer [s]."""
 DEFAULT_ROOT = "/hsp_control"
 """The node of our scene, where only an address was given."""
-_OURS_ALONE = ("/Background", "/lights", "/floor")
+_OURS_ALONE = ("/Background", "/lights", "/floor", "/plots")
 _NATIVE = {"set_object", "set_transform", "set_property", "delete"}
 _ANIMATED = {
     "position": "vector3",

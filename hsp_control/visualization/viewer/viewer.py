@@ -1,5 +1,6 @@
 """The viewer: shows a robot, its surroundings and its runs in a browser."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from html import escape
 from types import TracebackType
@@ -9,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ExportError, ViewerError
+from hsp_control.common.exceptions import ExportError, LogError, ViewerError
 from hsp_control.config.view_settings import ViewSettings
 from hsp_control.control.controller import Controller
 from hsp_control.geometry.scene import Scene
@@ -22,6 +23,7 @@ from hsp_control.visualization.viewer.clip import remove_clip, set_clip
 from hsp_control.visualization.viewer.commands import (
     Command,
     delete,
+    remove_plots,
     seek,
     set_caption,
     set_status,
@@ -33,6 +35,7 @@ from hsp_control.visualization.viewer.motion import motion_of
 from hsp_control.visualization.viewer.obstacle_drawing import ObstacleDrawing
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing
 from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers, clear
+from hsp_control.visualization.viewer.run_plots import plots_of
 from hsp_control.visualization.viewer.server import Server
 from hsp_control.visualization.viewer.stage import (
     draw_stage,
@@ -43,6 +46,8 @@ from hsp_control.visualization.viewer.stage import (
 )
 from hsp_control.visualization.viewer.stage_content import StageContent
 from hsp_control.visualization.viewer.transport import Transport
+
+_log = logging.getLogger(__name__)
 
 
 class Viewer:
@@ -93,6 +98,7 @@ class Viewer:
         self._data = robot.model.createData()
         self._obstacles: ObstacleDrawing | None = None
         self._others: list[str] = []
+        self._plotted = False
         if meshcat is not None:
             transport = MeshcatTransport(meshcat)
         self.transport = Server(port) if transport is None else transport
@@ -228,6 +234,7 @@ class Viewer:
         self._obstacles = None
         self._others = comparison.roots[1:]
         self.transport.send([*stage, *clip])
+        self._plot(runs)
 
     def open_browser(self) -> bool:
         """Open the page in the user's browser; return whether there is one.
@@ -320,6 +327,33 @@ class Viewer:
         self.transport.send(
             [*clear(), *run.draw(size), *clip, caption, set_status(status)]
         )
+        self._plot([ComparedRun("", self.robot, rollout, controller)])
+
+    def show_plots(self, plots: Command) -> None:
+        """Show plots beside the scene, until another scene is drawn.
+
+        Args:
+            plots: See `run_plots`.
+
+        Raises:
+            ViewerError: If the server has ended.
+        """
+        self._plotted = True
+        self.transport.send([plots])
+
+    @property
+    def has_plots(self) -> bool:
+        """Whether its pages show plots: those of its own server do."""
+        return isinstance(self.transport, Server)
+
+    def _plot(self, runs: Sequence[ComparedRun]) -> None:
+        """Show the plots of runs beside the scene, which is already there."""
+        if not self.has_plots:
+            return
+        try:
+            self.show_plots(plots_of(runs))
+        except LogError as error:  # the scene needs fewer columns than the plots
+            _log.warning("no plots beside the scene: %s", error)
 
     def _run(self, rollout: Rollout, controller: Controller | None) -> RunDrawing:
         _check(self.robot, rollout, controller)
@@ -336,6 +370,7 @@ class Viewer:
         stage = self._stage(run, rollout.meta.get("title"))
         self._obstacles = None
         self.transport.send([*stage, *set_clip(run.clip(), **playing)])
+        self._plot([ComparedRun("", self.robot, rollout, controller)])
 
     def _draw_obstacles(self, scene: Scene) -> None:
         placements = self._placements(self.robot.home())
@@ -365,6 +400,7 @@ class Viewer:
         points = in_sight(subject, scene.obstacle_points())
         floor = min(0.0, float(subject[:, 2].min()))
         commands = [
+            *([remove_plots()] if self._plotted else []),
             *clear(),
             *(delete(root) for root in self._others),
             *draw_stage(points, floor, view),
@@ -375,6 +411,7 @@ class Viewer:
             set_status(""),
         ]
         self._others = []
+        self._plotted = False
         return commands
 
     def _caption(self, scene: StageContent, title: str | None) -> Command:

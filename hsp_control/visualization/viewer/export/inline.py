@@ -6,7 +6,7 @@ from typing import Any
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
-from hsp_control.visualization.viewer.commands import CAPTION, unpack
+from hsp_control.visualization.viewer.commands import CAPTION, PLOTS, unpack
 from hsp_control.visualization.viewer.export.packing import ArrayTable
 from hsp_control.visualization.viewer.export.page import assemble
 from hsp_control.visualization.viewer.export.scene_reduction import reduce_scene
@@ -47,7 +47,9 @@ class InlineView:
         self.height = height
         self._url = url
         arrays = ArrayTable()
-        commands = [unpack(packed) for _, _, packed in scene.items()]
+        commands = [
+            unpack(packed) for path, _, packed in scene.items() if path != PLOTS
+        ]
         caption = scene.get(key_of(CAPTION, "caption"))
         title = str(unpack(caption)["title"]) if caption else "hsp_control"
         content = {

@@ -15,7 +15,7 @@ from hsp_control.visualization.viewer.server import meshcat_page
 
 _LIVE = Path(__file__).parents[1] / "page"
 _OWN = Path(__file__).parent / "page"
-_SCRIPTS = ("unpack.js", "plots.js", "run_switch.js", "export.js")
+_SCRIPTS = ("run_switch.js", "export.js")
 _STYLES = ("export.css",)
 _NOTE = (
     "Written by hsp_control. Holds Meshcat's page (MIT), which holds three.js (MIT)."
@@ -28,7 +28,7 @@ _POLICY = (
 
 
 def assemble(title: str, content: Json) -> str:
-    """Return the page's HTML: the live page with its files inlined, and the plots.
+    """Return the page's HTML: the live page with its files inlined, and its content.
 
     Args:
         title: The page's title.

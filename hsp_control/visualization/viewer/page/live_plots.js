@@ -1,4 +1,4 @@
-// The live plots: the last seconds of every curve, in the style of export/page/plots.js:
+// The plots of `hsp play`: the last seconds of every curve, in the style of plots.js:
 // both are made of plot_parts.js.
 //
 //   const plots = new LivePlots(parent, definitions, () => isOpen);

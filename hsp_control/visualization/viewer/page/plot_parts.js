@@ -1,4 +1,4 @@
-// What the plots of the live page (live_plots.js) and of exported pages (plots.js) share:
+// What the plots of a run (plots.js) and those of `hsp play` (live_plots.js) share:
 // their measures, the ticks of axes, numbers, and the box with a title and a legend.
 //
 //   const box = new PlotBox("h3", {title, note, series: [{name, color, dashed, band}]}, picture);

@@ -1,24 +1,15 @@
 // An exported page, which contains its scene: shows the scene and the plots beside it.
 "use strict";
 
-const stage = document.createElement("main");
-const side = document.createElement("aside");
-stage.id = "stage";
-side.id = "side";
-document.body.append(stage, side);
-for (const part of document.querySelectorAll("#meshcat-pane, #caption, .player, .moments")) {
-  stage.append(part);
-}
-
-barHeight = 0;  // the bar is below the picture
+const side = new Side(player);
 
 commandHandlers.show = ({arrays, commands, plots, about, runs}) => {
   const unpacked = arrays.map(unpackArray);
   viewer.set_3d_pane_size();
   viewer.handle_command(withArrays(commands, unpacked));
-  if (!plots) return document.body.classList.add("alone", "without-plots");
-  const drawn = new Plots(player, side, withArrays(plots, unpacked));
-  if (runs) new RunSwitch(viewer, stage, drawn, runs);
+  if (!plots) return;
+  const drawn = side.show(withArrays(plots, unpacked));
+  if (runs) new RunSwitch(viewer, side.stage, drawn, runs);
   addFooter(about);
 };
 
@@ -40,26 +31,8 @@ function addFooter(runs) {
     const list = facts.map(([what, value]) => `${what} ${value}`);
     add((runs.length > 1 ? [name, ...list] : list).join("  ·  "), "facts");
   }
-  side.append(foot);
+  side.box.append(foot);
 }
-
-// Show or hide the plots; the scene takes their space.
-function toggleSide() {
-  document.body.classList.toggle("alone");
-}
-const sideButton = document.createElement("button");
-sideButton.className = "side";
-sideButton.title = "Plots (g)";
-sideButton.setAttribute("aria-label", "Show or hide the plots");
-sideButton.innerHTML = '<svg viewBox="0 0 24 24"><path d="M4 4h1.8v14.2H20V20H4zM7.5 15l3.6-5 '
-  + '3.2 3 4.4-7 1.6 1-5.6 9-3.3-3.1-2.5 3.4z"/></svg>';
-sideButton.onclick = toggleSide;
-document.querySelector(".player .present").before(sideButton);
-addEventListener("keydown", (event) => {
-  if (document.body.classList.contains("without-plots")) return;
-  if (event.key !== "g" || event.ctrlKey || event.metaKey || event.altKey) return;
-  toggleSide();
-});
 
 // `page.html#t=2.5` opens the page paused at that time.
 function openAtHash() {

@@ -23,7 +23,7 @@ class RunSwitch {
       button.type = "button";
       const text = run !== null ? names[run] : names.length === 2 ? "both" : "all";
       button.title = `${text} (w: the next)`;
-      if (run !== null) button.append(this.sample(run));
+      if (run !== null) button.append(Plots.sample(run));
       button.append(Object.assign(document.createElement("span"), {textContent: text}));
       button.onclick = (event) => {
         this.select(run);
@@ -42,15 +42,6 @@ class RunSwitch {
       this.select(this.choices[next % this.choices.length]);
     });
     this.select(null);
-  }
-
-  // The line by which the plots tell the runs apart.
-  sample(run) {
-    const picture = svg("svg", {viewBox: "0 0 22 8", "aria-hidden": "true"});
-    svg("line", {x1: 2, x2: 20, y1: 4, y2: 4, stroke: "currentColor", "stroke-width": 2.2,
-                 "stroke-linecap": run ? "round" : "butt",
-                 "stroke-dasharray": Plot.dashes(run)}, picture);
-    return picture;
   }
 
   // Show one run; null: all.

@@ -1,6 +1,7 @@
 // The plots beside the scene: curves over time, and a cursor at the player's time.
 //
 //   const plots = new Plots(player, side, {runs, start, end, damped, panels, colors});
+//   plots.load({...});   // the same plots with more rows, or others; the zoom stays
 //   plots.select(1);     // emphasise the curves of one run; null: of all
 //
 // with the data of viewer/export/plot_packing.py.
@@ -27,12 +28,17 @@ function svg(name, attributes, parent) {
 class Plots {
   static FINEST = 1 / 500;  // the shortest span, over the whole one
 
-  constructor(player, parent, {runs, start, end, damped, panels, colors}) {
-    Object.assign(this, {player, runs, start, damped, colors, selected: null, hovered: null,
-                         under: null});
-    this.end = end > start ? end : start + 1;
-    this.from = this.start;
-    this.to = this.end;
+  // The line by which the plots tell the runs apart.
+  static sample(run) {
+    const picture = svg("svg", {viewBox: "0 0 22 8", "aria-hidden": "true"});
+    svg("line", {x1: 2, x2: 20, y1: 4, y2: 4, stroke: "currentColor", "stroke-width": 2.2,
+                 "stroke-linecap": run ? "round" : "butt",
+                 "stroke-dasharray": Plot.dashes(run)}, picture);
+    return picture;
+  }
+
+  constructor(player, parent, data) {
+    Object.assign(this, {player, parent, plots: [], selected: null, hovered: null, under: null});
     this.whole = document.createElement("button");
     this.whole.type = "button";
     this.whole.className = "whole-run";
@@ -40,11 +46,32 @@ class Plots {
     this.whole.title = "Show the whole run (Esc)";
     this.whole.onclick = () => this.reset();
     parent.append(this.whole);
-    this.plots = panels.map((panel, k) => new Plot(this, parent, panel, `plot-${k}`));
+    this.load(data);
     player.addEventListener("time", () => this.showTime());
     addEventListener("keydown", ({key}) => { if (key === "Escape") this.reset(); });
     new ResizeObserver(() => this.draw()).observe(parent);
-    this.draw();
+  }
+
+  // Show other data. Plots with the same curves are kept, and with them the focus and what the
+  // user drags; so are a span that is zoomed, and a curve that is shown alone.
+  load({runs, start, end, damped, panels, colors}) {
+    const {zoomed, parent} = this;
+    Object.assign(this, {runs, start, damped, colors, end: end > start ? end : start + 1});
+    if (!zoomed) [this.from, this.to] = [this.start, this.end];
+    const fit = panels.length === this.plots.length
+      && panels.every((panel, k) => this.plots[k].fits(panel));
+    if (fit) panels.forEach((panel, k) => this.plots[k].load(panel));
+    else {
+      const {scrollTop} = parent, before = this.plots;
+      for (const {frame} of before) frame.box.remove();
+      Object.assign(this, {hovered: null, under: null});
+      this.plots = panels.map((panel, k) => new Plot(this, parent, panel, `plot-${k}`));
+      for (const plot of this.plots) {
+        plot.isolateAs(before.find(({panel}) => panel.title === plot.panel.title));
+      }
+      parent.scrollTop = scrollTop;
+    }
+    if (zoomed) this.zoom(this.from, this.to); else this.draw();
   }
 
   get zoomed() { return this.from > this.start || this.to < this.end; }
@@ -110,14 +137,9 @@ class Plot {
   }
 
   constructor(plots, parent, panel, name) {
-    Object.assign(this, {plots, panel, name, pointers: new Map(), action: null, range: null});
+    Object.assign(this, {plots, name, pointers: new Map(), action: null, range: null});
     this.picture = svg("svg", {role: "slider", tabindex: 0, "aria-label": `${panel.title}, time`});
-    this.entries = [];  // one for the curves of the same name
-    for (const series of panel.series) {
-      const known = this.entries.find((entry) => entry.name === series.name);
-      if (known) known.curves.push(series);
-      else this.entries.push({...series, curves: [series]});
-    }
+    this.load(panel);
     const {title, note} = panel;
     this.frame = new PlotBox("h2", {title, note, series: this.entries}, this.picture);
     this.frame.onisolate = () => {
@@ -126,6 +148,38 @@ class Plot {
     };
     parent.append(this.frame.box);
     this.listen();
+  }
+
+  // Take other data; the legend stays, and so must the names of the curves: see `fits`.
+  load(panel) {
+    this.panel = panel;
+    this.entries = Plot.entriesOf(panel);
+  }
+
+  // One entry for the curves of the same name.
+  static entriesOf({series}) {
+    const entries = [];
+    for (const each of series) {
+      const known = entries.find((entry) => entry.name === each.name);
+      if (known) known.curves.push(each);
+      else entries.push({...each, curves: [each]});
+    }
+    return entries;
+  }
+
+  // Whether a panel has the same title and the same legend.
+  fits(panel) {
+    const told = (each, entries) => JSON.stringify([each.title, each.note, entries.map(
+      ({name, color, dashed, band}) => [name, color, dashed, band])]);
+    return told(panel, Plot.entriesOf(panel)) === told(this.panel, this.entries);
+  }
+
+  // Show alone what another plot shows alone.
+  isolateAs(other) {
+    if (!other || other.frame.alone === null) return;
+    const {name} = other.entries[other.frame.alone];
+    const place = this.entries.findIndex((entry) => entry.name === name);
+    if (place >= 0) this.frame.isolate(place);
   }
 
   // -- the picture --

@@ -1,0 +1,75 @@
+"""The plots beside the scene of a live page: those of an exported page."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hsp_control.common.arrays import Indices
+from hsp_control.robot import Robot
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.recorder import Recorder, continuous_dofs
+from hsp_control.simulation.rollout import complete_columns
+from hsp_control.visualization.viewer.commands import Command, Json, set_plots
+from hsp_control.visualization.viewer.comparison import ComparedRun
+
+PREVIEW_ROWS = 500
+"""About so many rows of a run that is being computed are plotted."""
+
+
+def plots_of(runs: Sequence[ComparedRun]) -> Command:
+    """Return the command that shows the plots of complete runs.
+
+    Raises:
+        LogError: If a log lacks a column that all runs have.
+    """
+    return _command(runs, None)
+
+
+def plots_so_far(
+    recorder: Recorder, meta: Json, robot: Robot, duration: float
+) -> Command:
+    """Return the command that shows the plots of a run that is being computed.
+
+    Their number of points does not grow with the run, and their axis is that of the
+    whole run.
+
+    Args:
+        recorder: The rows computed so far; at least one.
+        meta: The meta data of the log.
+        robot: The run's robot.
+        duration: The time at which the run will end [s].
+    """
+    rows = recorder.rows(0)
+    chosen = _chosen(len(rows["t"]))
+    columns = {name: values[chosen] for name, values in rows.items()}  # copies
+    complete_columns(columns, continuous_dofs(robot))
+    # Without the controller: the expected floor takes too long to compute meanwhile.
+    return _command([ComparedRun("", robot, Rollout(columns, meta), None)], duration)
+
+
+def _command(runs: Sequence[ComparedRun], end: float | None) -> Command:
+    # Here: the export imports the viewer, which imports this module.
+    from hsp_control.visualization.viewer.export.packing import ArrayTable
+    from hsp_control.visualization.viewer.export.plot_packing import (
+        PlottedRun,
+        pack_panels,
+    )
+
+    arrays = ArrayTable()
+    plotted = [PlottedRun(run.name, run.rollout, run.controller) for run in runs]
+    plots = pack_panels(plotted, arrays)
+    if end is not None:
+        plots["end"] = max(end, plots["end"])
+    return set_plots(plots, arrays.entries)
+
+
+def _chosen(count: int) -> Indices:
+    """Return rows at even distances, and the last one.
+
+    The distance is a power of two: so most rows are chosen again the next time, and
+    the curves do not flicker.
+    """
+    step = 1
+    while count > step * PREVIEW_ROWS:
+        step *= 2
+    return np.append(np.arange(0, count - 1, step), count - 1)
