@@ -11,6 +11,7 @@ from hsp_control.simulation import Rollout
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.appearance import CHALK, INK
+from hsp_control.visualization.viewer.capsules import Capsules
 from hsp_control.visualization.viewer.commands import (
     Command,
     delete,
@@ -26,7 +27,7 @@ from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers
 
 FRAME = 1.0 / 30.0
 """Time between two pictures [s]."""
-_FIELD_LAYERS = ("influence", "distances")
+_FIELD_LAYERS = ("influence", "distances", "capsules")
 _BATCHES = 64
 """Batches of samples that wait for a page at most; what is older is left out."""
 _JOINTS = 8
@@ -104,6 +105,7 @@ class Picture:
         field, ink = controller.field, CHALK if dark else INK
         layers["influence"] = Influence(field, obstacles.shapes, "/influence")
         layers["distances"] = Distances(controller, "/distances", ink)
+        layers["capsules"] = Capsules(controller, "/capsules")
         return layers
 
     def draw(self, *, running: bool, rate: float) -> None:
@@ -158,7 +160,7 @@ class Picture:
         for name in _FIELD_LAYERS:
             yield delete(f"/{name}")
             self._run.layers[name] = layers[name]
-            yield from layers[name].draw(self._size)
+            yield from self._run.draw_layer(name, self._size)
 
     def _motion(self) -> Motion:
         """Return the present row as a log."""
