@@ -8,6 +8,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.play.session import Session
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_distances import distance_label
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.appearance import CHALK, INK
@@ -265,11 +266,16 @@ def _plots(session: Session) -> Iterator[Plot]:
     if controller.field.controls:
         norm = Curve("‖e_N‖", "null_space_norm", slice(0, 1))
         units = dict.fromkeys(controller.robot.units)
-        unit = " or ".join(f"{unit}/s" for unit in units)
+        unit = ", ".join(f"{unit}/s" for unit in units)
         yield Plot("Null-space error", unit, True, [norm])
     names = [name for name in session.recorder.rows(0) if name.startswith("distance.")]
     if names:
-        curves = [Curve(n.removeprefix("distance."), n, slice(0, 1)) for n in names]
+        meta = session.recorder.meta("", "")
+        labels = [distance_label(meta, n.removeprefix("distance.")) for n in names]
+        curves = [
+            Curve(label, name, slice(0, 1))
+            for label, name in zip(labels, names, strict=True)
+        ]
         yield Plot("Smallest distance", "m", False, curves)
     dofs = controller.robot.dof_names
     if len(dofs) <= _JOINTS:

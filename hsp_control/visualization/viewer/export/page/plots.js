@@ -157,7 +157,7 @@ class Plot {
 
   // The axis: the packed range; of a part of the curves, or of time, what that part needs.
   limits(curves) {
-    const {low, high, logarithmic, zero} = this.panel;
+    const {low, high, logarithmic, edges} = this.panel;
     if (!this.plots.zoomed && this.frame.alone === null) return [low, high];
     const {from, to} = this.plots;
     let least = Infinity, most = -Infinity;
@@ -174,7 +174,7 @@ class Plot {
       }
     }
     if (!(least <= most)) return [low, high];
-    if (zero) [least, most] = [Math.min(least, 0), Math.max(most, 0)];
+    for (const {value} of edges) [least, most] = [Math.min(least, value), Math.max(most, value)];
     const needed = logarithmic ? 1 : (high - low) / 1000;
     const room = 0.08 * (most - least) + Math.max(0, needed - (most - least)) / 2;
     return [least - room, most + room];
@@ -244,7 +244,12 @@ class Plot {
       text({x, y: base, "text-anchor": "middle"}, clock.label(tick));
     }
     text({x: left + width, y: base, "text-anchor": "end", class: "unit"}, "t [s]");
-    if (panel.zero) across(this.y(0), contact);
+    for (const {value, name} of panel.edges) {
+      const y = this.y(value);
+      across(y, contact);
+      if (name) text({x: left + width - 2, y: y - 4, "text-anchor": "end", class: "edge",
+                      fill: contact}, name);
+    }
     across(floor, muted);
   }
 
