@@ -247,10 +247,23 @@ class Plot {
     for (const {value, name} of panel.edges) {
       const y = this.y(value);
       across(y, contact);
-      if (name) text({x: left + width - 2, y: y - 4, "text-anchor": "end", class: "edge",
-                      fill: contact}, name);
+      if (name) text({...this.freest(value), y: y - 4, class: "edge"}, name);
     }
     across(floor, muted);
+  }
+
+  // Where a label above a line hides least of the curves: at the left, middle or right.
+  freest(height) {
+    const {left} = PlotAxes.MARGIN, {from, to} = this.plots;
+    const room = (start) => Math.min(...this.curves().flatMap((curve) =>
+      [0, 0.25, 0.5, 0.75, 1].map((part) => {
+        const value = valueAt(curve, from + (start + 0.3 * part) * (to - from));
+        return value === null ? Infinity : Math.abs(value - height);
+      })));
+    const [start] = [0.7, 0.35, 0].sort((one, other) => room(other) - room(one));
+    const anchor = {0.7: "end", 0.35: "middle", 0: "start"}[start];
+    const place = {0.7: this.width - 2, 0.35: this.width / 2, 0: 2}[start];
+    return {x: left + place, "text-anchor": anchor};
   }
 
   drawCurve({times, values, color, dashed, band, run}, parent) {
