@@ -30,6 +30,9 @@ class ShownItems(Part, error=ViewerError):
     """The influence zones of the obstacles [-]."""
     distances: Flag = True
     """The shortest distances of the clearance fields [-]."""
+    capsules: Flag = False
+    """The shapes of the links that clearance fields and minimum distances measure
+    [-]."""
     ellipsoid: Flag = False
     """The manipulability ellipsoid of the tasks' frames [-]."""
     self_motion: Flag = True

@@ -8,9 +8,11 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.play.session import Session
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_distances import distance_label
 from hsp_control.visualization.palette import SERIES
 from hsp_control.visualization.viewer import Viewer
 from hsp_control.visualization.viewer.appearance import CHALK, INK
+from hsp_control.visualization.viewer.capsules import Capsules
 from hsp_control.visualization.viewer.commands import (
     Command,
     delete,
@@ -26,7 +28,7 @@ from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers
 
 FRAME = 1.0 / 30.0
 """Time between two pictures [s]."""
-_FIELD_LAYERS = ("influence", "distances")
+_FIELD_LAYERS = ("influence", "distances", "capsules")
 _BATCHES = 64
 """Batches of samples that wait for a page at most; what is older is left out."""
 _JOINTS = 8
@@ -104,6 +106,7 @@ class Picture:
         field, ink = controller.field, CHALK if dark else INK
         layers["influence"] = Influence(field, obstacles.shapes, "/influence")
         layers["distances"] = Distances(controller, "/distances", ink)
+        layers["capsules"] = Capsules(controller, "/capsules")
         return layers
 
     def draw(self, *, running: bool, rate: float) -> None:
@@ -158,7 +161,7 @@ class Picture:
         for name in _FIELD_LAYERS:
             yield delete(f"/{name}")
             self._run.layers[name] = layers[name]
-            yield from layers[name].draw(self._size)
+            yield from self._run.draw_layer(name, self._size)
 
     def _motion(self) -> Motion:
         """Return the present row as a log."""
@@ -263,11 +266,16 @@ def _plots(session: Session) -> Iterator[Plot]:
     if controller.field.controls:
         norm = Curve("‖e_N‖", "null_space_norm", slice(0, 1))
         units = dict.fromkeys(controller.robot.units)
-        unit = " or ".join(f"{unit}/s" for unit in units)
+        unit = ", ".join(f"{unit}/s" for unit in units)
         yield Plot("Null-space error", unit, True, [norm])
     names = [name for name in session.recorder.rows(0) if name.startswith("distance.")]
     if names:
-        curves = [Curve(n.removeprefix("distance."), n, slice(0, 1)) for n in names]
+        meta = session.recorder.meta("", "")
+        labels = [distance_label(meta, n.removeprefix("distance.")) for n in names]
+        curves = [
+            Curve(label, name, slice(0, 1))
+            for label, name in zip(labels, names, strict=True)
+        ]
         yield Plot("Smallest distance", "m", False, curves)
     dofs = controller.robot.dof_names
     if len(dofs) <= _JOINTS:

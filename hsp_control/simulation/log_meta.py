@@ -54,6 +54,7 @@ class _Model(BaseModel):
 class _Column(_Model):
     unit: str = "-"
     meaning: str = ""
+    center_of: str = ""
 
 
 class _Robot(_Model):

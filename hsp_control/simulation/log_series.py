@@ -10,6 +10,8 @@ from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_meta import drawn_columns
 
+_EFFORT_UNITS = {"rad": "N·m", "m": "N"}
+
 
 class ErrorPart(NamedTuple):
     """The components of a task's error that have the same unit.
@@ -128,15 +130,41 @@ def joint_positions(rollout: Rollout, *, absolute: bool = True) -> tuple[Array, 
     return positions, "joint position"
 
 
+def position_units(rollout: Rollout) -> list[str]:
+    """Return the unit of each dof's position: ``rad`` or ``m``."""
+    about = rollout.meta["robot"]
+    units, count = list(map(str, about["units"])), len(about["dofs"])
+    # A log from elsewhere may contradict itself.
+    return units if len(units) == count else [", ".join(dict.fromkeys(units))] * count
+
+
 def position_unit(rollout: Rollout) -> str:
-    """Return the unit of the joints' positions: ``rad``, ``m`` or ``rad or m``."""
-    return " or ".join(dict.fromkeys(map(str, rollout.meta["robot"]["units"])))
+    """Return the unit of all joints' positions: ``rad``, ``m`` or ``rad, m``."""
+    return ", ".join(dict.fromkeys(map(str, rollout.meta["robot"]["units"])))
+
+
+def null_space_unit(rollout: Rollout) -> str:
+    """Return the unit of ‖e_N‖_W; for the mass matrix the root of twice an energy."""
+    if rollout.meta.get("metric") == "MassMatrixMetric":
+        return "√J"
+    return rate_unit(rollout)
+
+
+def rate_unit(rollout: Rollout) -> str:
+    """Return the unit of a norm of joint rates: ``rad/s``, ``m/s``, ``(rad, m)/s``."""
+    unit = position_unit(rollout)
+    return f"({unit})/s" if " " in unit else f"{unit}/s"
+
+
+def effort_units(rollout: Rollout) -> list[str]:
+    """Return the unit of each dof's effort: ``N·m`` or ``N``."""
+    return [_EFFORT_UNITS.get(unit, "–") for unit in position_units(rollout)]
 
 
 def effort_unit(rollout: Rollout) -> str:
-    """Return the unit of the efforts: ``N·m``, ``N``, or as the log has it."""
-    efforts = {"rad": "N·m", "m": "N"}
-    return efforts.get(position_unit(rollout), column_unit(rollout, "tau"))
+    """Return the unit of all efforts: ``N·m``, ``N``, or as the log has it."""
+    unit = position_unit(rollout)
+    return _EFFORT_UNITS.get(unit) or column_unit(rollout, "tau")
 
 
 def constant_metric(rollout: Rollout) -> Array | None:

@@ -21,7 +21,7 @@ from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.shapes import shape_to_log
-from hsp_control.null_space.fields import NullSpaceField
+from hsp_control.null_space.fields import NullSpaceField, PointDistance
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import FixedMetric, Metric
 from hsp_control.robot import Robot, RobotState
@@ -108,13 +108,13 @@ class Recorder:
             column(f"{prefix}.quaternion", (4,), "-", "orientation (x, y, z, w)")
 
     def _add_column(
-        self, name: str, shape: tuple[int, ...], unit: str, meaning: str
+        self, name: str, shape: tuple[int, ...], unit: str, meaning: str, **more: str
     ) -> None:
         """Add a column if it does not exist; rows without a value hold NaN."""
         if name not in self._columns:
             self._reserve(self._capacity, shape)
             self._columns[name] = np.full((self._capacity, *shape), np.nan)
-            self._descriptions[name] = {"unit": unit, "meaning": meaning}
+            self._descriptions[name] = {"unit": unit, "meaning": meaning, **more}
 
     def _add_task_columns(self) -> None:
         """Add the columns of all tasks; the tasks may change during the run.
@@ -174,7 +174,9 @@ class Recorder:
             self._add_column(f"field.{name}.g", shape, unit, "weighted share of g")
             self._add_column(f"field.{name}.value", (), "-", "unweighted cost or norm")
             if field.minimum_distance(probe) is not None:
-                self._add_column(f"distance.{name}", (), "m", "minimum distance")
+                self._add_column(
+                    f"distance.{name}", (), "m", "minimum distance", **_center_of(field)
+                )
 
     def _reserve(self, rows: int, shape: tuple[int, ...]) -> None:
         """Check that the log can be loaded again, before memory is allocated."""
@@ -435,6 +437,13 @@ def logged_terms(controller: Controller) -> dict[str, NullSpaceField]:
         name if names.count(name) == 1 else f"{name}_{k}": term
         for k, (name, term) in enumerate(zip(names, terms, strict=True))
     }
+
+
+def _center_of(field: NullSpaceField) -> dict[str, str]:
+    """Return which obstacle's centre a field's distance leads to, if to a centre."""
+    if isinstance(field, PointDistance) and isinstance(field.obstacle, Obstacle):
+        return {"center_of": field.obstacle.name}
+    return {}
 
 
 def _task_meta(task: Task) -> dict[str, Any]:

@@ -213,8 +213,9 @@ def test_panels_are_drawn_from_the_run(number: int, runs: dict[int, Rollout]) ->
     np.testing.assert_array_equal(
         conditioning.lines[0].get_ydata(), run["manipulability"]
     )
-    frames = [a for a in figure.axes if a.get_title(loc="left").startswith("t = ")]
-    assert [a.get_title(loc="right") for a in frames] == [str(k) for k in range(1, 9)]
+    frames = [a for a in figure.axes if "t = " in a.get_title(loc="left")]
+    numbers = [a.get_title(loc="left").split()[0] for a in frames]
+    assert numbers == [rf"$\mathbf{{{k}}}$" for k in range(1, 9)]
     for axes, time in zip(frames, one.times, strict=True):
         row = int(np.abs(run.t - time).argmin())
         sticks = np.concatenate([line.get_xydata() for line in axes.lines])

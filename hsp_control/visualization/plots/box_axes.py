@@ -34,6 +34,10 @@ _EDGES = (
 )
 _DIGIT_WIDTH = 4.8
 """Width of a digit [pt]."""
+_NARROWEST = 115.0
+"""Width or height, the larger one, of the smallest box in a figure [pt]."""
+_HEIGHT = 11.0
+"""Height of a line of tick labels [pt]."""
 _WALLS = ((0, 0), (1, 1), (2, 0))
 """The sides behind the scene, (axis, side): low x, high y and the floor."""
 
@@ -49,7 +53,7 @@ def draw_box(axes: Axes, view: View, lower: Array, upper: Array) -> None:
     """
     axes.set_axis_off()
     ends = np.stack([lower, upper])
-    ticks = [_ticks(view, ends, axis) for axis in range(3)]
+    ticks = [_apart(view, ends, _ticks(view, ends, axis), axis) for axis in range(3)]
     for normal, side in _WALLS:
         _draw_wall(axes, view, ends, ticks, normal, side)
     for axis in range(3):
@@ -71,6 +75,20 @@ def _ticks(view: View, ends: Array, axis: int) -> Array:
         inside = ticks[(ticks >= first) & (ticks <= last)]
         count += 1
     return np.asarray(np.round(inside, 9))
+
+
+def _apart(view: View, ends: Array, ticks: Array, axis: int) -> Array:
+    """Return the ticks, or every second, third, ... if their labels would overlap."""
+    page = np.column_stack(view.project(corners(*ends)))
+    scale = _NARROWEST / float(np.ptp(page, axis=0).max())
+    direction = scale * np.abs(view.rows[:, axis])  # [pt] on the page for each metre
+    wide = _DIGIT_WIDTH * max((len(f"{tick:g}") for tick in ticks), default=0)
+    for stride in range(1, max(len(ticks) - 1, 1)):
+        kept = ticks[::stride]
+        across, up = direction * (kept[1] - kept[0]) if len(kept) > 1 else (wide, 0.0)
+        if across >= wide or up >= _HEIGHT:
+            return np.asarray(kept)
+    return np.asarray(ticks[:: max(len(ticks) - 1, 1)])
 
 
 def _draw_wall(
@@ -120,7 +138,11 @@ def _draw_tick_labels(
     axes.annotate(
         f"{'xyz'[axis]} [m]",
         (float(x), float(y)),
-        xytext=((-16.0, -18.0), (16.0, -16.0), (-9.0 - widest, 0.0))[axis],
+        xytext=(
+            (-16.0, -18.0),
+            (8.0 + 0.5 * widest, -16.0),
+            (-9.0 - widest, 0.0),
+        )[axis],
         textcoords="offset points",
         ha=("right", "left", "right")[axis],
         va="center" if upright else "top",

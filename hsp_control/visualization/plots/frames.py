@@ -1,6 +1,6 @@
 """The robot at selected times (frames): one plot each, or all in one plot."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -27,6 +27,8 @@ from hsp_control.visualization.plots.world_drawing import (
     draw_skeleton,
 )
 
+_NEAR = 0.035
+"""Width and height of a letter of a number, over the size of the scene."""
 MAX_TICKS = 10
 """With more frames, their times are not the ticks of the time scale."""
 
@@ -69,7 +71,9 @@ def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> 
     for place, one in enumerate(axes):
         if place < len(rows):
             draw_frame(one, rollout, rows[place], key=False)
-            one.set_title(str(place + 1), loc="right", fontsize=8.5, pad=3.0)
+            # Before the time: at the right it would look like the next frame's.
+            number = rf"$\mathbf{{{place + 1}}}$   {one.get_title(loc='left')}"
+            one.set_title(number, fontsize=8.5, fontweight="normal", pad=3.0)
         else:
             one.set_axis_off()
 
@@ -102,8 +106,10 @@ def draw_superimposed(
         draw_skeleton(
             axes, scene.view, points, tree, link=link, joint=joint, zorder=zorder
         )
-        if numbered:
-            _number(axes, scene.view, points, tree, place + 1)
+    if numbered:
+        near = _NEAR * float(np.ptp(scene.view.project(scene.points), axis=1).max())
+        for row, text in _numbers(scene.view, rollout, rows, near):
+            _number(axes, scene.view, rollout["skeleton"][row], tree, text)
     scene.finish(axes, shadows=False, key=True)
     if end > start:
         _time_bar(axes, start, end, times.tolist())
@@ -176,16 +182,55 @@ class _Scene(NamedTuple):
         return np.array([origin, origin - 0.3 * length * self.view.rows[1]])
 
 
+def _numbers(
+    view: View, rollout: Rollout, rows: Sequence[int], near: float
+) -> Iterator[tuple[int, str]]:
+    """Yield a row and its frames' numbers; numbers that would overlap are one text.
+
+    Args:
+        view: The view.
+        rollout: The log.
+        rows: The frames' rows.
+        near: Width and height of a letter on the page [m].
+    """
+    ends = np.column_stack(view.project(rollout["skeleton"][list(rows), -1]))
+    groups: list[list[int]] = []
+    for place in range(len(rows)):
+        group = [place]
+        # A text that grows with a frame's number may reach a further one.
+        while hit := [g for g in groups if _overlap(ends, g, group, near)]:
+            groups = [g for g in groups if g not in hit]
+            group = sorted(sum(hit, group))
+        groups.append(group)
+    for group in sorted(groups):
+        yield rows[group[-1]], _ranges(group)
+
+
+def _overlap(ends: Array, first: list[int], second: list[int], near: float) -> bool:
+    """Return whether the numbers of two groups of frames would overlap."""
+    across, up = np.abs(ends[first[-1]] - ends[second[-1]])
+    wide = 0.5 * near * (len(_ranges(first)) + len(_ranges(second)))
+    return bool(across < wide and up < near)
+
+
+def _ranges(group: list[int]) -> str:
+    """Return ascending places, from 0, as numbers from 1: ``1-3, 5`` with a dash."""
+    starts = [k for k in group if k - 1 not in group]
+    stops = [k for k in group if k + 1 not in group]
+    spans = zip(starts, stops, strict=True)
+    return ", ".join(f"{a + 1}–{b + 1}" if b > a else f"{a + 1}" for a, b in spans)
+
+
 def _number(
-    axes: Axes, view: View, points: Array, tree: Sequence[int], number: int
+    axes: Axes, view: View, points: Array, tree: Sequence[int], text: str
 ) -> None:
-    """Write a frame's number beyond the last point, in the direction of its link."""
+    """Write frames' numbers beyond the last point, in the direction of its link."""
     (x, y), (x0, y0) = (view.project(points[k]) for k in (-1, tree[-1]))
     along = np.array([float(x - x0), float(y - y0)])
     length = float(np.linalg.norm(along))
     offset = along / length if length > 0.0 else np.array([0.0, 1.0])
     axes.annotate(
-        str(number),
+        text,
         (float(x), float(y)),
         xytext=tuple(8.0 * offset),
         textcoords="offset points",

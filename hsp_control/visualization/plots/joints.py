@@ -4,10 +4,10 @@ from matplotlib.axes import Axes
 
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_series import (
-    effort_unit,
+    effort_units,
     joint_names,
     joint_positions,
-    position_unit,
+    position_units,
 )
 from hsp_control.visualization.plots.legends import legend_below
 from hsp_control.visualization.plots.lines import draw_lines, time_axis
@@ -25,15 +25,17 @@ def draw_joint_positions(
             does; False: always the joint angles q.
     """
     positions, what = joint_positions(rollout, absolute=absolute)
-    draw_lines(axes, rollout.t, positions, joint_names(rollout))
-    axes.set_ylabel(f"{what} [{position_unit(rollout)}]")
+    names, units = joint_names(rollout), position_units(rollout)
+    unit = draw_lines(axes, rollout.t, positions, names, units)
+    axes.set_ylabel(f"{what} [{unit}]")
     time_axis(axes, rollout.t)
     legend_below(axes)
 
 
 def draw_efforts(axes: Axes, rollout: Rollout) -> None:
     """Draw the joints' efforts tau."""
-    draw_lines(axes, rollout.t, rollout.tau, joint_names(rollout))
-    axes.set_ylabel(f"effort τ [{effort_unit(rollout)}]")
+    names, units = joint_names(rollout), effort_units(rollout)
+    unit = draw_lines(axes, rollout.t, rollout.tau, names, units)
+    axes.set_ylabel(f"effort τ [{unit}]")
     time_axis(axes, rollout.t)
     legend_below(axes)

@@ -15,7 +15,13 @@ MAX_NAMED, SELECTED = 14, 7
 _DASHES = ("-", "--")
 
 
-def draw_lines(axes: Axes, t: Array, values: Array, names: Sequence[str]) -> None:
+def draw_lines(
+    axes: Axes,
+    t: Array,
+    values: Array,
+    names: Sequence[str],
+    units: Sequence[str] | None = None,
+) -> str:
     """Draw one line per column, with names in the legend.
 
     Args:
@@ -23,25 +29,35 @@ def draw_lines(axes: Axes, t: Array, values: Array, names: Sequence[str]) -> Non
         t: Time [s], shape (N,).
         values: Shape (N, k).
         names: The columns' names.
+        units: The columns' units. If the named lines differ in them, names tell them;
+            lines without a name are drawn only if they share a unit with named ones.
+
+    Returns:
+        The units of what is drawn, for the axis; "" without units.
     """
-    named = list(range(len(names)))
+    units = list(units or [""] * len(names))
+    named, others = list(range(len(names))), []
     if len(names) > MAX_NAMED:
         spread = np.ptp(np.nan_to_num(values, posinf=0.0, neginf=0.0), axis=0)
         named = sorted(np.argsort(-spread, kind="stable")[:SELECTED].tolist())
-        others = [k for k in range(len(names)) if k not in named]
+        shown = {units[k] for k in named}
+        others = [k for k in range(len(names)) if k not in named and units[k] in shown]
         for k in others:
             axes.plot(t, values[:, k], color=palette.MUTED, linewidth=0.6, alpha=0.5)
+    kinds = list(dict.fromkeys(units[k] for k in named))
     for place, k in enumerate(named):
+        name = literal_text(names[k])
         axes.plot(
             t,
             values[:, k],
             marker=point_marker(t),
             color=palette.series(place),
             linestyle=_DASHES[place // len(palette.SERIES) % len(_DASHES)],
-            label=literal_text(names[k]),
+            label=f"{name} [{units[k]}]" if len(kinds) > 1 else name,
         )
-    if len(names) > len(named):
-        note(axes, f"{len(names) - len(named)} others (grey)")
+    if others:
+        note(axes, f"{len(others)} others (grey)")
+    return ", ".join(kinds)
 
 
 def point_marker(t: Array) -> str:

@@ -5,12 +5,13 @@ from matplotlib.axes import Axes
 
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.decay import predicted_decay
+from hsp_control.simulation.log_distances import logged_distances
 from hsp_control.simulation.log_series import (
     column_unit,
-    distances,
     field_terms,
     held_period,
-    position_unit,
+    null_space_unit,
+    rate_unit,
 )
 from hsp_control.visualization import palette
 from hsp_control.visualization.plots.legends import legend_below, literal_text, note
@@ -62,7 +63,7 @@ def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
         note(axes, f"effort held for {1e3 * period:g} ms")
     mark_damped(axes, rollout)
     log_scale(axes, norm, top=1e-6)
-    axes.set_ylabel(rf"$\Vert e_N \Vert_W$ [{_norm_unit(rollout)}]")
+    axes.set_ylabel(rf"$\Vert e_N \Vert_W$ [{null_space_unit(rollout)}]")
     time_axis(axes, t)
     legend_below(axes)
 
@@ -87,29 +88,28 @@ def draw_field_terms(axes: Axes, rollout: Rollout) -> None:
     norms = [np.linalg.norm(rollout[f"field.{name}.g"], axis=1) for name in names]
     draw_lines(axes, rollout.t, np.column_stack(norms), names)
     axes.set_ylim(bottom=0.0)
-    axes.set_ylabel(rf"contribution $\Vert g_k \Vert$ [{_rate_unit(rollout)}]")
+    axes.set_ylabel(rf"contribution $\Vert g_k \Vert$ [{rate_unit(rollout)}]")
     time_axis(axes, rollout.t)
     legend_below(axes)
 
 
 def draw_distances(axes: Axes, rollout: Rollout) -> None:
-    """Draw the minimum distance of each clearance field; below zero is contact."""
-    names = distances(rollout)
-    values = np.column_stack([rollout[f"distance.{name}"] for name in names])
-    draw_lines(axes, rollout.t, values, names)
-    axes.axhline(0.0, color=palette.OBSTACLE, linewidth=1.0, zorder=1.0)
+    """Draw the minimum distances, and a line at each where there is contact.
+
+    Surfaces touch at zero; a distance to a centre must not fall below the radius.
+    """
+    watched = logged_distances(rollout)
+    values = np.column_stack([each.values for each in watched])
+    draw_lines(axes, rollout.t, values, [each.label for each in watched])
+    for edge, name in dict.fromkeys((each.edge, each.edge_name) for each in watched):
+        if edge is not None:
+            axes.axhline(
+                edge,
+                color=palette.OBSTACLE,
+                linewidth=1.0,
+                zorder=1.0,
+                label=name or None,
+            )
     axes.set_ylabel("minimum distance [m]")
     time_axis(axes, rollout.t)
     legend_below(axes)
-
-
-def _norm_unit(rollout: Rollout) -> str:
-    """Return the norm's unit; with the mass matrix: the root of twice an energy."""
-    if rollout.meta.get("metric") == "MassMatrixMetric":
-        return "√J"
-    return _rate_unit(rollout)
-
-
-def _rate_unit(rollout: Rollout) -> str:
-    unit = position_unit(rollout)
-    return f"({unit})/s" if " " in unit else f"{unit}/s"

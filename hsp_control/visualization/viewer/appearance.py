@@ -26,6 +26,8 @@ BAR_RADIUS = 0.003
 """Radius of a distance bar, over the size of the scene."""
 BAR_END_RADIUS = 0.0075
 """Radius of the balls at its ends, over the size of the scene."""
+MEASURED, MEASURED_OPACITY = palette.SERIES[4], 0.3
+"""Colour and opacity of the shapes of links that distances are measured with."""
 ELLIPSOID, ELLIPSOID_OPACITY = palette.TASK, 0.3
 FIELD, FIELD_OPACITY = palette.FIELD, 0.4
 ARROW_RADIUS = 0.007

@@ -9,6 +9,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.visualization.viewer.appearance import CHALK, INK
 from hsp_control.visualization.viewer.bands import Band
+from hsp_control.visualization.viewer.capsules import Capsules
 from hsp_control.visualization.viewer.clip import Clip, Track
 from hsp_control.visualization.viewer.commands import Command, delete, set_property
 from hsp_control.visualization.viewer.contacts import Contacts
@@ -31,6 +32,7 @@ LAYERS = (
     "obstacles",
     "influence",
     "distances",
+    "capsules",
     "ellipsoid",
     "self_motion",
     "contacts",
@@ -72,6 +74,7 @@ def all_layers(
                 controller.field, obstacles.shapes, f"{root}/influence"
             ),
             "distances": Distances(controller, f"{root}/distances", ink),
+            "capsules": Capsules(controller, f"{root}/capsules"),
         }
         if "field.g" in motion.rows:
             arrows = SelfMotion(controller, motion, f"{root}/self_motion")
@@ -121,12 +124,17 @@ class RunDrawing:
 
     def draw(self, size: float) -> Iterator[Command]:
         """Yield the commands that draw the layers in a scene of the given size [m]."""
-        for name, layer in self.layers.items():
-            yield from layer.draw(size)
-            if not self._shown[name]:
-                # Not the layer's own node: each row of the legend is one switch.
-                for path in (path for entry in layer.legend() for path in entry.paths):
-                    yield set_property(path, "visible", False)
+        for name in self.layers:
+            yield from self.draw_layer(name, size)
+
+    def draw_layer(self, name: str, size: float) -> Iterator[Command]:
+        """Yield the commands that draw one layer; see `draw`."""
+        layer = self.layers[name]
+        yield from layer.draw(size)
+        if not self._shown[name]:
+            # Not the layer's own node: each row of the legend is one switch.
+            for path in (path for entry in layer.legend() for path in entry.paths):
+                yield set_property(path, "visible", False)
 
     def clip(self) -> Clip:
         """Return the clip of robot and layers."""

@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
+import hsp_control.visualization.plots as plots
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError
@@ -14,7 +16,7 @@ from hsp_control.visualization.viewer import ComparedRun, export_html
 from hsp_control.visualization.viewer.comparison import run_parts
 from hsp_control.visualization.viewer.export.held_effort import expected_floor
 from hsp_control.visualization.viewer.export.packing import ArrayTable
-from hsp_control.visualization.viewer.export.panels import panels_of
+from hsp_control.visualization.viewer.export.panels import Edge, Panel, panels_of
 from hsp_control.visualization.viewer.export.plot_packing import (
     PlottedRun,
     pack_panels,
@@ -107,6 +109,70 @@ def test_the_plot_says_how_long_the_effort_was_held(
     note = "effort held for 2 ms"
     assert null_space(held, held.controller) == (note, [predicted, actual, floor])
     assert null_space(held, None) == (note, [predicted, actual])
+
+
+# -- distances and units --------------------------------------------------------------
+
+
+def test_a_distance_to_a_centre_says_so_and_has_the_radius_as_its_line(
+    planar: ComparedRun,
+) -> None:
+    def distance(log: Rollout) -> Panel:
+        (panel,) = (p for p in panels_of(log) if p.title == "Minimum distance")
+        return panel
+
+    log = planar.rollout
+    panel = distance(log)
+    (curve,) = panel.series
+    assert curve.name == "joint to centre of disk"
+    assert panel.edges == [Edge(0.2, "radius 0.2 m")]
+    packed = pack_panels([PlottedRun("", log)] * 2, ArrayTable())
+    (plot,) = (p for p in packed["panels"] if p["title"] == "Minimum distance")
+    assert plot["edges"] == [{"value": 0.2, "name": "radius 0.2 m"}]  # once
+    assert plot["low"] < 0.2
+    figure = plots.diagnostics_figure(log)
+    (axes,) = (a for a in figure.axes if a.get_ylabel() == "minimum distance [m]")
+    drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
+    assert set(drawn) == {"joint to centre of disk", "radius 0.2 m"}
+    assert set(np.asarray(drawn["radius 0.2 m"])) == {0.2}
+    # Between surfaces, contact is at zero; a log that does not know is taken so.
+    columns = {"distance.point_distance": {"unit": "m", "meaning": ""}}
+    old = Rollout(log.columns, log.meta | {"columns": log.meta["columns"] | columns})
+    assert distance(old).edges == [Edge(0.0, "")]
+    # A box has no radius.
+    disk = log.meta["obstacles"]["disk"] | {"shape": "Box"}
+    boxed = Rollout(log.columns, log.meta | {"obstacles": {"disk": disk}})
+    assert distance(boxed).edges == []
+    assert distance(boxed).series[0].name == "joint to centre of disk"
+
+
+def test_units_are_those_of_the_joints_that_are_shown(planar: ComparedRun) -> None:
+    def shown(count: int, slides: int, moving: int) -> tuple[str, list[str], int]:
+        """Return unit and names of the page's panel, and a figure's number of lines."""
+        robot = {"units": ["m"] * slides + ["rad"] * (count - slides)}
+        robot |= {"dofs": [f"j{k}" for k in range(count)]}
+        speeds = np.where(np.arange(count) < count - moving, 0.01, 1.0)
+        columns = {"joint_positions": planar.rollout.t[:, None] * speeds}
+        columns |= {"tau": columns["joint_positions"]}
+        meta = planar.rollout.meta
+        about = meta["robot"] | robot | {"joint_coordinates": None}
+        log = Rollout(planar.rollout.columns | columns, meta | {"robot": about})
+        panels = {panel.title: panel for panel in panels_of(log)}
+        panel, efforts = panels["Joint positions"], panels["Efforts τ"]
+        other = {"rad": "N·m", "m": "N", "m, rad": "N, N·m"}
+        assert efforts.unit == other[panel.unit]
+        axes = Figure().add_subplot()
+        plots.draw_joint_positions(axes, log)
+        assert axes.get_ylabel() == f"joint position [{panel.unit}]"
+        drawn = sum(len(line.get_xdata()) > 0 for line in axes.lines)
+        return panel.unit, [series.name for series in panel.series], drawn
+
+    assert shown(2, 0, 2) == ("rad", ["j0", "j1"], 2)
+    assert shown(2, 2, 2) == ("m", ["j0", "j1"], 2)
+    assert shown(2, 1, 2) == ("m, rad", ["j0 [m]", "j1 [rad]"], 2)
+    # Of many, the metres of joints that are not named are left out.
+    many = [f"j{k}" for k in range(13, 20)]
+    assert shown(20, 3, 7) == ("rad", many, 17)
 
 
 # -- several runs ---------------------------------------------------------------------

@@ -72,7 +72,7 @@ def test_a_robot_that_stands_still_is_drawn(logs: dict[str, Rollout]) -> None:
 def test_any_number_of_frames_fits(logs: dict[str, Rollout], count: int) -> None:
     figure = plots.paper_figure(logs["obstacle"], frames=count)
     titles = [axes.get_title(loc="left") for axes in visible(figure)]
-    assert sum(title.startswith("t = ") for title in titles) == count
+    assert sum("t = " in title for title in titles) == count
 
 
 def test_a_box_has_two_numbers_on_every_edge() -> None:

@@ -210,8 +210,10 @@ def test_frames_bear_one_number_in_every_panel(logs: dict[str, Rollout]) -> None
     figure = plots.paper_figure(log, times=times, title="With $ in it")
     assert figure.get_suptitle() == r"With \$ in it"
     figure.canvas.draw()
-    strip = [a for a in figure.axes if a.get_title(loc="left").startswith("t = ")]
-    assert [axes.get_title(loc="right") for axes in strip] == ["1", "2", "3"]
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    strip = [title for title in titles if "t = " in title]
+    numbered = zip((1, 2, 3), times, strict=True)
+    assert strip == [rf"$\mathbf{{{k}}}$   t = {time:.2f} s" for k, time in numbered]
     (together,) = (a for a in figure.axes if len(a.texts) == len(times))
     for number, (text, time) in enumerate(zip(together.texts, times, strict=True), 1):
         assert text.get_text() == str(number)
@@ -222,6 +224,17 @@ def test_frames_bear_one_number_in_every_panel(logs: dict[str, Rollout]) -> None
         (upper,) = axes.child_axes
         np.testing.assert_allclose(upper.get_xticks(), times)
         assert [t.get_text() for t in upper.get_xticklabels()] == ["1", "2", "3"]
+
+
+def test_frames_that_end_at_one_place_share_their_numbers(
+    logs: dict[str, Rollout],
+) -> None:
+    skeleton = logs["rest"]["skeleton"].copy()
+    skeleton[:, -1] = [1.0, 0.0, 0.0]
+    skeleton[30, -1] = [1.0, 1.0, 0.0]
+    log = changed(logs["rest"], columns={"skeleton": skeleton})
+    axes = drawn(plots.draw_superimposed, log, [0, 10, 20, 30, 40])
+    assert [text.get_text() for text in axes.texts] == ["1–3, 5", "4"]
 
 
 def test_many_frames_are_marked_but_not_named(logs: dict[str, Rollout]) -> None:

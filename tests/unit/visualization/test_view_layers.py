@@ -29,6 +29,7 @@ from hsp_control.geometry.shapes import (
     Shape,
     Sphere,
 )
+from hsp_control.null_space.fields import Clearance
 from hsp_control.null_space.metrics import MetricSample
 from hsp_control.visualization.viewer import (
     ComparedRun,
@@ -37,10 +38,12 @@ from hsp_control.visualization.viewer import (
     Viewer,
     live,
 )
+from hsp_control.visualization.viewer.capsules import Capsules
 from hsp_control.visualization.viewer.commands import CAPTION, CLIP, unpack
 from hsp_control.visualization.viewer.controller_analysis import (
     from_the_start,
     null_space_projector,
+    terms_of_type,
 )
 from hsp_control.visualization.viewer.ellipsoid import SECONDS, principal_axes
 from hsp_control.visualization.viewer.influence import zone
@@ -270,6 +273,90 @@ def test_the_papers_cost_is_shown_from_the_nearest_joint_to_the_centre(
         )
         center = rollout["obstacle.disk"][row]
         np.testing.assert_allclose(tip(clip, path, t), center, atol=1e-5)
+
+
+# -- the links that are measured ------------------------------------------------------
+
+
+def test_distances_end_on_the_capsules_that_are_measured(
+    spatial: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    experiment, rollout = spatial
+    clip = drawn(experiment, rollout, recorder)
+    (term,) = terms_of_type(experiment.controller.field, Clearance)  # type: ignore[type-abstract]
+    proximity = term.proximity(experiment.controller.state)
+    measured = {i for i, _ in proximity.pairs}
+    joints = {proximity.links[i].joint for i in measured}
+    model_names = experiment.robot.model.names
+    assert clip.paths("/capsules") == {f"/capsules/{model_names[j]}" for j in joints}
+    # Off at first, with a row that switches them.
+    (entry,) = [e for e in legend(recorder) if "(measured)" in e["name"]]
+    assert entry["name"] == "capsules of the links (measured)"
+    assert (entry["shown"], entry["paths"]) == (False, ["/capsules"])
+    hidden = recorder.command("/capsules", "visible")
+    assert hidden is not None
+    assert hidden["value"] is False
+    # The nearest of the drawn capsules is as far from the ball as the log has it.
+    for row in (0, 20, 50):
+        t = float(rollout.t[row])
+        ball = rollout["obstacle.ball"][row]
+        gaps = []
+        for joint in joints:
+            path = f"/capsules/{model_names[joint]}"
+            here = np.linalg.inv(clip.pose(path, t)) @ [*ball, 1.0]
+            for start, end, radius in drawn_capsules(recorder, path):
+                along = end - start
+                share = (here[:3] - start) @ along / max(along @ along, 1e-12)
+                nearest = start + np.clip(share, 0.0, 1.0) * along
+                gaps.append(np.linalg.norm(here[:3] - nearest) - radius - 0.1)
+        logged = rollout["distance.obstacle_clearance"][row]
+        assert min(gaps) == pytest.approx(logged, abs=1e-5)
+
+
+def drawn_capsules(
+    recorder: Recorder, path: str
+) -> list[tuple[np.ndarray, np.ndarray, float]]:
+    """Return ends and radii of the capsules and spheres of a node, in its frame."""
+    thing = recorder.command(path, "object")["object"]  # type: ignore[index]
+    solids = {geometry["uuid"]: geometry for geometry in thing["geometries"]}
+    found = []
+    for child in thing["object"]["children"]:
+        pose = np.reshape(child["matrix"], (4, 4)).T
+        solid = solids[child["geometry"]]
+        if solid["type"] == "SphereGeometry":
+            ends, radius = [0.0, 0.0], solid["radius"]
+        else:
+            profile = np.array([[p["x"], p["y"]] for p in solid["points"]])
+            radius = profile[:, 0].max()
+            low, high = profile[[0, -1], 1]
+            ends = [low + radius, high - radius]
+        start, end = (pose @ [0.0, y, 0.0, 1.0] for y in ends)
+        found.append((start[:3], end[:3], float(radius)))
+    return found
+
+
+def test_minimum_distances_of_limits_are_drawn_and_unmeasured_links_are_not(
+    planar: tuple[Experiment, Rollout],
+    spatial: tuple[Experiment, Rollout],
+    recorder: Recorder,
+) -> None:
+    experiment, rollout = planar
+    assert not drawn(experiment, rollout, recorder).paths("/capsules")
+    assert not any("(measured)" in name for name in names(recorder))
+    limits = "limits={distances: [{type: self}]}"
+    kept = load_experiment(SPATIAL, limits, "null_space.fields=[{type: rest}]")
+    layer = Capsules(kept.controller, "/capsules")
+    assert kept.controller.limits is not None
+    (limit,) = kept.controller.limits.distances
+    shapes = limit.clearance.proximity(kept.controller.state)
+    joints = {shapes.links[i].joint for pair in shapes.pairs for i in pair}
+    nodes = {f"/capsules/{kept.robot.model.names[joint]}" for joint in joints}
+    recorder.send(layer.draw(1.0))
+    assert set(recorder.paths("/capsules")) == nodes
+    motion = motion_of(kept.robot, spatial[1])
+    moved = {track.path for track in layer.tracks(motion)}
+    assert moved == nodes - {"/capsules/universe"}  # the base: measured, but fixed
+    assert moved < nodes
 
 
 # -- influence ------------------------------------------------------------------------

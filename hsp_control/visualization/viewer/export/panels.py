@@ -9,6 +9,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.simulation import Rollout, log_series
 from hsp_control.simulation.decay import predicted_decay
+from hsp_control.simulation.log_distances import logged_distances
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.export.held_effort import expected_floor
 
@@ -36,6 +37,18 @@ class Series(NamedTuple):
     band: bool = False
 
 
+class Edge(NamedTuple):
+    """A value that curves must not fall below, drawn as a line: contact.
+
+    Attributes:
+        value: The value, in the panel's unit.
+        name: Its label; "" for zero, which needs none.
+    """
+
+    value: float
+    name: str
+
+
 class Panel(NamedTuple):
     """One plot over time.
 
@@ -44,7 +57,7 @@ class Panel(NamedTuple):
         unit: The unit of the curves.
         series: The curves.
         logarithmic: Whether its axis is logarithmic.
-        zero: Whether the axis includes zero, drawn as a line that means contact.
+        edges: Values that the axis includes and draws as lines.
         note: A remark beside the title, or "".
     """
 
@@ -52,7 +65,7 @@ class Panel(NamedTuple):
     unit: str
     series: Sequence[Series]
     logarithmic: bool = False
-    zero: bool = False
+    edges: Sequence[Edge] = ()
     note: str = ""
 
 
@@ -82,25 +95,24 @@ def _panels(rollout: Rollout, controller: Controller | None) -> Iterator[Panel]:
     period = log_series.held_period(rollout)
     yield Panel(
         "Null-space error ‖e_N‖",
-        log_series.column_unit(rollout, "null_space_norm"),
+        log_series.null_space_unit(rollout),
         list(_null_space(rollout, controller)),
         logarithmic=True,
         note=f"effort held for {1e3 * period:g} ms" if period else "",
     )
-    watched = log_series.distances(rollout)
+    watched = logged_distances(rollout)
     if watched:
-        values = np.column_stack([rollout[f"distance.{name}"] for name in watched])
-        names = [name.replace("_", " ") for name in watched]
-        yield Panel("Minimum distance", "m", _lines(values, names), zero=True)
+        values = np.column_stack([each.values for each in watched])
+        curves, unit = _lines(values, [each.label for each in watched])
+        edges = dict.fromkeys(
+            Edge(each.edge, each.edge_name) for each in watched if each.edge is not None
+        )
+        yield Panel("Minimum distance", "m", curves, edges=list(edges))
     joints = log_series.joint_names(rollout)
     some = f"{_SELECTED} of {len(joints)}" if len(joints) > _MAX_CURVES else ""
     positions, what = log_series.joint_positions(rollout)
-    yield Panel(
-        what.capitalize() + "s",
-        log_series.position_unit(rollout),
-        _lines(positions, joints),
-        note=some,
-    )
+    curves, unit = _lines(positions, joints, log_series.position_units(rollout))
+    yield Panel(what.capitalize() + "s", unit, curves, note=some)
     manipulability = Series("det(J W⁻¹ Jᵀ)", rollout["manipulability"], palette.TASK)
     yield Panel(
         "Manipulability",
@@ -112,12 +124,8 @@ def _panels(rollout: Rollout, controller: Controller | None) -> Iterator[Panel]:
     unit = log_series.column_unit(rollout, "field.value")
     if np.ptp(value.values) > 0.0:
         yield Panel("Value of the field", unit, [value])
-    yield Panel(
-        "Efforts τ",
-        log_series.effort_unit(rollout),
-        _lines(rollout.tau, joints),
-        note=some,
-    )
+    curves, unit = _lines(rollout.tau, joints, log_series.effort_units(rollout))
+    yield Panel("Efforts τ", unit, curves, note=some)
 
 
 def _null_space(rollout: Rollout, controller: Controller | None) -> Iterator[Series]:
@@ -140,16 +148,25 @@ def _null_space(rollout: Rollout, controller: Controller | None) -> Iterator[Ser
         yield Series(name, floor, palette.MUTED, predicted=True, band=True)
 
 
-def _lines(values: Array, names: Sequence[str]) -> list[Series]:
-    """Return one curve per column; of very many, those that vary most."""
+def _lines(
+    values: Array, names: Sequence[str], units: Sequence[str] | None = None
+) -> tuple[list[Series], str]:
+    """Return one curve per column, and their units; of very many, those that vary most.
+
+    Names tell the units if the curves differ in them.
+    """
     count = len(names) if len(names) <= _MAX_CURVES else _SELECTED
     order = np.argsort(-np.ptp(values, axis=0), kind="stable")[:count]
-    return [
+    units = list(units or [""] * len(names))
+    kinds = list(dict.fromkeys(units[column] for column in sorted(order.tolist())))
+    mixed = len(kinds) > 1
+    curves = [
         Series(
-            names[column],
+            f"{names[column]} [{units[column]}]" if mixed else names[column],
             values[:, column],
             palette.series(place),
             place >= len(palette.SERIES),
         )
         for place, column in enumerate(sorted(order.tolist()))
     ]
+    return curves, ", ".join(kinds)

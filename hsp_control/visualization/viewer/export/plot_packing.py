@@ -67,7 +67,8 @@ def pack_panels(runs: Sequence[PlottedRun], arrays: ArrayTable) -> Json:
     for number, run in enumerate(runs):
         for panel in panels_of(run.rollout, run.controller):
             key = panel.title, panel.unit
-            panels.setdefault(key, panel)
+            both = dict.fromkeys((*panels.get(key, panel).edges, *panel.edges))
+            panels[key] = panels.get(key, panel)._replace(edges=list(both))
             known = curves.setdefault(key, [])
             colors = {curve.series.name: curve.series.color for curve in known}
             known += [
@@ -136,7 +137,7 @@ def _packed(panel: Panel, curves: Sequence[_Curve], arrays: ArrayTable) -> Json:
         "unit": panel.unit,
         "note": panel.note,
         "logarithmic": panel.logarithmic,
-        "zero": panel.zero,
+        "edges": [edge._asdict() for edge in panel.edges],
         "low": low,
         "high": high,
         "series": packed,
@@ -155,7 +156,7 @@ def _range(panel: Panel, values: Array) -> tuple[float, float]:
     low, high = float(shown.min(initial=np.inf)), float(shown.max(initial=-np.inf))
     if not low <= high:
         return 0.0, 1.0
-    if panel.zero:
-        low, high = min(low, 0.0), max(high, 0.0)
+    for edge in panel.edges:
+        low, high = min(low, edge.value), max(high, edge.value)
     room = 0.06 * (high - low) or max(0.05 * abs(low), 0.5)
     return low - room, high + room

@@ -211,7 +211,7 @@ class Plot {
 
   // The axis: the packed range; of a part of the curves, or of time, what that part needs.
   limits(curves) {
-    const {low, high, logarithmic, zero} = this.panel;
+    const {low, high, logarithmic, edges} = this.panel;
     if (!this.plots.zoomed && this.frame.alone === null) return [low, high];
     const {from, to} = this.plots;
     let least = Infinity, most = -Infinity;
@@ -228,7 +228,7 @@ class Plot {
       }
     }
     if (!(least <= most)) return [low, high];
-    if (zero) [least, most] = [Math.min(least, 0), Math.max(most, 0)];
+    for (const {value} of edges) [least, most] = [Math.min(least, value), Math.max(most, value)];
     const needed = logarithmic ? 1 : (high - low) / 1000;
     const room = 0.08 * (most - least) + Math.max(0, needed - (most - least)) / 2;
     return [least - room, most + room];
@@ -298,8 +298,26 @@ class Plot {
       text({x, y: base, "text-anchor": "middle"}, clock.label(tick));
     }
     text({x: left + width, y: base, "text-anchor": "end", class: "unit"}, "t [s]");
-    if (panel.zero) across(this.y(0), contact);
+    for (const {value, name} of panel.edges) {
+      const y = this.y(value);
+      across(y, contact);
+      if (name) text({...this.freest(value), y: y - 4, class: "edge"}, name);
+    }
     across(floor, muted);
+  }
+
+  // Where a label above a line hides least of the curves: at the left, middle or right.
+  freest(height) {
+    const {left} = PlotAxes.MARGIN, {from, to} = this.plots;
+    const room = (start) => Math.min(...this.curves().flatMap((curve) =>
+      [0, 0.25, 0.5, 0.75, 1].map((part) => {
+        const value = valueAt(curve, from + (start + 0.3 * part) * (to - from));
+        return value === null ? Infinity : Math.abs(value - height);
+      })));
+    const [start] = [0.7, 0.35, 0].sort((one, other) => room(other) - room(one));
+    const anchor = {0.7: "end", 0.35: "middle", 0: "start"}[start];
+    const place = {0.7: this.width - 2, 0.35: this.width / 2, 0: 2}[start];
+    return {x: left + place, "text-anchor": anchor};
   }
 
   drawCurve({times, values, color, dashed, band, run}, parent) {
