@@ -111,7 +111,8 @@ def test_a_state_and_a_run_are_there_and_what_is_others_is_not_touched(
 def test_a_live_run_shows_its_last_instant(
     server: Recorded, experiment: hsp.Experiment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(live, "MIN_PERIOD", 0.0)
+    for period in ("MIN_PERIOD", "MAX_PERIOD"):  # every row is sent
+        monkeypatch.setattr(live, period, 0.0)
     with Viewer(experiment.robot, meshcat=server.address) as viewer:
         view = live.LiveView(viewer, experiment)
         log = experiment.run(on_row=view.on_row)
