@@ -25,6 +25,7 @@ from hsp_control.visualization.viewer.layer import Layer
 from hsp_control.visualization.viewer.motion import Motion
 from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
 from hsp_control.visualization.viewer.run_drawing import RunDrawing, all_layers
+from hsp_control.visualization.viewer.scene_path import path_element
 
 FRAME = 1.0 / 30.0
 """Time between two pictures [s]."""
@@ -172,7 +173,7 @@ class Picture:
     def _setup(self, title: str) -> Command:
         session, state = self._session, self._session.controller.state
         obstacles = [
-            {**grip.describe(state), "path": f"/obstacles/{name}"}
+            {**grip.describe(state), "path": f"/obstacles/{path_element(name)}"}
             for name, grip in session.obstacles.items()
         ]
         plots = []

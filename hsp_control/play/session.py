@@ -56,7 +56,6 @@ class Session:
         experiment: What is simulated.
         period: The control period [s].
         row: Time between two rows [s].
-        instant: The present instant; the next row overwrites it.
         recorder: The rows so far.
         message: What there is to say.
         warning: Whether that is a warning.
@@ -85,7 +84,6 @@ class Session:
         if self.pushes is not None:
             self.pushes.reachable = True
         self._point: Array | None = None
-        self.stiffness = PULL
         self.reset()
 
     def reset(self) -> None:
@@ -106,7 +104,6 @@ class Session:
         self.message, self.warning, self.over = "", False, ""
         self._turned: dict[str, float] = {}
         self._wanted: dict[str, float | bool] = {}
-        self.instant: Instant | None = None
         self.advance()
         self.targets: dict[str, Grip] = {
             **targets_of(self.controller),
@@ -153,7 +150,6 @@ class Session:
             if instant is None:
                 self.over = f"the log is full at t = {self.t:.0f} s; reset to go on"
                 return
-            self.instant = instant
             state, output, tau, own = instant
             others = self._plant.log_channels(state.t, state.q, state.v, tau)
             self.recorder.record(state, output, tau, {**own, **others})
@@ -231,7 +227,7 @@ class Session:
             place = self.controller.state.data.oMi[joint]
             self._point, self._unrepeatable = point, "somebody pulled at a link"
             self.pushes.spring = Spring(
-                joint, place.actInv(point), hand, self.stiffness, LARGEST_PULL
+                joint, place.actInv(point), hand, PULL, LARGEST_PULL
             )
         spring = self.pushes.spring
         assert spring is not None

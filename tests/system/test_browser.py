@@ -5,7 +5,6 @@ Chromium without a window. Where there is none these tests are skipped, but not 
 
 import io
 import itertools
-import os
 import re
 import subprocess
 import time
@@ -13,9 +12,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import browsers
 import numpy as np
 import pinocchio as pin
 import pytest
+from browsers import HARMLESS
 from PIL import Image, ImageSequence
 from places import ROOT, THOROUGH
 
@@ -26,8 +27,6 @@ from hsp_control.visualization.viewer import LiveView, Viewer
 from hsp_control.visualization.viewer.commands import PLOTS, set_property
 from hsp_control.visualization.viewer.export import FilmStyle, export_film, export_html
 from hsp_control.visualization.viewer.export.chromium import (
-    find_browser,
-    headless_browser,
     open_page,
 )
 from hsp_control.visualization.viewer.export.clip_reduction import (
@@ -50,7 +49,6 @@ COARSE = (
     "simulation.log_period=0.02",
 )
 PLANAR = "paper/4_moving_obstacle"
-HARMLESS = "GPU stall due to ReadPixels"  # a remark of the software renderer
 
 # What a page shows once it has drawn: without the two frames, a picture may be stale.
 SETTLE = """() => { viewer.render(); return new Promise((drawn) =>
@@ -59,12 +57,7 @@ SETTLE = """() => { viewer.render(); return new Promise((drawn) =>
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    if find_browser() is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail("CI needs Chromium: apt-get install chromium")
-        pytest.skip("there is no Chromium on the path")
-    with headless_browser() as started:
-        yield started
+    yield from browsers.started()
 
 
 @pytest.fixture(scope="module")

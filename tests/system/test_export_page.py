@@ -1,18 +1,16 @@
 """In a real browser: the plots of an exported page, and its switch between two runs."""
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import browsers
 import numpy as np
 import pytest
 
 from hsp_control import load_experiment
 from hsp_control.visualization.viewer import ComparedRun, export_html
 from hsp_control.visualization.viewer.export.chromium import (
-    find_browser,
-    headless_browser,
     open_page,
 )
 
@@ -26,12 +24,7 @@ JOINTS = 3  # the place of the plot of joint positions
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    if find_browser() is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail("CI needs Chromium: apt-get install chromium")
-        pytest.skip("there is no Chromium on the path")
-    with headless_browser() as started:
-        yield started
+    yield from browsers.started()
 
 
 @pytest.fixture(scope="module")

@@ -3,37 +3,28 @@
 Chromium without a window; where there is none these tests are skipped, but not in CI.
 """
 
-import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import browsers
 import numpy as np
 import pytest
+from browsers import HARMLESS
 
 import hsp_control as hsp
 from hsp_control import Rollout, Viewer, load_experiment
 from hsp_control.config.experiment import Experiment
-from hsp_control.visualization.viewer.export.chromium import (
-    find_browser,
-    headless_browser,
-)
 
 pytestmark = pytest.mark.browser
 
-HARMLESS = "GPU stall due to ReadPixels"  # a remark of the software renderer
 JOINT = "/robot/joint1"
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    if find_browser() is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail("CI needs Chromium: apt-get install chromium")
-        pytest.skip("there is no Chromium on the path")
-    with headless_browser() as started:
-        yield started
+    yield from browsers.started()
 
 
 @pytest.fixture(scope="module")
