@@ -52,9 +52,9 @@ def _check_task(planned: PlannedTask, state: RobotState, period: float) -> None:
         Kp, Kv = np.zeros_like(Kp), Kp
     if held_radius(Kp, Kv, period) < 1.0 + _ROUNDING:
         return
-    least, most = 0.0, 1.0
-    for _ in range(20):
-        scale = 0.5 * (least + most)
+    least, most = _SMALLEST, 1.0
+    for _ in range(50):
+        scale = float(np.sqrt(least * most))
         stable = held_radius(scale**2 * Kp, scale * Kv, period) < 1.0 + _ROUNDING
         least, most = (scale, most) if stable else (least, scale)
     what = "this impedance" if compliant else "these gains"
@@ -96,5 +96,7 @@ def rounded_down(value: float) -> str:
     return f"{np.floor(value / unit + 1e-6) * unit:.10g}"
 
 
+_SMALLEST = 1e-15
+"""Smallest scale of gains that is tried."""
 _ROUNDING = 1e-7
 """Of the radius: a double eigenvalue of 1 has an error of the root of its rounding."""

@@ -469,6 +469,15 @@ def test_a_change_that_the_period_does_not_bear_is_refused_while_it_runs(
     assert len(controller.changes) == 1
 
 
+def test_a_stiffness_of_any_size_is_refused_with_advice() -> None:
+    controller = stiff(Impedance(400.0))
+    state = panda().home(), np.zeros(7)
+    controller.applied(controller.compute(0.0, *state).tau, 0.001)
+    for stiffness in (1e8, 1e16, 1e24):
+        with pytest.raises(hsp.errors.UnstableRateError, match="needs at most"):
+            controller.at(0.0).impedance("hand", Impedance(stiffness))
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_the_radius_of_held_gains_is_that_of_the_loop_and_of_its_closed_form(
     seed: int,
