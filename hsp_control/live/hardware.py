@@ -16,6 +16,8 @@ class Measurement(NamedTuple):
         v: Velocity, shape (nv,).
         age: State age, as far as the hardware knows it [s].
         halted: Whether the robot has stopped by itself and ignores efforts.
+        applied: Effort the robot had when it measured, shape (nv,), where hardware
+            knows it; None: what was last sent counts.
     """
 
     sequence: int
@@ -24,6 +26,7 @@ class Measurement(NamedTuple):
     v: Array
     age: float = 0.0
     halted: bool = False
+    applied: Array | None = None
 
 
 @runtime_checkable
