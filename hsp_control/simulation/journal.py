@@ -31,8 +31,8 @@ from hsp_control.common.exceptions import LogError
 MAGIC = b"hsp_control journal 1\n"
 KILLED = "the journal has no end: its writer was killed"
 
-_FRAME = struct.Struct("<cII")
-_HEADING, _ROW, _END = b"H", b"R", b"E"
+FRAME = struct.Struct("<cII")
+HEADING, ROW, END = b"H", b"R", b"E"
 
 
 class JournalWriter:
@@ -71,7 +71,7 @@ class JournalWriter:
             LogError: If it cannot be written.
         """
         self._shapes = {name: a.shape[1:] for name, a in columns.items()}
-        self._frame(_HEADING, _json({"columns": self._shapes, "meta": meta}))
+        self._frame(HEADING, _json({"columns": self._shapes, "meta": meta}))
 
     def write_row(self, columns: Mapping[str, Array]) -> None:
         """Write the first row of columns that fit the last heading.
@@ -80,7 +80,7 @@ class JournalWriter:
             LogError: If it cannot be written.
         """
         row = np.concatenate([columns[name][0].ravel() for name in self._shapes])
-        self._frame(_ROW, row.astype("<f8").tobytes())
+        self._frame(ROW, row.astype("<f8").tobytes())
 
     def write_end(self, status: str, message: str, **meta: Any) -> None:
         """Write how the run ended, and meta data that replaces the heading's.
@@ -88,7 +88,7 @@ class JournalWriter:
         Raises:
             LogError: If it cannot be written.
         """
-        self._frame(_END, _json({"status": status, "message": message, **meta}))
+        self._frame(END, _json({"status": status, "message": message, **meta}))
 
     def close(self) -> None:
         """Close the file; a second call does nothing."""
@@ -99,7 +99,7 @@ class JournalWriter:
     def _frame(self, kind: bytes, payload: bytes) -> None:
         check = zlib.crc32(payload, zlib.crc32(kind))
         try:
-            self._put(_FRAME.pack(kind, len(payload), check) + payload)
+            self._put(FRAME.pack(kind, len(payload), check) + payload)
         except OSError as error:
             raise self._failure(error) from error
 
@@ -135,14 +135,14 @@ def read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
     parts: list[tuple[dict[str, tuple[int, ...]], list[Array]]] = []
     end: dict[str, Any] = {"status": "interrupted", "message": KILLED}
     for kind, payload in _frames(path.read_bytes()):
-        if kind == _HEADING:
+        if kind == HEADING:
             heading = json.loads(payload)
             meta = heading["meta"]
             shapes = {name: tuple(s) for name, s in heading["columns"].items()}
             parts.append((shapes, []))
-        elif kind == _ROW and parts:
+        elif kind == ROW and parts:
             parts[-1][1].append(np.frombuffer(payload, "<f8"))
-        elif kind == _END:
+        elif kind == END:
             end = json.loads(payload)
     if not parts:
         raise LogError(f"{path}: the journal ends before its first heading")
@@ -152,14 +152,20 @@ def read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
 def _frames(data: bytes) -> Iterator[tuple[bytes, bytes]]:
     """Yield kind and payload of every frame before the first incomplete one."""
     at = len(MAGIC)
-    while at + _FRAME.size <= len(data):
-        kind, length, check = _FRAME.unpack_from(data, at)
-        at += _FRAME.size
-        payload = data[at : at + length]
-        if len(payload) < length or zlib.crc32(payload, zlib.crc32(kind)) != check:
-            return
-        yield kind, payload
-        at += length
+    while (frame := frame_at(data, at)) is not None:
+        yield frame
+        at += FRAME.size + len(frame[1])
+
+
+def frame_at(data: bytes, at: int) -> tuple[bytes, bytes] | None:
+    """Return kind and payload of the frame at a place; None if it is incomplete."""
+    if at + FRAME.size > len(data):
+        return None
+    kind, length, check = FRAME.unpack_from(data, at)
+    payload = data[at + FRAME.size : at + FRAME.size + length]
+    if len(payload) < length or zlib.crc32(payload, zlib.crc32(kind)) != check:
+        return None
+    return kind, payload
 
 
 def _joined(
