@@ -4,8 +4,7 @@ import argparse
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from math import inf, nan
 from pathlib import Path
 from typing import Any
@@ -28,6 +27,7 @@ from hsp_control.live import (
 )
 from hsp_control.live.latency import Quantiles
 from hsp_control.live.settings import check_fixed
+from hsp_control.live.stop_signals import stop_signals
 from hsp_control.simulation import Rollout
 
 _DRY_RUN = 0.5
@@ -53,7 +53,7 @@ def live(options: argparse.Namespace) -> int:
         "log_period": simulation.log_period,
     }
     command = Command(experiment.controller, experiment.compensation)
-    with _stop_signals(requests):
+    with stop_signals(requests):
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
         run_loop(
             command,
@@ -111,28 +111,6 @@ def _meta(experiment: Experiment) -> dict[str, Any]:
         "title": experiment.scenario.title,
         "config": experiment.config,
     }
-
-
-@contextmanager
-def _stop_signals(requests: OperatorRequests) -> Iterator[None]:
-    """Make Ctrl-C and termination signals request the operator's stop.
-
-    A second signal raises `KeyboardInterrupt`: the loop ends at once, and the robot's
-    watchdog stops the robot.
-    """
-    kinds = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
-    def stop(number: int, frame: object) -> None:
-        requests.stop(f"stopped by the operator ({signal.Signals(number).name})")
-        for kind in kinds:
-            signal.signal(kind, signal.default_int_handler)
-
-    before = {kind: signal.signal(kind, stop) for kind in kinds}
-    try:
-        yield
-    finally:
-        for kind, handler in before.items():
-            signal.signal(kind, handler)
 
 
 def _parse_kill(text: str | None) -> tuple[str, float] | None:

@@ -43,6 +43,7 @@ class EffortLimiter:
         self.sent: Array = np.zeros(robot.nv)
         self.applied: Array = np.zeros(robot.nv)
         self.gravity: Array = np.zeros(robot.nv)
+        self._in_force: Array | None = None
 
     @property
     def effort_limits(self) -> Array:
@@ -62,16 +63,39 @@ class EffortLimiter:
         if not self._compensates:
             self.sent = np.clip(self.gravity, -self._upper, self._upper)
         self.applied = self.sent + self._added_by_robot
+        self._in_force = None
 
     @property
     def _added_by_robot(self) -> Array | float:
         return self.gravity if self._compensates else 0.0
+
+    def robot_has(self, effort: Array | None) -> bool:
+        """Use the effort that the robot has, as it says; None: it does not say.
+
+        Args:
+            effort: In the terms of ``sent``, shape (nv,), finite.
+
+        Returns:
+            Whether it differs from what was sent last; ``applied`` then follows it.
+        """
+        self._in_force = effort
+        if effort is None or np.array_equal(effort, self.sent):
+            return False
+        # Beyond the limits no motor has an effort, whatever is said.
+        borne = self._added_by_robot
+        self._in_force = np.clip(effort, -self._upper - borne, self._upper - borne)
+        self.applied = self._in_force + borne
+        return True
 
     def apply(self, tau: Array, q: Array) -> bool:
         """Compute ``sent`` from an effort.
 
         The effort is clipped to its limits first, then the sent value to its rate. If
         some value satisfies both limits, the result does.
+
+        The rate counts from the effort that the robot has, if it is known. What was
+        sent last may be lost, or still under way: where some value keeps the rate from
+        both, the result does.
 
         Args:
             tau: Effort, shape (nv,).
@@ -85,6 +109,16 @@ class EffortLimiter:
         if self._compensates:
             self.gravity = self._robot.inverse_dynamics(q, self._rest, self._rest)
         wanted = np.clip(tau, -self._upper, self._upper) - self._added_by_robot
-        np.clip(wanted, self.sent - self._step, self.sent + self._step, out=self.sent)
+        lower, upper = self.sent - self._step, self.sent + self._step
+        if (known := self._in_force) is not None:
+            far = np.abs(known - self.sent) > 2.0 * self._step
+            lower = np.maximum(np.where(far, -np.inf, lower), known - self._step)
+            upper = np.minimum(np.where(far, np.inf, upper), known + self._step)
+        np.clip(wanted, lower, upper, out=self.sent)
         self.applied = self.sent + self._added_by_robot
         return True
+
+    def take_back(self, sent: Array) -> None:
+        """Return to what was sent before, shape (nv,): the last effort was not sent."""
+        self.sent = sent
+        self.applied = sent + self._added_by_robot

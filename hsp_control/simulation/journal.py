@@ -20,6 +20,7 @@ import os
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,7 @@ class JournalWriter:
             flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND
             self._file = os.open(path, flags, 0o644)
             self._put(MAGIC)
+            self._size = len(MAGIC)
         except OSError as error:
             raise self._failure(error) from error
 
@@ -70,8 +72,9 @@ class JournalWriter:
         Raises:
             LogError: If it cannot be written.
         """
-        self._shapes = {name: a.shape[1:] for name, a in columns.items()}
-        self._frame(HEADING, _json({"columns": self._shapes, "meta": meta}))
+        shapes = {name: a.shape[1:] for name, a in columns.items()}
+        self._frame(HEADING, _json({"columns": shapes, "meta": meta}))
+        self._shapes = shapes  # only now: Ctrl-C may cut the heading short
 
     def write_row(self, columns: Mapping[str, Array]) -> None:
         """Write the first row of columns that fit the last heading.
@@ -97,11 +100,18 @@ class JournalWriter:
             self._file = -1
 
     def _frame(self, kind: bytes, payload: bytes) -> None:
+        """Write a frame, whole or not at all: what cuts it short takes it back."""
         check = zlib.crc32(payload, zlib.crc32(kind))
+        data = FRAME.pack(kind, len(payload), check) + payload
         try:
-            self._put(FRAME.pack(kind, len(payload), check) + payload)
-        except OSError as error:
-            raise self._failure(error) from error
+            self._put(data)
+            self._size += len(data)
+        except BaseException as error:
+            with suppress(OSError):
+                os.ftruncate(self._file, self._size)
+            if isinstance(error, OSError):
+                raise self._failure(error) from error
+            raise
 
     def _put(self, data: bytes) -> None:
         while data:  # a nearly full disk may take only a part
