@@ -198,7 +198,8 @@ def _print_ends(report: LoopReport, robot_report: dict[str, Any] | None) -> None
         f"{deadlines.without_state} without a new state, {deadlines.skipped_states} "
         "states skipped"
     )
-    end = "fell silent" if report.silent else "held the robot"
+    held = "held the robot" if report.at_rest else "could not bring the robot to rest"
+    end = "fell silent" if report.silent else held
     out.print(
         f"The loop: {report.reason}, at t = {report.t:.3f} s; {end}, the fastest "
         f"joint at {report.speed:.2g}"

@@ -118,7 +118,13 @@ class EffortLimiter:
         self.applied = self.sent + self._added_by_robot
         return True
 
-    def take_back(self, sent: Array) -> None:
-        """Return to what was sent before, shape (nv,): the last effort was not sent."""
+    def hold(self, q: Array) -> None:
+        """Keep ``sent``; ``applied`` follows g(q) if the robot compensates gravity."""
+        if self._compensates:
+            self.gravity = self._robot.inverse_dynamics(q, self._rest, self._rest)
+        self.applied = self.sent + self._added_by_robot
+
+    def replace_sent(self, sent: Array) -> None:
+        """Set ``sent``, shape (nv,): to another effort that the robot has."""
         self.sent = sent
         self.applied = sent + self._added_by_robot

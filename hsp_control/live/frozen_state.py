@@ -18,7 +18,8 @@ class FrozenState:
     stands. If they have a velocity that is not 0, or come from a sensor with noise, the
     model says how far the robot went meanwhile under the efforts applied.
 
-    A state with v = 0 in all joints is not judged: a robot that its brakes or its
+    Such a state must not be used: damping a velocity that is long gone drives the robot
+    backwards. A state with v = 0 in all joints is not judged: a robot that its brakes or its
     friction hold looks the same.
     """
 

@@ -38,9 +38,9 @@ class Hardware(Protocol):
     second `read` on, it calls `read` and `write` once a period, and `close` at the end.
     If it has no valid state any more, it calls `close` without further writes.
 
-    Once the first effort is out, whatever the methods raise ends in the safe stop and in
-    the report. What `read` raises means that no state can arrive any more: the loop then
-    sends nothing more. After what `write` raises it goes on trying, with the safe stop.
+    Once the first effort is out, whatever the methods raise ends in the report. What
+    `read` raises means that no state can arrive any more: the loop sends nothing more.
+    After what `write` raises it goes on trying, with the safe stop.
 
     Attributes:
         period: Time between two measurements [s].

@@ -186,7 +186,7 @@ class OneRun:
         try:
             self.hardware.write(self.limiter.sent.copy())
         except Exception as error:  # a driver may raise anything
-            self.limiter.take_back(before)
+            self.limiter.replace_sent(before)
             reason = f"the effort cannot be sent: {described(error)}"
             self.stop("fault", reason, error)
 

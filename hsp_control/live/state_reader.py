@@ -156,13 +156,10 @@ class StateReader:
             return None
         if not self._monitor.is_new(new):
             return None
-        self.fault = (
-            self._robot_clock.fault(new)
-            or self._monitor.violation(new)
-            or self._frozen.fault(new, applied)
-        )
-        if jump := self._monitor.jump(new):
-            self.fault = self.fault or jump
+        self.fault = self._robot_clock.fault(new) or self._monitor.violation(new)
+        untrue = self._frozen.fault(new, applied) or self._monitor.jump(new)
+        if untrue is not None:
+            self.fault = self.fault or untrue
             return None
         return new
 
