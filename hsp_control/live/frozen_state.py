@@ -19,8 +19,8 @@ class FrozenState:
     model says how far the robot went meanwhile under the efforts applied.
 
     Such a state must not be used: damping a velocity that is long gone drives the robot
-    backwards. A state with v = 0 in all joints is not judged: a robot that its brakes or its
-    friction hold looks the same.
+    backwards. A state with v = 0 in all joints is not judged: a robot that its brakes
+    or its friction hold looks the same.
     """
 
     def __init__(self, robot: Robot, period: float, tolerated: int) -> None:

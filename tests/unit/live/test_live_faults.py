@@ -99,8 +99,9 @@ ODD_NUMBERS = st.sampled_from(
 ODD_ARRAYS = st.one_of(
     st.sampled_from(
         [None, 3.0, "q", [], [[]], [None] * 7, ["a"] * 7, [1j] * 7, [True] * 7,
-         Hostile(), [Hostile()] * 7, [HUGE] * 7, [[1.0], [1.0, 2.0]], np.full(7, 1e300), {"q": 1},
-         np.full(7, np.nan), np.full(7, np.inf), np.full(7, 1e5), np.zeros((7, 1)),
+         Hostile(), [Hostile()] * 7, [HUGE] * 7, [[1.0], [1.0, 2.0]], {"q": 1},
+         np.full(7, 1e300), np.full(7, np.nan), np.full(7, np.inf),
+         np.full(7, 1e5), np.zeros((7, 1)),
          np.zeros(7, dtype="datetime64[s]"), np.zeros(7, dtype="f4,i4")]
     ),
     npst.arrays(
