@@ -53,7 +53,7 @@ def live(options: argparse.Namespace) -> int:
         "log_period": simulation.log_period,
     }
     command = Command(experiment.controller, experiment.compensation)
-    with stop_signals(requests):
+    with stop_signals(requests, takes_over=True):
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
         run_loop(
             command,

@@ -7,6 +7,10 @@ from hsp_control.constraints.limits import RobotLimits
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
+_TOLERANCE = 0.5
+"""By how much the effort that a robot says it has may exceed the limits, relative to
+them: the robot's own stop, or another load, may need more."""
+
 
 class EffortLimiter:
     """Converts an effort into the value that is sent, within effort and rate limits.
@@ -39,6 +43,8 @@ class EffortLimiter:
         self._rest = np.zeros(robot.nv)
         self._compensates = settings.compensates_gravity
         self._upper = settings.effort_limits(robot, limits)
+        # The controller's limits may fall while it runs: efforts follow by their rate.
+        self._largest = np.maximum(self._upper, settings.effort_limits(robot))
         self._step = settings.rate_limits(robot) * period
         self.sent: Array = np.zeros(robot.nv)
         self.applied: Array = np.zeros(robot.nv)
@@ -55,6 +61,7 @@ class EffortLimiter:
         if limits is not self._limits:
             self._limits = limits
             self._upper[:] = self._settings.effort_limits(self._robot, limits)
+            self._largest = np.maximum(self._upper, self._largest)
 
     def reset(self, q: Array) -> None:
         """Start at rest at q, shape (nq,): brakes or motors provide g(q)."""
@@ -69,6 +76,11 @@ class EffortLimiter:
     def _added_by_robot(self) -> Array | float:
         return self.gravity if self._compensates else 0.0
 
+    def believes(self, effort: Array) -> bool:
+        """Return whether the motors can have an effort, shape (nv,), as it is sent."""
+        tau = np.abs(effort + self._added_by_robot)
+        return bool((tau <= self._largest * (1.0 + _TOLERANCE)).all())
+
     def robot_has(self, effort: Array | None) -> bool:
         """Use the effort that the robot has, as it says; None: it does not say.
 
@@ -81,9 +93,9 @@ class EffortLimiter:
         self._in_force = effort
         if effort is None or np.array_equal(effort, self.sent):
             return False
-        # Beyond the limits no motor has an effort, whatever is said.
+        # Not even by rounding does an effort come from beyond the limits.
         borne = self._added_by_robot
-        self._in_force = np.clip(effort, -self._upper - borne, self._upper - borne)
+        self._in_force = np.clip(effort, -self._largest - borne, self._largest - borne)
         self.applied = self._in_force + borne
         return True
 

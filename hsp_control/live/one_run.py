@@ -163,6 +163,9 @@ class OneRun:
         """
         measurement = self.reader.measurement
         has = None if measurement is None else measurement.applied
+        if has is not None and not self.limiter.believes(has):
+            self.stop("fault", f"the robot says it has an effort of {has.tolist()}")
+            has = None
         if self.limiter.robot_has(has):
             self.tell_applied()
 

@@ -12,15 +12,21 @@ _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
 
 
 @contextmanager
-def stop_signals(requests: OperatorRequests) -> Iterator[None]:
+def stop_signals(
+    requests: OperatorRequests, *, takes_over: bool = False
+) -> Iterator[None]:
     """Make Ctrl-C and termination signals request the operator's stop.
 
     The first signal only sets the request, so that it interrupts nothing: no row of the
     log, no message to the robot. A second one raises `KeyboardInterrupt`: the loop ends
     at once, and the robot's watchdog stops the robot.
 
-    Signals that the program handles itself, or ignores, are left to it. Outside the
-    main thread, which alone receives signals, the context does nothing.
+    Outside the main thread, which alone receives signals, the context does nothing.
+
+    Args:
+        requests: Receives the request.
+        takes_over: Also handle signals that the program handles itself, or ignores;
+            they are left to it by default.
     """
 
     def stop(number: int, frame: object) -> None:
@@ -32,7 +38,7 @@ def stop_signals(requests: OperatorRequests) -> Iterator[None]:
         kind: handler
         for kind in _KINDS
         if threading.current_thread() is threading.main_thread()
-        and (handler := signal.getsignal(kind)) in _DEFAULTS
+        and ((handler := signal.getsignal(kind)) in _DEFAULTS or takes_over)
     }
     for kind in before:
         signal.signal(kind, stop)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from live_rigs import PERIOD, Array, Rig, law, panda, start, watched
 
-from hsp_control import Gains, Robot, Rollout
+from hsp_control import Gains, Limits, Robot, Rollout
 from hsp_control.control.compensation import Command, Compensation, MomentumObserver
 from hsp_control.live import (
     Link,
@@ -312,3 +312,23 @@ def test_the_start_is_the_loop_s_whatever_the_robot_weighs() -> None:
     assert robot.phase is Phase.RUNNING
     assert robot.in_force is not None
     np.testing.assert_array_equal(robot.in_force, gravity(start()))
+
+
+def test_limits_that_fall_are_followed_by_the_rate() -> None:
+    """The effort in force may be beyond the controller's new limit, by far."""
+    pushing = np.array([0.0, 0.0, 0.0, 20.0, 0.0, 0.0, 0.0])
+
+    class Pushing(Command):
+        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
+            super().effort(t, q, v, period)
+            return gravity(q) + pushing * (t < 0.05)
+
+    chosen = LiveSettings(effort_rate=1000.0, velocity_margin=9.0)
+    source = Pushing(law(limits=Limits(effort=60.0)))
+    source.controller.at(0.04).ramp(0.0).limits(Limits(effort=25.0))
+    robot = Lossy(chosen, says=True, every=11)
+    report = run_loop(source, robot, duration=0.1, settings=chosen)
+    assert report.ended == "completed", report.reason
+    largest = np.abs(robot.in_force)[:, 3]
+    assert largest[:40].max() > 1.5 * 25.0
+    assert largest[80:].max() <= 25.0
