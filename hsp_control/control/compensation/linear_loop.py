@@ -91,7 +91,7 @@ class LinearLoop:
         u = -self.kp @ x_seen - self.kv @ v_seen - self.ki @ z
         if own.momentum_observer is not None and own.momentum_observer.cancel:
             u = u - r
-        integrated = self.ki.any(axis=0)[:, None]
+        integrated = np.any(self.ki != 0.0, axis=0, keepdims=True).T
         z = np.where(integrated, z + h * x_seen, 0.0)
         drives = [*drives, u]
         plant = self._after(plant, self._performed(drives[0]))

@@ -21,8 +21,8 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation.compensation import Compensation
 from hsp_control.control.compensation.linear_loop import LinearLoop
+from hsp_control.control.compensation.null_space_rates import field_slope
 from hsp_control.control.controller import Controller
-from hsp_control.control.null_space_rates import field_slope
 from hsp_control.robot import Robot, RobotState
 
 
@@ -42,7 +42,8 @@ class LoadedLoop(NamedTuple):
 
     def with_part(self, s: float) -> LinearLoop:
         """Return the loop of a robot with s times the difference."""
-        share = np.linalg.inv(np.eye(len(self.difference)) + s * self.difference)
+        one = np.eye(len(self.difference))
+        share: Array = np.asarray(np.linalg.inv(one + s * self.difference), float)
         return replace(self.loop, share=share)
 
 
