@@ -768,8 +768,8 @@ MUTANTS = (
     Mutant(
         "live: the rate counts from what was sent",
         LIVE + "effort_limiter.py",
-        "if (known := self._in_force) is not None:",
-        "if (known := None) is not None:",
+        "if effort is None or np.array_equal(effort, self.sent):",
+        "if effort is None or effort is not None:",
         UNIT + "live/test_live_robot.py -k add_up",
     ),
     Mutant(
