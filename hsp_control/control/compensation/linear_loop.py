@@ -26,7 +26,7 @@ class LinearLoop:
         compensation: The compensators. Those that act on a linear loop are the velocity
             filter, the predictor and the momentum observer; integral action is ``ki``.
         share: The part of u that the robot performs: below 1 where it is heavier than
-            its model.
+            its model; a matrix, shape (m, m), where that differs with the direction.
     """
 
     kp: Array
@@ -36,7 +36,7 @@ class LinearLoop:
     effort_delay: int = 0
     sensor_delay: int = 0
     compensation: Compensation = field(default_factory=Compensation)
-    share: float = 1.0
+    share: float | Array = 1.0
 
     def transition(self) -> Array:
         """Return the transition matrix over one period, of the robot and all memory."""
@@ -85,9 +85,11 @@ class LinearLoop:
         u = -self.kp @ x_seen - self.kv @ v_seen - self.ki @ z
         if own.momentum_observer is not None and own.momentum_observer.cancel:
             u = u - r
-        z = z + h * x_seen if self.ki.any() else 0.0 * z
+        integrated = self.ki.any(axis=0)[:, None]
+        z = np.where(integrated, z + h * x_seen, 0.0)
         drives = [*drives, u]
-        x, v = _moved(x, v, self.share * drives[0], h)
+        share = np.asarray(self.share)
+        x, v = _moved(x, v, share @ drives[0] if share.ndim else share * drives[0], h)
         rest = [*past, *sent[1:], u, *drives[1:], *sensors]
         return [each[None] for each in (x, v, z, r, momentum, *rest)]
 
