@@ -24,8 +24,8 @@ JERK = 5000.0
 These three are Research 3's for every joint: libfranka 0.21, ``rate_limiting.h``, and
 "Limits for Franka Research 3" at https://frankarobotics.github.io/docs.
 """
-_NO_DECELERATION = 1e9
-"""Deceleration for which a velocity limit does not depend on the position [rad/s²]."""
+_ANY_DECELERATION = 1e9
+"""What clients are told if velocity limits do not depend on the position [rad/s²]."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class ArmLimits:
         velocity: Largest speeds [rad/s].
         effort: Largest efforts [N·m].
         velocity_offset: Of the velocity limits that depend on the position [rad/s].
-        deceleration: Of the same [rad/s²].
+        deceleration: Of the same [rad/s²]; inf: they do not depend on it.
     """
 
     lower: Array
@@ -55,10 +55,14 @@ class ArmLimits:
 
         and the same for v_min: libfranka 0.21, ``joint_velocity_limits.cpp``.
         """
-        above = np.sqrt(2.0 * self.deceleration * np.maximum(self.upper - q, 0.0))
-        below = np.sqrt(2.0 * self.deceleration * np.maximum(q - self.lower, 0.0))
-        highest = np.clip(above - self.velocity_offset, 0.0, self.velocity)
-        return -np.clip(below - self.velocity_offset, 0.0, self.velocity), highest
+        return -self._speed(q - self.lower), self._speed(self.upper - q)
+
+    def _speed(self, room: Array) -> Array:
+        """Return the largest speed towards a limit that is so far away [rad]."""
+        depends = np.isfinite(self.deceleration)
+        braking = np.where(depends, self.deceleration, 0.0)
+        speed = np.sqrt(2.0 * braking * np.maximum(room, 0.0)) - self.velocity_offset
+        return np.where(depends, np.clip(speed, 0.0, self.velocity), self.velocity)
 
 
 class Arm:
@@ -147,7 +151,7 @@ def _limits_of(robot: Robot) -> ArmLimits:
                 f"{robot.name}: {robot.joint_names[index]} has no {key} limit; the "
                 "box's reflexes need all limits: give them in the URDF"
             )
-    offset, deceleration = np.zeros(JOINTS), np.full(JOINTS, _NO_DECELERATION)
+    offset, deceleration = np.zeros(JOINTS), np.full(JOINTS, np.inf)
     elements = {
         joint.get("name"): joint.find("position_based_velocity_limits")
         for joint in read_urdf(robot.source.urdf).iter("joint")
@@ -156,9 +160,7 @@ def _limits_of(robot: Robot) -> ArmLimits:
         element = elements.get(name)
         if element is not None:
             offset[index] = float(element.get("velocity_offset", "0"))
-            deceleration[index] = float(
-                element.get("deceleration_limit", str(_NO_DECELERATION))
-            )
+            deceleration[index] = float(element.get("deceleration_limit", "inf"))
     return ArmLimits(**limits, velocity_offset=offset, deceleration=deceleration)
 
 
@@ -191,7 +193,9 @@ def _urdf(model: pin.Model, flange: pin.SE3, limits: ArmLimits, name: str) -> st
             joint,
             "position_based_velocity_limits",
             velocity_offset=repr(float(limits.velocity_offset[at])),
-            deceleration_limit=repr(float(limits.deceleration[at])),
+            deceleration_limit=repr(
+                float(min(limits.deceleration[at], _ANY_DECELERATION))
+            ),
         )
     ElementTree.SubElement(top, "link", name=FLANGE)
     _add_joint(top, JOINTS + 1, "fixed", flange)

@@ -23,7 +23,7 @@ DEADLINE = 300e-6
 """How long a client may take for a command [s]: "approx. < 300 µs for your own control
 loop" (https://frankarobotics.github.io/docs/libfranka.html)."""
 PATIENCE = 0.5
-"""How long a box in lockstep waits for a command [s]; libfranka waits 1 s for a state."""
+"""How long a box in lockstep waits for a command [s]; libfranka waits a second."""
 
 
 class Server:
@@ -100,8 +100,8 @@ class Server:
             while on_period():
                 self._notice_cut()
                 number = self._send_state()
+                self._respond()  # who reads a state after it, reads one that is newer
                 advance(number)
-                self._respond()
 
     def _send_state(self) -> int:
         """Send the next state, and return its number; 0 if nobody can answer it."""
@@ -121,7 +121,6 @@ class Server:
             self._due = now
         command = self._await(number, min(now + self._deadline, self._due))
         self.box.step(command)
-        self._respond()
         self._await(0, self._due)
 
     def _in_lockstep(self, number: int) -> None:
@@ -130,7 +129,6 @@ class Server:
         motion = box.motion
         if motion is None:
             box.settle()
-            self._respond()
             self._await(0, monotonic() + PERIOD)
             return
         begun = motion.commands > 0
@@ -189,7 +187,7 @@ class Server:
         self.client, self._cut = Connection(tcp, peer, self._host), False
 
     def _serve_requests(self, client: Connection) -> None:
-        before = client.connected
+        before, motion = client.connected, self.box.motion
         try:
             for request in client.requests():
                 self._requests.answer(*request)
@@ -198,7 +196,8 @@ class Server:
             return
         if client.connected and not before:
             self._say(f"{client.name} is connected")
-        self._respond()
+        if motion is not None and self.box.motion is motion:
+            self._respond()  # in lockstep the next state may have to wait for it
 
     def _respond(self) -> None:
         data, client = b"".join(self.box.outbox), self.client

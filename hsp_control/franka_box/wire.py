@@ -6,6 +6,7 @@ go over TCP, each with a header; states and commands go over UDP, one per millis
 """
 
 from enum import IntEnum
+from functools import partial
 
 import numpy as np
 
@@ -148,19 +149,24 @@ class Error(IntEnum):
         return self.name.lower().replace("tau_j_", "tau_J_")
 
 
-def _floats(**sizes: int) -> list[tuple[str, str, tuple[int, ...]]]:
-    return [(name, "<f4", (size,) if size > 1 else ()) for name, size in sizes.items()]
+Fields = list[tuple[str, str, tuple[int, ...]]]
 
 
-def _doubles(**sizes: int) -> list[tuple[str, str, tuple[int, ...]]]:
-    return [(name, "<f8", (size,) if size > 1 else ()) for name, size in sizes.items()]
+def _fields(kind: str, **sizes: int) -> Fields:
+    return [(name, kind, (size,) if size > 1 else ()) for name, size in sizes.items()]
+
+
+_count = partial(_fields, "<u8")
+_floats = partial(_fields, "<f4")
+_doubles = partial(_fields, "<f8")
+_bytes = partial(_fields, "u1")
 
 
 HEADER = np.dtype([("command", "<u4"), ("id", "<u4"), ("size", "<u4")])
 """Header of a request and of a response; the size includes it."""
 
 STATE = np.dtype(
-    [("message_id", "<u8")]
+    _count(message_id=1)
     + _floats(O_T_EE=16, O_T_EE_d=16, F_T_EE=16, EE_T_K=16, F_T_NE=16, NE_T_EE=16)
     + _floats(m_ee=1, I_ee=9, F_x_Cee=3, m_load=1, I_load=9, F_x_Cload=3)
     + _floats(elbow=2, elbow_d=2, tau_J=7, tau_J_d=7, dtau_J=7)
@@ -170,28 +176,28 @@ STATE = np.dtype(
     + _floats(elbow_c=2, delbow_c=2, ddelbow_c=2)
     + _floats(O_T_EE_c=16, O_dP_EE_c=6, O_ddP_EE_c=6, theta=7, dtheta=7)
     + _floats(accelerometer_top=18, accelerometer_bottom=18)
-    + [("motion_generator_mode", "u1"), ("controller_mode", "u1")]
-    + [("errors", "u1", (len(Error),)), ("reflex_reason", "u1", (len(Error),))]
-    + [("robot_mode", "u1"), ("control_command_success_rate", "<f4")]
+    + _bytes(motion_generator_mode=1, controller_mode=1)
+    + _bytes(errors=len(Error), reflex_reason=len(Error), robot_mode=1)
+    + _floats(control_command_success_rate=1)
 )
 """A robot state; matrices are stored by columns."""
 
 COMMAND = np.dtype(
-    [("message_id", "<u8")]
+    _count(message_id=1)
     + _doubles(q_c=7, dq_c=7, O_T_EE_c=16, O_dP_EE_c=6, elbow_c=2)
-    + [("valid_elbow", "u1"), ("motion_generation_finished", "u1")]
+    + _bytes(valid_elbow=1, motion_generation_finished=1)
     + _doubles(tau_J_d=7)
-    + [("torque_command_finished", "u1")]
+    + _bytes(torque_command_finished=1)
 )
 """A robot command: the answer to the state with the same ``message_id``."""
 
 _NOTHING = np.dtype([])
 REQUESTS = {
-    Command.CONNECT: np.dtype([("version", "<u2"), ("udp_port", "<u2")]),
+    Command.CONNECT: np.dtype(_fields("<u2", version=1, udp_port=1)),
     Command.MOVE: np.dtype(
-        [("controller", "<u4"), ("motion_generator", "<u4")]
+        _fields("<u4", controller=1, motion_generator=1)
         + _doubles(path_deviation=3, goal_deviation=3)
-        + [("asynchronous", "u1")]
+        + _bytes(asynchronous=1)
         + _doubles(maximum_velocity=7)
     ),
     Command.STOP_MOVE: _NOTHING,
@@ -209,7 +215,7 @@ REQUESTS = {
     ),
     Command.SET_JOINT_IMPEDANCE: np.dtype(_doubles(K_theta=7)),
     Command.SET_CARTESIAN_IMPEDANCE: np.dtype(_doubles(K_x=6)),
-    Command.SET_GUIDING_MODE: np.dtype([("axes", "u1", (6,)), ("null_space", "u1")]),
+    Command.SET_GUIDING_MODE: np.dtype(_bytes(axes=6, null_space=1)),
     Command.SET_EE_TO_K: np.dtype(_doubles(EE_T_K=16)),
     Command.SET_NE_TO_EE: np.dtype(_doubles(NE_T_EE=16)),
     Command.SET_LOAD: np.dtype(_doubles(m_load=1, F_x_Cload=3, I_load=9)),
