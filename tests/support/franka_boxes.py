@@ -9,7 +9,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,13 +56,15 @@ class Rig:
     """A box that serves in a thread.
 
     Attributes:
+        server: Its server.
         box: The box.
         host: Its address.
         said: What it has said.
     """
 
-    def __init__(self, host: str, box: Box, said: list[str]) -> None:
-        self.host, self.box, self.said = host, box, said
+    def __init__(self, host: str, server: Server, said: list[str]) -> None:
+        self.host, self.server, self.said = host, server, said
+        self.box = server.box
 
     def tells(self, text: str) -> str:
         """Return the only line that contains a text."""
@@ -81,9 +83,6 @@ class Rig:
         assert client.returncode == status, client.stdout + client.stderr
         return json.loads(client.stdout.splitlines()[-1]) if client.stdout else None
 
-    def __enter__(self) -> Self:
-        return self
-
 
 @contextmanager
 def served(
@@ -99,7 +98,7 @@ def served(
         thread = threading.Thread(target=server.serve, args=(running.is_set,))
         thread.start()
         try:
-            yield Rig(host, box, said)
+            yield Rig(host, server, said)
         finally:
             running.clear()
             thread.join(LONGEST)

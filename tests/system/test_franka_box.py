@@ -125,7 +125,7 @@ print(json.dumps(told))
     assert (mode, errors) == ("RobotMode.Reflex", '["controller_torque_discontinuity"]')
     assert 'not possible in the current mode ("Reflex")' in refused
     assert (mode_after, errors_after, second) == ("RobotMode.Idle", "[]", "no reflex")
-    line = rig.tells("reflex, ")
+    line = rig.tells("ended: reflex")
     assert "joint 6 at 1500 N·m/s; limit 1000" in line
 
 
