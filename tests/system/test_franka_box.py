@@ -7,11 +7,13 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from franka_boxes import LONGEST, PRELUDE, addresses, home, panda, plant, served
 
+from hsp_control import load_experiment
 from hsp_control.franka_box.wire import Error
 from hsp_control.simulation.plants import Payload
 
@@ -232,6 +234,66 @@ control = robot = None
         assert rig.run("print(json.dumps(str(robot.read_once().robot_mode)))") == (
             "RobotMode.Reflex"
         )
+
+
+CIRCLE: dict[str, Any] = {
+    "robot": {"name": "panda"},
+    "tasks": {
+        "hand": {
+            "type": "frame_position",
+            "trajectory": {
+                "type": "circle",
+                "origin": "start",
+                "center": [0.0, 0.0, 0.05],
+                "radius": 0.05,
+                "angular_rate": 6.0,
+                "normal": [1, 0, 0],
+            },
+            "gains": {"natural_frequency": 10.0},
+            "blend": 0.5,
+        }
+    },
+    "null_space": {"gain": 10, "fields": [{"type": "target_posture"}]},
+    "simulation": {
+        "duration": 1.0,
+        "control_period": 0.001,
+        "log_period": 0.01,
+        "integrator": {"type": "rk4", "step": 0.001},
+    },
+}
+
+
+def test_a_circle_with_a_posture_is_the_one_that_is_simulated() -> None:
+    """The same law and plant with and without the box: they differ by single precision.
+
+    The simulation knows no box, no gravity that somebody else adds, no packets.
+    """
+    experiment = load_experiment(CIRCLE)
+    run, path = experiment.run(), []
+    with served(plant(motor_inertia=0.0), experiment.q0) as rig:
+        rig.box.on_period = lambda: path.append(rig.box.q.copy())
+        rig.run(
+            f"config = {CIRCLE!r}"
+            + """
+from hsp_control import load_experiment
+experiment = load_experiment(config)
+arm, state, rest = experiment.robot, experiment.robot.state, np.zeros(7)
+experiment.controller.compute(0.0, experiment.q0, rest)  # compile before the motion
+control = robot.start_torque_control()
+for step in range(1001):
+    told, _ = control.readOnce()
+    q, v = np.array(told.q), np.array(told.dq)
+    tau = experiment.controller.compute(1e-3 * step, q, v).tau
+    command = franka.Torques((tau - arm.inverse_dynamics(q, rest, rest)).tolist())
+    command.motion_finished = step == 1000
+    control.writeOnce(command)
+"""
+        )
+        assert "1000 commands, 0 lost" in rig.tells("finished")
+    simulated = np.asarray(run["q"])
+    served_path = np.array([experiment.q0, *path[:1000]])[::10]
+    assert np.abs(simulated - experiment.q0).max() > 0.1
+    np.testing.assert_allclose(served_path, simulated, atol=1e-6)
 
 
 def test_a_payload_that_nobody_knows_is_an_external_force() -> None:
