@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from hsp_control.cli.franka_box_options import add_box_options
 from hsp_control.cli.startup import end_quietly, is_command
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.common.resources import bundled_configs, bundled_robots
@@ -49,7 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ) and signal.getsignal(signal.SIGINT) is end_quietly:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         with compiling_shown(consoles.errors):
-            return int(getattr(commands, options.command)(options))
+            command = options.command.replace("-", "_")
+            return int(getattr(commands, command)(options))
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
     except ArithmeticError:
@@ -169,6 +171,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_live(
         _command(commands, "live", "control a simulated robot in another process")
     )
+
+    box = _command(commands, "franka-box", "be a Franka's control box, without a robot")
+    _add_configuration(box, "the arm: a robot's name, or ", "panda")
+    add_box_options(box)
 
     robots = _command(
         commands, "robots", "list the robots that can be loaded, or describe one"
@@ -407,9 +413,13 @@ def _add_live(live: argparse.ArgumentParser) -> None:
     _add_page(live)
 
 
-def _add_configuration(parser: argparse.ArgumentParser, or_else: str = "") -> None:
+def _add_configuration(
+    parser: argparse.ArgumentParser, or_else: str = "", default: str | None = None
+) -> None:
     config = parser.add_argument(
         "config",
+        nargs=None if default is None else "?",
+        default=default,
         metavar="CONFIG",
         help=f"{or_else}a bundled name such as paper/4_moving_obstacle, a YAML file, "
         "or a log",
