@@ -18,6 +18,7 @@ class Measurement(NamedTuple):
         halted: Whether the robot has stopped by itself and ignores efforts.
         applied: Effort the robot had when it measured, shape (nv,), where hardware
             knows it; None: what was last sent counts.
+        fault: Why the robot must be stopped safely, if hardware knows a reason.
     """
 
     sequence: int
@@ -27,6 +28,7 @@ class Measurement(NamedTuple):
     age: float = 0.0
     halted: bool = False
     applied: Array | None = None
+    fault: str = ""
 
 
 @runtime_checkable
