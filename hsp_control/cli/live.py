@@ -27,6 +27,7 @@ from hsp_control.live import (
     run_loop,
 )
 from hsp_control.live.latency import Quantiles
+from hsp_control.live.ros2 import publish
 from hsp_control.live.settings import check_fixed
 from hsp_control.simulation import Rollout
 
@@ -53,6 +54,7 @@ def live(options: argparse.Namespace) -> int:
         "log_period": simulation.log_period,
     }
     command = Command(experiment.controller, experiment.compensation)
+    watched = None if options.publish is None else publish(options.publish, command)
     with _stop_signals(requests):
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
         run_loop(
@@ -70,6 +72,7 @@ def live(options: argparse.Namespace) -> int:
                 log=loop_log,
                 meta=_meta(experiment),
                 priority=options.priority,
+                on_period=watched,
                 **options_of_loop,
             )
             out.print(_times(report, experiment))
@@ -86,7 +89,7 @@ def live(options: argparse.Namespace) -> int:
                 log=loop_log,
                 meta=_meta(experiment),
                 priority=options.priority,
-                on_period=_kill_action(kill, robot),
+                on_period=_all(_kill_action(kill, robot), watched),
                 **options_of_loop,
             )
             robot_report = robot.wait()
@@ -166,6 +169,18 @@ def _kill_action(
                 os.kill(os.getpid(), signal.SIGKILL)
 
     return kill
+
+
+def _all(
+    *actions: Callable[[float], None] | None,
+) -> Callable[[float], None] | None:
+    wanted = [action for action in actions if action is not None]
+
+    def act(t: float) -> None:
+        for action in wanted:
+            action(t)
+
+    return act if wanted else None
 
 
 def _times(report: LoopReport, experiment: Experiment) -> Table:

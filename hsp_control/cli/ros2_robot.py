@@ -13,7 +13,6 @@ from threading import Event
 from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import load_experiment
-from hsp_control.config.streams import without_sources
 from hsp_control.live.ros2.backend import check_installed
 
 
@@ -47,8 +46,7 @@ def _run(options: argparse.Namespace, stopped: Event) -> str:
     check_installed()
     from hsp_control.live.ros2.simulated import RobotTopics, serve
 
-    loaded = load_experiment(options.config, *options.overrides)
-    experiment = load_experiment(without_sources(loaded.config))
+    experiment = load_experiment(options.config, *options.overrides)
     robot = simulated_robot(experiment)
     topics = RobotTopics(options.address, experiment.robot)
     print(f"{topics.states}, {topics.commands}: ready", flush=True)

@@ -1,15 +1,20 @@
 """The messages of ROS 2 that are sent and heard here, with ROS 2's own layouts.
 
 On the wire, ROS 2's ``sensor_msgs/msg/JointState`` is the DDS type
-``sensor_msgs::msg::dds_::JointState_``. Its bytes are plain CDR (XCDR1), in the order of
-the fields. The names here are those of ROS 2's packages common_interfaces and
-rcl_interfaces, where each field is described.
+``sensor_msgs::msg::dds_::JointState_``. Its bytes are plain CDR (XCDR1), in the order
+of the fields. ROS 2's repositories common_interfaces and rcl_interfaces describe them.
 """
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import float64, int32, sequence, uint32
+from cyclonedds.idl.types import float64, int32, uint32
+
+if TYPE_CHECKING:
+    from builtins import list as sequence  # what it is, but Cyclone does not say so
+else:
+    from cyclonedds.idl.types import sequence
 
 BILLION = 1_000_000_000
 """Nanoseconds in a second."""
@@ -122,8 +127,8 @@ TYPE_HASHES: dict[type[IdlStruct], str] = {
     ),
     PoseStamped: "10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8",
 }
-"""The hashes (RIHS01, REP 2016) by which ROS 2 since Iron tells types apart. It compares
-none, but warns where one is missing."""
+"""The hashes (RIHS01) by which ROS 2 since Iron tells types apart. It compares none
+over DDS, but warns where one is missing."""
 
 
 def ros_name(typename: str) -> str:

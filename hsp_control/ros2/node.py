@@ -12,6 +12,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 from cyclonedds.builtin import (
     BuiltinDataReader,
+    BuiltinTopic,
     BuiltinTopicDcpsPublication,
     BuiltinTopicDcpsSubscription,
 )
@@ -27,7 +28,7 @@ from cyclonedds.core import (
 )
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.internal import InvalidSample
+from cyclonedds.internal import InvalidSample, SampleInfo
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -106,7 +107,7 @@ class _End(Generic[M]):
     def _user_data(self) -> Policy.Userdata:
         return Policy.Userdata(f"typehash=RIHS01_{TYPE_HASHES[self.kind]};".encode())
 
-    def _others(self, builtin: object, verb: str) -> str:
+    def _others(self, builtin: BuiltinTopic, verb: str) -> str:
         """Return which endpoints there are instead of one that fits."""
         reader = BuiltinDataReader(self._participant, builtin)
         there = {
@@ -234,8 +235,8 @@ class Subscription(_End[M]):
             if not taken:
                 break
             if not isinstance(taken[0], InvalidSample):  # those say: a publisher left
-                publisher = taken[0].sample_info.publication_handle
-                found.append(Received(taken[0], publisher))
+                info: SampleInfo = taken[0].sample_info  # type: ignore[attr-defined]
+                found.append(Received(taken[0], info.publication_handle))
         return found
 
 

@@ -103,7 +103,8 @@ class Client:
         self._participant = DomainParticipant(domain)
         self._waiting = WaitSet(self._participant)
         self._qos = Qos(
-            Policy.Reliability.Reliable(duration(seconds=10)), Policy.History.KeepLast(9)
+            Policy.Reliability.Reliable(duration(seconds=10)),
+            Policy.History.KeepLast(9),
         )
 
     def reader(self, topic: str, kind: type) -> DataReader:

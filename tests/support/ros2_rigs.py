@@ -36,15 +36,20 @@ def fresh() -> tuple[str, str, str]:
     return f"/{name}", states, f"{name}?states={states}&domain={DOMAIN}"
 
 
-def client(*words: object) -> subprocess.Popen[str]:
-    """Start the plain client; see `dds_client`."""
+@contextmanager
+def client(out: Path, *words: object) -> Iterator[subprocess.Popen[bytes]]:
+    """Run the plain client, see `dds_client`; at the end it has ended by itself."""
     script = Path(__file__).with_name("dds_client.py")
-    return subprocess.Popen(
-        [sys.executable, str(script), *map(str, words)],
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": ""},
-    )
+    command = [sys.executable, str(script), *map(str, words)]
+    environment = {**os.environ, "PYTHONPATH": ""}
+    with out.open("wb") as file:  # not a pipe: a full one would hold it up
+        process = subprocess.Popen(command, stdout=file, env=environment)
+    try:
+        yield process
+        assert process.wait(60.0) == 0
+    finally:
+        process.kill()
+        process.wait()
 
 
 def joint_state(

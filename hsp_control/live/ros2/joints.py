@@ -105,7 +105,9 @@ class Joints:
                 )
         if sorted(given) != sorted(self.names):
             missing = [name for name in self.names if name not in given]
-            wrong = f"{missing[0]!r} is missing" if missing else "a joint is there twice"
+            wrong = (
+                f"{missing[0]!r} is missing" if missing else "a joint is there twice"
+            )
             raise HardwareError(f"joints={joints}: {wrong}")
         return [self.names.index(name) for name in given]
 

@@ -327,5 +327,7 @@ def test_a_robot_that_does_not_fit_is_refused(
 
 def test_without_cyclone_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "cyclonedds.domain", None)
-    with refused(r"needs Cyclone DDS; install it with: pip install 'hsp_control\[ros2\]"):
+    with refused(
+        r"needs Cyclone DDS; install it with: pip install 'hsp_control\[ros2\]"
+    ):
         connect("a", panda(), PERIOD)

@@ -89,7 +89,7 @@ def test_the_wire_changes_no_bit_of_a_run(served: Served) -> None:
     report = run_loop(law(), hardware, duration=0.2, settings=PATIENT)  # type: ignore[arg-type]
     assert report.ended == "completed", report.reason
     assert served.ended() == "the loop closed the connection"
-    # The same efforts again, without a wire: every state that was heard was the robot's.
+    # The same efforts again, without a wire: every state that was heard is there.
     twin, states = watched(PATIENT), set()
     states.add(np.concatenate(twin.measure()).tobytes())
     for effort in hardware.sent:

@@ -19,7 +19,9 @@ def test_the_domain_is_that_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
     assert parse("a").domain == 12
     assert parse("a?domain=3").domain == 3
     monkeypatch.setenv("ROS_DOMAIN_ID", "x")
-    with pytest.raises(HardwareError, match=r"^ROS_DOMAIN_ID: the domain is 'x'; needs"):
+    with pytest.raises(
+        HardwareError, match=r"^ROS_DOMAIN_ID: the domain is 'x'; needs"
+    ):
         parse("a")
 
 

@@ -55,7 +55,9 @@ def test_ros_reads_our_bytes_and_writes_the_same(message: Any, store: Stores) ->
     theirs = types.deserialize_cdr(message.serialize(), name)
     assert same(message, theirs)
     assert bytes(types.serialize_cdr(theirs, name)) == message.serialize()
-    assert type(message).deserialize(bytes(types.serialize_cdr(theirs, name))) == message
+    assert (
+        type(message).deserialize(bytes(types.serialize_cdr(theirs, name))) == message
+    )
 
 
 def test_a_state_is_plain_little_endian_cdr() -> None:
