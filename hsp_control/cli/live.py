@@ -28,6 +28,7 @@ from hsp_control.live import (
     run_loop,
 )
 from hsp_control.live.latency import Quantiles
+from hsp_control.live.ros2 import publish
 from hsp_control.live.settings import check_fixed
 from hsp_control.live.stop_signals import stop_signals
 from hsp_control.simulation import Rollout
@@ -63,6 +64,8 @@ def live(options: argparse.Namespace) -> int:
     }
     command = Command(experiment.controller, experiment.compensation)
     on_period: list[Callable[[float], object]] = []
+    if options.publish is not None:
+        on_period.append(publish(options.publish, command))
     with stop_signals(requests, takes_over=True), ExitStack() as stack:
         page = stack.enter_context(steering_page(options, experiment, loop_log))
         dry_run_robot = InProcessRobot(simulated_robot(experiment))

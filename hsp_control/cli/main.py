@@ -374,6 +374,7 @@ def _add_live(live: argparse.ArgumentParser) -> None:
         metavar="NAME://ADDRESS",
         help="a robot that an installed package can reach; default: a simulated one",
     )
+    live.add_argument("--publish", metavar="ros2://NAME", help="topics for watchers")
     live.add_argument(
         "--duration",
         type=float,
