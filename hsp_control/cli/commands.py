@@ -247,6 +247,13 @@ def live(options: argparse.Namespace) -> int:
     return lives.live(options)
 
 
+def franka_box(options: argparse.Namespace) -> int:
+    """Be a Franka's control box, without a robot."""
+    from hsp_control.cli import franka_box as boxes
+
+    return boxes.franka_box(options)
+
+
 def robots(options: argparse.Namespace) -> int:
     """List all robots, or describe one."""
     if options.name is not None:

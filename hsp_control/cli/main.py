@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from hsp_control.cli.franka_box_options import add_box_options
 from hsp_control.cli.startup import end_quietly, is_command
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.common.resources import bundled_configs, bundled_robots
@@ -49,7 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ) and signal.getsignal(signal.SIGINT) is end_quietly:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         with compiling_shown(consoles.errors):
-            return int(getattr(commands, options.command)(options))
+            command = options.command.replace("-", "_")
+            return int(getattr(commands, command)(options))
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
     except ArithmeticError:
@@ -101,13 +103,7 @@ def _parser() -> argparse.ArgumentParser:
     play.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
     )
-    play.add_argument(
-        "--host",
-        default="127.0.0.1",
-        metavar="ADDRESS",
-        help="the address of this computer at which another one, or a phone, opens the "
-        "page; default: only this computer may",
-    )
+    _add_host(play)
     _add_page(play)
 
     view = _command(commands, "view", "play logs in a browser, one or several together")
@@ -175,6 +171,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_live(
         _command(commands, "live", "control a simulated robot in another process")
     )
+
+    box = _command(commands, "franka-box", "be a Franka's control box, without a robot")
+    _add_configuration(box, "the arm: a robot's name, or ", "panda")
+    add_box_options(box)
 
     robots = _command(
         commands, "robots", "list the robots that can be loaded, or describe one"
@@ -257,6 +257,16 @@ def _picture_size(text: str) -> tuple[int, int]:
     if not (width.isdigit() and height.isdigit()):
         raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT, as 1280x720")
     return int(width), int(height)
+
+
+def _add_host(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="the address of this computer at which another one, or a phone, opens the "
+        "page; default: only this computer may",
+    )
 
 
 def _add_page(parser: argparse.ArgumentParser) -> None:
@@ -364,6 +374,7 @@ def _add_live(live: argparse.ArgumentParser) -> None:
         metavar="NAME://ADDRESS",
         help="a robot that an installed package can reach; default: a simulated one",
     )
+    live.add_argument("--publish", metavar="ros2://NAME", help="topics for watchers")
     live.add_argument(
         "--duration",
         type=float,
@@ -391,11 +402,25 @@ def _add_live(live: argparse.ArgumentParser) -> None:
         metavar="LEVEL",
         help="real-time priority of the loop (SCHED_FIFO), 1 to 99",
     )
+    live.add_argument(
+        "--steer",
+        nargs="?",
+        choices=("simulated", "hardware"),
+        const="simulated",
+        help="show a page that steers: drag targets and obstacles, turn settings; with "
+        "hardware, the robot moves only while a key is held on the page",
+    )
+    _add_host(live)
+    _add_page(live)
 
 
-def _add_configuration(parser: argparse.ArgumentParser, or_else: str = "") -> None:
+def _add_configuration(
+    parser: argparse.ArgumentParser, or_else: str = "", default: str | None = None
+) -> None:
     config = parser.add_argument(
         "config",
+        nargs=None if default is None else "?",
+        default=default,
         metavar="CONFIG",
         help=f"{or_else}a bundled name such as paper/4_moving_obstacle, a YAML file, "
         "or a log",
