@@ -71,7 +71,13 @@ def _checked(raw: Measurement, robot: Robot, period: float) -> Measurement:
     applied: Array | None = None
     if raw.applied is not None:
         applied = _vector("applied", raw.applied, robot.nv, _LARGEST_EFFORT)
-    return Measurement(int(raw.sequence), t, q, v, age, bool(raw.halted), applied)
+    if not isinstance(raw.fault, str):
+        raise HardwareError(
+            f"the state's fault is of type {type(raw.fault).__name__}; needs a text"
+        )
+    return Measurement(
+        int(raw.sequence), t, q, v, age, bool(raw.halted), applied, raw.fault
+    )
 
 
 def _number(what: str, value: Any) -> float:

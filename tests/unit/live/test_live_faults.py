@@ -118,9 +118,9 @@ ODD_RESULTS = st.one_of(
     st.tuples(st.sampled_from(["q", "v", "applied"]), ODD_ARRAYS).map(
         lambda pair: lambda m: m._replace(**{pair[0]: pair[1]})
     ),
-    st.tuples(st.sampled_from(["sequence", "t", "age", "halted"]), ODD_NUMBERS).map(
-        lambda pair: lambda m: m._replace(**{pair[0]: pair[1]})
-    ),
+    st.tuples(
+        st.sampled_from(["sequence", "t", "age", "halted", "fault"]), ODD_NUMBERS
+    ).map(lambda pair: lambda m: m._replace(**{pair[0]: pair[1]})),
 )  # fmt: skip
 
 
@@ -168,6 +168,8 @@ FAULTS: dict[str, tuple[Any, int, str]] = {
     "a huge position": (replaced(q=np.full(7, 1e300)), 1, r"absurd: q\[0\] is 1e\+300"),
     "a huge speed": (replaced(v=np.full(7, -1e200)), 1, r"absurd: v\[0\] is -1e\+200"),
     "an applied effort": (replaced(applied=np.full(7, np.nan)), 1, "not finite"),
+    "what the hardware says": (replaced(fault="two of them send"), 1, "two of them"),
+    "a reason that is none": (replaced(fault=None), 1, "fault is of type NoneType"),
     "another type": (lambda m: tuple(m), 1, "type tuple; needs a Measurement"),
     "complex numbers": (replaced(q=np.zeros(7, complex)), 1, "holds complex128"),
     "a frozen state": (Frozen, 20_000, "the state is frozen: it was the same 22 times"),
@@ -192,7 +194,8 @@ def test_each_fault_of_a_measurement_is_named(kind: str, tmp_path: Path) -> None
 def test_a_robot_at_rest_is_not_frozen() -> None:
     """Its brakes hold it: the same state to the last bit, and a velocity of 0."""
     still = always(replaced(q=start(), v=np.zeros(7)), 1)
-    report = run(rig(still), duration=0.1)
+    patient = LiveSettings(stop=QUICK, velocity_margin=99.0)  # it is not held here
+    report = run(Rig(watched(patient), still), duration=0.1, settings=patient)
     assert report.ended == "completed", report.reason
 
 
