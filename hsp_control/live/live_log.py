@@ -123,10 +123,6 @@ class LiveLog:
             raise
         self._journal.close()
 
-    def close(self) -> None:
-        """Close the file without an end; a second call does nothing."""
-        self._journal.close()
-
     def _head(self) -> None:
         meta = self._recorder.meta("running", "", **self._meta)
         self._journal.write_heading(self._recorder.rows(0), meta)
@@ -163,6 +159,7 @@ class LoopLog:
         self._effort_source, self._period = effort_source, period
         self._log: LiveLog | None = None
         self._next, self._phase = -inf, Phase.WAITING
+        self._failed = False
         self.path = None if path is None else Path(path)
         self.controller_failed = False
         if self.path is not None:
@@ -190,15 +187,16 @@ class LoopLog:
             LogError: If it cannot be written; later calls then do nothing.
         """
         measurement, state = reader.measurement, reader.state
-        if self._log is None or (measurement is None and phase == Phase.RUNNING):
+        if self._log is None or self._failed:
+            return
+        if measurement is None and phase == Phase.RUNNING:
             return  # no measurement, so no effort was computed
         if state.t < self._next and phase == self._phase and not last:
             return
         try:
             self._log.add(self._row(phase, reader, limiter, response))
-        except Exception:  # no log is left; after Ctrl-C the row is written again
-            self._log.close()
-            self._log = None
+        except Exception:  # after Ctrl-C the row is written again
+            self._failed = True
             raise
         periods = floor(state.t / self._period + 1e-6) + 1
         self._next, self._phase = (periods - 1e-6) * self._period, phase

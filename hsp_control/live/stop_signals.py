@@ -38,7 +38,8 @@ def stop_signals(
         kind: handler
         for kind in _KINDS
         if threading.current_thread() is threading.main_thread()
-        and ((handler := signal.getsignal(kind)) in _DEFAULTS or takes_over)
+        and (handler := signal.getsignal(kind)) is not None
+        and (takes_over or handler in _DEFAULTS)
     }
     for kind in before:
         signal.signal(kind, stop)

@@ -329,6 +329,8 @@ def test_whatever_an_effort_source_does(what: str, given_: Any, tmp_path: Path) 
         "completed" if what == "applied" and not raised else "fault"
     )
     assert_safe(robot, report)
+    logged = Rollout.load(tmp_path / "a.journal")
+    assert logged.meta["message"] == report.reason  # also where a row failed
 
 
 @pytest.mark.parametrize("says", [True, False])
