@@ -42,7 +42,8 @@ def without_saddles(A: Array) -> Array:
     intended, and no control rate changes it.
     """
     values, U = np.linalg.eigh(0.5 * (A + A.T))
-    return (U * np.maximum(values, 0.0)) @ U.T
+    stable: Array = (U * np.maximum(values, 0.0)) @ U.T
+    return stable
 
 
 def field_slope(controller: Controller, state: RobotState) -> Array:
