@@ -81,8 +81,9 @@ def _experiment(options: argparse.Namespace) -> Experiment:
             "plant": {"type": "rigid_body", "motor_inertia": MOTOR_INERTIA},
         }
     strict = options.strict or bool(options.allow)
+    period = f"simulation.control_period={PERIOD}"  # whatever another loop's is
     experiment = load_experiment(
-        source, *options.overrides, strict=strict, allow=options.allow
+        source, *options.overrides, period, strict=strict, allow=options.allow
     )
     if experiment.v0.any():
         raise LiveError("start: the box holds the arm at rest; leave out its velocity")

@@ -93,7 +93,7 @@ class Model:
         square = J @ J.T
         if np.linalg.eigvalsh(square)[0] < _SINGULAR:
             return np.zeros(6), np.zeros(6)
-        wrench: Array = np.linalg.solve(square, J @ self.external_effort)
+        wrench = np.asarray(np.linalg.solve(square, J @ self.external_effort), float)
         turned: Array = np.concatenate(
             [K.rotation.T @ wrench[:3], K.rotation.T @ wrench[3:]]
         )
