@@ -74,7 +74,8 @@ def _priority(level: int | None) -> AbstractContextManager[None]:
 def _experiment(options: argparse.Namespace) -> Experiment:
     """Return the experiment of a configuration, or of a robot at home."""
     source, name = options.config, str(options.config)
-    if name not in bundled_configs() and name in {*bundled_robots(), *example_robots()}:
+    robots = {*bundled_robots(), *example_robots()} - {*bundled_configs()}
+    if name in robots or name.endswith(".urdf"):
         source = {
             "robot": {"name": name},
             "tasks": {"hand": {"type": "frame_pose"}},
