@@ -95,7 +95,7 @@ class Box:
         for line in self._self_distance.unwatched:
             say(line)
         self.tau: Array = self.model.gravity
-        self._reference = Reference(self.q, self.v, self.v)
+        self._reference = reference.at_rest(self.q)
         self._goal: Array | None = None
         self._clear: Array = self.q
         self._measure(_ZERO)
@@ -246,7 +246,7 @@ class Box:
         )
         self.mode = RobotMode.REFLEX
 
-    def _violations(self) -> "list[Violation]":
+    def _violations(self) -> list[Violation]:
         """Return what the measured state violates; note postures that are clear."""
         state, limits = self.model.state, self.arm.limits
         found = [*reflexes.measured(state.q, state.v, self.tau, limits)]

@@ -191,6 +191,23 @@ def test_recovery_answers_when_the_arm_is_back() -> None:
     assert told["reflex_reason"].any()  # of the last motion, until the next reflex
 
 
+def test_the_errors_of_the_last_motion_are_those_of_the_last_reflex() -> None:
+    box = Talking()
+    for effort, error in (
+        (np.full(7, 2.0), Error.CONTROLLER_TORQUE_DISCONTINUITY),
+        (None, Error.COMMUNICATION_CONSTRAINTS_VIOLATION),
+    ):
+        box.begin(1, *TORQUE)
+        box.step(command())
+        while box.motion is not None:
+            box.step(None if effort is None else command(tau_J_d=effort))
+        told = state(box)
+        assert np.flatnonzero(told["reflex_reason"]).tolist() == [error]
+        ask(box, Command.AUTOMATIC_ERROR_RECOVERY)
+        box.settle()
+        assert not state(box)["errors"].any()
+
+
 def test_an_arm_that_folds_into_itself_stops() -> None:
     """Joints 4 and 6 fold the hand towards the base, within their limits."""
     box = Talking()

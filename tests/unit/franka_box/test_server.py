@@ -4,6 +4,8 @@ import socket
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from select import select
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ from franka_boxes import Rig, home, panda, plant, served
 
 from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.franka_box import PORT, Box, Server
+from hsp_control.franka_box.connection import Connection
 from hsp_control.franka_box.wire import COMMAND, HEADER, STATE, Command, response
 
 LONGEST = 30.0
@@ -118,6 +121,37 @@ def test_a_request_in_pieces_is_whole() -> None:
             slow.tcp.sendall(bytes([byte]))
         answer = slow.answer()
         assert answer == b"\0" + rig.box.arm.urdf.encode()
+
+
+def test_requests_in_one_piece_are_all_answered() -> None:
+    with served() as rig, client(rig) as hasty:
+        assert hasty.connect()
+        stop = [response(Command.STOP_MOVE, number, b"") for number in (5, 6, 7)]
+        hasty.tcp.sendall(b"".join(stop))
+        assert [hasty.answer() for _ in stop] == [b"\0"] * 3
+
+
+def test_a_command_is_late_by_when_it_arrived_not_by_when_it_is_read() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        tcp = socket.create_connection(listener.getsockname())
+        connection = Connection(*listener.accept(), "127.0.0.1")
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp, tcp:
+            udp.bind(("127.0.0.1", 0))
+            hello = struct.pack("<HH", 10, udp.getsockname()[1])
+            tcp.sendall(response(Command.CONNECT, 1, hello))
+            select([connection.tcp], [], [], LONGEST)
+            assert not list(connection.requests())
+            box = connection.udp.getsockname()
+            for deadline, late in ((0.0, 1), (LONGEST, 1)):
+                connection.send(bytes(STATE.itemsize))
+                udp.sendto(bytes(COMMAND.itemsize), box)
+                sent = monotonic()
+                while monotonic() < sent + 1e-3:  # it is read later than it arrives
+                    pass
+                command = connection.command(0, deadline)
+                assert (command is None) == (deadline == 0.0)
+                assert connection.late == late
+        connection.close(broken=False)
 
 
 def test_datagrams_that_are_no_commands_are_ignored() -> None:
