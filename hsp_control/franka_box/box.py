@@ -171,7 +171,9 @@ class Box:
         An arm beyond a limit first returns to where it was last clear of all limits.
         """
         if self.mode is not RobotMode.REFLEX:
-            self._respond(Command.AUTOMATIC_ERROR_RECOVERY, number, Status.SUCCESS)
+            recovers = self.mode is RobotMode.AUTOMATIC_ERROR_RECOVERY
+            status = Status.COMMAND_NOT_POSSIBLE_REJECTED if recovers else Status.SUCCESS
+            self._respond(Command.AUTOMATIC_ERROR_RECOVERY, number, status)
             return
         self.mode, self._recovery = RobotMode.AUTOMATIC_ERROR_RECOVERY, number
         if not self._is_allowed():
