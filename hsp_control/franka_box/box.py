@@ -172,7 +172,9 @@ class Box:
         """
         if self.mode is not RobotMode.REFLEX:
             recovers = self.mode is RobotMode.AUTOMATIC_ERROR_RECOVERY
-            status = Status.COMMAND_NOT_POSSIBLE_REJECTED if recovers else Status.SUCCESS
+            status = (
+                Status.COMMAND_NOT_POSSIBLE_REJECTED if recovers else Status.SUCCESS
+            )
             self._respond(Command.AUTOMATIC_ERROR_RECOVERY, number, status)
             return
         self.mode, self._recovery = RobotMode.AUTOMATIC_ERROR_RECOVERY, number
