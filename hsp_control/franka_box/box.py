@@ -118,6 +118,8 @@ class Box:
             wanted = motion.reference or Reference(measured.q, measured.v, _ZERO)
         hand = motion.generator.hand if motion and motion.generator else None
         self.readings.set_desired(self.model, wanted, hand)
+        if motion is not None and motion.external:
+            fields["tau_J_d"][:] = motion.effort  # from which its rate is taken
         fields["message_id"][0] = self._id
         fields["robot_mode"][0] = self.mode
         idle = MotionGenerator.IDLE, Controller.OTHER
