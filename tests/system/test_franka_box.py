@@ -301,6 +301,7 @@ CIRCLE: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow
 def test_a_circle_with_a_posture_is_the_one_that_is_simulated() -> None:
     """The same law and plant with and without the box: they differ by single precision.
 
@@ -382,6 +383,7 @@ def await_start(box: "subprocess.Popen[str]") -> None:
         assert line, "the box did not start"
 
 
+@pytest.mark.slow
 def test_a_client_sees_that_its_box_was_killed() -> None:
     host = next(addresses())
     command = [sys.executable, "-m", "hsp_control", "franka-box", "--lockstep"]
@@ -436,6 +438,7 @@ except franka.NetworkException as error:
     assert "is connected" in rig.tells("refused: ")
 
 
+@pytest.mark.slow
 def test_the_example_in_the_documentation_runs(tmp_path: Path) -> None:
     """As a user does it: the command, the example, Ctrl-C, and the log."""
     page = Path(__file__).parents[2] / "docs" / "franka_box.md"
