@@ -34,6 +34,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.suggestions import listing
 from hsp_control.ros2.messages import TYPE_HASHES, ros_name
 
 M = TypeVar("M", bound=IdlStruct)
@@ -126,8 +127,8 @@ class _End(Generic[M]):
             )
         same = sorted(name[2:] for name, kind in there if kind == needed)
         return (
-            f"nobody {verb} {self.topic} (with {ros_name(needed)} there is "
-            f"{', '.join(same[:8]) or 'no topic'})"
+            f"nobody {verb} {self.topic} in domain {self._participant.get_domain_id()} "
+            f"(topics with {ros_name(needed)}: {listing(same) if same else 'none'})"
         )
 
 
