@@ -65,7 +65,23 @@ def load_model(
     locks = source.locked if settings.locked is None else settings.locked
     if locks:
         model = _lock(model, locks)
-    for name, tool in settings.tool_frames.items():
+    return completed(model, source, settings.tool_frames, gravity)
+
+
+def completed(
+    model: pin.Model,
+    source: RobotSource,
+    tool_frames: Mapping[str, ToolFrame],
+    gravity: ArrayLike | None,
+) -> pin.Model:
+    """Return a checked model, with frames and gravity of one's own.
+
+    Raises:
+        ModelError: If a tool frame's name exists already, a joint's limits are
+            reversed, or the mass matrix is singular.
+        FrameNotFoundError: If a tool frame's parent does not exist.
+    """
+    for name, tool in tool_frames.items():
         _add_frame(model, name, tool)
     if gravity is not None:
         model.gravity.linear = np.asarray(gravity)

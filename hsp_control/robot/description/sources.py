@@ -36,11 +36,13 @@ class RobotSource:
 
     Attributes:
         name: Name of a known robot, or the URDF file's name without ``.urdf``.
-        urdf: The URDF file.
+        urdf: The URDF file. Of a robot in a MuJoCo model, which `geometry` describes:
+            the MJCF file, or the model's name if it was compiled in Python.
         srdf: The SRDF file (reference postures, disabled collision pairs), if any.
         root: The default root: ``fixed``, ``planar`` or ``free_flyer``.
         package_dirs: Folders in which ``package://`` is looked up.
-        origin: ``bundled``, ``example-robot-data``, ``file`` or ``combined``.
+        origin: ``bundled``, ``example-robot-data``, ``file``, ``mujoco`` or
+            ``combined``.
         locked: Joints that are locked by default, name to value [rad or m].
         end_effector: The frame that tasks use by default, if known.
         home: Joint values of a good start posture, shape (nv,) [rad or m], if known.
@@ -48,6 +50,7 @@ class RobotSource:
         joint_coordinates: Which coordinates theta = A q the literature uses for this
             robot (``absolute`` for the planar arm), if not q.
         access: Which files its URDF may name.
+        omitted: What the model that it comes from has and the robot lacks, in words.
     """
 
     name: str
@@ -62,6 +65,7 @@ class RobotSource:
     posture: str | None = None
     joint_coordinates: str | None = None
     access: Access = ANYWHERE
+    omitted: tuple[str, ...] = ()
 
 
 def find_robot(name: str | Path, access: Access = ANYWHERE) -> RobotSource:

@@ -15,11 +15,11 @@ from hsp_control.declaration import within
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import number_of_steps
+from hsp_control.robot.mujoco_coordinates import MujocoCoordinates, joints_of
 from hsp_control.simulation.plants.contact_channels import contact_channels
 from hsp_control.simulation.plants.floating_roots import FloatingRoots
 from hsp_control.simulation.plants.json_data import to_json_data
 from hsp_control.simulation.plants.mujoco.contact_shapes import ContactShape, geoms_of
-from hsp_control.simulation.plants.mujoco.conventions import Conventions, joints_of
 from hsp_control.simulation.plants.mujoco.ground import Ground
 from hsp_control.simulation.plants.mujoco.mjcf import write_mjcf
 from hsp_control.simulation.plants.plant import SampledPlant
@@ -39,7 +39,7 @@ class MujocoPlant(SampledPlant):
         mjcf: The model as MJCF text, for MuJoCo's own tools.
         model: MuJoCo's model.
         data: MuJoCo's data.
-        conventions: Converts between Pinocchio's coordinates and MuJoCo's.
+        coordinates: Converts between Pinocchio's coordinates and MuJoCo's.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class MujocoPlant(SampledPlant):
         self.data: Any = mujoco.MjData(self.model)
         names = [name for joint in joints for name in joint.mujoco_names]
         made = [self.model.joint(name) for name in names]
-        self.conventions = Conventions(
+        self.coordinates = MujocoCoordinates(
             robot,
             joints,
             {name: int(j.qposadr[0]) for name, j in zip(names, made, strict=True)},
@@ -131,7 +131,7 @@ class MujocoPlant(SampledPlant):
         """Set the state; see `SampledPlant.reset`."""
         self._mujoco.mj_resetData(self.model, self.data)
         self.data.time = t
-        self.conventions.to_mujoco(q, v, self.data.qpos, self.data.qvel)
+        self.coordinates.to_mujoco(q, v, self.data.qpos, self.data.qvel)
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
         """Step MuJoCo from t to ``end``; see `SampledPlant.advance`.
@@ -144,16 +144,16 @@ class MujocoPlant(SampledPlant):
         motors = self._roots.remove_effort(t, tau)
         steps = number_of_steps(end - t, self.timestep)
         h = self.model.opt.timestep = (end - t) / steps
-        q, v = self.conventions.from_mujoco(data.qpos, data.qvel)
+        q, v = self.coordinates.from_mujoco(data.qpos, data.qvel)
         pushed = self.pushes.any_active(t, end)
-        constant = self.conventions.constant_effort and not pushed
+        constant = self.coordinates.constant_effort and not pushed
         steps_at_once = steps if constant else 1
         for k in range(0, steps, steps_at_once):
             effort = motors + self.pushes.effort(t + (k + 0.5) * h, q)
-            self.conventions.effort_to_mujoco(q, effort, data.qfrc_applied)
+            self.coordinates.effort_to_mujoco(q, effort, data.qfrc_applied)
             self._mujoco.mj_step(self.model, data, steps_at_once)
             self._check_warnings(end)
-            q, v = self.conventions.from_mujoco(data.qpos, data.qvel)
+            q, v = self.coordinates.from_mujoco(data.qpos, data.qvel)
         return q, v
 
     def log_channels(
@@ -163,7 +163,7 @@ class MujocoPlant(SampledPlant):
         if not self.contacts:
             return {}
         effort = self._roots.remove_effort(t, tau) + self.pushes.effort(t, q)
-        self.conventions.effort_to_mujoco(q, effort, self.data.qfrc_applied)
+        self.coordinates.effort_to_mujoco(q, effort, self.data.qfrc_applied)
         self._mujoco.mj_forward(self.model, self.data)
         return contact_channels(self._wrenches(q))
 
@@ -182,7 +182,7 @@ class MujocoPlant(SampledPlant):
             raise SimulationError(f"{self.robot.name} has no contacts with the ground")
         probe = self._mujoco.MjData(self.model)
         rest = np.zeros(self.robot.nv)
-        self.conventions.to_mujoco(q, rest, probe.qpos, probe.qvel)
+        self.coordinates.to_mujoco(q, rest, probe.qpos, probe.qvel)
         self._mujoco.mj_kinematics(self.model, probe)
         ground = self.model.geom("ground").id
         distance = self._mujoco.mj_geomDistance
