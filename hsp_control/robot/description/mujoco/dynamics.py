@@ -157,11 +157,21 @@ class _Builder:
         moments = np.array(scene.body_inertia[body], dtype=float)
         mass = float(scene.body_mass[body])
         if joint and (mass > 0.0 or moments.any()):
-            center = pose(scene.body_ipos[body], scene.body_iquat[body])
+            center = self._inertial_frame(body)
             inertia = pin.Inertia(mass, np.zeros(3), np.diag(moments))
             self.model.appendBodyToJoint(joint, center.act(inertia), place)
         name = self._selection.names.bodies[body]
         self.model.addFrame(pin.Frame(name, joint, 0, place, pin.FrameType.BODY))
+
+    def _inertial_frame(self, body: int) -> pin.SE3:
+        """Return the frame of a body's inertia; where MuJoCo rounds it, as it does."""
+        scene, same = self._scene, constants("mjtSameFrame")
+        center = pose(scene.body_ipos[body], scene.body_iquat[body])
+        if scene.body_sameframe[body] == same.mjSAMEFRAME_BODY:
+            return pin.SE3.Identity()
+        if scene.body_sameframe[body] == same.mjSAMEFRAME_BODYROT:
+            center.rotation = np.eye(3)
+        return center
 
     def _add_sites(self) -> None:
         scene, names = self._scene, self._selection.names.sites
