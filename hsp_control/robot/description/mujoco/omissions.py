@@ -14,6 +14,7 @@ from hsp_control.robot.description.mujoco import motors
 from hsp_control.robot.description.mujoco.constants import constants
 from hsp_control.robot.description.mujoco.dynamics import dofs_of
 from hsp_control.robot.description.mujoco.selection import Selection
+from hsp_control.robot.description.mujoco.shapes import shapeless_geoms
 
 _OF_TENDONS = "stiffness", "damping", "frictionloss", "limited", "armature"
 
@@ -85,6 +86,9 @@ def _of_bodies(selection: Selection) -> Iterator[str]:
     soft = set(map(int, scene.flex_vertbodyid)) & set(bodies) if scene.nflex else set()
     yield from _sentence(
         "flexes at bodies", (names[b] for b in sorted(soft)), "no force"
+    )
+    yield from _sentence(
+        "geoms", shapeless_geoms(selection), "no distance to them is known"
     )
     if scene.opt.density or scene.opt.viscosity:
         yield "the fluid around it: no force"

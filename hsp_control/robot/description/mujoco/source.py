@@ -11,6 +11,7 @@ from hsp_control.robot.description.mujoco.constants import constants
 from hsp_control.robot.description.mujoco.dynamics import build_model
 from hsp_control.robot.description.mujoco.omissions import omissions
 from hsp_control.robot.description.mujoco.selection import Selection
+from hsp_control.robot.description.mujoco.shapes import body_shapes, excluded_pairs
 from hsp_control.robot.description.sources import RobotSource
 
 _log = logging.getLogger(__name__)
@@ -41,6 +42,8 @@ def load_selection(
         origin="mujoco",
         home=tuple(map(float, _home(selection, model))),
         locked=_locked(selection),
+        shapes=body_shapes(selection),
+        excluded=excluded_pairs(selection),
         omitted=omitted,
     )
     return model, source
