@@ -35,6 +35,7 @@ from hsp_control.robot.description.loading import (
     load_model,
     reference_posture,
 )
+from hsp_control.robot.description.mujoco.compiling import compile_mjcf
 from hsp_control.robot.description.mujoco.selection import select
 from hsp_control.robot.description.mujoco.source import load_selection
 from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
@@ -161,6 +162,7 @@ class Robot(ConfigurationSpace):
         *,
         qpos: ArrayLike | None = None,
         keyframe: str | None = None,
+        locked: Mapping[str, float] | None = None,
         tool_frames: Mapping[str, ToolFrame] | None = None,
     ) -> Self:
         """Return a robot in a compiled MuJoCo model: with the numbers MuJoCo uses.
@@ -181,6 +183,7 @@ class Robot(ConfigurationSpace):
                 then the home of a joint that is not within its limits there is in
                 their middle.
             keyframe: The name of that configuration in the model, instead.
+            locked: Hinges and slides to lock elsewhere, name to value [rad or m].
             tool_frames: Frames to add, by name.
 
         Raises:
@@ -189,7 +192,7 @@ class Robot(ConfigurationSpace):
             FrameNotFoundError: If the root or a tool frame's parent does not exist.
             JointNotFoundError: If a joint does not exist or is not below the root.
         """
-        selection = select(model, root, joints, qpos, keyframe)
+        selection = select(model, root, joints, qpos, keyframe, locked)
         found, source = load_selection(selection)
         return cls(completed(found, source, tool_frames or {}, None), source)
 
@@ -197,6 +200,8 @@ class Robot(ConfigurationSpace):
     def _described(cls, description: RobotDescription, access: Access) -> Self:
         """Return the robot of a description."""
         gravity = description.gravity
+        if description.mjcf is not None:
+            return cls._in_mjcf(description, Path(description.mjcf), access)
         if description.parts is None:
             assert description.name is not None
             source = find_robot(description.name, access)
@@ -212,6 +217,26 @@ class Robot(ConfigurationSpace):
             whole = cls.combine(robots)
         whole.description = description
         return whole
+
+    @classmethod
+    def _in_mjcf(
+        cls, description: RobotDescription, file: Path, access: Access
+    ) -> Self:
+        """Return the robot of a description that names an MJCF."""
+        with within("mjcf"):
+            scene = compile_mjcf(file, access)
+        model, source = load_selection(
+            select(
+                scene,
+                description.root,
+                description.joints,
+                keyframe=description.keyframe,
+                locked=description.locked,
+            ),
+            file,
+        )
+        model = completed(model, source, description.tool_frames, description.gravity)
+        return cls(model, source, description=description)
 
     @classmethod
     def combine(cls, robots: Mapping[str, tuple["Robot", pin.SE3]]) -> Self:

@@ -1,6 +1,6 @@
 """Which bodies of a MuJoCo scene are the robot, and which of its joints move."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,8 @@ from hsp_control.common.exceptions import (
     ModelError,
 )
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.declaration import within
+from hsp_control.robot.description.mujoco.constants import constants
 from hsp_control.robot.description.mujoco.names import Names
 
 
@@ -57,6 +59,7 @@ def select(
     joints: Sequence[str] | None = None,
     qpos: ArrayLike | None = None,
     keyframe: str | None = None,
+    locked: Mapping[str, float] | None = None,
 ) -> Selection:
     """Return the robot that a root and the names of its moving joints select.
 
@@ -66,31 +69,52 @@ def select(
         joints: Names of the joints that move; None: all joints of the subtree.
         qpos: The scene's configuration, shape (model.nq,).
         keyframe: The name of that configuration in the model, instead.
+        locked: Joints that do not move, name to value [rad or m]: there, whatever the
+            configuration says.
 
     Raises:
         FrameNotFoundError: If there is no such body.
         JointNotFoundError: If the subtree has no such joint.
         ModelError: If no joint moves, both configurations are given, there is no such
-            keyframe, or the configuration is not one of the scene.
+            keyframe, the configuration is not one of the scene, or a joint to lock
+            is to move, or is no hinge or slide.
     """
     names = Names(model)
     top = 0
     if root is not None:
         if root not in names.bodies:
-            raise FrameNotFoundError(
-                f"root: no body {root!r}{did_you_mean(root, names.bodies)} "
-                f"(the scene has {listing(names.bodies)})"
-            )
+            with within("root"):
+                raise FrameNotFoundError(
+                    f"no body {root!r}{did_you_mean(root, names.bodies)} "
+                    f"(the scene has {listing(names.bodies)})"
+                )
         top = names.bodies.index(root)
     bodies = _subtree(model, top)
-    inside = [j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in bodies]
-    moving = inside if joints is None else _named(names, joints, inside, root)
+    inside = {
+        names.joints[joint]: joint
+        for joint in range(model.njnt)
+        if int(model.jnt_bodyid[joint]) in bodies
+    }
+    chosen = set(inside if joints is None else joints) - set(locked or {})
+    with within("joints"):
+        _check_joints(names, joints or (), inside)
+    with within("locked"):
+        _check_joints(names, locked or (), inside)
+        for name in locked or {}:
+            if name in (joints or ()):
+                raise ModelError(f"{name!r} is one of the joints that move")
+    moving = [joint for name, joint in inside.items() if name in chosen]
     if not moving:
         raise ModelError(
             f"no joint of {names.bodies[top]!r} moves; at least one must be left to "
             "control"
         )
     configuration = _configuration(model, qpos, keyframe)
+    for name, value in (locked or {}).items():
+        if model.jnt_type[inside[name]] < constants("mjtJoint").mjJNT_SLIDE:
+            with within("locked"):
+                raise ModelError(f"{name!r} is neither a hinge nor a slide")
+        configuration[model.jnt_qposadr[inside[name]]] = value
     return Selection(
         model,
         names,
@@ -110,26 +134,24 @@ def _subtree(model: Any, top: int) -> set[int]:
     return bodies
 
 
-def _named(
-    names: Names, joints: Sequence[str], inside: list[int], root: str | None
-) -> list[int]:
+def _check_joints(
+    names: Names, joints: Iterable[str], inside: Mapping[str, int]
+) -> None:
+    """Check that joints exist and are below the root."""
     if isinstance(joints, str):
-        raise ModelError(f"joints is {joints!r}; needs a list of names")
-    known = {names.joints[joint]: joint for joint in inside}
+        raise ModelError(f"{joints!r} is text; needs a list of names")
     for name in joints:
-        if name in known:
+        if name in inside:
             continue
         if name in names.joints:
             raise JointNotFoundError(
-                f"joints: {name!r} is a joint of the scene, but not below the root "
-                f"{root!r} (which has {listing(list(known))})"
+                f"{name!r} is a joint of the scene, but not below the root (which has "
+                f"{listing(list(inside))})"
             )
         raise JointNotFoundError(
-            f"joints: no joint {name!r}{did_you_mean(name, list(known))} "
-            f"(the robot has {listing(list(known))})"
+            f"no joint {name!r}{did_you_mean(name, list(inside))} "
+            f"(the robot has {listing(list(inside))})"
         )
-    chosen = set(joints)
-    return [joint for name, joint in known.items() if name in chosen]
 
 
 def _configuration(model: Any, qpos: ArrayLike | None, keyframe: str | None) -> Array:
@@ -138,10 +160,11 @@ def _configuration(model: Any, qpos: ArrayLike | None, keyframe: str | None) -> 
     if keyframe is not None:
         known = [model.key(i).name for i in range(model.nkey)]
         if keyframe not in known:
-            raise ModelError(
-                f"no keyframe {keyframe!r}{did_you_mean(keyframe, known)} (the scene "
-                f"has {listing(known)})"
-            )
+            with within("keyframe"):
+                raise ModelError(
+                    f"no keyframe {keyframe!r}{did_you_mean(keyframe, known)} (the "
+                    f"scene has {listing(known) or 'none'})"
+                )
         return np.array(model.key_qpos[known.index(keyframe)], dtype=float)
     if qpos is None:
         return np.array(model.qpos0, dtype=float)
