@@ -234,6 +234,7 @@ class Robot(ConfigurationSpace):
                 locked=description.locked,
             ),
             file,
+            access,
         )
         model = completed(model, source, description.tool_frames, description.gravity)
         return cls(model, source, description=description)

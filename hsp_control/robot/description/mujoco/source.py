@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
+from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.mujoco.constants import constants
 from hsp_control.robot.description.mujoco.dynamics import build_model
 from hsp_control.robot.description.mujoco.omissions import omissions
@@ -18,13 +19,14 @@ _log = logging.getLogger(__name__)
 
 
 def load_selection(
-    selection: Selection, file: Path | None = None
+    selection: Selection, file: Path | None = None, access: Access = ANYWHERE
 ) -> tuple[pin.Model, RobotSource]:
     """Return the Pinocchio model of a robot in a MuJoCo scene, and its source.
 
     Args:
         selection: The robot.
         file: The MJCF that the scene was compiled from, if it was a file.
+        access: Which files that one may name.
 
     Raises:
         ModelError: If two joints or frames would have the same name.
@@ -42,6 +44,7 @@ def load_selection(
         origin="mujoco",
         home=tuple(map(float, _home(selection, model))),
         locked=_locked(selection),
+        access=access,
         shapes=body_shapes(selection),
         excluded=excluded_pairs(selection),
         omitted=omitted,
