@@ -55,7 +55,7 @@ def differences(robot: Robot, model: Any, qpos: Any, count: int = 3) -> Differen
 
 
 def velocity_map(coordinates: MujocoCoordinates, q: Any, size: int) -> Any:
-    """Return T(q) of qvel = T v, shape (size, nv); zero where the robot has no joint."""
+    """Return T(q) of qvel = T v, shape (size, nv)."""
     columns = np.eye(coordinates.robot.nv)
     T = np.zeros((size, len(columns)))
     for column, unit in enumerate(columns):
