@@ -164,6 +164,6 @@ def test_it_is_drawn_with_its_meshes_in_place() -> None:
     gaps = np.linalg.norm(ours[:, None] - theirs[None], axis=2).min(axis=0)
     assert gaps.max() < 1e-6  # MuJoCo keeps vertices as floats
     assert triangles.max() < len(vertices)
-    drawn = [command["path"] for command in RobotDrawing(robot).draw()]
+    drawn = [command.path for command in RobotDrawing(robot).draw()]
     assert len(drawn) == 2
     assert not any("placeholder" in path for path in drawn)
