@@ -96,6 +96,20 @@ def test_it_is_the_robot_that_python_makes(folder: Path) -> None:
     assert again.robot.joint_names == experiment.robot.joint_names
 
 
+def test_the_plant_may_be_another_mjcf_or_no_mjcf(folder: Path) -> None:
+    """It has the controller's root, joints and keyframe; a URDF has neither."""
+    (folder / "heavy.xml").write_text(CELL.replace('mass="1"', 'mass="1.5"'))
+    scene = "{type: mujoco_scene, contacts: [ball]}"
+    other = f"{{type: rigid_body, robot: {{mjcf: {folder}/heavy.xml}}}}"
+    plant = load_experiment(write(folder, scene, other)).plant
+    assert plant.robot.model.inertias[4].mass == pytest.approx(1.55)
+    assert plant.robot.source.locked == {"f": 0.02}
+    with pytest.raises(SimulationError, match="the plant moves panda with the joints"):
+        load_experiment(
+            write(folder, scene, "{type: rigid_body, robot: {name: panda}}")
+        )
+
+
 MISTAKES = [
     ("cell.xml", "cel.xml", RobotNotFoundError,
      "robot.mjcf: cel.xml: no such file"),
