@@ -104,6 +104,18 @@ def test_a_model_that_mujoco_ships() -> None:
     assert differences(robot, model, model.qpos0).largest < TOLERANCE
 
 
+def test_inertias_are_rounded_like_mujocos() -> None:
+    """MuJoCo takes an inertial frame that is nearly the body's for the body's."""
+    inertial = (
+        "<inertial pos='{0} 0 {0}' quat='1 {1} 0 0' mass='1' diaginertia='1 2 2.5'/>"
+    )
+    for numbers in ((3e-7, 0.0), (0.0, 3e-7), (0.1, 3e-7), (3e-7, 3e-7)):
+        joint = "<joint type='ball'/>" + inertial.format(*numbers)
+        model = compiled(body(joint))
+        robot = Robot.from_mujoco(model)
+        assert differences(robot, model, model.qpos0).largest < TOLERANCE
+
+
 def test_gravity_is_the_scenes() -> None:
     off = "<option gravity='0 0 -3'><flag gravity='disable'/></option>"
     for rest, g in (("<option gravity='1 2 3'/>", [1.0, 2.0, 3.0]), (off, [0.0] * 3)):
@@ -153,6 +165,7 @@ def test_names_and_order_are_mujocos() -> None:
     assert "ball" not in robot.frame_names
     assert robot.name == "base"
     assert Robot.from_mujoco(compiled(CELL)).name == "cell"
+    assert Robot.from_mujoco(compiled(body())).name == "scene"
 
 
 def test_what_has_no_name_gets_one() -> None:

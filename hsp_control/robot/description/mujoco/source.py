@@ -105,7 +105,10 @@ def _locked(selection: Selection) -> dict[str, float]:
 
 def _name_of_scene(selection: Selection, file: Path | None) -> str:
     own: bytes = selection.model.names  # begins with the name of the whole model
-    return file.stem if file is not None else own.split(b"\0")[0].decode() or "scene"
+    name = own.split(b"\0")[0].decode(errors="replace")
+    if name in ("", "MuJoCo Model"):  # MuJoCo's default
+        return "scene" if file is None else file.stem
+    return name
 
 
 def _home(selection: Selection, model: pin.Model) -> Array:
