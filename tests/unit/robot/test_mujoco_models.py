@@ -250,6 +250,24 @@ def test_a_joint_may_limit_the_sum_of_its_actuators() -> None:
     )
     robot = Robot.from_mujoco(compiled(body(joint, motor)))
     assert robot.model.upperEffortLimit[0] == 2.0
+    assert robot.source.omitted == ()
+
+
+def test_actuators_may_have_an_armature_and_a_damping() -> None:
+    """Of MuJoCo 4, behind the gear; M and the damping force are MuJoCo's."""
+    motor = "<motor joint='a' gear='3' armature='2' damping='4'/>"
+    try:
+        model = compiled(body(rest=f"<actuator>{motor}</actuator>"))
+    except ValueError:
+        pytest.skip("this MuJoCo's actuators have none")
+    robot = Robot.from_mujoco(model)
+    assert robot.model.armature[0] == 18.0
+    assert differences(robot, model, model.qpos0).largest < TOLERANCE
+    data = mujoco.MjData(model)
+    data.qvel[0] = 0.5
+    mujoco.mj_forward(model, data)
+    viscous = JointFriction.of_model(robot).viscous
+    assert data.qfrc_passive[0] == pytest.approx(-0.5 * viscous[0], rel=1e-12)
 
 
 def test_friction_and_position_limits_are_the_joints() -> None:
