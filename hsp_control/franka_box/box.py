@@ -7,8 +7,9 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LiveError
-from hsp_control.franka_box import reference, reflexes
+from hsp_control.franka_box import impedance, reference, reflexes
 from hsp_control.franka_box.arm import Arm
+from hsp_control.franka_box.generators import generator
 from hsp_control.franka_box.model import Model
 from hsp_control.franka_box.motion import Motion, finished, is_finite
 from hsp_control.franka_box.readings import Readings
@@ -54,7 +55,8 @@ class Box:
         motion: The motion under way, or None.
         mode: The robot's mode.
         thresholds: Of contacts and collisions; none until a client sets them.
-        stiffness: Of the impedance controller, shape (7,) [N·m/rad].
+        joint_stiffness: Of the joints' impedance controller, shape (7,) [N·m/rad].
+        cartesian_stiffness: Of the hand's, shape (6,) [N/m, N·m/rad].
         outbox: Responses to be sent.
         q: True positions, shape (7,) [rad].
         v: True velocities, shape (7,) [rad/s].
@@ -81,7 +83,8 @@ class Box:
         self.motion: Motion | None = None
         self.mode = RobotMode.IDLE
         self.thresholds = reflexes.Thresholds.none()
-        self.stiffness: Array = reference.STIFFNESS.copy()
+        self.joint_stiffness: Array = impedance.JOINT_STIFFNESS
+        self.cartesian_stiffness: Array = impedance.CARTESIAN_STIFFNESS
         self.outbox: list[bytes] = []
         self.periods, self.at_rest = 0, True
         self.on_period: Callable[[], object] = lambda: None
@@ -90,10 +93,10 @@ class Box:
         plant.reset(0.0, self.q, self.v)
         self.model.state.update(0.0, self.q, self.v)
         self._self_distance = SelfDistance(self.model.state)
-        for pair in self._self_distance.ignored:
-            say(f"self-collision of {pair} is not watched: they overlap at the start")
+        for line in self._self_distance.unwatched:
+            say(line)
         self.tau: Array = self.model.gravity
-        self._reference = Reference(self.q, self.v, self.v)
+        self._reference = reference.at_rest(self.q)
         self._goal: Array | None = None
         self._clear: Array = self.q
         self._measure(_ZERO)
@@ -113,25 +116,30 @@ class Box:
         wanted, measured = self._reference, self.model.state
         if motion is not None:
             wanted = motion.reference or Reference(measured.q, measured.v, _ZERO)
-        self.readings.set_desired(self.model, wanted)
+        hand = motion.generator.hand if motion and motion.generator else None
+        self.readings.set_desired(self.model, wanted, hand)
+        if motion is not None and motion.external:
+            fields["tau_J_d"][:] = motion.effort  # from which its rate is taken
         fields["message_id"][0] = self._id
         fields["robot_mode"][0] = self.mode
         idle = MotionGenerator.IDLE, Controller.OTHER
-        modes = (motion.generator, motion.controller) if motion else idle
+        modes = (motion.kind, motion.controller) if motion else idle
         fields["motion_generator_mode"][0], fields["controller_mode"][0] = modes
         rate = motion.success_rate if motion else 0.0
         fields["control_command_success_rate"][0] = rate
         return self._id, self.readings.datagram()
 
-    def begin(self, number: int, by: Controller, generator: MotionGenerator) -> None:
+    def begin(self, number: int, by: Controller, kind: MotionGenerator) -> None:
         """Start the motion of a request.
 
         Args:
             number: Number of the request.
             by: Who computes efforts.
-            generator: Who computes the desired motion.
+            kind: Which motion generator.
         """
-        self.motion = Motion(number, by, generator, self._reference)
+        start = reference.at_rest(self._reference.q)
+        made = generator(kind, start, self.arm.limits, self.model)
+        self.motion = Motion(number, by, kind, made)
         self.mode, self.at_rest = RobotMode.MOVE, False
         self._respond(Command.MOVE, number, MoveStatus.MOTION_STARTED)
         self._say(f"motion: {self.motion}")
@@ -165,7 +173,11 @@ class Box:
         An arm beyond a limit first returns to where it was last clear of all limits.
         """
         if self.mode is not RobotMode.REFLEX:
-            self._respond(Command.AUTOMATIC_ERROR_RECOVERY, number, Status.SUCCESS)
+            recovers = self.mode is RobotMode.AUTOMATIC_ERROR_RECOVERY
+            status = (
+                Status.COMMAND_NOT_POSSIBLE_REJECTED if recovers else Status.SUCCESS
+            )
+            self._respond(Command.AUTOMATIC_ERROR_RECOVERY, number, status)
             return
         self.mode, self._recovery = RobotMode.AUTOMATIC_ERROR_RECOVERY, number
         if not self._is_allowed():
@@ -189,7 +201,8 @@ class Box:
             effort = motion.effort
         else:
             assert motion.reference is not None
-            effort = self._tracking_effort(motion.reference, gravity)
+            of_hand = motion.controller is Controller.CARTESIAN_IMPEDANCE
+            effort = self._tracking_effort(motion.reference, gravity, of_hand=of_hand)
         self.tau = effort + gravity
         end = (self.periods + 1) * PERIOD
         self.q, self.v = self.plant.advance(self.t, end, self.tau)
@@ -228,7 +241,7 @@ class Box:
         if finished(command):
             self.end(MoveStatus.SUCCESS, "the client has finished it")
             return
-        violations = list(motion.obey(command, self.arm.limits))
+        violations = list(motion.obey(command))
         if violations:
             self._reflex(violations)
 
@@ -243,7 +256,7 @@ class Box:
         )
         self.mode = RobotMode.REFLEX
 
-    def _violations(self) -> "list[Violation]":
+    def _violations(self) -> list[Violation]:
         """Return what the measured state violates; note postures that are clear."""
         state, limits = self.model.state, self.arm.limits
         found = [*reflexes.measured(state.q, state.v, self.tau, limits)]
@@ -300,9 +313,16 @@ class Box:
             self._reference = reference.retreating(self._goal, before)
         return self._tracking_effort(self._reference, gravity)
 
-    def _tracking_effort(self, wanted: Reference, gravity: Array) -> Array:
-        state, limit = self.model.state, self.arm.limits.effort
-        effort = reference.impedance_effort(state, wanted, self.stiffness)
+    def _tracking_effort(
+        self, wanted: Reference, gravity: Array, *, of_hand: bool = False
+    ) -> Array:
+        model, limit = self.model, self.arm.limits.effort
+        kind = (
+            impedance.of_hand(model, self.cartesian_stiffness)
+            if of_hand
+            else impedance.of_joints(model, self.joint_stiffness)
+        )
+        effort = impedance.tracking_effort(model, wanted, kind)
         return np.clip(effort, -limit - gravity, limit - gravity)
 
     def _measure(self, effort: Array) -> None:

@@ -76,12 +76,24 @@ class Model:
         """Placement of the end effector in the base, measured."""
         return self.state.data.oMi[JOINTS] * self.arm.flange * self.F_T_EE
 
-    def desired(self, q: Array, dq: Array) -> tuple[pin.SE3, Array]:
-        """Return the pose and the twist, shape (6,), of a desired motion's hand."""
+    def hand_at(self, q: Array) -> tuple[pin.SE3, Array]:
+        """Return the end effector's pose and Jacobian, shape (6, 7), at any q."""
         model, data = self.arm.robot.model, self._desired
         pin.computeJointJacobians(model, data, q)
         hand = data.oMi[JOINTS] * self.arm.flange * self.F_T_EE
-        return hand, _jacobian(model, data, hand.translation) @ dq
+        return hand, _jacobian(model, data, hand.translation)
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether the hand cannot move in every direction."""
+        J = self.stiffness_jacobian()
+        return bool(np.linalg.eigvalsh(J @ J.T)[0] < _SINGULAR)
+
+    def stiffness_jacobian(self) -> Array:
+        """Return the Jacobian of the stiffness frame in its axes, shape (6, 7)."""
+        K = self.O_T_EE * self.EE_T_K
+        J = _jacobian(self.state.robot.model, self.state.data, K.translation)
+        return np.vstack([K.rotation.T @ J[:3], K.rotation.T @ J[3:]])
 
     def external_wrench(self) -> tuple[Array, Array]:
         """Return the wrench of the arm on its surroundings at K, shape (6,) each.
@@ -93,7 +105,7 @@ class Model:
         square = J @ J.T
         if np.linalg.eigvalsh(square)[0] < _SINGULAR:
             return np.zeros(6), np.zeros(6)
-        wrench: Array = np.linalg.solve(square, J @ self.external_effort)
+        wrench = np.asarray(np.linalg.solve(square, J @ self.external_effort), float)
         turned: Array = np.concatenate(
             [K.rotation.T @ wrench[:3], K.rotation.T @ wrench[3:]]
         )

@@ -11,7 +11,7 @@ from typing import Self
 
 import numpy as np
 
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.franka_box.box import Box, Say
 from hsp_control.franka_box.connection import Connection, ConnectionEnd, break_off
 from hsp_control.franka_box.motion import Motion
@@ -64,8 +64,10 @@ class Server:
                 stays. None: never.
 
         Raises:
+            LiveError: If a time is out of range.
             HardwareError: If the address is not one of loopback, or is in use.
         """
+        _check_times(deadline, patience, cut)
         self.box, self._say = box, say
         self._requests = Requests(box, say)
         self._host, self._lockstep = host, lockstep
@@ -92,7 +94,7 @@ class Server:
         """Serve clients.
 
         Args:
-            on_period: Called after each period; false ends the service.
+            on_period: Called before each period; false ends the service.
         """
         advance = self._in_lockstep if self._lockstep else self._in_real_time
         with no_garbage_collection():
@@ -113,14 +115,17 @@ class Server:
         return number
 
     def _in_real_time(self, number: int) -> None:
-        """Wait for the command, step, and wait for the end of the period."""
-        self._due += PERIOD
+        """Wait for the command, step, and wait for the end of the period.
+
+        A state that was sent late leaves its client the whole time until the deadline.
+        """
         now = monotonic()
-        if now > self._due:
-            self.overrun += now - self._due
+        late = now - self._due
+        if late > PERIOD:  # it will not be made up for: the clock is moved
+            self.overrun += late
             self._due = now
-        command = self._await(number, min(now + self._deadline, self._due))
-        self.box.step(command)
+        self._due += PERIOD
+        self.box.step(self._await(number, now + self._deadline))
         self._await(0, self._due)
 
     def _in_lockstep(self, number: int) -> None:
@@ -223,6 +228,18 @@ class Server:
         if self._cut_at is not None and self.box.t >= self._cut_at and self.client:
             self._cut, self._cut_at = True, None
             self._say("the link is cut: neither states nor commands arrive any more")
+
+
+def _check_times(deadline: float, patience: float, cut: float | None) -> None:
+    if not 0.0 < deadline <= PERIOD:
+        raise LiveError(
+            f"deadline {1e6 * deadline:g} µs; must be above 0, and "
+            f"{1e6 * PERIOD:g} µs, a period, at most"
+        )
+    if not 0.0 < patience < np.inf:
+        raise LiveError(f"patience {patience:g} s; must be positive")
+    if cut is not None and not cut >= 0.0:
+        raise LiveError(f"cut {cut:g} s; must not be negative")
 
 
 def _listen(host: str) -> socket.socket:

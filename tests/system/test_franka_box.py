@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from franka_boxes import LONGEST, PRELUDE, addresses, home, panda, plant, served
 
-from hsp_control import load_experiment
+from hsp_control import Rollout, load_experiment
 from hsp_control.franka_box.wire import Error
 from hsp_control.simulation.plants import Payload
 
@@ -154,18 +154,19 @@ print(json.dumps([at, robot.read_once().q[3]]))
     assert "recovered" in rig.tells("recovered")
 
 
+@pytest.mark.parametrize("controller", ["JointImpedance", "CartesianImpedance"])
 @pytest.mark.parametrize("kind", ["position", "velocity"])
-def test_motion_generators_are_tracked(kind: str) -> None:
+def test_motion_generators_are_tracked(kind: str, controller: str) -> None:
     with served() as rig:
         error, moved, mode = rig.run(
-            f"kind = {kind!r}"
+            f"kind, controller = {kind!r}, {controller!r}"
             + """
-mode = franka.ControllerMode.JointImpedance
+mode = getattr(franka.ControllerMode, controller)
 control = getattr(robot, f"start_joint_{kind}_control")(mode)
 state, _ = control.readOnce()
 start, worst = np.array(state.q_d), 0.0
 turn = np.array([0, 0, 0, 1, 1, 0, 1]) * np.pi / 8
-for step in range(1, 1251):
+for step in range(1251):
     t = 2.0 * np.pi * step / 1250
     if kind == "position":
         command = franka.JointPositions((start + turn * 0.5 * (1 - np.cos(t))).tolist())
@@ -189,13 +190,51 @@ print(json.dumps([worst, moved, str(robot.read_once().robot_mode)]))
     assert "finished" in rig.tells("motion ended")
 
 
+@pytest.mark.parametrize("kind", ["pose", "velocity"])
+def test_motion_generators_of_the_hand_are_tracked(kind: str) -> None:
+    with served() as rig:
+        error, moved, mode = rig.run(
+            f"kind = {kind!r}"
+            + """
+mode = franka.ControllerMode.JointImpedance
+control = getattr(robot, f"start_cartesian_{kind}_control")(mode)
+state, _ = control.readOnce()
+start, worst = np.array(state.O_T_EE), 0.0
+way = np.array([0.03, -0.03, 0.05])
+for step in range(1001):
+    t = 2.0 * np.pi * step / 1000
+    if kind == "pose":
+        pose = start.copy()
+        pose[12:15] += way * 0.5 * (1 - np.cos(t))
+        command = franka.CartesianPose(pose.tolist())
+    else:
+        speed = 2.0 * np.pi / 1.0 * 0.5 * np.sin(t)
+        command = franka.CartesianVelocities([*(way * speed), 0, 0, 0])
+    command.motion_finished = step == 1000
+    control.writeOnce(command)
+    if step < 1000:
+        state, _ = control.readOnce()
+        far = np.array(state.O_T_EE) - state.O_T_EE_c
+        worst = max(worst, np.abs(far).max())
+        if step == 500:
+            moved = (np.array(state.O_T_EE) - start)[12:15].tolist()
+del control
+print(json.dumps([worst, moved, str(robot.read_once().robot_mode)]))
+"""
+        )
+    assert error < 2e-3
+    assert moved == pytest.approx([0.03, -0.03, 0.05], abs=2e-3)
+    assert mode == "RobotMode.Idle"
+    assert "finished" in rig.tells("motion ended")
+
+
 def test_what_is_not_served_is_refused_by_the_protocol() -> None:
     with served() as rig:
         told = rig.run("""
-mode, told = franka.ControllerMode, []
+handler = franka.AsyncPositionControlHandler
+settings = handler.Configuration([1.0] * 7, 1e-3)
+told = [handler.configure(robot, settings).error_message]
 for attempt in (
-    lambda: robot.start_cartesian_pose_control(mode.JointImpedance),
-    lambda: robot.start_joint_position_control(mode.CartesianImpedance),
     lambda: robot.set_load(-1.0, [0, 0, 0], [0] * 9),
     lambda: robot.set_K([2] * 16),
 ):
@@ -205,14 +244,13 @@ for attempt in (
         told.append(str(error))
 print(json.dumps([told, str(robot.read_once().robot_mode)]))
 """)
-    (pose, impedance, load, frame), mode = told
+    (motion, load, frame), mode = told
     assert mode == "RobotMode.Idle"
-    assert "Move command rejected: command not possible" in pose
-    assert "Move command rejected: command not possible" in impedance
+    assert "Move command rejected: command not possible" in motion
     assert "Set Load command rejected: invalid argument" in load
     assert "Set EE to K command rejected: invalid argument" in frame
-    assert rig.tells("refused: move: cartesian position with joint impedance is not")
-    assert rig.tells("refused: move: joint position with cartesian impedance is not")
+    line = rig.tells("refused: move")
+    assert "asynchronous joint position with joint impedance is not served" in line
 
 
 def test_a_cut_link_ends_motion_and_client() -> None:
@@ -263,6 +301,7 @@ CIRCLE: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow
 def test_a_circle_with_a_posture_is_the_one_that_is_simulated() -> None:
     """The same law and plant with and without the box: they differ by single precision.
 
@@ -275,7 +314,7 @@ def test_a_circle_with_a_posture_is_the_one_that_is_simulated() -> None:
         rig.run(
             f"config = {CIRCLE!r}"
             + """
-from hsp_control import load_experiment
+from hsp_control import Rollout, load_experiment
 experiment = load_experiment(config)
 arm, state, rest = experiment.robot, experiment.robot.state, np.zeros(7)
 experiment.controller.compute(0.0, experiment.q0, rest)  # compile before the motion
@@ -338,6 +377,13 @@ while True:
         assert "its client is disconnected" in rig.tells("motion ended")
 
 
+def await_start(box: "subprocess.Popen[str]") -> None:
+    assert box.stdout is not None
+    while "research interface 10" not in (line := box.stdout.readline()):
+        assert line, "the box did not start"
+
+
+@pytest.mark.slow
 def test_a_client_sees_that_its_box_was_killed() -> None:
     host = next(addresses())
     command = [sys.executable, "-m", "hsp_control", "franka-box", "--lockstep"]
@@ -346,8 +392,7 @@ def test_a_client_sees_that_its_box_was_killed() -> None:
     ) as box:
         assert box.stdout is not None
         try:
-            while "research interface 10" not in (line := box.stdout.readline()):
-                assert line, "the box did not start"
+            await_start(box)
             client = subprocess.Popen(
                 [
                     sys.executable,
@@ -393,16 +438,33 @@ except franka.NetworkException as error:
     assert "is connected" in rig.tells("refused: ")
 
 
-def test_the_example_in_the_documentation_runs() -> None:
+@pytest.mark.slow
+def test_the_example_in_the_documentation_runs(tmp_path: Path) -> None:
+    """As a user does it: the command, the example, Ctrl-C, and the log."""
     page = Path(__file__).parents[2] / "docs" / "franka_box.md"
     example = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
     assert len(example.strip().splitlines()) <= 14
-    with served() as rig:
-        source = example.replace("127.0.0.1", rig.host)
-        client = subprocess.run(
-            [sys.executable, "-c", source],
-            capture_output=True, text=True, timeout=LONGEST,
-        )  # fmt: skip
-        assert client.returncode == 0, client.stderr
-        assert "finished" in rig.tells("motion ended")
-        assert rig.box.q - home() == pytest.approx([0, 0, 0, 0.3, 0, 0, 0], abs=0.01)
+    host, log = next(addresses()), tmp_path / "example.npz"
+    command = [sys.executable, "-m", "hsp_control", "franka-box", "--lockstep"]
+    with subprocess.Popen(
+        [*command, "--host", host, "--log", log], stdout=subprocess.PIPE, text=True
+    ) as box:
+        try:
+            await_start(box)
+            source = example.replace("127.0.0.1", host)
+            client = subprocess.run(
+                [sys.executable, "-c", source],
+                capture_output=True, text=True, timeout=LONGEST,
+            )  # fmt: skip
+            assert client.returncode == 0, client.stderr
+            box.send_signal(signal.SIGINT)
+            said, _ = box.communicate(timeout=LONGEST)
+        finally:
+            box.kill()
+    assert box.returncode == 0
+    assert "motion ended: the client has finished it (2999 commands, 0 lost)" in said
+    assert f"Log: {log}" in said
+    run = Rollout.load(log)
+    moved = np.asarray(run["q"])[-1] - home()
+    assert moved == pytest.approx([0, 0, 0, 0.3, 0, 0, 0], abs=0.01)
+    assert np.asarray(run["t"])[-1] == pytest.approx(3.0, abs=0.2)

@@ -103,6 +103,18 @@ def test_a_payload_sinks_unless_its_load_is_set() -> None:
     assert sunk[1] < 1e-9
 
 
+def test_a_motion_begins_at_the_effort_that_its_client_is_told() -> None:
+    """What holds a payload is the box's effort: a client's rate is taken from zero."""
+    box = Talking(plant(payload=Payload("panda_link8", 2.0)))
+    for _ in range(300):
+        box.step(None)
+    assert np.abs(state(box)["tau_J_d"]).max() > 5.0
+    box.begin(1, *TORQUE)
+    assert not state(box)["tau_J_d"].any()
+    box.step(command(tau_J_d=state(box)["tau_J_d"] + 0.9))
+    assert box.motion is not None
+
+
 def test_the_same_commands_give_the_same_bits() -> None:
     random = np.random.default_rng(3)
     efforts = np.cumsum(random.uniform(-0.5, 0.5, (100, 7)), axis=0)
@@ -191,6 +203,23 @@ def test_recovery_answers_when_the_arm_is_back() -> None:
     assert told["reflex_reason"].any()  # of the last motion, until the next reflex
 
 
+def test_the_errors_of_the_last_motion_are_those_of_the_last_reflex() -> None:
+    box = Talking()
+    for effort, error in (
+        (np.full(7, 2.0), Error.CONTROLLER_TORQUE_DISCONTINUITY),
+        (None, Error.COMMUNICATION_CONSTRAINTS_VIOLATION),
+    ):
+        box.begin(1, *TORQUE)
+        box.step(command())
+        while box.motion is not None:
+            box.step(None if effort is None else command(tau_J_d=effort))
+        told = state(box)
+        assert np.flatnonzero(told["reflex_reason"]).tolist() == [error]
+        ask(box, Command.AUTOMATIC_ERROR_RECOVERY)
+        box.settle()
+        assert not state(box)["errors"].any()
+
+
 def test_an_arm_that_folds_into_itself_stops() -> None:
     """Joints 4 and 6 fold the hand towards the base, within their limits."""
     box = Talking()
@@ -226,8 +255,10 @@ def test_what_a_client_may_not_do_while_the_arm_moves() -> None:
         ({"controller": 2, "motion_generator": 4}, True),
         ({"controller": 2, "motion_generator": 0}, True),
         ({"controller": 0, "motion_generator": 1}, True),
-        ({"controller": 0, "motion_generator": 2}, False),
-        ({"controller": 1, "motion_generator": 0}, False),
+        ({"controller": 0, "motion_generator": 2}, True),
+        ({"controller": 1, "motion_generator": 3}, True),
+        ({"controller": 1, "motion_generator": 0}, True),
+        ({"controller": 1, "motion_generator": 4}, False),
         ({"controller": 0, "motion_generator": 4}, False),
         ({"controller": 0, "motion_generator": 0, "asynchronous": 1}, False),
         ({"controller": 77, "motion_generator": 4}, False),
@@ -241,6 +272,17 @@ def test_which_motions_are_served(fields: dict[str, int], served: bool) -> None:
         else MoveStatus.COMMAND_NOT_POSSIBLE_REJECTED
     )
     assert answer == (Command.MOVE, 5, status)
+
+
+def test_a_hand_does_not_start_in_a_singular_posture() -> None:
+    q = home()
+    q[[1, 3, 5]] = 0.0, -0.0699, np.pi / 2 - 0.07  # the arm is nearly stretched
+    box = Talking(q=q)
+    assert ask(box, Command.MOVE, controller=0, motion_generator=2) == [
+        (Command.MOVE, 5, MoveStatus.START_AT_SINGULAR_POSE_REJECTED)
+    ]
+    (answer,) = ask(box, Command.MOVE, controller=0, motion_generator=0)
+    assert answer[2] == MoveStatus.MOTION_STARTED
 
 
 def test_a_command_that_is_not_finite_ends_the_motion() -> None:
@@ -260,6 +302,7 @@ def test_a_command_that_is_not_finite_ends_the_motion() -> None:
         (Command.SET_EE_TO_K, {"EE_T_K": np.ones(16)}),
         (Command.SET_NE_TO_EE, {"NE_T_EE": np.full(16, np.nan)}),
         (Command.SET_JOINT_IMPEDANCE, {"K_theta": -np.ones(7)}),
+        (Command.SET_CARTESIAN_IMPEDANCE, {"K_x": np.full(6, np.nan)}),
         (Command.SET_COLLISION_BEHAVIOR, {"lower_force_nominal": np.ones(6)}),
         (Command.SET_COLLISION_BEHAVIOR, {"upper_torque_nominal": [np.inf] * 7}),
     ],
