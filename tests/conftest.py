@@ -13,5 +13,9 @@ settings.load_profile("proof")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
-# There is no Cyclone DDS for every Python that we run on.
-collect_ignore_glob = [] if find_spec("cyclonedds") else ["*ros2*"]
+# These have no wheels for every Python that we run on.
+collect_ignore_glob = [
+    tests
+    for package, tests in (("cyclonedds", "*ros2*"), ("pylibfranka", "*franka*"))
+    if find_spec(package) is None
+]
