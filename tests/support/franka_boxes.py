@@ -23,6 +23,8 @@ from hsp_control.simulation.plants import IntegratedPlant, RigidBody, SampledPla
 Array = NDArray[np.float64]
 LONGEST = 120.0
 """Time after which a client is killed: libfranka can wait for ever [s]."""
+PATIENCE = 30.0
+"""How long a box waits for a command [s]: machines that run tests may stall."""
 PRELUDE = """
 import json, sys
 import numpy as np, pylibfranka as franka
@@ -92,7 +94,8 @@ def served(
     said: list[str] = []
     start = home() if q is None else q
     box = Box(panda(), simulated or plant(), start, said.append)
-    with _anywhere(box, said, {"lockstep": True, **options}) as (server, host):
+    patient = {"lockstep": True, "patience": PATIENCE, **options}
+    with _anywhere(box, said, patient) as (server, host):
         running = threading.Event()
         running.set()
         thread = threading.Thread(target=server.serve, args=(running.is_set,))

@@ -11,12 +11,25 @@ from typing import Any
 
 import numpy as np
 import pytest
-from franka_boxes import LONGEST, PRELUDE, addresses, home, panda, plant, served
+from franka_boxes import (
+    LONGEST,
+    PATIENCE,
+    PRELUDE,
+    addresses,
+    home,
+    panda,
+    plant,
+    served,
+)
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.franka_box.wire import Error
 from hsp_control.simulation.plants import Payload
 
+COMMAND = [
+    *(sys.executable, "-m", "hsp_control", "franka-box"),
+    *("--lockstep", "--patience", str(PATIENCE)),
+]
 pytest.importorskip("pylibfranka", reason="needs the extra franka")
 pytestmark = pytest.mark.process
 
@@ -386,9 +399,8 @@ def await_start(box: "subprocess.Popen[str]") -> None:
 @pytest.mark.slow
 def test_a_client_sees_that_its_box_was_killed() -> None:
     host = next(addresses())
-    command = [sys.executable, "-m", "hsp_control", "franka-box", "--lockstep"]
     with subprocess.Popen(
-        [*command, "--host", host], stdout=subprocess.PIPE, text=True
+        [*COMMAND, "--host", host], stdout=subprocess.PIPE, text=True
     ) as box:
         assert box.stdout is not None
         try:
@@ -445,9 +457,8 @@ def test_the_example_in_the_documentation_runs(tmp_path: Path) -> None:
     example = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
     assert len(example.strip().splitlines()) <= 14
     host, log = next(addresses()), tmp_path / "example.npz"
-    command = [sys.executable, "-m", "hsp_control", "franka-box", "--lockstep"]
     with subprocess.Popen(
-        [*command, "--host", host, "--log", log], stdout=subprocess.PIPE, text=True
+        [*COMMAND, "--host", host, "--log", log], stdout=subprocess.PIPE, text=True
     ) as box:
         try:
             await_start(box)

@@ -334,6 +334,53 @@ def test_contacts_and_collisions_follow_the_thresholds() -> None:
     assert told["joint_collision"].any()
 
 
+@pytest.mark.parametrize(
+    ("controller", "kind", "stiffness"),
+    [
+        (Controller.JOINT_IMPEDANCE, Command.SET_JOINT_IMPEDANCE, [200.0] * 7),
+        (
+            Controller.CARTESIAN_IMPEDANCE,
+            Command.SET_CARTESIAN_IMPEDANCE,
+            [500.0, 500.0, 500.0, 300.0, 300.0, 300.0],
+        ),
+    ],
+)
+def test_an_unknown_payload_stretches_the_springs_that_are_set(
+    controller: Controller, kind: Command, stiffness: list[float]
+) -> None:
+    """At rest the joints yield by tau / K, or the hand by its weight over K."""
+    box = Talking(plant(payload=Payload("panda_tcp", 1.0)))
+    field = "K_theta" if kind is Command.SET_JOINT_IMPEDANCE else "K_x"
+    assert ask(box, kind, **{field: stiffness})[0][2] == Status.SUCCESS
+    before = box.model.O_T_EE
+    box.begin(1, controller, MotionGenerator.JOINT_POSITION)
+    for _ in range(2500):
+        box.step(command(q_c=home()))
+    assert np.abs(box.v).max() < 5e-3
+    if field == "K_theta":
+        weight = box.plant.robot.inverse_dynamics(box.q, REST, REST)
+        yielded = (weight - box.model.gravity) / stiffness
+        np.testing.assert_allclose(home() - box.q, yielded, rtol=0.1, atol=1e-3)
+    else:
+        sunk = before.translation[2] - box.model.O_T_EE.translation[2]
+        assert sunk == pytest.approx(9.81 / 500.0, rel=0.1)
+
+
+def test_a_client_is_told_the_pose_that_it_commands() -> None:
+    box = Talking()
+    box.begin(1, Controller.JOINT_IMPEDANCE, MotionGenerator.CARTESIAN_VELOCITY)
+    twist = 2e-4 * np.array([1, 0, 2, 0, 1, 0])
+    start = box.model.O_T_EE.translation.copy()
+    for step in range(1, 4):
+        box.step(command(O_dP_EE_c=step * twist))
+    told = state(box)
+    moved = told["O_T_EE_c"].reshape(4, 4).T[:3, 3] - start
+    np.testing.assert_allclose(moved, 6 * PERIOD * twist[:3], atol=1e-7)
+    assert box.motion is not None
+    np.testing.assert_allclose(told["O_dP_EE_c"], 3 * twist, rtol=1e-6)
+    np.testing.assert_allclose(told["O_ddP_EE_c"], twist / PERIOD, rtol=1e-6)
+
+
 def test_a_start_beyond_a_limit_is_refused() -> None:
     q = home()
     q[3] = 0.0

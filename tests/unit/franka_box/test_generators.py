@@ -130,6 +130,16 @@ def test_each_limit_of_a_commanded_hand_is_watched() -> None:
             assert all(v.reason.startswith(name) for v in violations)
 
 
+def test_joints_that_cannot_follow_the_hand_are_told_apart() -> None:
+    """About the tool's axis the hand may jerk faster than joint 7 that turns it."""
+    generator, model = made(HandTwists)
+    axis = model.hand_at(home())[0].rotation[:, 2]
+    jerky = 0.9 * reflexes.HAND_JERK[1] * PERIOD**2
+    assert follow(generator, command(O_dP_EE_c=[0, 0, 0, *(jerky * axis)])) == [
+        Error.CARTESIAN_MOTION_GENERATOR_JOINT_ACCELERATION_DISCONTINUITY
+    ]
+
+
 def test_a_hand_starts_where_it_is_and_its_pose_is_one() -> None:
     near, far = np.zeros(6), np.zeros(6)
     near[0], far[0] = 2.9e-3, 3.1e-3

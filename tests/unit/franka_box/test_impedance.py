@@ -78,7 +78,12 @@ def test_a_motion_without_error_gets_the_model_s_effort() -> None:
 
 
 def test_an_axis_is_critically_damped_for_its_own_inertia() -> None:
-    model = at(home())
+    model, K_x = at(home()), impedance.CARTESIAN_STIFFNESS
+    J, M = model.stiffness_jacobian(), np.array(model.state.mass_matrix)
+    D = impedance.of_hand(model, K_x).damping
+    yielding = J @ np.linalg.solve(D, J.T)  # to a wrench of the hand
+    D_x = 2.0 * np.sqrt(K_x / np.diag(J @ np.linalg.solve(M, J.T)))
+    np.testing.assert_allclose(yielding, np.diag(1.0 / D_x), atol=1e-12)
     K, D = impedance.of_joints(model, impedance.JOINT_STIFFNESS)
     M = np.diag(np.array(model.state.mass_matrix))
     np.testing.assert_allclose(np.diag(D) ** 2, 4.0 * np.diag(K) * M)
