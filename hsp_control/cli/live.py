@@ -26,6 +26,7 @@ from hsp_control.live import (
     connect,
     run_loop,
 )
+from hsp_control.live.adapting import AdaptingHardware
 from hsp_control.live.latency import Quantiles
 from hsp_control.live.settings import check_fixed
 from hsp_control.simulation import Rollout
@@ -63,6 +64,12 @@ def live(options: argparse.Namespace) -> int:
         )
         if options.robot is not None:
             hardware = connect(options.robot, experiment.robot, live_period(experiment))
+            told = 0
+            if isinstance(hardware, AdaptingHardware):
+                settings = hardware.adapted(experiment.scenario.live)
+                options_of_loop["settings"] = settings
+                told = len(hardware.lines)
+                out.print("\n".join(hardware.lines))
             report = run_loop(
                 command,
                 hardware,
@@ -74,6 +81,8 @@ def live(options: argparse.Namespace) -> int:
             )
             out.print(_times(report, experiment))
             out.print(f"The loop: {report.reason}")
+            if isinstance(hardware, AdaptingHardware):
+                out.print("\n".join(hardware.lines[told:]))
             _convert(loop_log)
             return 0 if report.ended in {"completed", "operator"} else 2
         with RobotProcess(

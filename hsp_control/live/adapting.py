@@ -1,0 +1,26 @@
+"""Robots that know how they take efforts, whatever a configuration says."""
+
+from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
+
+from hsp_control.live.hardware import Hardware
+from hsp_control.live.settings import LiveSettings
+
+
+@runtime_checkable
+class AdaptingHardware(Hardware, Protocol):
+    """`Hardware` that corrects the settings of its loop, and tells what it found.
+
+    Attributes:
+        lines: What the user should know of the robot, one sentence each; `close` may
+            add some.
+    """
+
+    lines: Sequence[str]
+
+    def adapted(self, settings: LiveSettings) -> LiveSettings:
+        """Return the settings with what is fixed on this robot.
+
+        Raises:
+            LiveError: If a setting contradicts the robot.
+        """

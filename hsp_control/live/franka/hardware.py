@@ -1,0 +1,133 @@
+"""A Franka arm under torque control, as the live loop sees it."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.live.franka import client
+from hsp_control.live.franka.client_process import ClientProcess
+from hsp_control.live.franka.settings import FrankaSettings
+from hsp_control.live.hardware import Measurement
+from hsp_control.live.settings import LiveSettings
+
+EFFORT_RATE = 1000.0
+"""Greatest rate of what is sent that the arm accepts [N·m/s]."""
+_START = 5.0
+"""Longest time that starting or ending the torque control takes [s]."""
+_LAST_WORDS = 1.5
+"""Time to wait for what the client says when it hears nothing for 1 s [s]."""
+
+
+class FrankaHardware:
+    """`Hardware`: seven joints that take tau - g(q) each millisecond.
+
+    The second `read` starts the torque control and waits for it: the first states come
+    without, while the loop compiles. A reflex, the stop button and a lost line are
+    raised by `read`; the arm then holds itself.
+
+    Attributes:
+        period: Time between two states [s].
+        lines: What was found and set when connecting, one sentence each.
+    """
+
+    period = 0.001
+
+    def __init__(
+        self, process: ClientProcess, settings: FrankaSettings, lines: list[str]
+    ) -> None:
+        """Take over a process that is connected to the arm."""
+        self._process, self.lines = process, lines
+        self._reads, self._origin = 0, 0.0
+        self._running = self._closed = False
+        self._effort = np.zeros(7)
+        self._sent_any = False
+        share = settings.cutoff_frequency
+        # The filter of libfranka's own control loop.
+        self._new_part = (
+            1.0
+            if share is None
+            else (self.period / (self.period + 1.0 / (2.0 * pi * share)))
+        )
+
+    def adapted(self, settings: LiveSettings) -> LiveSettings:
+        """Return settings with what is fixed on this arm.
+
+        It adds g(q) itself, and accepts 1000 N·m/s.
+
+        Raises:
+            LiveError: If `settings` allow efforts another rate than the arm.
+        """
+        rate = settings.effort_rate
+        if rate is None:
+            return replace(settings, compensates_gravity=True, effort_rate=EFFORT_RATE)
+        if np.max(np.array(rate, dtype=float)) > EFFORT_RATE:
+            raise LiveError(
+                f"effort_rate is {rate}; a Franka accepts {EFFORT_RATE:g} N·m/s"
+            )
+        return replace(settings, compensates_gravity=True)
+
+    def read(self, timeout: float) -> Measurement | None:
+        """Return the state that follows the last effort; see `Hardware.read`."""
+        if not self._process.waiting:
+            if self._running:  # the loop sent nothing: the last effort stays
+                self._send(client.EFFORT)
+            else:
+                self._process.ask(client.READ if self._reads == 0 else client.START)
+        if self._reads == 1:
+            timeout = max(timeout, _START)
+        answer = self._process.receive(timeout)
+        if answer is None:
+            return None
+        _, t, *numbers = client.STATE.unpack(answer)
+        if not self._running:  # time stands still while the loop compiles
+            self._origin = t - self._reads * self.period
+        self._running = self._reads > 0
+        self._reads += 1
+        q, v, self._applied = np.array(numbers).reshape(3, 7)
+        sequence = round((t - self._origin) / self.period)
+        t = sequence * self.period
+        return Measurement(sequence, t, q, v, applied=self._applied)
+
+    def write(self, effort: Array) -> None:
+        """Send an effort for the last state; without a new state it is too late.
+
+        Raises:
+            HardwareError: If the robot cannot be reached, or the first effort contains
+                g(q).
+        """
+        if self._process.waiting:
+            return
+        largest = float(np.abs(effort - self._applied).max())
+        if not self._sent_any and largest > 2.0 * EFFORT_RATE * self.period:
+            raise HardwareError(
+                f"the first effort jumps by {largest:.3g} N·m; a Franka adds g(q) "
+                "itself: run the loop with hardware.adapted(settings)"
+            )
+        self._sent_any = True
+        self._effort = self._applied + self._new_part * (effort - self._applied)
+        self._send(client.EFFORT)
+
+    def close(self) -> None:
+        """End the torque control with the last effort; see `Hardware.close`.
+
+        What the robot says then, if it does not answer, is added to `lines`.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            if self._process.waiting:
+                self._process.receive(_LAST_WORDS)
+            if self._running and not self._process.waiting:
+                self._send(client.FINISH)
+                self._process.receive(_START)
+        except HardwareError as error:
+            self.lines.append(f"at the end: {error}")
+        finally:
+            self._process.close()
+
+    def _send(self, kind: bytes) -> None:
+        self._process.ask(client.REQUEST.pack(kind, *self._effort.tolist()))
