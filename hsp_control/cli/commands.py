@@ -247,6 +247,13 @@ def live(options: argparse.Namespace) -> int:
     return lives.live(options)
 
 
+def franka_model(options: argparse.Namespace) -> int:
+    """Save a Franka arm's own model."""
+    from hsp_control.cli import franka_model as models
+
+    return models.franka_model(options)
+
+
 def robots(options: argparse.Namespace) -> int:
     """List all robots, or describe one."""
     if options.name is not None:

@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ) and signal.getsignal(signal.SIGINT) is end_quietly:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         with compiling_shown(consoles.errors):
-            return int(getattr(commands, options.command)(options))
+            return int(getattr(commands, options.command.replace("-", "_"))(options))
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
     except ArithmeticError:
@@ -174,6 +174,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_bench(_command(commands, "bench", "measure a control loop on this machine"))
     _add_live(
         _command(commands, "live", "control a simulated robot in another process")
+    )
+
+    _add_franka_model(
+        _command(commands, "franka-model", "save a Franka arm's own model as a URDF")
     )
 
     robots = _command(
@@ -391,6 +395,21 @@ def _add_live(live: argparse.ArgumentParser) -> None:
         metavar="LEVEL",
         help="real-time priority of the loop (SCHED_FIFO), 1 to 99",
     )
+
+
+def _add_franka_model(model: argparse.ArgumentParser) -> None:
+    model.add_argument(
+        "address",
+        metavar="ADDRESS",
+        help="of the control box, with settings as behind franka:// (docs/franka.md)",
+    )
+    model.add_argument("urdf", type=Path, metavar="FILE", help="the URDF to write")
+    like = model.add_argument(
+        "--like",
+        metavar="ROBOT",
+        help="keep this robot's names, frames and shapes, such as panda's",
+    )
+    _complete(like, bundled_robots)
 
 
 def _add_configuration(parser: argparse.ArgumentParser, or_else: str = "") -> None:

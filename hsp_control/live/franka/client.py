@@ -128,10 +128,8 @@ def main(descriptor: int) -> None:
     client = Client()
     while message := link.recv(LONGEST):
         link.send(client.answer(message))
+    os._exit(0)  # without libfranka's destructors, which may wait without end
 
 
 if __name__ == "__main__":
-    try:
-        main(int(sys.argv[1]))
-    finally:
-        os._exit(0)  # without libfranka's destructors, which may wait without end
+    main(int(sys.argv[1]))

@@ -1,9 +1,12 @@
 """Connect to a Franka arm, check it, and set what the settings say."""
 
 import json
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.live.franka import client
 from hsp_control.live.franka.client_process import ClientProcess
@@ -13,6 +16,8 @@ from hsp_control.live.franka.reflexes import MODES, about
 from hsp_control.live.franka.settings import FrankaSettings
 from hsp_control.robot import Robot
 
+_KERNEL = Path("/sys/kernel/realtime")
+"""Contains 1 with a PREEMPT_RT kernel; libfranka looks there, too."""
 _TIMEOUT = 20.0
 """Longest time that connecting may take, a recovery included [s]."""
 
@@ -36,17 +41,9 @@ def connect(
         FrankaSettings.parse(address) if isinstance(address, str) else address
     )
     _check(robot, period)
-    process = ClientProcess()
+    chosen = postures(robot)
+    process, found = reached(settings, chosen)
     try:
-        chosen = postures(robot)
-        found = process.asked(client.CONNECT + _wanted(settings, chosen), _TIMEOUT)
-        if found["mode"] != "Idle":
-            errors = f" ({about(found['errors'])})" if found["errors"] else ""
-            raise HardwareError(
-                f"the robot is in mode {found['mode']}{errors}; "
-                f"{MODES.get(found['mode'], 'it must be Idle')}"
-            )
-        _check_load(settings, found["load"])
         q = np.vstack([found["q"], chosen])
         masses = np.array(found["masses"]).reshape(-1, 7, 7)
         models = difference(robot, q, masses, np.array(found["gravities"]))
@@ -55,12 +52,51 @@ def connect(
         process.close()
         raise
     lines = [
-        f"Franka at {settings.address}: end effector {found['end_effector']['mass']:.3g} "
-        f"kg (Desk), load {found['load']['mass']:.3g} kg; real-time scheduling "
-        + ("enforced" if settings.realtime == "enforce" else "not enforced (kIgnore)"),
+        f"The robot at {settings.address}: end effector "
+        f"{found['end_effector']['mass']:.3g} kg (Desk), load "
+        f"{found['load']['mass']:.3g} kg, {_realtime(settings)}",
         str(models)[0].upper() + str(models)[1:],
     ]
     return FrankaHardware(process, settings, lines)
+
+
+def reached(
+    settings: FrankaSettings, chosen: Array
+) -> tuple[ClientProcess, dict[str, Any]]:
+    """Return a connection to an arm that is ready, and what it said (`client`).
+
+    Args:
+        settings: What is set there.
+        chosen: Postures at which the robot's model is asked, shape (n, 7).
+
+    Raises:
+        HardwareError: If the arm cannot be reached, or is not ready.
+    """
+    process = ClientProcess()
+    try:
+        found = process.asked(client.CONNECT + _wanted(settings, chosen), _TIMEOUT)
+        if found["mode"] != "Idle":
+            errors = f" ({about(found['errors'])})" if found["errors"] else ""
+            raise HardwareError(
+                f"the robot is in mode {found['mode']}{errors}; "
+                f"{MODES.get(found['mode'], 'it must be Idle')}"
+            )
+        _check_load(settings, found["load"])
+    except BaseException:
+        process.close()
+        raise
+    return process, found
+
+
+def _realtime(settings: FrankaSettings) -> str:
+    if settings.realtime == "enforce":
+        return "real-time kernel and priority enforced (kEnforce)"
+    try:
+        there = _KERNEL.read_text().strip() == "1"
+    except OSError:
+        there = False
+    kernel = "real-time" if there else "not real-time: packets may be late"
+    return f"real time not enforced (kIgnore); this kernel is {kernel}"
 
 
 def _check(robot: Robot, period: float) -> None:
@@ -76,7 +112,7 @@ def _check(robot: Robot, period: float) -> None:
         )
 
 
-def _wanted(settings: FrankaSettings, chosen: object) -> bytes:
+def _wanted(settings: FrankaSettings, chosen: Array) -> bytes:
     """Return what the client shall set, as JSON."""
     load = settings.load
     return json.dumps(
@@ -93,12 +129,12 @@ def _wanted(settings: FrankaSettings, chosen: object) -> bytes:
                 "center": np.asarray(load.center).tolist(),
                 "inertia": np.asarray(load.inertia).ravel().tolist(),
             },
-            "postures": np.asarray(chosen).tolist(),
+            "postures": chosen.tolist(),
         }
     ).encode()
 
 
-def _check_load(settings: FrankaSettings, found: dict[str, object]) -> None:
+def _check_load(settings: FrankaSettings, found: dict[str, Any]) -> None:
     """Check that the robot has the load that was sent.
 
     Raises:

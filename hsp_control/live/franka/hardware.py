@@ -113,21 +113,23 @@ class FrankaHardware:
     def close(self) -> None:
         """End the torque control with the last effort; see `Hardware.close`.
 
-        What the robot says then, if it does not answer, is added to `lines`.
+        A fault that shows only now, because the robot did not answer, is added to
+        `lines`.
         """
         if self._closed:
             return
         self._closed = True
+        process = self._process
         try:
-            if self._process.waiting:
-                self._process.receive(_LAST_WORDS)
-            if self._running and not self._process.waiting:
+            if process.waiting:
+                process.receive(_LAST_WORDS)
+            if self._running and not process.waiting and process.fault is None:
                 self._send(client.FINISH)
-                self._process.receive(_START)
+                process.receive(_START)
         except HardwareError as error:
-            self.lines.append(f"at the end: {error}")
+            self.lines.append(f"At the end: {error}")
         finally:
-            self._process.close()
+            process.close()
 
     def _send(self, kind: bytes) -> None:
         self._process.ask(client.REQUEST.pack(kind, *self._effort.tolist()))
