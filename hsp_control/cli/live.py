@@ -68,8 +68,7 @@ def live(options: argparse.Namespace) -> int:
             if isinstance(hardware, AdaptingHardware):
                 settings = hardware.adapted(experiment.scenario.live)
                 options_of_loop["settings"] = settings
-                told = len(hardware.lines)
-                out.print("\n".join(hardware.lines))
+                told = _tell(hardware)
             report = run_loop(
                 command,
                 hardware,
@@ -82,7 +81,7 @@ def live(options: argparse.Namespace) -> int:
             out.print(_times(report, experiment))
             out.print(f"The loop: {report.reason}")
             if isinstance(hardware, AdaptingHardware):
-                out.print("\n".join(hardware.lines[told:]))
+                _tell(hardware, told)
             _convert(loop_log)
             return 0 if report.ended in {"completed", "operator"} else 2
         with RobotProcess(
@@ -112,6 +111,13 @@ def live(options: argparse.Namespace) -> int:
     if not regular:
         print(f"hsp: {report.reason}", file=sys.stderr)
     return 0 if regular and robot_report is not None else 2
+
+
+def _tell(hardware: AdaptingHardware, told: int = 0) -> int:
+    """Print what a robot has to say beyond what was told; return how much it was."""
+    for line in hardware.lines[told:]:
+        out.print(line, highlight=False)
+    return len(hardware.lines)
 
 
 def _meta(experiment: Experiment) -> dict[str, Any]:

@@ -49,7 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ) and signal.getsignal(signal.SIGINT) is end_quietly:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         with compiling_shown(consoles.errors):
-            return int(getattr(commands, options.command.replace("-", "_"))(options))
+            command = options.command.replace("-", "_")
+            return int(getattr(commands, command)(options))
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
     except ArithmeticError:

@@ -108,7 +108,8 @@ class FrankaSettings(Part, error=LiveError):
         try:
             return cls(**data)
         except LiveError as error:
-            raise LiveError(f"franka://{text}: {error.bare_message}") from None
+            wrong = error.bare_message.removeprefix(f"{cls.__name__}: ")
+            raise LiveError(f"franka://{text}: {wrong}") from None
         except TypeError as error:  # a key that is no name
             raise LiveError(f"franka://{text}: {error}") from None
 
