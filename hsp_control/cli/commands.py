@@ -247,6 +247,13 @@ def live(options: argparse.Namespace) -> int:
     return lives.live(options)
 
 
+def franka_box(options: argparse.Namespace) -> int:
+    """Be a Franka's control box, without a robot."""
+    from hsp_control.cli import franka_box as boxes
+
+    return boxes.franka_box(options)
+
+
 def franka_model(options: argparse.Namespace) -> int:
     """Save a Franka arm's own model."""
     from hsp_control.cli import franka_model as models

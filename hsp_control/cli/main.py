@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from hsp_control.cli.franka_box_options import add_box_options
 from hsp_control.cli.startup import end_quietly, is_command
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.common.resources import bundled_configs, bundled_robots
@@ -176,6 +177,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_live(
         _command(commands, "live", "control a simulated robot in another process")
     )
+
+    box = _command(commands, "franka-box", "be a Franka's control box, without a robot")
+    _add_configuration(box, "the arm: a robot's name, or ", "panda")
+    add_box_options(box)
 
     _add_franka_model(
         _command(commands, "franka-model", "save a Franka arm's own model as a URDF")
@@ -413,9 +418,13 @@ def _add_franka_model(model: argparse.ArgumentParser) -> None:
     _complete(like, bundled_robots)
 
 
-def _add_configuration(parser: argparse.ArgumentParser, or_else: str = "") -> None:
+def _add_configuration(
+    parser: argparse.ArgumentParser, or_else: str = "", default: str | None = None
+) -> None:
     config = parser.add_argument(
         "config",
+        nargs=None if default is None else "?",
+        default=default,
         metavar="CONFIG",
         help=f"{or_else}a bundled name such as paper/4_moving_obstacle, a YAML file, "
         "or a log",
