@@ -64,11 +64,11 @@ def live(options: argparse.Namespace) -> int:
         )
         if options.robot is not None:
             hardware = connect(options.robot, experiment.robot, live_period(experiment))
-            told = 0
             if isinstance(hardware, AdaptingHardware):
                 settings = hardware.adapted(experiment.scenario.live)
                 options_of_loop["settings"] = settings
-                told = _tell(hardware)
+                for line in hardware.lines:
+                    out.print(line, highlight=False)
             report = run_loop(
                 command,
                 hardware,
@@ -80,10 +80,12 @@ def live(options: argparse.Namespace) -> int:
             )
             out.print(_times(report, experiment))
             out.print(f"The loop: {report.reason}")
-            if isinstance(hardware, AdaptingHardware):
-                _tell(hardware, told)
+            fault = getattr(hardware, "fault", None)
+            if fault is not None and fault not in report.reason:
+                out.print(f"The robot: {fault}", highlight=False)
             _convert(loop_log)
-            return 0 if report.ended in {"completed", "operator"} else 2
+            regular = report.ended in {"completed", "operator"} and fault is None
+            return 0 if regular else 2
         with RobotProcess(
             experiment, faults=faults, log=robot_log, log_period=simulation.log_period
         ) as robot:
@@ -111,13 +113,6 @@ def live(options: argparse.Namespace) -> int:
     if not regular:
         print(f"hsp: {report.reason}", file=sys.stderr)
     return 0 if regular and robot_report is not None else 2
-
-
-def _tell(hardware: AdaptingHardware, told: int = 0) -> int:
-    """Print what a robot has to say beyond what was told; return how much it was."""
-    for line in hardware.lines[told:]:
-        out.print(line, highlight=False)
-    return len(hardware.lines)
 
 
 def _meta(experiment: Experiment) -> dict[str, Any]:

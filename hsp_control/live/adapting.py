@@ -12,11 +12,16 @@ class AdaptingHardware(Hardware, Protocol):
     """`Hardware` that corrects the settings of its loop, and tells what it found.
 
     Attributes:
-        lines: What the user should know of the robot, one sentence each; `close` may
-            add some.
+        lines: What the user should know of the robot, one sentence each.
+        fault: Why the robot stopped by itself or was lost, once it is known; also if
+            that was after the loop's safe stop began, or only in `close`.
     """
 
     lines: Sequence[str]
+
+    @property
+    def fault(self) -> str | None:
+        """The fault, or None."""
 
     def adapted(self, settings: LiveSettings) -> LiveSettings:
         """Return the settings with what is fixed on this robot.

@@ -57,7 +57,7 @@ def connect(
         f"{found['load']['mass']:.3g} kg, {_realtime(settings)}",
         str(models)[0].upper() + str(models)[1:],
     ]
-    return FrankaHardware(process, settings, lines)
+    return FrankaHardware(robot, process, settings, lines)
 
 
 def reached(

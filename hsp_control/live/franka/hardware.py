@@ -1,20 +1,25 @@
 """A Franka arm under torque control, as the live loop sees it."""
 
+from collections.abc import Sequence
 from dataclasses import replace
-from math import pi
+from math import inf, pi
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.common.exceptions import HardwareError
 from hsp_control.live.franka import client
 from hsp_control.live.franka.client_process import ClientProcess
 from hsp_control.live.franka.settings import FrankaSettings
 from hsp_control.live.hardware import Measurement
 from hsp_control.live.settings import LiveSettings
+from hsp_control.robot import Robot
 
-EFFORT_RATE = 1000.0
-"""Greatest rate of what is sent that the arm accepts [N·m/s]."""
+EFFORT_RATE = 999.0
+"""Greatest rate of what is sent [N·m/s].
+
+The arm accepts 1000, counted from an effort that it tells in single precision: 100 N·m
+are told to 4e-6, which is 0.004 N·m/s."""
 _START = 5.0
 """Longest time that starting or ending the torque control takes [s]."""
 _LAST_WORDS = 1.5
@@ -36,38 +41,47 @@ class FrankaHardware:
     period = 0.001
 
     def __init__(
-        self, process: ClientProcess, settings: FrankaSettings, lines: list[str]
+        self,
+        robot: Robot,
+        process: ClientProcess,
+        settings: FrankaSettings,
+        lines: Sequence[str],
     ) -> None:
-        """Take over a process that is connected to the arm."""
-        self._process, self.lines = process, lines
+        """Take over a process that is connected to the arm.
+
+        Args:
+            robot: The controller's model.
+            process: The process.
+            settings: Those of the filter count here.
+            lines: What was found and set.
+        """
+        self._robot, self._process, self.lines = robot, process, lines
         self._reads, self._origin = 0, 0.0
         self._running = self._closed = False
         self._effort = np.zeros(7)
         self._sent_any = False
-        share = settings.cutoff_frequency
-        # The filter of libfranka's own control loop.
-        self._new_part = (
-            1.0
-            if share is None
-            else (self.period / (self.period + 1.0 / (2.0 * pi * share)))
-        )
+        self._applied = np.zeros(7)
+        cutoff = settings.cutoff_frequency or inf
+        # The filter of libfranka's own control loop (lowpass_filter.cpp).
+        self._new_part = self.period / (self.period + 1.0 / (2.0 * pi * cutoff))
 
     def adapted(self, settings: LiveSettings) -> LiveSettings:
         """Return settings with what is fixed on this arm.
 
-        It adds g(q) itself, and accepts 1000 N·m/s.
+        It adds g(q) itself, and accepts no higher rate than `EFFORT_RATE`.
 
         Raises:
-            LiveError: If `settings` allow efforts another rate than the arm.
+            LiveError: If there are neither one nor seven effort rates.
         """
-        rate = settings.effort_rate
-        if rate is None:
-            return replace(settings, compensates_gravity=True, effort_rate=EFFORT_RATE)
-        if np.max(np.array(rate, dtype=float)) > EFFORT_RATE:
-            raise LiveError(
-                f"effort_rate is {rate}; a Franka accepts {EFFORT_RATE:g} N·m/s"
-            )
-        return replace(settings, compensates_gravity=True)
+        rates = np.minimum(settings.rate_limits(self._robot), EFFORT_RATE)
+        return replace(
+            settings, compensates_gravity=True, effort_rate=rates.tolist()
+        )
+
+    @property
+    def fault(self) -> str | None:
+        """Why the arm stopped by itself or was lost, once it is known."""
+        return self._process.fault
 
     def read(self, timeout: float) -> Measurement | None:
         """Return the state that follows the last effort; see `Hardware.read`."""
@@ -83,7 +97,7 @@ class FrankaHardware:
             return None
         _, t, *numbers = client.STATE.unpack(answer)
         if not self._running:  # time stands still while the loop compiles
-            self._origin = t - self._reads * self.period
+            self._origin = t
         self._running = self._reads > 0
         self._reads += 1
         q, v, self._applied = np.array(numbers).reshape(3, 7)
@@ -113,8 +127,7 @@ class FrankaHardware:
     def close(self) -> None:
         """End the torque control with the last effort; see `Hardware.close`.
 
-        A fault that shows only now, because the robot did not answer, is added to
-        `lines`.
+        Its client may say only now why the arm did not answer: `fault`.
         """
         if self._closed:
             return
@@ -126,8 +139,8 @@ class FrankaHardware:
             if self._running and not process.waiting and process.fault is None:
                 self._send(client.FINISH)
                 process.receive(_START)
-        except HardwareError as error:
-            self.lines.append(f"At the end: {error}")
+        except HardwareError:
+            pass  # it is kept: `fault`
         finally:
             process.close()
 
