@@ -31,7 +31,7 @@ def main() -> None:
 
     with headless_browser() as browser:
         go(650)
-        pose = np.array(session.targets["hand"].where(session.controller.state))
+        pose = np.array(session.handles.targets["hand"].where(session.controller.state))
         for _ in range(40):
             pose[:3] += [0.001, 0.004, 0.001]
             session.take({"do": "move", "target": "hand", "pose": pose.tolist()})

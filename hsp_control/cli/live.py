@@ -4,8 +4,7 @@ import argparse
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from math import inf, nan
 from pathlib import Path
 from typing import Any
@@ -29,6 +28,7 @@ from hsp_control.live import (
 from hsp_control.live.adapting import AdaptingHardware
 from hsp_control.live.latency import Quantiles
 from hsp_control.live.settings import check_fixed
+from hsp_control.live.stop_signals import stop_signals
 from hsp_control.simulation import Rollout
 
 _DRY_RUN = 0.5
@@ -54,7 +54,7 @@ def live(options: argparse.Namespace) -> int:
         "log_period": simulation.log_period,
     }
     command = Command(experiment.controller, experiment.compensation)
-    with _stop_signals(requests):
+    with stop_signals(requests, takes_over=True):
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
         run_loop(
             command,
@@ -121,28 +121,6 @@ def _meta(experiment: Experiment) -> dict[str, Any]:
         "title": experiment.scenario.title,
         "config": experiment.config,
     }
-
-
-@contextmanager
-def _stop_signals(requests: OperatorRequests) -> Iterator[None]:
-    """Make Ctrl-C and termination signals request the operator's stop.
-
-    A second signal raises `KeyboardInterrupt`: the loop ends at once, and the robot's
-    watchdog stops the robot.
-    """
-    kinds = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
-    def stop(number: int, frame: object) -> None:
-        requests.stop(f"stopped by the operator ({signal.Signals(number).name})")
-        for kind in kinds:
-            signal.signal(kind, signal.default_int_handler)
-
-    before = {kind: signal.signal(kind, stop) for kind in kinds}
-    try:
-        yield
-    finally:
-        for kind, handler in before.items():
-            signal.signal(kind, handler)
 
 
 def _parse_kill(text: str | None) -> tuple[str, float] | None:
@@ -230,7 +208,8 @@ def _print_ends(report: LoopReport, robot_report: dict[str, Any] | None) -> None
         f"{deadlines.without_state} without a new state, {deadlines.skipped_states} "
         "states skipped"
     )
-    end = "fell silent" if report.silent else "held the robot"
+    held = "held the robot" if report.at_rest else "could not bring the robot to rest"
+    end = "fell silent" if report.silent else held
     out.print(
         f"The loop: {report.reason}, at t = {report.t:.3f} s; {end}, the fastest "
         f"joint at {report.speed:.2g}"

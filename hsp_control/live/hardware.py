@@ -16,8 +16,9 @@ class Measurement(NamedTuple):
         v: Velocity, shape (nv,).
         age: State age, as far as the hardware knows it [s].
         halted: Whether the robot has stopped by itself and ignores efforts.
-        applied: Effort the robot had when it measured, shape (nv,), where hardware
-            knows it; None: what was last sent counts.
+        applied: Effort the robot had when it measured, in the terms of
+            `Hardware.write` (libfranka's ``tau_J_d``), shape (nv,), where the hardware
+            knows it; None: what was sent last counts.
     """
 
     sequence: int
@@ -36,6 +37,10 @@ class Hardware(Protocol):
     The loop calls `read` once, and then compiles kernels for some seconds. From the
     second `read` on, it calls `read` and `write` once a period, and `close` at the end.
     If it has no valid state any more, it calls `close` without further writes.
+
+    Once the first effort is out, whatever the methods raise ends in the report. What
+    `read` raises means that no state can arrive any more: the loop sends nothing more.
+    After what `write` raises it goes on trying, with the safe stop.
 
     Attributes:
         period: Time between two measurements [s].

@@ -100,7 +100,8 @@ class Picture:
         dark = self._viewer.dark
         layers = all_layers(robot, motion, None, dark=dark)
         del layers["paths"]
-        if set(self._session.targets) >= {t.name for t in controller.tasks if t.drawn}:
+        drawn = {task.name for task in controller.tasks if task.drawn}
+        if set(self._session.handles.targets) >= drawn:
             del layers["targets"]  # the handles are there
         obstacles = layers["obstacles"]
         assert isinstance(obstacles, ObstacleLayer)
@@ -124,7 +125,7 @@ class Picture:
 
     def frame(self, *, running: bool, rate: float) -> list[Command]:
         """Return the commands of a picture; see `draw`."""
-        session, state = self._session, self._session.controller.state
+        session, handles = self._session, self._session.handles
         changed = list(self._changed_field())
         tracks = [
             {
@@ -134,19 +135,18 @@ class Picture:
             }
             for track in self._run.tracks(self._motion())
         ]
-        poses = {name: grip.where(state) for name, grip in session.targets.items()}
-        places = {name: grip.where(state) for name, grip in session.obstacles.items()}
-        text = session.over or session.message
+        poses, places = handles.places()
+        text = session.over or handles.message
         return [
             *changed,
             play_command("pose", "pose", tracks=tracks),
             play_command("play_targets", "targets", poses=poses, obstacles=places),
             play_command(
                 "play_state", "state", t=session.t, running=running, rate=rate,
-                message=text, level="warning" if session.warning or session.over
+                message=text, level="warning" if handles.warning or session.over
                 else "info",
             ),
-            play_command("play_values", "values", values=session.values),
+            play_command("play_values", "values", values=handles.values),
             self._force(),
             *self._samples(),
         ]  # fmt: skip
@@ -174,7 +174,7 @@ class Picture:
         session, state = self._session, self._session.controller.state
         obstacles = [
             {**grip.describe(state), "path": f"/obstacles/{path_element(name)}"}
-            for name, grip in session.obstacles.items()
+            for name, grip in session.handles.obstacles.items()
         ]
         plots = []
         for k, plot in enumerate(self._plots):
@@ -195,9 +195,9 @@ class Picture:
             "play_setup",
             "setup",
             title=title,
-            targets=[grip.describe(state) for grip in session.targets.values()],
+            targets=[grip.describe(state) for grip in session.handles.targets.values()],
             obstacles=obstacles,
-            controls=[knob.describe() for knob in session.knobs.values()],
+            controls=[knob.describe() for knob in session.handles.knobs.values()],
             plots=plots,
             pull=session.pushes is not None,
             period_ms=1e3 * session.period,

@@ -54,7 +54,7 @@ def play(
                     picture.begin()
                     due = monotonic()
                 case {"do": "save"}:
-                    session.message, session.warning = save(), False
+                    session.handles.say(save())
                     due = monotonic()
                 case _:
                     session.take(message)

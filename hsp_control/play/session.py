@@ -14,10 +14,9 @@ from hsp_control.config import Experiment
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
 from hsp_control.live.simulated_robot import sampled
-from hsp_control.play.grips import Grip, obstacles_of, targets_of
-from hsp_control.play.knobs import RAMP, Knob, knobs_of
+from hsp_control.play.handles import Handles
+from hsp_control.play.knobs import Knob
 from hsp_control.play.operational_space import ComparedCommand
-from hsp_control.play.posture_grip import posture_of
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.loops import Instant, sampled_loop
@@ -32,8 +31,6 @@ LONGEST = 1200.0
 """Longest time that is recorded [s]."""
 LARGEST_LOG = 3e8
 """Largest log [bytes]."""
-KNOB_PERIOD = 0.1
-"""Time between two changes by one knob [s]: a slider says much more."""
 PULL = 300.0
 """Stiffness of the spring of somebody who pulls at a link [N/m]."""
 LARGEST_PULL = 100.0
@@ -57,8 +54,7 @@ class Session:
         period: The control period [s].
         row: Time between two rows [s].
         recorder: The rows so far.
-        message: What there is to say.
-        warning: Whether that is a warning.
+        handles: What can be touched, but for the links.
         over: Why it goes on no more, until it is reset; empty: it does.
     """
 
@@ -101,37 +97,19 @@ class Session:
             experiment.q0, experiment.v0,
         )  # fmt: skip
         self.recorder = Recorder(self.controller, self.controller.scene, rows)
-        self.message, self.warning, self.over = "", False, ""
-        self._turned: dict[str, float] = {}
-        self._wanted: dict[str, float | bool] = {}
-        self.advance()
-        self.targets: dict[str, Grip] = {
-            **targets_of(self.controller),
-            **posture_of(self.controller),
-        }
-        self.obstacles = obstacles_of(self.controller)
-        self.knobs = knobs_of(self.controller, self.period)
+        self.over = ""
+        self._step()
+        self.handles = Handles(self.controller, self.period)
         law = Knob(
             "operational", "Null space", "operational-space law instead", "", False,
             0.0, 1.0, self._compare,
         )  # fmt: skip
         if self.controller.field.controls:
-            self.knobs[law.id] = law
-        self.values: dict[str, float | bool] = {
-            name: knob.value for name, knob in self.knobs.items()
-        }
+            self.handles.add(law)
 
     def rehearse(self) -> None:
         """Do everything once, and begin anew: no kernel is compiled in the play."""
-        state = self.controller.state
-        for name, grip in self.targets.items():
-            self.take({"do": "move", "target": name, "pose": grip.where(state)})
-        for name, obstacle in self.obstacles.items():
-            where = obstacle.where(state)
-            self.take({"do": "obstacle", "name": name, "position": where})
-        for name, value in self.values.items():
-            off = not value if isinstance(value, bool) else value
-            self.take({"do": "set", "id": name, "value": off})
+        self.handles.rehearse()
         for _ in range(_REHEARSED):
             self.advance()
         self.reset()
@@ -143,8 +121,11 @@ class Session:
 
     def advance(self) -> None:
         """Go on to the next row; what goes wrong ends the run, and not the session."""
-        if self.over:
-            return
+        if not self.over:
+            self._step()
+            self.handles.turn_knobs()
+
+    def _step(self) -> None:
         try:
             instant = next(self._loop, None)
             if instant is None:
@@ -153,7 +134,6 @@ class Session:
             state, output, tau, own = instant
             others = self._plant.log_channels(state.t, state.q, state.v, tau)
             self.recorder.record(state, output, tau, {**own, **others})
-            self._turn_knobs()
         except HspControlError as error:
             self.over = f"{error}; reset to go on"
             _log.warning("%s", error)
@@ -161,55 +141,18 @@ class Session:
     # -- messages ---------------------------------------------------------------------
 
     def take(self, message: Mapping[str, Any]) -> None:
-        """Do what a page says; what is wrong is answered in `message`.
-
-        ``move`` and ``resume`` a target, move an ``obstacle``, ``pull`` at a link and
-        ``let_go``, ``set`` a knob. Other messages are not the session's.
-        """
+        """Do what a page says: ``pull`` at a link and ``let_go``, or see `Handles`."""
         try:
             match message:
-                case {"do": "move", "target": str(name), "pose": list(pose)}:
-                    self._grip(self.targets, name).move(pose, self.t)
-                case {"do": "resume", "target": str(name)}:
-                    self._grip(self.targets, name).resume(self.t)
-                case {"do": "obstacle", "name": str(name), "position": list(where)}:
-                    self._grip(self.obstacles, name).move(where, self.t)
                 case {"do": "pull", "path": str(path), "point": list(point),
                       "to": list(hand)}:  # fmt: skip
                     self._pull(path, _vector(point), _vector(hand))
                 case {"do": "let_go" | "left"}:
                     self.let_go()
-                case {"do": "set", "id": str(name), "value": value}:
-                    self._wanted[name] = self._knob(name).checked(value)
-                case {"do": "release", "target": str()}:
-                    pass  # it stays where it is
                 case _:
-                    raise ValueError(f"cannot do {str(dict(message))[:200]}")
-        except (HspControlError, ValueError, TypeError, OverflowError) as error:
-            self.message, self.warning = str(error), True
-
-    def _grip(self, among: Mapping[str, Grip], name: str) -> Grip:
-        if name not in among:
-            raise ValueError(f"there is no {name!r} to drag")
-        return among[name]
-
-    def _knob(self, name: str) -> Knob:
-        if name not in self.knobs:
-            raise ValueError(f"there is no knob {name!r}")
-        return self.knobs[name]
-
-    def _turn_knobs(self) -> None:
-        """Make the changes that knobs ask for; each knob's not too often."""
-        for name in list(self._wanted):
-            if self.t - self._turned.get(name, -np.inf) < KNOB_PERIOD:
-                continue
-            value, self._turned[name] = self._wanted.pop(name), self.t
-            try:
-                self.knobs[name].turn(self.controller.at(self.t).ramp(RAMP), value)
-                self.values[name] = value
-                self.message, self.warning = "", False
-            except HspControlError as error:
-                self.message, self.warning = str(error), True
+                    self.handles.take(message)
+        except (ValueError, TypeError, OverflowError) as error:
+            self.handles.say(str(error), warning=True)
 
     def _compare(self, _at: Changes, operational: bool) -> None:
         """Follow another law; it is no part of the controller, nor of its log."""

@@ -37,7 +37,7 @@ def go(session: Session, seconds: float) -> None:
 
 
 def pose_of(session: Session, name: str = "hand") -> Array:
-    return np.array(session.targets[name].where(session.controller.state))
+    return np.array(session.handles.targets[name].where(session.controller.state))
 
 
 def test_what_is_dragged_is_reached_and_the_log_repeats_it(
@@ -57,12 +57,12 @@ def test_what_is_dragged_is_reached_and_the_log_repeats_it(
     session.take({"do": "set", "id": "weight.target_posture", "value": 3.0})
     session.take({"do": "set", "id": "frequency.hand", "value": 15.0})
     go(session, 1.5)
-    assert not session.message
+    assert not session.handles.message
     frame = session.controller.state.frame("panda_tcp")
     np.testing.assert_allclose(frame.position, wanted[:3], atol=1e-4)
     ball = session.controller.scene["ball"].placement(session.t).translation
     np.testing.assert_allclose(ball, [0.1, 0.3, 0.605], atol=1e-9)
-    assert session.values["frequency.hand"] == 15.0
+    assert session.handles.values["frequency.hand"] == 15.0
     log = session.rollout()
     # The error of the law is that of a held effort, however the hand was dragged.
     assert np.abs(log["task.hand.error"][log.t > 0.5]).max() < 1e-3
@@ -82,7 +82,7 @@ def test_its_own_path_comes_back(session: Session) -> None:
     go(session, 0.5)
     assert abs(pose_of(session)[2] - pose[2]) < 1e-3
     session.take({"do": "resume", "target": "hand"})
-    session.obstacles["ball"].resume(session.t)
+    session.handles.obstacles["ball"].resume(session.t)
     go(session, 1.0)
     go(untouched, 2.0)
     np.testing.assert_allclose(pose_of(session), pose_of(untouched), atol=1e-9)
@@ -158,8 +158,8 @@ def test_nonsense_is_answered_and_moves_nothing(
     session: Session, message: dict[str, Any]
 ) -> None:
     session.take(message)
-    assert session.message
-    assert session.warning
+    assert session.handles.message
+    assert session.handles.warning
     assert not session.controller.changes
     assert session.pull() is None
     go(session, 0.05)
@@ -168,7 +168,7 @@ def test_nonsense_is_answered_and_moves_nothing(
 def test_a_knob_goes_no_further_than_the_period_bears(session: Session) -> None:
     session.take({"do": "set", "id": "frequency.hand", "value": 1e9})
     go(session, 0.5)
-    assert session.values["frequency.hand"] == pytest.approx(100.0)  # ten times
+    assert session.handles.values["frequency.hand"] == pytest.approx(100.0)  # ten times
     assert np.abs(session.rollout().v).max() < 5.0
 
 
@@ -177,7 +177,7 @@ def test_a_slider_that_is_dragged_makes_few_changes(session: Session) -> None:
         session.take({"do": "set", "id": "null_space_gain", "value": 10.0 + 0.1 * k})
         session.advance()
     go(session, 0.2)
-    assert session.values["null_space_gain"] == pytest.approx(19.9)
+    assert session.handles.values["null_space_gain"] == pytest.approx(19.9)
     assert len(session.controller.changes) <= 12
 
 
@@ -245,7 +245,7 @@ def test_it_begins_anew(session: Session) -> None:
     session.take({"do": "obstacle", "name": "ball", "position": [0.4, 0.4, 0.4]})
     go(session, 0.3)
     session.reset()
-    assert session.values["null_space_gain"] == 10.0
+    assert session.handles.values["null_space_gain"] == 10.0
     assert not session.controller.changes
     go(session, 0.3)
     np.testing.assert_array_equal(session.rollout().q, first)
@@ -294,7 +294,7 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     assert [each["title"] for each in setup["plots"]] == [
         "Task error", "Task error", "Null-space error", "Smallest distance", "Effort",
     ]  # fmt: skip
-    assert {each["id"] for each in setup["controls"]} == set(session.knobs)
+    assert {each["id"] for each in setup["controls"]} == set(session.handles.knobs)
     session.take({"do": "obstacle", "name": "ball", "position": [0.2, 0.4, 0.5]})
     go(session, 1.5)
     picture.draw(running=True, rate=1.0)
@@ -355,8 +355,8 @@ def test_any_fixed_robot_is_a_playground() -> None:
     assert experiment.controller.null_space_gain[0, 0] == 4.0
     assert experiment.scenario.simulation.control_period == 0.001
     session = Session(experiment)
-    assert list(session.targets) == ["hand", "posture"]
-    assert list(session.obstacles) == ["ball"]
+    assert list(session.handles.targets) == ["hand", "posture"]
+    assert list(session.handles.obstacles) == ["ball"]
 
 
 def test_a_configuration_without_a_period_gets_one() -> None:

@@ -26,7 +26,7 @@ from hsp_control.live import Faults, LiveSettings, Phase, run_loop
 
 pytestmark = pytest.mark.process
 
-PATIENT = {"missing": 1000, "age": 5.0, "watchdog": 1000}
+PATIENT = {"missing": 1000, "age": 5.0, "watchdog": 1000, "velocity_margin": 2.0}
 """For a machine on which other tests run: what is shown here is not punctuality."""
 CONFIG: dict[str, Any] = {
     "robot": {"name": "panda"},
