@@ -14,6 +14,7 @@ from rich.table import Table
 from hsp_control.cli.consoles import out
 from hsp_control.cli.live_experiment import live_period, simulated_robot
 from hsp_control.cli.robot_process import RobotProcess
+from hsp_control.cli.robot_start import begun_where_it_is, closed_after_errors
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.control.compensation import Command
@@ -65,8 +66,13 @@ def live(options: argparse.Namespace) -> int:
         if options.robot is not None:
             hardware = connect(options.robot, experiment.robot, live_period(experiment))
             if isinstance(hardware, AdaptingHardware):
-                settings = hardware.adapted(experiment.scenario.live)
-                options_of_loop["settings"] = settings
+                with closed_after_errors(hardware):
+                    options_of_loop["settings"] = hardware.adapted(
+                        experiment.scenario.live
+                    )
+                    experiment = begun_where_it_is(experiment, options, hardware.q)
+                command = Command(experiment.controller, experiment.compensation)
+                options_of_loop["scene"] = experiment.scene
                 for line in hardware.lines:
                     out.print(line, highlight=False)
             report = run_loop(

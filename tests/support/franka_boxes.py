@@ -17,17 +17,20 @@ from hsp_control.live import LiveSettings, Measurement
 from hsp_control.live.franka import FrankaHardware, connect
 from hsp_control.live.simulated_robot import sampled
 
+
 class Patiently:
     """An arm whose next state is waited for: the loop is in lockstep, too.
 
     Attributes:
         period: Time between two states [s].
         arm: The arm.
+        q: Configuration when it was connected, shape (7,) [rad].
         lines: What was found and set.
     """
 
     def __init__(self, arm: FrankaHardware) -> None:
-        self.arm, self.period, self.lines = arm, arm.period, arm.lines
+        self.arm, self.period = arm, arm.period
+        self.q, self.lines = arm.q, arm.lines
 
     @property
     def fault(self) -> str | None:

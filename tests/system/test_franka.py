@@ -203,7 +203,8 @@ def test_the_load_is_in_both_models(tmp_path: Path) -> None:
         text = f"{box.address}&load.mass=0.8&load.center=[0.02, 0, 0.15]"
         assert main(["franka-model", text, urdf, "--like", "panda"]) == 0
         box.wait_alone()
-        known = circle(robot={"name": urdf})
+        start = {"configuration": experiment.q0.tolist()}
+        known = circle(robot={"name": urdf}, start=start)
         arm = connect(settings, known.robot, PERIOD)
         log = tmp_path / "loaded.journal"
         report = moved(arm, known, log=log)
@@ -234,11 +235,20 @@ def test_the_command_line_drives_the_arm(
     with serving(experiment) as box:
         assert main([*options, f"franka://{box.address}", "--duration", "0.15"]) == 0
         told = capsys.readouterr().out
+        run = Rollout.load(tmp_path / "circle-live.npz")
+        assert np.abs(run["task.hand.error"][run.t < 0.1]).max() < 1e-3
         assert "end effector 0.76 kg (Desk)" in told
         assert "differs from the robot's by" in told
         assert "The loop: the duration is over" in told
         box.wait_alone()
         assert main([*options, f"franka://{box.address}", "--duration", "1"]) == 2
         assert "_reflex: " in capsys.readouterr().out
+        box.wait_alone()
+        away = ["--set", "start={joints: {panda_joint2: -0.3}}"]
+        recover = f"franka://{box.address}&recover=true"
+        assert main([*options, recover, *away]) == 2
+        told = capsys.readouterr().err
+        assert "panda_joint2 is 0.4" in told
+        assert "begin where it is" in told
     assert main([*options, "franka://a?realtme=ignore"]) == 2
     assert "did you mean 'realtime'" in capsys.readouterr().err

@@ -37,9 +37,7 @@ def connect(
         HardwareError: If the arm cannot be reached, is not ready or is not the arm of
             the model.
     """
-    settings = (
-        FrankaSettings.parse(address) if isinstance(address, str) else address
-    )
+    settings = FrankaSettings.parse(address) if isinstance(address, str) else address
     _check(robot, period)
     chosen = postures(robot)
     process, found = reached(settings, chosen)
@@ -57,7 +55,7 @@ def connect(
         f"{found['load']['mass']:.3g} kg, {_realtime(settings)}",
         str(models)[0].upper() + str(models)[1:],
     ]
-    return FrankaHardware(robot, process, settings, lines)
+    return FrankaHardware(robot, process, settings, q[0], lines)
 
 
 def reached(

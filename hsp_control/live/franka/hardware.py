@@ -35,6 +35,7 @@ class FrankaHardware:
 
     Attributes:
         period: Time between two states [s].
+        q: Configuration when it was connected, shape (7,) [rad].
         lines: What was found and set when connecting, one sentence each.
     """
 
@@ -45,6 +46,7 @@ class FrankaHardware:
         robot: Robot,
         process: ClientProcess,
         settings: FrankaSettings,
+        q: Array,
         lines: Sequence[str],
     ) -> None:
         """Take over a process that is connected to the arm.
@@ -53,9 +55,11 @@ class FrankaHardware:
             robot: The controller's model.
             process: The process.
             settings: Those of the filter count here.
+            q: Its configuration, shape (7,) [rad].
             lines: What was found and set.
         """
-        self._robot, self._process, self.lines = robot, process, lines
+        self._robot, self._process = robot, process
+        self.q, self.lines = q, lines
         self._reads, self._origin = 0, 0.0
         self._running = self._closed = False
         self._effort = np.zeros(7)
@@ -74,9 +78,7 @@ class FrankaHardware:
             LiveError: If there are neither one nor seven effort rates.
         """
         rates = np.minimum(settings.rate_limits(self._robot), EFFORT_RATE)
-        return replace(
-            settings, compensates_gravity=True, effort_rate=rates.tolist()
-        )
+        return replace(settings, compensates_gravity=True, effort_rate=rates.tolist())
 
     @property
     def fault(self) -> str | None:

@@ -74,7 +74,9 @@ def postures(robot: Robot) -> Array:
     return np.asarray(lower + share * (upper - lower))
 
 
-def difference(robot: Robot, q: Array, masses: Array, gravities: Array) -> ModelDifference:
+def difference(
+    robot: Robot, q: Array, masses: Array, gravities: Array
+) -> ModelDifference:
     """Compare the controller's model with M and g of the robot.
 
     Args:

@@ -160,7 +160,9 @@ def about(names: list[str]) -> str:
     """Return errors by name, each with its meaning and advice."""
     told = []
     for name in names:
-        what, advice = REFLEXES.get(name, ("an error that hsp_control does not know", ""))
+        what, advice = REFLEXES.get(
+            name, ("an error that hsp_control does not know", "")
+        )
         told.append(f"{name}: {what}" + (f" ({advice})" if advice else ""))
     return listing(told, 3) if told else "no error is named"
 

@@ -104,7 +104,9 @@ def test_a_forgotten_load_is_refused() -> None:
     light = own.copy()
     light.inertias[7] += pin.Inertia(0.7, np.array([0.0, 0.0, 0.2]), np.zeros((3, 3)))
     found = difference(robot, q, *masses_and_gravities(light, q))
-    with pytest.raises(HardwareError, match=r"differs .* N·m in g\(q\).*carries 0.7 kg"):
+    with pytest.raises(
+        HardwareError, match=r"differs .* N·m in g\(q\).*carries 0.7 kg"
+    ):
         found.check(0.7)
 
 

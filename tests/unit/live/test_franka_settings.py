@@ -71,7 +71,12 @@ def test_an_exception_is_told_with_its_names() -> None:
         "control_command_success_rate: 0.97 packets lost in a row in the last sample: 2"
     )
     told = explained("ControlException", text)
-    for part in ("joint_reflex: ", "collision_torque", "power_limit_violation: ", "0.97"):
+    for part in (
+        "joint_reflex: ",
+        "collision_torque",
+        "power_limit_violation: ",
+        "0.97",
+    ):
         assert part in told
     stopped = "libfranka: Move command aborted: User Stop pressed!"
     assert "stop button was pressed" in explained("ControlException", stopped)
