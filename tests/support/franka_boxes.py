@@ -63,7 +63,7 @@ def host(number: int = 0) -> str:
 
 
 def circle(**changes: Any) -> Experiment:
-    """Return a Panda whose hand draws a circle while a posture field moves its elbow."""
+    """Return a Panda that draws a circle while a posture field moves its elbow."""
     document: dict[str, Any] = {
         "robot": {"name": "panda"},
         "tasks": {

@@ -38,7 +38,7 @@ class ClientProcess:
         if importlib.util.find_spec("pylibfranka") is None:
             raise HardwareError(f"a Franka arm needs pylibfranka: {INSTALL}")
         self._link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._errors = tempfile.TemporaryFile()
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with it)
         self._process = subprocess.Popen(
             [sys.executable, "-P", client.__file__, str(theirs.fileno())],
             stdin=subprocess.DEVNULL,

@@ -43,8 +43,8 @@ class ModelDifference:
 
     def __str__(self) -> str:
         return (
-            f"the controller's model differs from the robot's by {self.gravity:.2g} N·m "
-            f"in g(q) ({self.joint}), and M(q) changes natural frequencies by factors "
+            f"the controller's model differs from the robot's by {self.gravity:.2g} "
+            f"N·m in g(q) ({self.joint}), and M(q) changes natural frequencies by factors "
             f"from {self.slowest:.2g} to {self.fastest:.2g}"
         )
 

@@ -16,7 +16,7 @@ _DESK = (
 REFLEXES: dict[str, tuple[str, str]] = {
     "joint_position_limits_violation": (
         "a joint is at the end of its range",
-        "guide it back by hand; keep limits: on, with a start farther away from the end",
+        "guide it back by hand; keep limits on, and start farther from the end",
     ),
     "cartesian_position_limits_violation": (
         "the hand left the space that Desk allows",
@@ -28,7 +28,7 @@ REFLEXES: dict[str, tuple[str, str]] = {
     ),
     "joint_velocity_violation": (
         "a joint was too fast",
-        "keep limits: on; slow the task down, or lower natural_frequency and gain",
+        "keep limits on; slow the task down, or lower natural_frequency and gain",
     ),
     "cartesian_velocity_violation": (
         "the hand was too fast",
@@ -114,7 +114,7 @@ _CAUSES: dict[str, str] = {
     "refused": "switch FCI on in Desk (menu Activate FCI), and unlock the joints",
     "timeout": "the cable, the address, or the control box is off; or it stopped "
     "sending",
-    "realtime capabilities": "boot a PREEMPT_RT kernel, or ?realtime=ignore for a trial",
+    "realtime capabilities": "boot a PREEMPT_RT kernel; ?realtime=ignore for a trial",
     "realtime scheduling": "allow it: rtprio 99 in /etc/security/limits.conf "
     "(docs/franka.md), or ?realtime=ignore for a trial",
     "thread priority": "allow it: rtprio 99 in /etc/security/limits.conf "
@@ -160,9 +160,7 @@ def about(names: list[str]) -> str:
     """Return errors by name, each with its meaning and advice."""
     told = []
     for name in names:
-        what, advice = REFLEXES.get(
-            name, ("an error that hsp_control does not know", "")
-        )
+        what, advice = REFLEXES.get(name, ("an error without explanation here", ""))
         told.append(f"{name}: {what}" + (f" ({advice})" if advice else ""))
     return listing(told, 3) if told else "no error is named"
 
@@ -171,8 +169,8 @@ def table() -> str:
     """Return the errors as a Markdown table, for the manual."""
     lines = ["| the robot says | what happened | what to do |", "|---|---|---|"]
     rows: dict[tuple[str, str], list[str]] = {}
-    for name, what in REFLEXES.items():
-        rows.setdefault(what, []).append(f"`{name}`")
+    for name, about_it in REFLEXES.items():
+        rows.setdefault(about_it, []).append(f"`{name}`")
     for (what, advice), names in rows.items():
         lines.append(f"| {', '.join(names)} | {what} | {advice} |")
     return "\n".join(lines)

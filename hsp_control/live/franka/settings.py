@@ -97,7 +97,7 @@ class FrankaSettings(Part, error=LiveError):
             LiveError: If a name or a value is wrong, or the file cannot be read.
         """
         where, _, query = text.partition("?")
-        data = {"address": where}
+        data: dict[str, Any] = {"address": where}
         if where.endswith((".yaml", ".yml")):
             data = _read(Path(where))
         for part in filter(None, query.split("&")):

@@ -33,7 +33,7 @@ def arm_alone() -> str:
     top = ElementTree.parse(Robot.load("panda").source.urdf).getroot()
     for each in list(top):
         name = each.get("name", "")
-        if not name.removeprefix("panda_")[:-1] in {"link", "joint"}:
+        if name.removeprefix("panda_")[:-1] not in {"link", "joint"}:
             top.remove(each)
             continue
         each.set("name", name.removeprefix("panda_"))
