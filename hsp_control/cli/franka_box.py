@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 
+from hsp_control.cli.franka_box_log import BoxLog
 from hsp_control.common.exceptions import LiveError
 from hsp_control.common.resources import bundled_configs, bundled_robots
 from hsp_control.config import Experiment, load_experiment
@@ -35,6 +36,7 @@ def franka_box(options: argparse.Namespace) -> int:
     box = _box(experiment, terminal.say)
     terminal.box = box
     with (
+        BoxLog(options.log, experiment, box) if options.log else nullcontext() as log,
         _ended_by_signals() as running,
         _priority(options.priority),
         Server(
@@ -60,6 +62,8 @@ def franka_box(options: argparse.Namespace) -> int:
 
         server.serve(on_period)
     terminal.end()
+    if log is not None:
+        print(f"Log: {log.path}")
     return 0
 
 

@@ -1,6 +1,7 @@
 """The options of ``hsp franka-box``, apart: a help text has to come at once."""
 
 import argparse
+from pathlib import Path
 
 
 def add_box_options(box: argparse.ArgumentParser) -> None:
@@ -36,6 +37,12 @@ def add_box_options(box: argparse.ArgumentParser) -> None:
         default=0.5,
         metavar="S",
         help="after which a command is lost in lockstep [s]; default: 0.5",
+    )
+    box.add_argument(
+        "--log",
+        type=Path,
+        metavar="FILE",
+        help="write the true motion as a log for hsp plot and hsp view (.npz)",
     )
     box.add_argument(
         "--cut",

@@ -156,11 +156,11 @@ def _limits_of(robot: Robot) -> ArmLimits:
         joint.get("name"): joint.find("position_based_velocity_limits")
         for joint in read_urdf(robot.source.urdf).iter("joint")
     }
-    for index, name in enumerate(robot.joint_names):
+    for at, name in enumerate(robot.joint_names):
         element = elements.get(name)
         if element is not None:
-            offset[index] = float(element.get("velocity_offset", "0"))
-            deceleration[index] = float(element.get("deceleration_limit", "inf"))
+            offset[at] = float(element.get("velocity_offset", "0"))
+            deceleration[at] = float(element.get("deceleration_limit", "inf"))
     return ArmLimits(**limits, velocity_offset=offset, deceleration=deceleration)
 
 

@@ -61,6 +61,7 @@ class Box:
         tau: Effort of the motors in the last period, shape (7,) [N·m].
         periods: Number of periods that were simulated.
         at_rest: Whether the arm stands still, held by the box.
+        on_period: Called at the end of each period, for logs.
     """
 
     def __init__(self, arm: Arm, plant: SampledPlant, q: Array, say: Say) -> None:
@@ -83,6 +84,7 @@ class Box:
         self.stiffness: Array = reference.STIFFNESS.copy()
         self.outbox: list[bytes] = []
         self.periods, self.at_rest = 0, True
+        self.on_period: Callable[[], object] = lambda: None
         self._id, self._braked_for, self._recovery = 0, 0, -1
         self.q, self.v = q.copy(), np.zeros(JOINTS)
         plant.reset(0.0, self.q, self.v)
@@ -199,6 +201,7 @@ class Box:
                 self._reflex(violations)
         else:
             self._come_to_rest()
+        self.on_period()
 
     def settle(self) -> None:
         """Simulate until the arm is at rest, and a recovery has ended."""

@@ -93,8 +93,10 @@ class Model:
         square = J @ J.T
         if np.linalg.eigvalsh(square)[0] < _SINGULAR:
             return np.zeros(6), np.zeros(6)
-        wrench = np.linalg.solve(square, J @ self.external_effort)
-        turned = np.concatenate([K.rotation.T @ wrench[:3], K.rotation.T @ wrench[3:]])
+        wrench: Array = np.linalg.solve(square, J @ self.external_effort)
+        turned: Array = np.concatenate(
+            [K.rotation.T @ wrench[:3], K.rotation.T @ wrench[3:]]
+        )
         return wrench, turned
 
 

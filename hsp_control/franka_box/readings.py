@@ -52,8 +52,9 @@ class Readings:
         fields["O_ddP_O"][:] = arm.robot.model.gravity.linear
 
     def set_desired(self, model: Model, reference: Reference) -> None:
-        """Fill the desired motion."""
+        """Fill the desired motion, and where the end effector is."""
         fields = self.fields
+        fields["O_T_EE"][:] = _columns(model.O_T_EE)
         fields["q_d"][:], fields["dq_d"][:], fields["ddq_d"][:] = reference
         pose, twist = model.desired(reference.q, reference.dq)
         fields["O_T_EE_d"][:] = fields["O_T_EE_c"][:] = _columns(pose)
@@ -81,7 +82,6 @@ class Readings:
         fields["dtau_J"][:] = (tau_J - before) / PERIOD
         fields["tau_J"][:], self._tau_J = tau_J, tau_J
         fields["tau_J_d"][:] = tau_J_d
-        fields["O_T_EE"][:] = _columns(model.O_T_EE)
         fields["elbow"][:] = _elbow(state.q)
         wrench, turned = model.external_wrench()
         effort = model.external_effort

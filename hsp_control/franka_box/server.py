@@ -155,10 +155,10 @@ class Server:
                 if number:
                     sockets.append(client.udp)
             ready, _, _ = select(sockets, [], [], max(until - monotonic(), 0.0))
+            if client is not None and client.tcp in ready:
+                self._serve_requests(client)  # it may go, and another one come
             if self._listener in ready:
                 self._accept()
-            if client is not None and client.tcp in ready:
-                self._serve_requests(client)
             if client is not None and client.udp in ready:
                 limit = np.inf if self._lockstep else self._deadline
                 command = self._command(client, number, float(limit))

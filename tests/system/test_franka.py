@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from franka_boxes import Patiently, circle, host, serving
+from franka_arms import Patiently, circle, host, serving
 from places import ROOT
 
 from hsp_control import Robot, Rollout
@@ -230,7 +230,7 @@ def test_the_arm_has_seven_joints_and_a_millisecond() -> None:
 def test_the_command_line_drives_the_arm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    entry = EntryPoint("franka", "franka_boxes:connect_patiently", backends.GROUP)
+    entry = EntryPoint("franka", "franka_arms:connect_patiently", backends.GROUP)
     monkeypatch.setattr(backends, "entry_points", lambda group: [entry])
     later = PUSH | {"start": 0.9}
     experiment = circle(plant={"type": "rigid_body", "pushes": [later]})

@@ -44,8 +44,8 @@ class ModelDifference:
     def __str__(self) -> str:
         return (
             f"the controller's model differs from the robot's by {self.gravity:.2g} "
-            f"N·m in g(q) ({self.joint}), and M(q) changes natural frequencies by factors "
-            f"from {self.slowest:.2g} to {self.fastest:.2g}"
+            f"N·m in g(q) ({self.joint}), and M(q) changes natural frequencies by "
+            f"factors from {self.slowest:.2g} to {self.fastest:.2g}"
         )
 
     def check(self, total_mass: float) -> None:
