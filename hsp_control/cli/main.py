@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from hsp_control.cli.franka_box_options import add_box_options
+from hsp_control.cli.franka_model_options import add_model_options
 from hsp_control.cli.startup import end_quietly, is_command
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.common.resources import bundled_configs, bundled_robots
@@ -182,9 +183,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_configuration(box, "the arm: a robot's name, or ", "panda")
     add_box_options(box)
 
-    _add_franka_model(
-        _command(commands, "franka-model", "save a Franka arm's own model as a URDF")
-    )
+    model = _command(commands, "franka-model", "save a Franka arm's model as a URDF")
+    _complete(add_model_options(model), bundled_robots)
 
     robots = _command(
         commands, "robots", "list the robots that can be loaded, or describe one"
@@ -372,7 +372,8 @@ def _add_live(live: argparse.ArgumentParser) -> None:
     live.add_argument(
         "--robot",
         metavar="NAME://ADDRESS",
-        help="a robot that an installed package can reach; default: a simulated one",
+        help="franka://ADDRESS, or another robot that an installed package can reach; "
+        "default: a simulated one",
     )
     live.add_argument(
         "--duration",
@@ -401,21 +402,6 @@ def _add_live(live: argparse.ArgumentParser) -> None:
         metavar="LEVEL",
         help="real-time priority of the loop (SCHED_FIFO), 1 to 99",
     )
-
-
-def _add_franka_model(model: argparse.ArgumentParser) -> None:
-    model.add_argument(
-        "address",
-        metavar="ADDRESS",
-        help="of the control box, with settings as behind franka:// (docs/franka.md)",
-    )
-    model.add_argument("urdf", type=Path, metavar="FILE", help="the URDF to write")
-    like = model.add_argument(
-        "--like",
-        metavar="ROBOT",
-        help="keep this robot's names, frames and shapes, such as panda's",
-    )
-    _complete(like, bundled_robots)
 
 
 def _add_configuration(

@@ -1,4 +1,4 @@
-"""Franka arms for tests: behind a control box in lockstep, in a thread of this process."""
+"""Franka arms for tests: behind a control box in lockstep, in a thread."""
 
 import os
 import threading

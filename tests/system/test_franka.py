@@ -194,6 +194,16 @@ def test_nobody_there_is_told() -> None:
         connect(f"{host(3)}?realtime=ignore", Robot.load("panda"), PERIOD)
 
 
+@pytest.mark.skipif(
+    Path("/sys/kernel/realtime").exists(), reason="this is a real-time kernel"
+)
+def test_real_time_is_enforced_unless_told_otherwise() -> None:
+    with serving(circle()) as box:
+        told = r"RealtimeException: .*(rtprio|PREEMPT_RT).*\?realtime=ignore"
+        with pytest.raises(HardwareError, match=told):
+            connect(box.host, Robot.load("panda"), PERIOD)
+
+
 def test_the_load_is_in_both_models(tmp_path: Path) -> None:
     """A load in one model only is refused; in both, the arm follows its path."""
     load = {"mass": 0.8, "center": [0.02, 0.0, 0.15]}

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
@@ -53,6 +54,8 @@ def connect(
         f"The robot at {settings.address}: end effector "
         f"{found['end_effector']['mass']:.3g} kg (Desk), load "
         f"{found['load']['mass']:.3g} kg, {_realtime(settings)}",
+        f"It stops at external efforts of {_listed(settings.collision_torque)} N·m "
+        f"and forces of {_listed(settings.collision_force)} N and N·m",
         str(models)[0].upper() + str(models)[1:],
     ]
     return FrankaHardware(robot, process, settings, q[0], lines)
@@ -84,6 +87,10 @@ def reached(
         process.close()
         raise
     return process, found
+
+
+def _listed(values: ArrayLike) -> str:
+    return ", ".join(f"{each:g}" for each in np.ravel(values))
 
 
 def _realtime(settings: FrankaSettings) -> str:
