@@ -6,6 +6,7 @@ and what hangs there is killed.
 
 import os
 import re
+import shlex
 import signal
 import socket
 import subprocess
@@ -18,11 +19,12 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from franka_arms import Patiently, circle, host, serving
+from franka_arms import Patiently, circle, connect_patiently, host, serving
 from places import ROOT
 
-from hsp_control import Robot, Rollout
+from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
+from hsp_control.cli.main import _parser
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.live import (
     InProcessRobot,
@@ -40,6 +42,7 @@ from hsp_control.live.franka import (
     connect,
     connecting,
 )
+from hsp_control.live.franka.reflexes import REFLEXES, table
 from hsp_control.live.simulated_robot import sampled
 
 pytest.importorskip("pylibfranka")
@@ -267,3 +270,34 @@ def test_the_command_line_drives_the_arm(
         assert "begin where it is" in told
     assert main([*options, "franka://a?realtme=ignore"]) == 2
     assert "did you mean 'realtime'" in capsys.readouterr().err
+
+
+def test_the_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (ROOT / "docs" / "franka.md").read_text(encoding="utf-8")
+    assert table() in text
+    told = dict(re.findall(r"^\| `(\w+)` \|.*\| ([^|]*)\|$", text, re.MULTILINE))
+    fields = FrankaSettings("a").all_fields()
+    assert set(told) - set(REFLEXES) == set(fields)
+    for name in ("collision_torque", "collision_force"):
+        wanted = ", ".join(f"{each:g}" for each in fields[name])
+        assert told[name].strip() == wanted
+    (document,) = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "lab.yaml").write_text(document)
+    load = Load(0.4, center=[0.0, 0.0, 0.1])
+    written = FrankaSettings("172.16.0.2", load=load)
+    assert FrankaSettings.parse(str(tmp_path / "lab.yaml")) == written
+    shell = "".join(re.findall(r"```sh\n(.*?)```", text, re.DOTALL))
+    commands = shell.replace("\\\n", " ").splitlines()
+    used = [shlex.split(line, comments=True)[1:] for line in commands if "hsp " in line]
+    assert {command[0] for command in used if command} >= {"live", "franka-model"}
+    for command in used:
+        if command[0] != "install":
+            _parser().parse_args(command)
+    (snippet,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    monkeypatch.setattr("hsp_control.live.franka.connect", connect_patiently)
+    with serving(load_experiment("panda_obstacle")) as box:
+        snippet = snippet.replace("172.16.0.2", box.address)
+        space: dict[str, Any] = {}
+        exec(compile(snippet, "franka.md", "exec"), space)
+    assert space["report"].ended == "completed", space["report"].reason
+    assert space["arm"].fault is None
