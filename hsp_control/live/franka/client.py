@@ -105,8 +105,7 @@ def described(state: Any) -> dict[str, Any]:
         "mode": state.robot_mode.name,
         "errors": [name for name in names if getattr(errors, name)],
         "q": list(state.q),
-        "gravity": list(state.O_ddP_O),
-        "end_effector": {"mass": state.m_ee, "center": list(state.F_x_Cee)},
+        "end_effector": state.m_ee,
         "load": {
             "mass": state.m_load,
             "center": list(state.F_x_Cload),

@@ -52,7 +52,7 @@ def connect(
         raise
     lines = [
         f"The robot at {settings.address}: end effector "
-        f"{found['end_effector']['mass']:.3g} kg (Desk), load "
+        f"{found['end_effector']:.3g} kg (Desk), load "
         f"{found['load']['mass']:.3g} kg, {_realtime(settings)}",
         f"It stops at external efforts of {_listed(settings.collision_torque)} N·m "
         f"and forces of {_listed(settings.collision_force)} N and N·m",

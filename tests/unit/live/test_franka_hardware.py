@@ -10,7 +10,14 @@ from hsp_control import Robot
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.live import Hardware, LiveSettings, Measurement
 from hsp_control.live.adapting import AdaptingHardware
-from hsp_control.live.franka import FrankaHardware, FrankaSettings, client
+from hsp_control.live.franka import (
+    FrankaHardware,
+    FrankaSettings,
+    Load,
+    client,
+    connecting,
+)
+from hsp_control.live.franka.client_process import ClientProcess
 
 Array = NDArray[np.float64]
 APPLIED = np.linspace(-0.6, 0.6, 7)
@@ -141,3 +148,21 @@ def test_the_loop_s_settings_become_the_arm_s() -> None:
     np.testing.assert_array_equal(adapted.rate_limits(robot), 999.0)
     slower = hardware.adapted(LiveSettings(effort_rate=[2000.0] * 6 + [300.0]))
     np.testing.assert_array_equal(slower.rate_limits(robot), [999.0] * 6 + [300.0])
+
+
+def test_a_load_that_the_robot_did_not_take_is_refused() -> None:
+    load = Load(0.5, center=[0.0, 0.0, 0.1])
+    settings = FrankaSettings("a", load=load)
+    taken = {"mass": 0.5, "center": [0.0, 0.0, 0.1], "inertia": [0.0] * 9}
+    connecting._check_load(settings, taken)
+    for name, other in (("mass", 0.0), ("center", [0.0] * 3), ("inertia", [0.1] * 9)):
+        with pytest.raises(HardwareError, match=f"{name} .* after set_load"):
+            connecting._check_load(settings, taken | {name: other})
+
+
+def test_without_pylibfranka_the_extra_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(HardwareError, match=r"pip install 'hsp_control\[franka\]'"):
+        ClientProcess()
