@@ -42,6 +42,7 @@ from hsp_control.live.franka import (
     connect,
     connecting,
 )
+from hsp_control.live.franka.hardware import EFFORT_RATE
 from hsp_control.live.franka.reflexes import REFLEXES, table
 from hsp_control.live.simulated_robot import sampled
 
@@ -133,6 +134,25 @@ def test_efforts_with_gravity_are_not_sent() -> None:
         arm = connect(box.address, experiment.robot, PERIOD)
         report = moved(arm, settings=LiveSettings())
         assert "a Franka adds g(q) itself" in report.reason
+        assert not box.said("reflex")
+
+
+def test_the_fastest_change_that_is_sent_is_accepted() -> None:
+    """The limit itself is 1000: with 1000.5 the box reports a reflex."""
+    experiment = circle()
+    with serving(experiment) as box:
+        arm = connect(box.address, experiment.robot, PERIOD)
+        arm.read(60.0)
+        for k in range(320):
+            state = arm.read(60.0)
+            assert state is not None
+            assert state.applied is not None
+            # Up and down around zero: the arm stays where it is; the wrist is light.
+            slow, fast = ((k + n // 4) % n < n // 2 for n in (32, 4))
+            signs = np.array([1.0 if slow else -1.0] * 4 + [1.0 if fast else -1.0] * 3)
+            arm.write(state.applied + signs * EFFORT_RATE * PERIOD)
+        arm.close()
+        assert arm.fault is None
         assert not box.said("reflex")
 
 
