@@ -74,15 +74,17 @@ def _priority(level: int | None) -> AbstractContextManager[None]:
 def _experiment(options: argparse.Namespace) -> Experiment:
     """Return the experiment of a configuration, or of a robot at home."""
     source, name = options.config, str(options.config)
-    if name not in bundled_configs() and name in {*bundled_robots(), *example_robots()}:
+    robots = {*bundled_robots(), *example_robots()} - {*bundled_configs()}
+    if name in robots or name.endswith(".urdf"):
         source = {
             "robot": {"name": name},
             "tasks": {"hand": {"type": "frame_pose"}},
             "plant": {"type": "rigid_body", "motor_inertia": MOTOR_INERTIA},
         }
     strict = options.strict or bool(options.allow)
+    period = f"simulation.control_period={PERIOD}"  # whatever another loop's is
     experiment = load_experiment(
-        source, *options.overrides, strict=strict, allow=options.allow
+        source, *options.overrides, period, strict=strict, allow=options.allow
     )
     if experiment.v0.any():
         raise LiveError("start: the box holds the arm at rest; leave out its velocity")

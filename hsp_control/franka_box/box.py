@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LiveError
-from hsp_control.franka_box import reference, reflexes
+from hsp_control.franka_box import impedance, reference, reflexes
 from hsp_control.franka_box.arm import Arm
 from hsp_control.franka_box.model import Model
 from hsp_control.franka_box.motion import Motion, finished, is_finite
@@ -54,7 +54,8 @@ class Box:
         motion: The motion under way, or None.
         mode: The robot's mode.
         thresholds: Of contacts and collisions; none until a client sets them.
-        stiffness: Of the impedance controller, shape (7,) [N·m/rad].
+        joint_stiffness: Of the joints' impedance controller, shape (7,) [N·m/rad].
+        cartesian_stiffness: Of the hand's, shape (6,) [N/m, N·m/rad].
         outbox: Responses to be sent.
         q: True positions, shape (7,) [rad].
         v: True velocities, shape (7,) [rad/s].
@@ -81,7 +82,8 @@ class Box:
         self.motion: Motion | None = None
         self.mode = RobotMode.IDLE
         self.thresholds = reflexes.Thresholds.none()
-        self.stiffness: Array = reference.STIFFNESS.copy()
+        self.joint_stiffness: Array = impedance.JOINT_STIFFNESS
+        self.cartesian_stiffness: Array = impedance.CARTESIAN_STIFFNESS
         self.outbox: list[bytes] = []
         self.periods, self.at_rest = 0, True
         self.on_period: Callable[[], object] = lambda: None
@@ -90,10 +92,10 @@ class Box:
         plant.reset(0.0, self.q, self.v)
         self.model.state.update(0.0, self.q, self.v)
         self._self_distance = SelfDistance(self.model.state)
-        for pair in self._self_distance.ignored:
-            say(f"self-collision of {pair} is not watched: they overlap at the start")
+        for line in self._self_distance.unwatched:
+            say(line)
         self.tau: Array = self.model.gravity
-        self._reference = Reference(self.q, self.v, self.v)
+        self._reference = reference.at_rest(self.q)
         self._goal: Array | None = None
         self._clear: Array = self.q
         self._measure(_ZERO)
@@ -189,7 +191,8 @@ class Box:
             effort = motion.effort
         else:
             assert motion.reference is not None
-            effort = self._tracking_effort(motion.reference, gravity)
+            of_hand = motion.controller is Controller.CARTESIAN_IMPEDANCE
+            effort = self._tracking_effort(motion.reference, gravity, of_hand=of_hand)
         self.tau = effort + gravity
         end = (self.periods + 1) * PERIOD
         self.q, self.v = self.plant.advance(self.t, end, self.tau)
@@ -243,7 +246,7 @@ class Box:
         )
         self.mode = RobotMode.REFLEX
 
-    def _violations(self) -> "list[Violation]":
+    def _violations(self) -> list[Violation]:
         """Return what the measured state violates; note postures that are clear."""
         state, limits = self.model.state, self.arm.limits
         found = [*reflexes.measured(state.q, state.v, self.tau, limits)]
@@ -300,9 +303,16 @@ class Box:
             self._reference = reference.retreating(self._goal, before)
         return self._tracking_effort(self._reference, gravity)
 
-    def _tracking_effort(self, wanted: Reference, gravity: Array) -> Array:
-        state, limit = self.model.state, self.arm.limits.effort
-        effort = reference.impedance_effort(state, wanted, self.stiffness)
+    def _tracking_effort(
+        self, wanted: Reference, gravity: Array, *, of_hand: bool = False
+    ) -> Array:
+        model, limit = self.model, self.arm.limits.effort
+        kind = (
+            impedance.of_hand(model, self.cartesian_stiffness)
+            if of_hand
+            else impedance.of_joints(model, self.joint_stiffness)
+        )
+        effort = impedance.tracking_effort(model, wanted, kind)
         return np.clip(effort, -limit - gravity, limit - gravity)
 
     def _measure(self, effort: Array) -> None:

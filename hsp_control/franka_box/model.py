@@ -83,6 +83,12 @@ class Model:
         hand = data.oMi[JOINTS] * self.arm.flange * self.F_T_EE
         return hand, _jacobian(model, data, hand.translation) @ dq
 
+    def stiffness_jacobian(self) -> Array:
+        """Return the Jacobian of the stiffness frame in its axes, shape (6, 7)."""
+        K = self.O_T_EE * self.EE_T_K
+        J = _jacobian(self.state.robot.model, self.state.data, K.translation)
+        return np.vstack([K.rotation.T @ J[:3], K.rotation.T @ J[3:]])
+
     def external_wrench(self) -> tuple[Array, Array]:
         """Return the wrench of the arm on its surroundings at K, shape (6,) each.
 
@@ -93,7 +99,7 @@ class Model:
         square = J @ J.T
         if np.linalg.eigvalsh(square)[0] < _SINGULAR:
             return np.zeros(6), np.zeros(6)
-        wrench: Array = np.linalg.solve(square, J @ self.external_effort)
+        wrench = np.asarray(np.linalg.solve(square, J @ self.external_effort), float)
         turned: Array = np.concatenate(
             [K.rotation.T @ wrench[:3], K.rotation.T @ wrench[3:]]
         )

@@ -25,6 +25,8 @@ SERVED = {
     (Controller.EXTERNAL, MotionGenerator.JOINT_VELOCITY),
     (Controller.JOINT_IMPEDANCE, MotionGenerator.JOINT_POSITION),
     (Controller.JOINT_IMPEDANCE, MotionGenerator.JOINT_VELOCITY),
+    (Controller.CARTESIAN_IMPEDANCE, MotionGenerator.JOINT_POSITION),
+    (Controller.CARTESIAN_IMPEDANCE, MotionGenerator.JOINT_VELOCITY),
 }
 """What a motion can be made of."""
 

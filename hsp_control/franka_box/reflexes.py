@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ModelError
 from hsp_control.franka_box.arm import ACCELERATION, EFFORT_RATE, JERK, ArmLimits
 from hsp_control.franka_box.wire import JOINTS, PERIOD, Error
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
@@ -181,16 +182,20 @@ class SelfDistance:
     """The distances between the links of an arm that can collide.
 
     Attributes:
-        ignored: Pairs that are not watched, ``a and b``: they overlap at the start.
+        unwatched: What is not watched, and why, a line each.
     """
 
     def __init__(self, state: RobotState) -> None:
         """Watch all pairs of links that are apart at a state."""
         robot = state.robot
-        shapes = link_shapes(robot)
-        pairs = self_pairs(robot, shapes)
-        self.ignored: list[str] = []
+        self.unwatched: list[str] = []
         self._proximity: Proximity | None = None
+        try:
+            shapes = link_shapes(robot)
+        except ModelError as error:  # a mesh is missing; the other reflexes need none
+            self.unwatched.append(f"no self-collision is watched: {error}")
+            return
+        pairs = self_pairs(robot, shapes)
         if not pairs:
             return
         distances = Proximity(robot, shapes, (), pairs).measure(state)
@@ -198,8 +203,11 @@ class SelfDistance:
         for pair, distance in zip(pairs, distances, strict=True):
             if distance > 0.0:
                 apart.append(pair)
-            else:
-                self.ignored.append(" and ".join(shapes[k].link for k in pair))
+                continue
+            links = " and ".join(shapes[k].link for k in pair)
+            self.unwatched.append(
+                f"self-collision of {links} is not watched: they overlap at the start"
+            )
         if apart:
             self._proximity = Proximity(robot, shapes, (), apart)
 

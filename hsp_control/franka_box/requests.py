@@ -130,15 +130,16 @@ class Requests:
 
     def _set_joint_impedance(self, number: int, body: np.void) -> int:
         stiffness = np.array(body["K_theta"])
-        if not (np.isfinite(stiffness).all() and (stiffness >= 0.0).all()):
-            return self._invalid(
-                Command.SET_JOINT_IMPEDANCE, f"stiffness {stiffness.tolist()} N·m/rad"
-            )
-        self._box.stiffness = stiffness
+        if not _is_stiffness(stiffness):
+            return self._invalid(Command.SET_JOINT_IMPEDANCE, f"{stiffness} N·m/rad")
+        self._box.joint_stiffness = stiffness
         return Status.SUCCESS
 
     def _set_cartesian_impedance(self, number: int, body: np.void) -> int:
-        self._say("Cartesian impedance: without effect, no controller here uses it")
+        stiffness = np.array(body["K_x"])
+        if not _is_stiffness(stiffness):
+            return self._invalid(Command.SET_CARTESIAN_IMPEDANCE, f"{stiffness}")
+        self._box.cartesian_stiffness = stiffness
         return Status.SUCCESS
 
     def _set_guiding_mode(self, number: int, body: np.void) -> int:
@@ -180,6 +181,10 @@ class Requests:
 
 
 _PHASES = ("acceleration", "nominal")
+
+
+def _is_stiffness(values: Array) -> bool:
+    return bool(np.isfinite(values).all() and (values >= 0.0).all())
 
 
 def _placement(columns: Array) -> pin.SE3 | None:

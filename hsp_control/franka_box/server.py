@@ -11,7 +11,7 @@ from typing import Self
 
 import numpy as np
 
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.franka_box.box import Box, Say
 from hsp_control.franka_box.connection import Connection, ConnectionEnd, break_off
 from hsp_control.franka_box.motion import Motion
@@ -64,8 +64,10 @@ class Server:
                 stays. None: never.
 
         Raises:
+            LiveError: If a time is out of range.
             HardwareError: If the address is not one of loopback, or is in use.
         """
+        _check_times(deadline, patience, cut)
         self.box, self._say = box, say
         self._requests = Requests(box, say)
         self._host, self._lockstep = host, lockstep
@@ -223,6 +225,18 @@ class Server:
         if self._cut_at is not None and self.box.t >= self._cut_at and self.client:
             self._cut, self._cut_at = True, None
             self._say("the link is cut: neither states nor commands arrive any more")
+
+
+def _check_times(deadline: float, patience: float, cut: float | None) -> None:
+    if not 0.0 < deadline <= PERIOD:
+        raise LiveError(
+            f"deadline {1e6 * deadline:g} µs; must be above 0, and "
+            f"{1e6 * PERIOD:g} µs, a period, at most"
+        )
+    if not 0.0 < patience < np.inf:
+        raise LiveError(f"patience {patience:g} s; must be positive")
+    if cut is not None and not cut >= 0.0:
+        raise LiveError(f"cut {cut:g} s; must not be negative")
 
 
 def _listen(host: str) -> socket.socket:

@@ -154,13 +154,14 @@ print(json.dumps([at, robot.read_once().q[3]]))
     assert "recovered" in rig.tells("recovered")
 
 
+@pytest.mark.parametrize("controller", ["JointImpedance", "CartesianImpedance"])
 @pytest.mark.parametrize("kind", ["position", "velocity"])
-def test_motion_generators_are_tracked(kind: str) -> None:
+def test_motion_generators_are_tracked(kind: str, controller: str) -> None:
     with served() as rig:
         error, moved, mode = rig.run(
-            f"kind = {kind!r}"
+            f"kind, controller = {kind!r}, {controller!r}"
             + """
-mode = franka.ControllerMode.JointImpedance
+mode = getattr(franka.ControllerMode, controller)
 control = getattr(robot, f"start_joint_{kind}_control")(mode)
 state, _ = control.readOnce()
 start, worst = np.array(state.q_d), 0.0
@@ -195,7 +196,7 @@ def test_what_is_not_served_is_refused_by_the_protocol() -> None:
 mode, told = franka.ControllerMode, []
 for attempt in (
     lambda: robot.start_cartesian_pose_control(mode.JointImpedance),
-    lambda: robot.start_joint_position_control(mode.CartesianImpedance),
+    lambda: robot.start_cartesian_velocity_control(mode.CartesianImpedance),
     lambda: robot.set_load(-1.0, [0, 0, 0], [0] * 9),
     lambda: robot.set_K([2] * 16),
 ):
@@ -212,7 +213,7 @@ print(json.dumps([told, str(robot.read_once().robot_mode)]))
     assert "Set Load command rejected: invalid argument" in load
     assert "Set EE to K command rejected: invalid argument" in frame
     assert rig.tells("refused: move: cartesian position with joint impedance is not")
-    assert rig.tells("refused: move: joint position with cartesian impedance is not")
+    assert rig.tells("refused: move: cartesian velocity with cartesian impedance is")
 
 
 def test_a_cut_link_ends_motion_and_client() -> None:

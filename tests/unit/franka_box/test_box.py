@@ -191,6 +191,23 @@ def test_recovery_answers_when_the_arm_is_back() -> None:
     assert told["reflex_reason"].any()  # of the last motion, until the next reflex
 
 
+def test_the_errors_of_the_last_motion_are_those_of_the_last_reflex() -> None:
+    box = Talking()
+    for effort, error in (
+        (np.full(7, 2.0), Error.CONTROLLER_TORQUE_DISCONTINUITY),
+        (None, Error.COMMUNICATION_CONSTRAINTS_VIOLATION),
+    ):
+        box.begin(1, *TORQUE)
+        box.step(command())
+        while box.motion is not None:
+            box.step(None if effort is None else command(tau_J_d=effort))
+        told = state(box)
+        assert np.flatnonzero(told["reflex_reason"]).tolist() == [error]
+        ask(box, Command.AUTOMATIC_ERROR_RECOVERY)
+        box.settle()
+        assert not state(box)["errors"].any()
+
+
 def test_an_arm_that_folds_into_itself_stops() -> None:
     """Joints 4 and 6 fold the hand towards the base, within their limits."""
     box = Talking()
@@ -227,7 +244,8 @@ def test_what_a_client_may_not_do_while_the_arm_moves() -> None:
         ({"controller": 2, "motion_generator": 0}, True),
         ({"controller": 0, "motion_generator": 1}, True),
         ({"controller": 0, "motion_generator": 2}, False),
-        ({"controller": 1, "motion_generator": 0}, False),
+        ({"controller": 1, "motion_generator": 0}, True),
+        ({"controller": 1, "motion_generator": 4}, False),
         ({"controller": 0, "motion_generator": 4}, False),
         ({"controller": 0, "motion_generator": 0, "asynchronous": 1}, False),
         ({"controller": 77, "motion_generator": 4}, False),
@@ -260,6 +278,7 @@ def test_a_command_that_is_not_finite_ends_the_motion() -> None:
         (Command.SET_EE_TO_K, {"EE_T_K": np.ones(16)}),
         (Command.SET_NE_TO_EE, {"NE_T_EE": np.full(16, np.nan)}),
         (Command.SET_JOINT_IMPEDANCE, {"K_theta": -np.ones(7)}),
+        (Command.SET_CARTESIAN_IMPEDANCE, {"K_x": np.full(6, np.nan)}),
         (Command.SET_COLLISION_BEHAVIOR, {"lower_force_nominal": np.ones(6)}),
         (Command.SET_COLLISION_BEHAVIOR, {"upper_torque_nominal": [np.inf] * 7}),
     ],

@@ -4,17 +4,22 @@ import socket
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from select import select
+from time import monotonic
 from typing import Any
 
 import numpy as np
 import pytest
 from franka_boxes import Rig, home, panda, plant, served
 
-from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.franka_box import PORT, Box, Server
+from hsp_control.franka_box.connection import Connection
 from hsp_control.franka_box.wire import COMMAND, HEADER, STATE, Command, response
 
 LONGEST = 30.0
+MOVE = struct.pack("<II", 2, 4).ljust(113, b"\0")
+"""Torque control."""
 
 
 class RawClient:
@@ -118,13 +123,43 @@ def test_a_request_in_pieces_is_whole() -> None:
         assert answer == b"\0" + rig.box.arm.urdf.encode()
 
 
+def test_requests_in_one_piece_are_all_answered() -> None:
+    with served() as rig, client(rig) as hasty:
+        assert hasty.connect()
+        stop = [response(Command.STOP_MOVE, number, b"") for number in (5, 6, 7)]
+        hasty.tcp.sendall(b"".join(stop))
+        assert [hasty.answer() for _ in stop] == [b"\0"] * 3
+
+
+def test_a_command_is_late_by_when_it_arrived_not_by_when_it_is_read() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        tcp = socket.create_connection(listener.getsockname())
+        connection = Connection(*listener.accept(), "127.0.0.1")
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp, tcp:
+            udp.bind(("127.0.0.1", 0))
+            hello = struct.pack("<HH", 10, udp.getsockname()[1])
+            tcp.sendall(response(Command.CONNECT, 1, hello))
+            select([connection.tcp], [], [], LONGEST)
+            assert not list(connection.requests())
+            box = connection.udp.getsockname()
+            for deadline, late in ((0.0, 1), (LONGEST, 1)):
+                connection.send(bytes(STATE.itemsize))
+                udp.sendto(bytes(COMMAND.itemsize), box)
+                sent = monotonic()
+                while monotonic() < sent + 1e-3:  # it is read later than it arrives
+                    pass
+                command = connection.command(0, deadline)
+                assert (command is None) == (deadline == 0.0)
+                assert connection.late == late
+        connection.close(broken=False)
+
+
 def test_datagrams_that_are_no_commands_are_ignored() -> None:
     """Torn, foreign and outdated ones; the right one moves the arm."""
     with served(patience=LONGEST) as rig, client(rig) as noisy:
         assert noisy.connect()
         noisy.state()
-        move = struct.pack("<II", 2, 4).ljust(113, b"\0")
-        assert noisy.ask(Command.MOVE, move) == b"\1"
+        assert noisy.ask(Command.MOVE, MOVE) == b"\1"
         while (state := noisy.state())["robot_mode"] != 2:
             pass
         good = np.zeros(1, COMMAND)
@@ -159,6 +194,43 @@ def test_random_bytes_never_stop_the_box() -> None:
                 while mad.answer():
                     pass
         assert serves(rig)
+
+
+def test_in_real_time_a_command_after_the_deadline_is_lost() -> None:
+    """No answer arrives within a nanosecond; within a millisecond one does at last."""
+    for deadline, in_time in ((1e-9, False), (1e-3, True)):
+        with served(lockstep=False, deadline=deadline) as rig, client(rig) as quick:
+            assert quick.connect()
+            assert quick.ask(Command.MOVE, MOVE) == b"\1"
+            for _ in range(50 if not in_time else 10_000):
+                good = np.zeros(1, COMMAND)
+                good["message_id"] = quick.state()["message_id"]
+                quick.udp.sendto(good.tobytes(), quick.box)
+                motion, served_client = rig.box.motion, rig.server.client
+                if in_time and (motion is None or motion.commands):
+                    break
+            assert served_client is not None
+            if in_time:
+                assert motion is None or motion.commands
+            else:
+                assert motion is not None
+                assert not motion.commands
+                assert served_client.late + served_client.outdated > 0
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ({"deadline": 0.0}, "deadline 0 µs; must be above 0"),
+        ({"deadline": 2e-3}, "deadline 2000 µs"),
+        ({"patience": float("nan")}, "patience nan s; must be positive"),
+        ({"cut": -1.0}, "cut -1 s"),
+    ],
+)
+def test_times_out_of_range_are_refused(option: dict[str, float], said: str) -> None:
+    box = Box(panda(), plant(), home(), print)
+    with pytest.raises(LiveError, match=said):
+        Server(box, print, **option)
 
 
 def test_addresses_beyond_loopback_and_taken_ones_are_refused() -> None:
