@@ -400,7 +400,7 @@ def build(document: Document) -> Experiment:
     scenario = replace(scenario, plant=scenario.plant.located(folder))
     plant = _plant(document, scenario, robot)
     check_compensation(document, scenario, controller)
-    rates = check_rates(document, scenario, controller, q0)
+    rates = check_rates(document, scenario, controller, q0, plant.robot)
     return _experiment(
         name=Path(document.name).stem,
         scenario=scenario,

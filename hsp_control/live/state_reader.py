@@ -122,7 +122,6 @@ class StateReader:
         self._monitor.follow(limits)
         self.fault = self.error = self.measurement = None
         new = self._newest(applied)
-        self.arrival = self._clock()
         if new is None:
             self._predict(applied)
             return
@@ -146,7 +145,8 @@ class StateReader:
         except Exception as error:  # a driver may raise anything
             self.fault, self.error = f"no state can be read: {described(error)}", error
             self.connection_lost = True
-            return None
+            raw = None
+        self.arrival = self._clock()
         if raw is None:
             return None
         try:

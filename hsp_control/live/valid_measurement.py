@@ -1,5 +1,7 @@
 """Turn what a robot's `read` returned into a measurement that the loop can trust."""
 
+from contextlib import nullcontext
+from math import isfinite, ulp
 from numbers import Integral, Real
 from typing import Any
 
@@ -14,6 +16,8 @@ _LARGEST_SPEED = 1e4
 """No joint moves faster [rad/s or m/s]: it holds where the model has no limit."""
 _LARGEST_POSITION = 1e6
 """No joint is further away, or was turned further [rad or m]."""
+_LARGEST_EFFORT = 1e9
+"""No motor has a larger effort [N·m or N]."""
 _RESOLUTION = 1e-3
 """Coarsest step of the robot's clock [periods]; a huge time has coarser ones."""
 
@@ -51,7 +55,7 @@ def _checked(raw: Measurement, robot: Robot, period: float) -> Measurement:
             "integer"
         )
     t, age = _number("time", raw.t), _number("age", raw.age)
-    if np.spacing(abs(t)) > _RESOLUTION * period:
+    if ulp(t) > _RESOLUTION * period:
         raise HardwareError(
             f"the state's time is {t:g} s, too large for periods of {period:g} s"
         )
@@ -66,19 +70,20 @@ def _checked(raw: Measurement, robot: Robot, period: float) -> Measurement:
             )
     applied: Array | None = None
     if raw.applied is not None:
-        applied = _vector("applied", raw.applied, robot.nv, np.inf)
+        applied = _vector("applied", raw.applied, robot.nv, _LARGEST_EFFORT)
     return Measurement(int(raw.sequence), t, q, v, age, bool(raw.halted), applied)
 
 
 def _number(what: str, value: Any) -> float:
-    if not isinstance(value, Real):
-        raise HardwareError(
-            f"the state's {what} is of type {type(value).__name__}; needs a number"
-        )
-    number = float(value)
-    if not np.isfinite(number):
-        raise HardwareError(f"the state's {what} is {number}")
-    return number
+    if type(value) is not float:
+        if not isinstance(value, Real):
+            raise HardwareError(
+                f"the state's {what} is of type {type(value).__name__}; needs a number"
+            )
+        value = float(value)
+    if not isfinite(value):
+        raise HardwareError(f"the state's {what} is {value}")
+    return float(value)
 
 
 def _vector(name: str, value: Any, size: int, largest: float) -> Array:
@@ -89,15 +94,11 @@ def _vector(name: str, value: Any, size: int, largest: float) -> Array:
         )
     if given.dtype.kind not in "fiu":
         raise HardwareError(f"the state's {name} holds {given.dtype}; needs numbers")
-    with np.errstate(over="ignore"):
-        vector = given.astype(float)
-    for wrong, fault in (
-        (~np.isfinite(vector), "is not finite"),
-        (np.abs(vector) > largest, "is absurd"),
-    ):
-        if wrong.any():
-            where = int(np.flatnonzero(wrong)[0])
-            raise HardwareError(
-                f"the state {fault}: {name}[{where}] is {vector[where]:g}"
-            )
-    return vector
+    with nullcontext() if given.itemsize <= 8 else np.errstate(over="ignore"):
+        vector: Array = given.astype(float)
+    if np.abs(vector).max(initial=0.0) <= largest:  # NaN is not
+        return vector
+    finite = np.isfinite(vector)
+    wrong = ~finite if not finite.all() else np.abs(vector) > largest
+    where, fault = int(wrong.argmax()), "is absurd" if finite.all() else "is not finite"
+    raise HardwareError(f"the state {fault}: {name}[{where}] is {vector[where]:g}")

@@ -285,7 +285,7 @@ def without_absurd_rows(
     kept = drawable_rows(columns)
     if kept.all():
         return columns, meta
-    count, first = int((~kept).sum()), columns["t"][int((~kept).argmax())]
+    count, first = int((kept == 0).sum()), columns["t"][int(kept.argmin())]
     told = f"{count} of {len(kept)} rows are left out, from t = {first:g} s on: their "
     told += "numbers are too large, or not finite"
     meta = {**meta, "message": "; ".join(filter(None, (meta.get("message"), told)))}

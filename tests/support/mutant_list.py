@@ -646,8 +646,8 @@ MUTANTS = (
     Mutant(
         "rate check: drives without delay",
         COMPENSATION + "linear_loop.py",
-        "self.share * drives[0]",
-        "self.share * drives[-1]",
+        "self._performed(drives[0])",
+        "self._performed(drives[-1])",
         UNIT + "control/test_rate_check.py -k limits_of_theory",
     ),
     Mutant(

@@ -125,7 +125,7 @@ ODD_RESULTS = st.one_of(
 
 
 @pytest.mark.slow
-@settings(max_examples=40)
+@settings(max_examples=30)
 @given(odd=ODD_RESULTS, count=st.sampled_from([1, 30, 20_000]))
 def test_whatever_read_returns(odd: Trick, count: int) -> None:
     robot = rig(always(odd, BEGIN, count))
@@ -266,7 +266,7 @@ class Failing(Rig):
 
 
 @pytest.mark.slow
-@settings(max_examples=25)
+@settings(max_examples=16)
 @given(
     method=st.sampled_from(["read", "write", "close", "on_period", "change"]),
     error=ERRORS,
