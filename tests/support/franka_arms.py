@@ -118,7 +118,7 @@ class RunningBox:
     def wait_alone(self) -> None:
         """Wait until it has noticed that its clients have gone."""
         for _ in range(6000):
-            ended = sum("is disconnected" in line for line in self.lines)
+            ended = sum(" is disconnected: " in line for line in self.lines)
             if self._begun() == ended:
                 return
             sleep(0.01)

@@ -194,6 +194,22 @@ def test_a_killed_box_ends_the_loop() -> None:
             box.kill()
 
 
+def test_a_client_that_dies_is_told() -> None:
+    experiment = circle()
+    with serving(experiment) as box:
+        arm = connect(box.address, experiment.robot, PERIOD)
+
+        def kill(t: float) -> None:
+            if t >= 0.1:
+                arm._process._process.kill()
+
+        report = moved(arm, on_period=kill)
+        assert report.ended == "fault"
+        assert "the process that talks to the robot ended (SIGKILL)" in report.reason
+        box.wait_alone()
+        assert box.said("motion ended")
+
+
 def test_a_client_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     """libfranka waits without end where a box closes the line without an answer."""
     monkeypatch.setattr(connecting, "_TIMEOUT", 1.0)

@@ -1,12 +1,16 @@
 """What is written behind franka://, and what the arm's errors are told as."""
 
+import tomllib
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT
 
 from hsp_control.common.exceptions import LiveError
-from hsp_control.live.franka import FrankaSettings, Load
+from hsp_control.live import backends
+from hsp_control.live.franka import FrankaSettings, Load, connect
 from hsp_control.live.franka.reflexes import MODES, REFLEXES, explained
 
 pylibfranka = pytest.importorskip("pylibfranka")
@@ -82,3 +86,10 @@ def test_an_exception_is_told_with_its_names() -> None:
     assert "stop button was pressed" in explained("ControlException", stopped)
     other = explained("ValueError", "something new\nand more")
     assert other == "ValueError: something new; and more"
+
+
+def test_the_package_offers_the_arm() -> None:
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        points = tomllib.load(file)["project"]["entry-points"]
+    point = EntryPoint("franka", points[backends.GROUP]["franka"], backends.GROUP)
+    assert point.load() is connect
