@@ -86,16 +86,21 @@ class FrankaHardware:
         return self._process.fault
 
     def read(self, timeout: float) -> Measurement | None:
-        """Return the state that follows the last effort; see `Hardware.read`."""
+        """Return the state that follows the last effort; see `Hardware.read`.
+
+        Raises:
+            HardwareError: If the arm stopped by itself, does not start or is lost.
+        """
         if not self._process.waiting:
             if self._running:  # the loop sent nothing: the last effort stays
                 self._send(client.EFFORT)
             else:
                 self._process.ask(client.READ if self._reads == 0 else client.START)
-        if self._reads == 1:
-            timeout = max(timeout, _START)
-        answer = self._process.receive(timeout)
+        starts = self._reads == 1
+        answer = self._process.receive(max(timeout, _START) if starts else timeout)
         if answer is None:
+            if starts:
+                raise HardwareError(f"torque control did not start in {_START:g} s")
             return None
         _, t, *numbers = client.STATE.unpack(answer)
         if not self._running:  # time stands still while the loop compiles

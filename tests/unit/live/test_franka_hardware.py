@@ -111,6 +111,14 @@ def test_an_effort_answers_a_state() -> None:
     assert b"F" not in answers.asked
 
 
+def test_control_that_does_not_start_is_an_error() -> None:
+    hardware, answers = arm()
+    state(hardware)
+    answers.late = True
+    with pytest.raises(HardwareError, match="torque control did not start in 5 s"):
+        hardware.read(0.001)
+
+
 def test_the_filter_is_libfranka_s() -> None:
     """lowpass_filter.cpp: gain y + (1 - gain) y_last, gain = h / (h + 1 / (2 π f))."""
     hardware, answers = arm(cutoff_frequency=100.0)
