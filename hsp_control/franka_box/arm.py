@@ -24,6 +24,8 @@ JERK = 5000.0
 These three are Research 3's for every joint: libfranka 0.21, ``rate_limiting.h``, and
 "Limits for Franka Research 3" at https://frankarobotics.github.io/docs.
 """
+ELBOW_FLIP = -0.467002423653011
+"""Position of joint 4 at which the arm is stretched [rad]; the same page."""
 _ANY_DECELERATION = 1e9
 """What clients are told if velocity limits do not depend on the position [rad/s²]."""
 

@@ -9,6 +9,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LiveError
 from hsp_control.franka_box import impedance, reference, reflexes
 from hsp_control.franka_box.arm import Arm
+from hsp_control.franka_box.generators import generator
 from hsp_control.franka_box.model import Model
 from hsp_control.franka_box.motion import Motion, finished, is_finite
 from hsp_control.franka_box.readings import Readings
@@ -115,25 +116,28 @@ class Box:
         wanted, measured = self._reference, self.model.state
         if motion is not None:
             wanted = motion.reference or Reference(measured.q, measured.v, _ZERO)
-        self.readings.set_desired(self.model, wanted)
+        hand = motion.generator.hand if motion and motion.generator else None
+        self.readings.set_desired(self.model, wanted, hand)
         fields["message_id"][0] = self._id
         fields["robot_mode"][0] = self.mode
         idle = MotionGenerator.IDLE, Controller.OTHER
-        modes = (motion.generator, motion.controller) if motion else idle
+        modes = (motion.kind, motion.controller) if motion else idle
         fields["motion_generator_mode"][0], fields["controller_mode"][0] = modes
         rate = motion.success_rate if motion else 0.0
         fields["control_command_success_rate"][0] = rate
         return self._id, self.readings.datagram()
 
-    def begin(self, number: int, by: Controller, generator: MotionGenerator) -> None:
+    def begin(self, number: int, by: Controller, kind: MotionGenerator) -> None:
         """Start the motion of a request.
 
         Args:
             number: Number of the request.
             by: Who computes efforts.
-            generator: Who computes the desired motion.
+            kind: Which motion generator.
         """
-        self.motion = Motion(number, by, generator, self._reference)
+        start = reference.at_rest(self._reference.q)
+        made = generator(kind, start, self.arm.limits, self.model)
+        self.motion = Motion(number, by, kind, made)
         self.mode, self.at_rest = RobotMode.MOVE, False
         self._respond(Command.MOVE, number, MoveStatus.MOTION_STARTED)
         self._say(f"motion: {self.motion}")
@@ -231,7 +235,7 @@ class Box:
         if finished(command):
             self.end(MoveStatus.SUCCESS, "the client has finished it")
             return
-        violations = list(motion.obey(command, self.arm.limits))
+        violations = list(motion.obey(command))
         if violations:
             self._reflex(violations)
 

@@ -76,12 +76,18 @@ class Model:
         """Placement of the end effector in the base, measured."""
         return self.state.data.oMi[JOINTS] * self.arm.flange * self.F_T_EE
 
-    def desired(self, q: Array, dq: Array) -> tuple[pin.SE3, Array]:
-        """Return the pose and the twist, shape (6,), of a desired motion's hand."""
+    def hand_at(self, q: Array) -> tuple[pin.SE3, Array]:
+        """Return the end effector's pose and Jacobian, shape (6, 7), at any q."""
         model, data = self.arm.robot.model, self._desired
         pin.computeJointJacobians(model, data, q)
         hand = data.oMi[JOINTS] * self.arm.flange * self.F_T_EE
-        return hand, _jacobian(model, data, hand.translation) @ dq
+        return hand, _jacobian(model, data, hand.translation)
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether the hand cannot move in every direction."""
+        J = self.stiffness_jacobian()
+        return bool(np.linalg.eigvalsh(J @ J.T)[0] < _SINGULAR)
 
     def stiffness_jacobian(self) -> Array:
         """Return the Jacobian of the stiffness frame in its axes, shape (6, 7)."""

@@ -6,27 +6,24 @@ from collections.abc import Iterator
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.franka_box import reference
-from hsp_control.franka_box.arm import ArmLimits
-from hsp_control.franka_box.reflexes import (
-    Reference,
-    Violation,
-    commanded_motion,
-    effort_rate,
-)
+from hsp_control.franka_box.generators import Generator
+from hsp_control.franka_box.reflexes import Reference, Violation, effort_rate
 from hsp_control.franka_box.wire import JOINTS, Controller, MotionGenerator
 
 _WINDOW = 100
 """Commands over which the success rate is taken (libfranka, ``RobotState``)."""
 
-SERVED = {
-    (Controller.EXTERNAL, MotionGenerator.NONE),
-    (Controller.EXTERNAL, MotionGenerator.JOINT_POSITION),
-    (Controller.EXTERNAL, MotionGenerator.JOINT_VELOCITY),
-    (Controller.JOINT_IMPEDANCE, MotionGenerator.JOINT_POSITION),
-    (Controller.JOINT_IMPEDANCE, MotionGenerator.JOINT_VELOCITY),
-    (Controller.CARTESIAN_IMPEDANCE, MotionGenerator.JOINT_POSITION),
-    (Controller.CARTESIAN_IMPEDANCE, MotionGenerator.JOINT_VELOCITY),
+OF_THE_HAND = {MotionGenerator.CARTESIAN_POSITION, MotionGenerator.CARTESIAN_VELOCITY}
+"""Motion generators whose commands are the hand's."""
+_OF_THE_JOINTS = {MotionGenerator.JOINT_POSITION, MotionGenerator.JOINT_VELOCITY}
+SERVED = {(Controller.EXTERNAL, MotionGenerator.NONE)} | {
+    (controller, generator)
+    for controller in (
+        Controller.EXTERNAL,
+        Controller.JOINT_IMPEDANCE,
+        Controller.CARTESIAN_IMPEDANCE,
+    )
+    for generator in _OF_THE_JOINTS | OF_THE_HAND
 }
 """What a motion can be made of."""
 
@@ -40,8 +37,8 @@ class Motion:
     Attributes:
         number: Number of the request that has started it.
         controller: Who computes efforts.
-        generator: Who computes the desired motion.
-        reference: The desired motion; None without a motion generator.
+        kind: Which motion generator.
+        generator: What makes the desired motion; None without a motion generator.
         effort: The effort commanded last, shape (7,) [N·m]; zero at first.
         commands: Number of commands.
         lost: Number of commands that were lost in a row.
@@ -52,22 +49,26 @@ class Motion:
         self,
         number: int,
         controller: Controller,
-        generator: MotionGenerator,
-        start: Reference,
+        kind: MotionGenerator,
+        generator: Generator | None = None,
     ) -> None:
-        """Begin at a desired motion."""
-        self.number, self.controller, self.generator = number, controller, generator
-        generated = generator is not MotionGenerator.NONE
-        self.reference = reference.as_told(start) if generated else None
+        """Begin."""
+        self.number, self.controller, self.kind = number, controller, kind
+        self.generator = generator
         self.effort: Array = np.zeros(JOINTS)
         self.commands = self.lost = self.lost_in_all = 0
         self._window: deque[bool] = deque(maxlen=_WINDOW)
 
     def __str__(self) -> str:
         by = self.controller.name.lower().replace("_", " ") + " controller"
-        if self.reference is None:
+        if self.generator is None:
             return by
-        return f"{self.generator.name.lower().replace('_', ' ')}, {by}"
+        return f"{self.kind.name.lower().replace('_', ' ')}, {by}"
+
+    @property
+    def reference(self) -> Reference | None:
+        """The desired motion; None without a motion generator."""
+        return self.generator.reference if self.generator else None
 
     @property
     def external(self) -> bool:
@@ -86,10 +87,10 @@ class Motion:
         self.lost += 1
         self.lost_in_all += 1
         self._window.append(False)
-        if self.reference is not None:
-            self.reference = reference.extrapolated(self.reference)
+        if self.generator is not None:
+            self.generator.extrapolate()
 
-    def obey(self, command: np.void, limits: ArmLimits) -> Iterator[Violation]:
+    def obey(self, command: np.void) -> Iterator[Violation]:
         """Follow a command, and yield what it violates."""
         self._window.append(True)
         self.lost = 0
@@ -99,17 +100,8 @@ class Motion:
             before = self.effort.astype(np.float32).astype(float)
             self.effort = effort
             yield from effort_rate(effort, before)
-        if self.reference is None:
-            return
-        kind = self.generator
-        name, advance = {
-            MotionGenerator.JOINT_POSITION: ("q_c", reference.to_position),
-            MotionGenerator.JOINT_VELOCITY: ("dq_c", reference.to_velocity),
-        }[kind]
-        values = np.array(command[name])
-        told = reference.as_told(self.reference)
-        self.reference = advance(values, self.reference)
-        yield from commanded_motion(advance(values, told), told, limits, first=first)
+        if self.generator is not None:
+            yield from self.generator.follow(command, first=first)
 
 
 def finished(command: np.void) -> bool:
@@ -120,5 +112,6 @@ def finished(command: np.void) -> bool:
 
 
 def is_finite(command: np.void) -> bool:
-    """Return whether all joint values of a command are finite."""
-    return all(bool(np.isfinite(command[n]).all()) for n in ("q_c", "dq_c", "tau_J_d"))
+    """Return whether all numbers of a command are finite."""
+    names = ("q_c", "dq_c", "O_T_EE_c", "O_dP_EE_c", "elbow_c", "tau_J_d")
+    return all(bool(np.isfinite(command[name]).all()) for name in names)

@@ -6,20 +6,18 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
+from hsp_control.franka_box.arm import ELBOW_FLIP
+from hsp_control.franka_box.hand import HandMotion
 from hsp_control.franka_box.model import Model
 from hsp_control.franka_box.reflexes import Reference, Thresholds
 from hsp_control.franka_box.wire import PERIOD, STATE
-
-ELBOW_FLIP = -0.467002423653011
-"""Position of joint 4 at which the arm is stretched [rad]; Franka's limits page."""
 
 
 class Readings:
     """The fields of a state.
 
-    Not filled, and zero: the accelerometers, which a simulated arm has not;
-    ``ddelbow_c``, ``delbow_c`` and ``O_ddP_EE_c``, which belong to Cartesian motion
-    generators. The motors' ``theta`` and ``dtheta`` are the joints' ``q`` and ``dq``.
+    Not filled, and zero: the accelerometers, which a simulated arm has not. The motors'
+    ``theta`` and ``dtheta`` are the joints' ``q`` and ``dq``.
 
     Attributes:
         fields: Views of the fields, by name; write into them.
@@ -51,15 +49,32 @@ class Readings:
             fields[f"I_{name}"][:] = body.inertia.T.ravel()
         fields["O_ddP_O"][:] = arm.robot.model.gravity.linear
 
-    def set_desired(self, model: Model, reference: Reference) -> None:
-        """Fill the desired motion, and where the end effector is."""
+    def set_desired(
+        self, model: Model, reference: Reference, hand: HandMotion | None
+    ) -> None:
+        """Fill the desired motion, and where the end effector is.
+
+        Args:
+            model: The model at the measured state.
+            reference: The desired motion of the joints.
+            hand: The commanded motion of the hand, if it is what is commanded.
+        """
         fields = self.fields
         fields["O_T_EE"][:] = _columns(model.O_T_EE)
         fields["q_d"][:], fields["dq_d"][:], fields["ddq_d"][:] = reference
-        pose, twist = model.desired(reference.q, reference.dq)
-        fields["O_T_EE_d"][:] = fields["O_T_EE_c"][:] = _columns(pose)
-        fields["O_dP_EE_d"][:] = fields["O_dP_EE_c"][:] = twist
+        pose, jacobian = model.hand_at(reference.q)
+        desired = HandMotion(pose, jacobian @ reference.dq, np.zeros(6))
+        fields["O_T_EE_d"][:] = _columns(pose)
+        fields["O_dP_EE_d"][:] = desired.twist
+        told = hand or desired
+        fields["O_T_EE_c"][:] = _columns(told.pose)
+        fields["O_dP_EE_c"][:] = told.twist
+        fields["O_ddP_EE_c"][:] = told.acceleration
         fields["elbow_d"][:] = fields["elbow_c"][:] = _elbow(reference.q)
+        fields["delbow_c"][0], fields["ddelbow_c"][0] = (
+            reference.dq[2],
+            reference.ddq[2],
+        )
 
     def set_measured(
         self, model: Model, tau_J: Array, tau_J_d: Array, thresholds: Thresholds

@@ -5,7 +5,7 @@ Specification and Robot Limits", https://frankarobotics.github.io/docs. The meas
 state is watched with the limits of the arm's description.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.franka_box.arm import ACCELERATION, EFFORT_RATE, JERK, ArmLimits
+from hsp_control.franka_box.hand import HandMotion
 from hsp_control.franka_box.wire import JOINTS, PERIOD, Error
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.robot import RobotState
@@ -20,6 +21,36 @@ from hsp_control.robot import RobotState
 LOST_IN_A_ROW = 20
 """So many lost commands in a row end a motion ("Errors due to communication problems",
 https://frankarobotics.github.io/docs/libfranka.html)."""
+
+
+HAND_VELOCITY = np.array([3.0, 2.5])
+"""Largest speeds of a commanded hand, along and about an axis [m/s, rad/s]."""
+HAND_ACCELERATION = np.array([9.0, 17.0])
+"""Largest accelerations of the same [m/s², rad/s²]."""
+HAND_JERK = np.array([4500.0, 8500.0])
+"""Largest jerks of the same [m/s³, rad/s³]."""
+ELBOW_VELOCITY = 1.5
+"""Largest speed of a commanded elbow [rad/s].
+
+These four are Research 3's: libfranka 0.21, ``rate_limiting.h``.
+"""
+OF_JOINTS = (
+    Error.JOINT_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION,
+    Error.JOINT_MOTION_GENERATOR_VELOCITY_DISCONTINUITY,
+    Error.JOINT_MOTION_GENERATOR_ACCELERATION_DISCONTINUITY,
+)
+"""Too large velocities, accelerations and jerks of commanded joints."""
+AFTER_INVERSE_KINEMATICS = (
+    Error.CARTESIAN_MOTION_GENERATOR_JOINT_VELOCITY_LIMITS_VIOLATION,
+    Error.CARTESIAN_MOTION_GENERATOR_JOINT_VELOCITY_DISCONTINUITY,
+    Error.CARTESIAN_MOTION_GENERATOR_JOINT_ACCELERATION_DISCONTINUITY,
+)
+"""The same of joints that follow a commanded hand."""
+_HAND_ERRORS = (
+    Error.CARTESIAN_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION,
+    Error.CARTESIAN_MOTION_GENERATOR_VELOCITY_DISCONTINUITY,
+    Error.CARTESIAN_MOTION_GENERATOR_ACCELERATION_DISCONTINUITY,
+)
 
 
 class Violation(NamedTuple):
@@ -111,41 +142,88 @@ def effort_rate(effort: Array, before: Array) -> Iterator[Violation]:
     )
 
 
-def commanded_motion(
-    new: Reference, before: Reference, limits: ArmLimits, *, first: bool
-) -> Iterator[Violation]:
-    """Yield what a commanded motion violates; see `reference.following`.
+def start_position(q: Array, at: Array, limits: ArmLimits) -> Iterator[Violation]:
+    """Yield whether a motion starts out of range, or elsewhere than where the arm is.
 
-    A position out of range is a ``joint_position_limits_violation``: the motion
-    generator's own flag is always false since libfranka 0.15.
+    Args:
+        q: The first commanded position, shape (7,) [rad].
+        at: Where the arm is held, shape (7,) [rad].
+        limits: The arm's; in a period it must be able to get there.
+    """
+    yield from _position(q, limits)
+    error = Error.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID
+    lowest, highest = limits.velocities(at)
+    yield from _outside(error, q - at, PERIOD * lowest, PERIOD * highest, "rad away")
+
+
+def commanded_motion(
+    new: Reference,
+    before: Reference,
+    limits: ArmLimits,
+    errors: tuple[Error, Error, Error] = OF_JOINTS,
+) -> Iterator[Violation]:
+    """Yield what a commanded motion violates; see `reference.to_position`.
 
     Args:
         new: The commanded motion.
         before: The one a period before.
         limits: The arm's.
-        first: Whether the motion begins; then a jump is a wrong start.
+        errors: What too large velocities, accelerations and jerks are called.
     """
-    yield from _outside(
-        Error.JOINT_POSITION_LIMITS_VIOLATION, new.q, limits.lower, limits.upper,
-        "rad commanded",
-    )  # fmt: skip
+    yield from _position(new.q, limits)
     lowest, highest = limits.velocities(before.q)
-    too_fast = (
-        Error.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID
-        if first
-        else Error.JOINT_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION
-    )
-    yield from _outside(too_fast, new.dq, lowest, highest, "rad/s commanded")
+    velocity, acceleration, jerk = errors
+    yield from _outside(velocity, new.dq, lowest, highest, "rad/s commanded")
     limit = np.full(JOINTS, ACCELERATION)
-    yield from _outside(
-        Error.JOINT_MOTION_GENERATOR_VELOCITY_DISCONTINUITY,
-        new.ddq, -limit, limit, "rad/s² commanded",
-    )  # fmt: skip
-    limit = np.full(JOINTS, JERK)
-    yield from _outside(
-        Error.JOINT_MOTION_GENERATOR_ACCELERATION_DISCONTINUITY,
-        (new.ddq - before.ddq) / PERIOD, -limit, limit, "rad/s³ commanded",
-    )  # fmt: skip
+    yield from _outside(acceleration, new.ddq, -limit, limit, "rad/s² commanded")
+    limit, change = np.full(JOINTS, JERK), (new.ddq - before.ddq) / PERIOD
+    yield from _outside(jerk, change, -limit, limit, "rad/s³ commanded")
+
+
+def start_pose(way: HandMotion) -> Iterator[Violation]:
+    """Yield whether a motion starts elsewhere than where the hand is.
+
+    Args:
+        way: The motion to the first commanded pose, within a period.
+    """
+    error = Error.CARTESIAN_POSITION_MOTION_GENERATOR_START_POSE_INVALID
+    yield from _of_hand(error, PERIOD * way.twist, PERIOD * HAND_VELOCITY, "away")
+
+
+def commanded_hand(new: HandMotion, before: HandMotion) -> Iterator[Violation]:
+    """Yield what a commanded motion of the hand violates; see `hand.to_pose`."""
+    change = (new.acceleration - before.acceleration) / PERIOD
+    for error, values, limits, what in (
+        (_HAND_ERRORS[0], new.twist, HAND_VELOCITY, "per s commanded"),
+        (_HAND_ERRORS[1], new.acceleration, HAND_ACCELERATION, "per s² commanded"),
+        (_HAND_ERRORS[2], change, HAND_JERK, "per s³ commanded"),
+    ):
+        yield from _of_hand(error, values, limits, what)
+
+
+def commanded_elbow(
+    speed: float, side: float, actual_side: float, *, first: bool
+) -> Iterator[Violation]:
+    """Yield whether a commanded elbow is on the other side, or too far away.
+
+    Args:
+        speed: Of joint 3 on the way to it [rad/s].
+        side: The commanded flip direction, 1 or -1.
+        actual_side: That of the arm.
+        first: Whether the motion begins with it.
+    """
+    if side != actual_side:
+        yield Violation(
+            Error.CARTESIAN_MOTION_GENERATOR_ELBOW_SIGN_INCONSISTENT,
+            f"flip direction {side:g} commanded; the arm's is {actual_side:g}",
+        )
+    if abs(speed) > ELBOW_VELOCITY:
+        yield Violation(
+            Error.CARTESIAN_MOTION_GENERATOR_START_ELBOW_INVALID
+            if first
+            else Error.CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,
+            f"elbow at {speed:.6g} rad/s commanded; limit {ELBOW_VELOCITY:g}",
+        )
 
 
 def collisions(
@@ -225,13 +303,31 @@ def self_collision(distance: float, links: str) -> Iterator[Violation]:
         )
 
 
+def _position(q: Array, limits: ArmLimits) -> Iterator[Violation]:
+    """Yield whether a commanded position is out of range.
+
+    The motion generators' own flag for it is always false since libfranka 0.15.
+    """
+    error = Error.JOINT_POSITION_LIMITS_VIOLATION
+    yield from _outside(error, q, limits.lower, limits.upper, "rad commanded")
+
+
+def _of_hand(
+    error: Error, values: Array, limits: Array, what: str
+) -> Iterator[Violation]:
+    """Yield whether the norm along or about the axes, of shape (6,), is too large."""
+    norms = np.array([np.linalg.norm(values[:3]), np.linalg.norm(values[3:])])
+    ways = ("translation", "rotation")
+    yield from _outside(error, norms, -limits, limits, f"m or rad {what}", of=ways)
+
+
 def _outside(
     error: Error,
     values: Array,
     lower: Array,
     upper: Array,
     unit: str,
-    of: str = "",
+    of: Sequence[str] = (),
 ) -> Iterator[Violation]:
     """Yield the value that is farthest outside its range, if one is.
 
@@ -241,7 +337,7 @@ def _outside(
         lower: Smallest values, shape (n,).
         upper: Largest values, shape (n,).
         unit: Unit of the values, and what they are.
-        of: A letter for each value; by default they are numbered as joints.
+        of: A name for each value; by default they are numbered as joints.
     """
     excess = np.maximum(values - upper, lower - values)
     worst = int(np.argmax(excess))

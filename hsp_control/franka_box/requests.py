@@ -7,7 +7,8 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.franka_box.box import Box
-from hsp_control.franka_box.motion import SERVED
+from hsp_control.franka_box.hand import placement
+from hsp_control.franka_box.motion import OF_THE_HAND, SERVED
 from hsp_control.franka_box.reflexes import Thresholds
 from hsp_control.franka_box.wire import (
     REQUESTS,
@@ -94,6 +95,9 @@ class Requests:
                 f"refused: move: {kind}{_spelled(generator)} with {_spelled(by)} is "
                 "not served"
             )
+        elif generator in OF_THE_HAND and box.model.is_singular:
+            self._say("refused: move: the arm is in a singular posture")
+            return MoveStatus.START_AT_SINGULAR_POSE_REJECTED
         else:
             box.begin(number, by, generator)
             return None
@@ -148,18 +152,18 @@ class Requests:
         )
 
     def _set_ee_to_k(self, number: int, body: np.void) -> int:
-        placement = _placement(body["EE_T_K"])
-        if placement is None:
+        frame = placement(body["EE_T_K"])
+        if frame is None:
             return self._invalid(Command.SET_EE_TO_K, "not a homogeneous transform")
-        self._box.model.EE_T_K = placement
+        self._box.model.EE_T_K = frame
         self._box.readings.set_end_effector(self._box.model)
         return Status.SUCCESS
 
     def _set_ne_to_ee(self, number: int, body: np.void) -> int:
-        placement = _placement(body["NE_T_EE"])
-        if placement is None:
+        frame = placement(body["NE_T_EE"])
+        if frame is None:
             return self._invalid(Command.SET_NE_TO_EE, "not a homogeneous transform")
-        self._box.model.NE_T_EE = placement
+        self._box.model.NE_T_EE = frame
         self._box.readings.set_end_effector(self._box.model)
         return Status.SUCCESS
 
@@ -185,18 +189,6 @@ _PHASES = ("acceleration", "nominal")
 
 def _is_stiffness(values: Array) -> bool:
     return bool(np.isfinite(values).all() and (values >= 0.0).all())
-
-
-def _placement(columns: Array) -> pin.SE3 | None:
-    """Return the placement of a matrix stored by columns; None if it is none."""
-    matrix = np.array(columns).reshape(4, 4).T
-    if not np.isfinite(matrix).all():
-        return None
-    R, last = matrix[:3, :3], matrix[3]
-    rotates = np.abs(R.T @ R - np.eye(3)).max() < _TOLERANCE and np.linalg.det(R) > 0.0
-    if not (rotates and np.abs(last - [0.0, 0.0, 0.0, 1.0]).max() < _TOLERANCE):
-        return None
-    return pin.SE3(R, matrix[:3, 3])
 
 
 def _spelled(item: Command | Controller | MotionGenerator) -> str:

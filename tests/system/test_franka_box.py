@@ -166,7 +166,7 @@ control = getattr(robot, f"start_joint_{kind}_control")(mode)
 state, _ = control.readOnce()
 start, worst = np.array(state.q_d), 0.0
 turn = np.array([0, 0, 0, 1, 1, 0, 1]) * np.pi / 8
-for step in range(1, 1251):
+for step in range(1251):
     t = 2.0 * np.pi * step / 1250
     if kind == "position":
         command = franka.JointPositions((start + turn * 0.5 * (1 - np.cos(t))).tolist())
@@ -190,13 +190,51 @@ print(json.dumps([worst, moved, str(robot.read_once().robot_mode)]))
     assert "finished" in rig.tells("motion ended")
 
 
+@pytest.mark.parametrize("kind", ["pose", "velocity"])
+def test_motion_generators_of_the_hand_are_tracked(kind: str) -> None:
+    with served() as rig:
+        error, moved, mode = rig.run(
+            f"kind = {kind!r}"
+            + """
+mode = franka.ControllerMode.JointImpedance
+control = getattr(robot, f"start_cartesian_{kind}_control")(mode)
+state, _ = control.readOnce()
+start, worst = np.array(state.O_T_EE), 0.0
+way = np.array([0.03, -0.03, 0.05])
+for step in range(1001):
+    t = 2.0 * np.pi * step / 1000
+    if kind == "pose":
+        pose = start.copy()
+        pose[12:15] += way * 0.5 * (1 - np.cos(t))
+        command = franka.CartesianPose(pose.tolist())
+    else:
+        speed = 2.0 * np.pi / 1.0 * 0.5 * np.sin(t)
+        command = franka.CartesianVelocities([*(way * speed), 0, 0, 0])
+    command.motion_finished = step == 1000
+    control.writeOnce(command)
+    if step < 1000:
+        state, _ = control.readOnce()
+        far = np.array(state.O_T_EE) - state.O_T_EE_c
+        worst = max(worst, np.abs(far).max())
+        if step == 500:
+            moved = (np.array(state.O_T_EE) - start)[12:15].tolist()
+del control
+print(json.dumps([worst, moved, str(robot.read_once().robot_mode)]))
+"""
+        )
+    assert error < 2e-3
+    assert moved == pytest.approx([0.03, -0.03, 0.05], abs=2e-3)
+    assert mode == "RobotMode.Idle"
+    assert "finished" in rig.tells("motion ended")
+
+
 def test_what_is_not_served_is_refused_by_the_protocol() -> None:
     with served() as rig:
         told = rig.run("""
-mode, told = franka.ControllerMode, []
+handler = franka.AsyncPositionControlHandler
+settings = handler.Configuration([1.0] * 7, 1e-3)
+told = [handler.configure(robot, settings).error_message]
 for attempt in (
-    lambda: robot.start_cartesian_pose_control(mode.JointImpedance),
-    lambda: robot.start_cartesian_velocity_control(mode.CartesianImpedance),
     lambda: robot.set_load(-1.0, [0, 0, 0], [0] * 9),
     lambda: robot.set_K([2] * 16),
 ):
@@ -206,14 +244,13 @@ for attempt in (
         told.append(str(error))
 print(json.dumps([told, str(robot.read_once().robot_mode)]))
 """)
-    (pose, impedance, load, frame), mode = told
+    (motion, load, frame), mode = told
     assert mode == "RobotMode.Idle"
-    assert "Move command rejected: command not possible" in pose
-    assert "Move command rejected: command not possible" in impedance
+    assert "Move command rejected: command not possible" in motion
     assert "Set Load command rejected: invalid argument" in load
     assert "Set EE to K command rejected: invalid argument" in frame
-    assert rig.tells("refused: move: cartesian position with joint impedance is not")
-    assert rig.tells("refused: move: cartesian velocity with cartesian impedance is")
+    line = rig.tells("refused: move")
+    assert "asynchronous joint position with joint impedance is not served" in line
 
 
 def test_a_cut_link_ends_motion_and_client() -> None:

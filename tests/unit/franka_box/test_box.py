@@ -243,7 +243,8 @@ def test_what_a_client_may_not_do_while_the_arm_moves() -> None:
         ({"controller": 2, "motion_generator": 4}, True),
         ({"controller": 2, "motion_generator": 0}, True),
         ({"controller": 0, "motion_generator": 1}, True),
-        ({"controller": 0, "motion_generator": 2}, False),
+        ({"controller": 0, "motion_generator": 2}, True),
+        ({"controller": 1, "motion_generator": 3}, True),
         ({"controller": 1, "motion_generator": 0}, True),
         ({"controller": 1, "motion_generator": 4}, False),
         ({"controller": 0, "motion_generator": 4}, False),
@@ -259,6 +260,17 @@ def test_which_motions_are_served(fields: dict[str, int], served: bool) -> None:
         else MoveStatus.COMMAND_NOT_POSSIBLE_REJECTED
     )
     assert answer == (Command.MOVE, 5, status)
+
+
+def test_a_hand_does_not_start_in_a_singular_posture() -> None:
+    q = home()
+    q[[1, 3, 5]] = 0.0, -0.0699, np.pi / 2 - 0.07  # the arm is nearly stretched
+    box = Talking(q=q)
+    assert ask(box, Command.MOVE, controller=0, motion_generator=2) == [
+        (Command.MOVE, 5, MoveStatus.START_AT_SINGULAR_POSE_REJECTED)
+    ]
+    (answer,) = ask(box, Command.MOVE, controller=0, motion_generator=0)
+    assert answer[2] == MoveStatus.MOTION_STARTED
 
 
 def test_a_command_that_is_not_finite_ends_the_motion() -> None:

@@ -84,25 +84,30 @@ def test_collisions_have_the_thresholds_of_the_client() -> None:
 def test_each_limit_of_a_commanded_motion_is_watched() -> None:
     limits, start = panda().limits, Reference(home(), REST, REST)
 
-    def found(velocity: Any, *, first: bool = False) -> list[Error]:
+    def found(velocity: Any) -> list[Error]:
         new = reference.to_velocity(velocity, start)
-        return errors(reflexes.commanded_motion(new, start, limits, first=first))
+        return errors(reflexes.commanded_motion(new, start, limits))
 
     gentle, jerky, sudden = 0.9 * JERK * PERIOD**2, 1.5 * JERK * PERIOD**2, 2e-2
+    too_fast, acceleration, jerk = reflexes.OF_JOINTS
     assert found(unit(0, gentle)) == []
-    acceleration = Error.JOINT_MOTION_GENERATOR_ACCELERATION_DISCONTINUITY
-    velocity = Error.JOINT_MOTION_GENERATOR_VELOCITY_DISCONTINUITY
     assert jerky < ACCELERATION * PERIOD
-    assert found(unit(0, jerky)) == [acceleration]
-    assert found(unit(0, sudden)) == [velocity, acceleration]
-    too_fast = Error.JOINT_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION
-    wrong_start = Error.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID
-    assert found(unit(0, 3.0))[0] is too_fast
-    assert found(unit(0, 3.0), first=True)[0] is wrong_start
+    assert found(unit(0, jerky)) == [jerk]
+    assert found(unit(0, sudden)) == [acceleration, jerk]
+    assert found(unit(0, 3.0)) == [too_fast, acceleration, jerk]
     beyond = reference.to_position(limits.upper + 1e-3, start)
-    assert errors(reflexes.commanded_motion(beyond, start, limits, first=False))[0] is (
+    assert errors(reflexes.commanded_motion(beyond, start, limits))[0] is (
         Error.JOINT_POSITION_LIMITS_VIOLATION
     )
+
+
+def test_a_motion_starts_where_the_arm_is() -> None:
+    limits, at = panda().limits, home()
+    reach = limits.velocity[1] * PERIOD
+    assert not list(reflexes.start_position(at + unit(1, 0.99 * reach), at, limits))
+    (violation,) = reflexes.start_position(at + unit(1, 1.01 * reach), at, limits)
+    assert violation.error is Error.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID
+    assert violation.reason.startswith("joint 2 at ")
 
 
 def test_a_lost_command_keeps_the_acceleration() -> None:
@@ -130,16 +135,15 @@ def test_braking_comes_to_rest_as_fast_as_it_may(speeds: list[float]) -> None:
 
 
 def test_success_is_counted_over_a_hundred_commands() -> None:
-    start = Reference(home(), REST, REST)
-    motion = Motion(1, Controller.EXTERNAL, MotionGenerator.NONE, start)
+    motion = Motion(1, Controller.EXTERNAL, MotionGenerator.NONE)
     command = np.zeros(1, COMMAND)[0]
     motion.lose()  # before the first command nothing is lost
     assert (motion.success_rate, motion.lost) == (1.0, 0)
     for _ in range(150):
-        assert not list(motion.obey(command, panda().limits))
+        assert not list(motion.obey(command))
     for _ in range(7):
         motion.lose()
     assert motion.success_rate == pytest.approx(0.93)
     assert motion.lost == 7
-    list(motion.obey(command, panda().limits))
+    list(motion.obey(command))
     assert (motion.lost, motion.lost_in_all) == (0, 7)
