@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from math import inf, nan
 from pathlib import Path
 from typing import Any
@@ -14,12 +15,14 @@ from rich.table import Table
 from hsp_control.cli.consoles import out
 from hsp_control.cli.live_experiment import live_period, simulated_robot
 from hsp_control.cli.robot_process import RobotProcess
-from hsp_control.cli.robot_start import begun_where_it_is, closed_after_errors
+from hsp_control.cli.robot_start import begun_where_it_is
+from hsp_control.cli.steering import let_steer, steering_page
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.control.compensation import Command
 from hsp_control.live import (
     Faults,
+    Hardware,
     InProcessRobot,
     LoopReport,
     OperatorRequests,
@@ -28,6 +31,7 @@ from hsp_control.live import (
 )
 from hsp_control.live.adapting import AdaptingHardware
 from hsp_control.live.latency import Quantiles
+from hsp_control.live.ros2 import publish
 from hsp_control.live.settings import check_fixed
 from hsp_control.live.stop_signals import stop_signals
 from hsp_control.simulation import Rollout
@@ -45,6 +49,13 @@ def live(options: argparse.Namespace) -> int:
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:
         raise LiveError(f"--duration {duration:g}; must be positive")
+    if options.robot is not None and options.steer == "simulated":
+        raise LiveError(
+            "--steer: a page that moves a real robot needs a dead-man's key; say "
+            "--steer hardware"
+        )
+    if options.steer is None and (options.port, options.host) != (None, "127.0.0.1"):
+        raise LiveError("--port and --host are those of a page: they need --steer")
     loop_log = options.out / f"{experiment.name}-live.journal"
     robot_log = options.out / f"{experiment.name}-robot.journal"
     requests = OperatorRequests()
@@ -55,7 +66,9 @@ def live(options: argparse.Namespace) -> int:
         "log_period": simulation.log_period,
     }
     command = Command(experiment.controller, experiment.compensation)
-    with stop_signals(requests, takes_over=True):
+    on_period: list[Callable[[float], object]] = []
+    with stop_signals(requests, takes_over=True), ExitStack() as stack:
+        page = stack.enter_context(steering_page(options, experiment, loop_log))
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
         run_loop(
             command,
@@ -63,18 +76,22 @@ def live(options: argparse.Namespace) -> int:
             duration=min(duration, _DRY_RUN),
             **options_of_loop,
         )
+        hardware: Hardware | None = None
         if options.robot is not None:
             hardware = connect(options.robot, experiment.robot, live_period(experiment))
-            if isinstance(hardware, AdaptingHardware):
-                with closed_after_errors(hardware):
-                    options_of_loop["settings"] = hardware.adapted(
-                        experiment.scenario.live
-                    )
-                    experiment = begun_where_it_is(experiment, options, hardware.q)
-                command = Command(experiment.controller, experiment.compensation)
-                options_of_loop["scene"] = experiment.scene
-                for line in hardware.lines:
-                    out.print(line, highlight=False)
+            stack.callback(hardware.close)
+        if isinstance(hardware, AdaptingHardware):
+            settings = hardware.adapted(experiment.scenario.live)
+            experiment = begun_where_it_is(experiment, options, hardware.q)
+            options_of_loop |= {"settings": settings, "scene": experiment.scene}
+            command = Command(experiment.controller, experiment.compensation)
+            for line in hardware.lines:
+                out.print(line, highlight=False)
+        if options.publish is not None:
+            on_period.append(publish(options.publish, command))
+        if page is not None:
+            on_period.append(let_steer(page, experiment, requests))
+        if hardware is not None:
             report = run_loop(
                 command,
                 hardware,
@@ -82,6 +99,7 @@ def live(options: argparse.Namespace) -> int:
                 log=loop_log,
                 meta=_meta(experiment),
                 priority=options.priority,
+                on_period=_in_turn(on_period),
                 **options_of_loop,
             )
             out.print(_times(report, experiment))
@@ -95,6 +113,8 @@ def live(options: argparse.Namespace) -> int:
         with RobotProcess(
             experiment, faults=faults, log=robot_log, log_period=simulation.log_period
         ) as robot:
+            if kill is not None:
+                on_period.append(_kill_action(kill, robot))
             report = run_loop(
                 command,
                 robot.hardware,
@@ -102,7 +122,7 @@ def live(options: argparse.Namespace) -> int:
                 log=loop_log,
                 meta=_meta(experiment),
                 priority=options.priority,
-                on_period=_kill_action(kill, robot),
+                on_period=_in_turn(on_period),
                 **options_of_loop,
             )
             robot_report = robot.wait()
@@ -143,11 +163,22 @@ def _parse_kill(text: str | None) -> tuple[str, float] | None:
     return process, time
 
 
+def _in_turn(
+    actions: list[Callable[[float], object]],
+) -> Callable[[float], object] | None:
+    if len(actions) < 2:
+        return actions[0] if actions else None
+
+    def act(t: float) -> None:
+        for action in actions:
+            action(t)
+
+    return act
+
+
 def _kill_action(
-    setting: tuple[str, float] | None, robot: RobotProcess
-) -> Callable[[float], None] | None:
-    if setting is None:
-        return None
+    setting: tuple[str, float], robot: RobotProcess
+) -> Callable[[float], object]:
     process, time = setting
     pending = [True]
 

@@ -104,13 +104,7 @@ def _parser() -> argparse.ArgumentParser:
     play.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
     )
-    play.add_argument(
-        "--host",
-        default="127.0.0.1",
-        metavar="ADDRESS",
-        help="the address of this computer at which another one, or a phone, opens the "
-        "page; default: only this computer may",
-    )
+    _add_host(play)
     _add_page(play)
 
     view = _command(commands, "view", "play logs in a browser, one or several together")
@@ -269,6 +263,16 @@ def _picture_size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
+def _add_host(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="the address of this computer at which another one, or a phone, opens the "
+        "page; default: only this computer may",
+    )
+
+
 def _add_page(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--port",
@@ -375,6 +379,7 @@ def _add_live(live: argparse.ArgumentParser) -> None:
         help="franka://ADDRESS, or another robot that an installed package can reach; "
         "default: a simulated one",
     )
+    live.add_argument("--publish", metavar="ros2://NAME", help="topics for watchers")
     live.add_argument(
         "--duration",
         type=float,
@@ -402,6 +407,16 @@ def _add_live(live: argparse.ArgumentParser) -> None:
         metavar="LEVEL",
         help="real-time priority of the loop (SCHED_FIFO), 1 to 99",
     )
+    live.add_argument(
+        "--steer",
+        nargs="?",
+        choices=("simulated", "hardware"),
+        const="simulated",
+        help="show a page that steers: drag targets and obstacles, turn settings; with "
+        "hardware, the robot moves only while a key is held on the page",
+    )
+    _add_host(live)
+    _add_page(live)
 
 
 def _add_configuration(

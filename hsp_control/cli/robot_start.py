@@ -1,15 +1,12 @@
 """A live run begins where the robot is, not where the configuration thinks it is."""
 
 import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.config import Experiment, load_experiment
-from hsp_control.live import Hardware
 
 _FARTHEST = 0.2
 """Largest distance of a joint from the configuration's start [rad or m].
@@ -43,13 +40,3 @@ def begun_where_it_is(
             f"or begin where it is, after a rehearsal: --set '{start}'"
         )
     return load_experiment(options.config, *options.overrides, start)
-
-
-@contextmanager
-def closed_after_errors(hardware: Hardware) -> Iterator[None]:
-    """Close the connection to a robot if what follows fails."""
-    try:
-        yield
-    except BaseException:
-        hardware.close()
-        raise

@@ -4,6 +4,7 @@ An adapter is f(address of the words, time), whatever the kernel's own arguments
 """
 
 import hashlib
+import struct
 import warnings
 from collections.abc import Callable
 from functools import cache
@@ -16,6 +17,7 @@ from llvmlite import ir
 from numba import types
 from numba.core.datamodel.registry import default_manager
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import callback, kernel
@@ -37,27 +39,81 @@ def unknown_layout() -> str:
     return ""
 
 
-def packed(argument: Any) -> tuple[types.Type, Array]:
-    """Return an argument's type, and what stands for it in memory."""
+def packed(arguments: tuple[Any, ...]) -> tuple[tuple[types.Type, ...], Array]:
+    """Return the types of arguments, and what stands for them in memory."""
+    words: list[int] = []
+    kinds = tuple(_pack(argument, words) for argument in arguments)
+    return kinds, np.array(words, dtype=np.int64)
+
+
+def _pack(argument: Any, words: list[int]) -> types.Type:
+    """Append what stands for an argument in memory, and return its type."""
     if isinstance(argument, np.ndarray):
-        kind = cast("Callable[[Any], types.Type]", numba.typeof)(argument)
-        size, item, at = argument.size, argument.itemsize, argument.ctypes.data
-        shape = *argument.shape, *argument.strides
         # Two owners come first in Numba's arrays, of which kernels know nothing.
-        return kind, np.array([0, 0, size, item, at, *shape], dtype=np.int64)
+        words += 0, 0, argument.size, argument.itemsize, argument.ctypes.data
+        words += argument.shape
+        words += argument.strides
+        return _kind_of_array(argument)
     if isinstance(argument, tuple):  # a record: its values, one after the other
-        kind = cast("Callable[[Any], types.Type]", numba.typeof)(argument)
-        return kind, np.concatenate([packed(value)[1] for value in argument])
+        kinds = tuple([_pack(value, words) for value in argument])
+        return _kind_of_tuple(kinds, type(argument))
     if isinstance(argument, bool | int | np.integer | np.bool_):
-        return types.int64, np.array([argument], dtype=np.int64)
-    return types.float64, np.array([argument], dtype=float).view(np.int64)
+        words.append(int(argument))
+        return types.int64
+    words += _BITS.unpack(_NUMBER.pack(argument))
+    return types.float64
 
 
-@cache
+_NUMBER, _BITS = struct.Struct("d"), struct.Struct("q")
+_kinds: dict[tuple[Any, ...], types.Type] = {}
+"""Types that were found, each once: they are known by identity, as Numba's own equality
+looks at all that is in them."""
+_addresses: dict[tuple[Any, ...], int] = {}
+"""Adapters that were made, by their kernels and the types of their arguments."""
+
+
+def _kind_of_array(array: NDArray[Any]) -> types.Type:
+    """Return `numba.typeof` of an array, which takes ten times as long as to look."""
+    flags = array.flags
+    key = (
+        array.dtype, array.ndim, flags.c_contiguous, flags.f_contiguous,
+        flags.writeable, flags.aligned,
+    )  # fmt: skip
+    kind = _kinds.get(key)
+    if kind is None:
+        kind = _kinds[key] = cast("Callable[[Any], types.Type]", numba.typeof)(array)
+    return kind
+
+
+def _kind_of_tuple(kinds: tuple[types.Type, ...], record: type) -> types.Type:
+    key = record, *map(id, kinds)
+    kind = _kinds.get(key)
+    if kind is None:
+        kind = cast("Any", types).BaseTuple.from_types(kinds, record)
+        _kinds[key] = kind
+    return kind
+
+
 def adapter(
     function: Callable[..., Any], kinds: tuple[types.Type, ...], timed: bool
 ) -> int:
-    """Return the address of what calls a kernel: f(where its arguments are, time)."""
+    """Return the address of what calls a kernel: f(where its arguments are, time).
+
+    Args:
+        function: The kernel.
+        kinds: The types of its arguments, from `packed`.
+        timed: Whether the time comes after them.
+    """
+    key = function, timed, *map(id, kinds)
+    address = _addresses.get(key)
+    if address is None:
+        address = _addresses[key] = _compiled(function, kinds, timed)
+    return address
+
+
+def _compiled(
+    function: Callable[..., Any], kinds: tuple[types.Type, ...], timed: bool
+) -> int:
     template = _call_at_a_time if timed else _call
     place = {
         "__name__": __name__,

@@ -43,8 +43,7 @@ class NativeCall(partial[float]):
         """Pack the arguments, and compile or load the adapter."""
         from hsp_control.common import adapters
 
-        kinds, words = zip(*map(adapters.packed, arguments), strict=True)
-        table = np.concatenate(words)
+        kinds, table = adapters.packed(arguments)
         address = adapters.adapter(kernel, kinds, timed)
         row = address, table.ctypes.data
         free = () if timed else (0.0,)

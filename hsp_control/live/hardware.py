@@ -19,6 +19,7 @@ class Measurement(NamedTuple):
         applied: Effort the robot had when it measured, in the terms of
             `Hardware.write` (libfranka's ``tau_J_d``), shape (nv,), where the hardware
             knows it; None: what was sent last counts.
+        fault: Why the robot must be stopped safely, if hardware knows a reason.
     """
 
     sequence: int
@@ -28,6 +29,7 @@ class Measurement(NamedTuple):
     age: float = 0.0
     halted: bool = False
     applied: Array | None = None
+    fault: str = ""
 
 
 @runtime_checkable

@@ -78,9 +78,12 @@ class MeasurementMonitor:
     def violation(self, measurement: Measurement) -> str | None:
         """Return why the loop must stop at a valid state, or None.
 
-        Checks the robot's own stop, state age, skipped states, positions and speeds.
+        Checks what the hardware found, the robot's own stop, state age, skipped states,
+        positions and speeds.
         """
         last, allowed = self.last, self._settings
+        if measurement.fault:
+            return measurement.fault
         if measurement.halted:
             return "the robot has stopped by itself"
         if not abs(measurement.age) <= allowed.age:

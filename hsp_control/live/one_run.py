@@ -161,8 +161,10 @@ class OneRun:
         Efforts may be lost: then neither the rate nor the controller's memory may count
         from what was sent.
         """
-        measurement = self.reader.measurement
-        has = None if measurement is None else measurement.applied
+        if (measurement := self.reader.measurement) is None:
+            self.limiter.nothing_heard()
+            return
+        has = measurement.applied
         if has is not None and not self.limiter.believes(has):
             self.stop("fault", f"the robot says it has an effort of {has.tolist()}")
             has = None
@@ -232,7 +234,7 @@ class OneRun:
         standing = speed <= self.settings.stop.standstill
         at_rest = standing and self.safe_stop.done and not self.silent
         ended, reason = self.ended, self.reason
-        if ended != "fault" and not at_rest and not self.abandoned:
+        if ended != "fault" and not self.abandoned and (self.later or not at_rest):
             ended = "fault"
             reason += f"; then {self.later or f'the robot still moved at {speed:.3g}'}"
         return LoopReport(

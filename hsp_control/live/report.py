@@ -17,7 +17,7 @@ class LoopReport:
     Attributes:
         ended: ``completed``: the duration is over, and the robot is at rest;
             ``operator``: the operator stopped it; ``fault``: a fault stopped it, or
-            the robot still moved after its safe stop.
+            came in the safe stop, or the robot still moved afterwards.
         reason: Why it ended, in a sentence.
         phase: The last phase of the safe stop: `Phase.HOLDING` if the safe stop ended,
             `Phase.DAMPING` if the loop fell silent before.

@@ -44,9 +44,11 @@ class Channel:
             except BlockingIOError:
                 break
             except OSError:
+                data = b""
+            if data:
+                words.append(json.loads(data))
+            else:
                 self.lost = True
-                break
-            words.append(json.loads(data))
         return words
 
     def close(self) -> None:

@@ -1,12 +1,14 @@
 """What the page of a session shows: the scene, its handles, its knobs and its plots."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.play.session import Session
+from hsp_control.config import Experiment
+from hsp_control.control.controller import Controller
+from hsp_control.play.handles import Handles
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_distances import distance_label
 from hsp_control.visualization.palette import SERIES
@@ -66,11 +68,73 @@ class Plot(NamedTuple):
     curves: list[Curve]
 
 
-class Picture:
-    """Draws a session on the pages of a viewer."""
+Kind = Literal["simulated", "live", "held"]
+"""A simulation; a live loop; one that runs only while somebody holds a key."""
 
-    def __init__(self, session: Session, viewer: Viewer) -> None:
-        """Draw the session as it is, with all that can be touched."""
+
+class Rows(Protocol):
+    """Rows of a log, as of a `Recorder` or a `JournalTail`."""
+
+    @property
+    def count(self) -> int:
+        """How many there were so far."""
+
+    def rows(self, first: int) -> dict[str, Array]:
+        """Return the columns from a row on."""
+
+
+class Played(Protocol):
+    """What a picture shows: a `Session`, or the `Mirror` of a live loop."""
+
+    @property
+    def kind(self) -> Kind:
+        """A simulation, or a live loop."""
+
+    @property
+    def experiment(self) -> Experiment:
+        """What is simulated or controlled."""
+
+    @property
+    def controller(self) -> Controller:
+        """The controller, at the present state."""
+
+    @property
+    def handles(self) -> Handles:
+        """What can be touched."""
+
+    @property
+    def period(self) -> float:
+        """The control period [s]."""
+
+    @property
+    def recorder(self) -> Rows:
+        """The rows so far."""
+
+    @property
+    def meta(self) -> dict[str, Any]:
+        """The meta data of these rows."""
+
+    @property
+    def over(self) -> str:
+        """Why it goes on no more; empty: it does."""
+
+    @property
+    def pushes(self) -> object | None:
+        """What a page pulls with; None: it cannot."""
+
+    @property
+    def t(self) -> float:
+        """The time of the present row [s]."""
+
+    def pull(self) -> tuple[Array, Array, float] | None:
+        """Return where somebody pulls, the hand, both (3,) [m], and the force [N]."""
+
+
+class Picture:
+    """Draws what is played on the pages of a viewer."""
+
+    def __init__(self, session: Played, viewer: Viewer) -> None:
+        """Draw it as it is, with all that can be touched."""
         self._session, self._viewer = session, viewer
         self._batch = 0
         self.begin()
@@ -79,7 +143,7 @@ class Picture:
         """Draw the scene anew: the session has begun anew."""
         session, viewer = self._session, self._viewer
         self._sent = 0
-        self._meta = session.recorder.meta("", "")
+        self._meta = session.meta
         self._field = session.controller.field
         motion = self._motion()
         self._shown = viewer.view.show.all_fields()
@@ -157,7 +221,7 @@ class Picture:
         if controller.field is self._field:
             return
         self._field = controller.field
-        self._meta = self._session.recorder.meta("", "")
+        self._meta = self._session.meta
         layers = self._layers(self._motion())
         for name in _FIELD_LAYERS:
             yield delete(f"/{name}")
@@ -167,7 +231,7 @@ class Picture:
     def _motion(self) -> Motion:
         """Return the present row as a log."""
         recorder = self._session.recorder
-        columns = {name: column[-1:] for name, column in recorder.rows(0).items()}
+        columns = recorder.rows(recorder.count - 1)
         return Motion(self._session.experiment.robot, Rollout(columns, self._meta))
 
     def _setup(self, title: str) -> Command:
@@ -200,6 +264,7 @@ class Picture:
             controls=[knob.describe() for knob in session.handles.knobs.values()],
             plots=plots,
             pull=session.pushes is not None,
+            loop=session.kind,
             period_ms=1e3 * session.period,
         )
 
@@ -219,11 +284,11 @@ class Picture:
 
     def _samples(self) -> Iterator[Command]:
         """Yield the rows of the plots since the last picture."""
-        rows = self._session.recorder.rows(self._sent)
-        times = rows["t"]
-        if not len(times):
+        recorder = self._session.recorder
+        if recorder.count <= self._sent:
             return
-        self._sent += len(times)
+        rows, self._sent = recorder.rows(self._sent), recorder.count
+        times = rows["t"]
         self._batch += 1
         values = np.column_stack(
             [_values(rows, curve) for plot in self._plots for curve in plot.curves]
@@ -249,7 +314,7 @@ def _values(rows: dict[str, Array], curve: Curve) -> Array:
     return part[:, 0] if part.shape[1] == 1 else np.linalg.norm(part, axis=1)
 
 
-def _plots(session: Session) -> Iterator[Plot]:
+def _plots(session: Played) -> Iterator[Plot]:
     """Yield the plots of a session."""
     controller = session.controller
     errors: dict[str, list[Curve]] = {}
@@ -271,7 +336,7 @@ def _plots(session: Session) -> Iterator[Plot]:
         yield Plot("Null-space error", unit, True, [norm])
     names = [name for name in session.recorder.rows(0) if name.startswith("distance.")]
     if names:
-        meta = session.recorder.meta("", "")
+        meta = session.meta
         labels = [distance_label(meta, n.removeprefix("distance.")) for n in names]
         curves = [
             Curve(label, name, slice(0, 1))

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -57,6 +57,8 @@ class Session:
         handles: What can be touched, but for the links.
         over: Why it goes on no more, until it is reset; empty: it does.
     """
+
+    kind: Literal["simulated"] = "simulated"
 
     def __init__(self, experiment: Experiment) -> None:
         """Begin at the experiment's start.
@@ -192,6 +194,11 @@ class Session:
         return point, spring.hand, float(np.linalg.norm(spring.force(point)))
 
     # -- the log ----------------------------------------------------------------------
+
+    @property
+    def meta(self) -> dict[str, Any]:
+        """The meta data of the rows so far."""
+        return self.recorder.meta("", "")
 
     def rollout(self) -> Rollout:
         """Return the log so far; `hsp run` repeats it, unless somebody pulled."""

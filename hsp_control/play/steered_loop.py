@@ -79,7 +79,7 @@ class SteeredLoop:
                     self.handles.take(message)
 
     def tell(self) -> None:
-        """Say where the targets and the obstacles are, and what the knobs are set to."""
+        """Say where everything is, and what the knobs are set to."""
         targets, obstacles = self.handles.places()
         word: dict[str, Any] = {
             "targets": targets,

@@ -320,6 +320,11 @@ class Recorder:
             ratios = tangential[loaded] / (contact.friction * local[loaded, 2])
             used[self._rows] = ratios.max(initial=0.0)
 
+    @property
+    def count(self) -> int:
+        """How many rows are recorded."""
+        return self._rows
+
     def rows(self, start: int) -> dict[str, Array]:
         """Return views of the columns from a row to the last one recorded."""
         return {name: a[start : self._rows] for name, a in self._columns.items()}

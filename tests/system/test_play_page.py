@@ -85,6 +85,7 @@ SETUP: dict[str, Any] = {
         },
     ],
     "pull": True,
+    "loop": "simulated",
     "period_ms": 1.0,
 }
 
@@ -326,6 +327,41 @@ def test_keys_steer_the_run(page: Any) -> None:
     assert len(sent(page, "step")) == 2
 
 
+def test_the_key_of_a_live_loop_is_held(page: Any) -> None:
+    """By the space bar or the button; whoever looks away has let go."""
+    live = SETUP | {"loop": "held"}
+    page.evaluate("(command) => viewer.handle_command(command)", live)
+    page.evaluate("sent.length = 0")
+    assert not page.locator(".play-bar .toggle").is_visible()
+    for release in ("up", "blur", "watching"):
+        page.keyboard.down(" ")
+        assert len(until_sent(page, "hold", 3)) >= 3  # again and again
+        assert all(message["held"] for message in sent(page, "hold"))
+        if release == "watching":
+            tell(page, "play_drive", mine=False, taken=True)
+            assert not page.evaluate("play.holdKey.held")
+            tell(page, "play_drive", mine=True, taken=True)
+        elif release == "blur":
+            page.evaluate("dispatchEvent(new Event('blur'))")
+        page.keyboard.up(" ")
+        if release != "watching":
+            assert sent(page, "hold")[-1] == {"do": "hold", "held": False}
+        page.evaluate("sent.length = 0")
+    button = page.locator(".play-bar .hold")
+    button.hover()
+    page.mouse.down()
+    until_sent(page, "hold", 2)
+    assert button.get_attribute("aria-pressed") == "true"
+    page.mouse.up()
+    assert sent(page, "hold")[-1] == {"do": "hold", "held": False}
+    for key in (".", "r", "s"):
+        page.keyboard.press(key)
+    page.locator(".play-bar .stop").click()
+    until_sent(page, "stop")
+    assert {message["do"] for message in sent(page)} == {"hold", "stop"}
+    page.evaluate("play.holdKey.button.remove(); play.holdKey = null")
+
+
 def test_an_obstacle_is_dragged(page: Any) -> None:
     start = pixel(page, BALL)
     end = start + np.array([-30.0, -50.0])
@@ -557,3 +593,11 @@ def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:
     assert (move["do"], release["do"]) == ("move", "release")
     page.close()
     assert wrong == []
+
+
+def test_a_browser_that_cannot_draw_is_told_so(chromium: Any, viewer: Viewer) -> None:
+    page = chromium.new_page()
+    page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    page.goto(str(viewer.url))
+    page.get_by_text("WebGL is off").wait_for()
+    page.close()

@@ -9,8 +9,9 @@ and J L⁻ᵀ = U [S 0] Vᵀ, all are one linear loop:
     u₁ = -S⁻¹ Uᵀ (Kp e + Kv e' + Ki ∫e),     e = U S y₁,
     u₂ = -(K_N + A₂₂) y₂' - K_N A₂ y - A₂₁ y₁',
 
-with the field's slope A = -T (∂g/∂q) T⁻¹. It is exact about a state at rest of a robot
-without weight. A payload's weight adds a slow motion in the null space.
+with the field's slope A = -T (∂g/∂q) T⁻¹, without saddles. It is exact about a state
+at rest of a robot without weight. A payload's weight adds a slow motion in the null
+space.
 """
 
 from dataclasses import replace
@@ -21,7 +22,10 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation.compensation import Compensation
 from hsp_control.control.compensation.linear_loop import LinearLoop
-from hsp_control.control.compensation.null_space_rates import field_slope
+from hsp_control.control.compensation.null_space_rates import (
+    field_slope,
+    without_saddles,
+)
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot, RobotState
 
@@ -39,6 +43,11 @@ class LoadedLoop(NamedTuple):
     loop: LinearLoop
     difference: Array
     heavier: float
+
+    def largest_part(self, wanted: float) -> float:
+        """Return this part, or less: what is lighter must keep a tenth of its mass."""
+        lightest = float(np.linalg.eigvals(self.difference).real.min())
+        return wanted if lightest >= 0.0 else min(wanted, -0.9 / lightest)
 
     def with_part(self, s: float) -> LinearLoop:
         """Return the loop of a robot with s times the difference."""
@@ -105,6 +114,7 @@ def loaded_loop(
         gain[:m, :m] = into @ own @ out_of
     if m < n:
         A = -(T @ field_slope(controller, state) @ back)[m:]
+        A[:, m:] = without_saddles(A[:, m:])
         K = (T @ controller.null_space_gain @ back)[m:, m:]
         kp[m:], kv[m:] = K @ A, A
         kv[m:, m:] += K

@@ -16,9 +16,7 @@ def null_space_rates(controller: Controller, state: RobotState) -> tuple[Array, 
     """Return K_N and the field's slope A ≥ 0 in the null space, shape (k, k) each.
 
     Both are in coordinates that are orthonormal in the metric. A is the symmetric part
-    of -∂g/∂q, by central differences. Negative eigenvalues of A are set to 0: there the
-    field drives the robot away from a point (a saddle of its cost), which is intended,
-    and no control rate changes it.
+    of -∂g/∂q, by central differences, `without_saddles`.
     """
     nothing = np.zeros((0, 0))
     if not controller.field.controls:
@@ -33,9 +31,18 @@ def null_space_rates(controller: Controller, state: RobotState) -> tuple[Array, 
         return nothing, nothing
     into, out_of = L.T, np.linalg.inv(L.T)
     A = -Z.T @ into @ field_slope(controller, state) @ out_of @ Z
+    K = Z.T @ into @ controller.null_space_gain @ out_of @ Z
+    return K, without_saddles(A)
+
+
+def without_saddles(A: Array) -> Array:
+    """Return the symmetric part of a slope, with 0 for its negative eigenvalues.
+
+    There the field drives the robot away from a point (a saddle of its cost), which is
+    intended, and no control rate changes it.
+    """
     values, U = np.linalg.eigh(0.5 * (A + A.T))
-    A = (U * np.maximum(values, 0.0)) @ U.T
-    return Z.T @ into @ controller.null_space_gain @ out_of @ Z, A
+    return (U * np.maximum(values, 0.0)) @ U.T
 
 
 def field_slope(controller: Controller, state: RobotState) -> Array:

@@ -253,17 +253,18 @@ def _integral_finding(name: str, loop: LinearLoop) -> RateFinding | None:
 
 def _loaded_finding(loaded: LoadedLoop) -> RateFinding | None:
     """Return the problem of a robot whose bodies differ from the model's."""
-    wanted = loaded.with_part(RULE_LOADED)
+    part = loaded.largest_part(RULE_LOADED)
+    wanted = loaded.with_part(part)
     if wanted.radius() <= 1.0 + _ROUNDING:
         return None
-    times = _largest(lambda s: loaded.with_part(s * RULE_LOADED))
+    times = _largest(lambda s: loaded.with_part(s * part))
     if times is None:  # unstable with the exact model, too
         return None
     radius = loaded.with_part(1.0).radius()
     grows = (
         f"grows by a factor of up to {radius:.6g} per period"
         if radius > 1.0 + _ROUNDING
-        else f"grows if they differ {times * RULE_LOADED:.3g} times as much"
+        else f"grows if they differ {times * part:.3g} times as much"
     )
     choices, path = [], ("simulation", "control_period")
     if loaded.loop.ki.any():
@@ -277,7 +278,7 @@ def _loaded_finding(loaded: LoadedLoop) -> RateFinding | None:
     return RateFinding(
         path,
         f"the plant's bodies differ from the model's: it is {loaded.heavier:.3g} times "
-        f"as heavy at the tasks, and motion {grows}; design for {RULE_LOADED:g} times "
+        f"as heavy at the tasks, and motion {grows}; design for {part:.3g} times "
         f"the difference: use {' or '.join(choices)}",
         radius,
         False,

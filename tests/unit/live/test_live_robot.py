@@ -200,6 +200,39 @@ def test_lost_efforts_do_not_add_up_where_the_robot_says_what_it_has(
         assert "in a period; 0.5 are allowed, a rate of 500" in robot.robot.reason
 
 
+@pytest.mark.slow
+@settings(max_examples=15)
+@given(seed=st.integers(0, 2**32 - 1), loss=st.sampled_from([0.1, 0.3]))
+def test_a_robot_never_rejects_an_effort_over_a_bad_line(
+    seed: int, loss: float
+) -> None:
+    """States and efforts are lost at random, while it runs and while it stops."""
+    rng = np.random.default_rng(seed)
+    chosen = LiveSettings(effort_rate=100.0, velocity_margin=9.0)
+
+    class Bad(Lossy):
+        lost = 0  # states in a row
+
+        def read(self, timeout: float) -> Measurement | None:
+            found = super().read(timeout)
+            lost = self.reads > 2 and self.lost < 5 and rng.random() < loss
+            self.lost = self.lost + 1 if lost else 0
+            return None if lost else found
+
+        def write(self, effort: Array) -> None:
+            if rng.random() < loss:
+                self.sent.append(np.array(effort))
+            else:
+                Rig.write(self, effort)
+
+    robot = Bad(chosen, says=True, every=1)
+    quick = law(gains=Gains(natural_frequency=20.0))
+    report = run_loop(quick, robot, duration=0.1, settings=chosen)
+    assert report.ended == "completed", report.reason
+    assert robot.robot.reason == "the loop has ended"
+    assert np.abs(np.diff(robot.in_force, axis=0)).max() <= 0.1 * (1.0 + 1e-6)
+
+
 def test_the_controller_is_told_what_the_robot_has() -> None:
     told: list[Array] = []  # last, before each effort
 

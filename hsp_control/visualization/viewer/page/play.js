@@ -9,6 +9,7 @@
 //   play_hand.js, play_keys.js       pointers and keys
 //   play_overlay.js                  names, selection and spring over the scene
 //   play_bar.js, play_panel.js       the bar, the panel
+//   play_hold.js                     the dead-man's key of a live loop
 //   live_plots.js                    the plots in the panel
 "use strict";
 
@@ -49,12 +50,16 @@ class Play {
     this.obstacles = new Map();  // key -> {name, path, at, radius}
     this.held = new Map();       // key -> until when its own place is shown [ms]
     this.mine = true;
+    this.holdKey = null;
     this.taken = false;
     this.state = {t: 0, running: true, rate: 1, message: "", level: "info"};
     this.setup = this.selected = this.force = this.pull = null;
   }
 
   get ready() { return this.setup !== null; }
+
+  // Whether it is a simulation, which can be paused; else it is a live loop.
+  get simulated() { return this.setup.loop === "simulated"; }
 
   // --- what the program says ---
 
@@ -63,6 +68,8 @@ class Play {
     if (first) this.build();
     else this.hand.end(true);
     this.setup = setup;
+    document.body.classList.toggle("live-loop", !this.simulated);
+    if (setup.loop === "held") this.holdKey ??= new PlayHold(this, this.bar.row);
     this.held.clear();
     this.force = null;
     for (const gizmo of this.gizmos.values()) gizmo.dispose();
@@ -144,6 +151,7 @@ class Play {
       this.outbox.pending.clear();
       this.hand.end(true);
       this.keys.moving.clear();
+      this.holdKey?.set(false);
     }
     this.showDrive();
   }

@@ -8,6 +8,7 @@ class PlayBar {
     go: "M8 5v14l11-7z",
     step: "M6 5v14l9.6-7zM16.6 5H19v14h-2.4z",
     reset: "M12 5V1.6L6.6 6.2 12 10.8V7.4a5.4 5.4 0 1 1-5.4 5.4H4.2A7.8 7.8 0 1 0 12 5z",
+    stop: "M6 6h12v12H6z",
     save: "M10.8 3.5h2.4v8.2l3-3 1.7 1.7L12 16.3 6.1 10.4l1.7-1.7 3 3zM4.5 18.1h15v2.4h-15z",
     panel: "M4 6.2h8.2a3 3 0 0 1 5.6 0H20v2h-2.2a3 3 0 0 1-5.6 0H4zM4 15.8h2.2a3 3 0 0 1 5.6 "
       + "0H20v2h-8.2a3 3 0 0 1-5.6 0H4z",
@@ -29,6 +30,7 @@ class PlayBar {
       <div class="play-bar" role="toolbar" aria-label="Simulation">
         ${button("toggle", "Pause", "space")}${button("step", "One step", ".")}
         ${button("reset", "Reset", "r")}${button("save", "Save the run", "s")}
+        ${button("stop", "Stop the robot")}
         <output class="clock" aria-label="Time"></output>
         <output class="rate" aria-label="Rate"></output>
         ${button("panel", "Controls and plots")}
@@ -39,9 +41,9 @@ class PlayBar {
     [this.status, this.watching, this.clock, this.rate, this.toggle, this.panel] =
       [".play-status", ".play-watching", ".clock", ".rate", ".toggle", ".panel"].map(part);
     this.row = part(".play-bar");
-    this.acting = ["toggle", "step", "reset", "save"].map((name) => part(`.${name}`));
+    this.acting = ["toggle", "step", "reset", "save", "stop"].map((name) => part(`.${name}`));
     this.toggle.onclick = () => play.toggle();
-    for (const name of ["step", "reset", "save"]) part(`.${name}`).onclick = () => play.act(name);
+    for (const name of ["step", "reset", "save", "stop"]) part(`.${name}`).onclick = () => play.act(name);
     part(".play-watching button").onclick = () => play.takeOver();
     this.panel.onclick = () => play.panel.setOpen(!play.panel.open);
     // After a click the keyboard is the scene's again: space must not press it once more.
@@ -53,7 +55,8 @@ class PlayBar {
   showState({t, running, rate, message, level}) {
     this.clock.textContent = `${t.toFixed(2)} s`;
     this.rate.innerHTML = running
-      ? `${Number(rate).toFixed(2)} ×<span> real time</span>` : "paused";
+      ? `${Number(rate).toFixed(2)} ×<span> real time</span>`
+      : this.play.simulated ? "paused" : "stopped";
     const label = running ? "Pause" : "Go";
     if (this.toggle.getAttribute("aria-label") !== label) {
       this.toggle.setAttribute("aria-label", label);

@@ -5,7 +5,8 @@
 //   page up/down  the same vertically                r       reset
 //   escape        let go, select nothing             s       save
 //
-// `p` is that of presentation.js.
+// `p` is that of presentation.js. In a live loop the space bar is the dead-man's key, if it
+// has one, and there is no pause, step, reset or save.
 //
 // The arrows follow those of the world's horizontal axes that lie nearest to the picture's;
 // a coordinate that the program does not follow is left out. An orientation is turned, by 1°
@@ -52,6 +53,8 @@ class PlayKeys {
     }[key];
     if (way) return play.selected && (() => this.move(key, way, shiftKey));
     if (repeat && key !== ".") return null;
+    if (key === " " && play.holdKey) return () => play.holdKey.set(true);
+    if (!play.simulated) return null;
     return {
       " ": () => play.toggle(), ".": () => play.act("step"),
       r: () => play.act("reset"), s: () => play.act("save"),
@@ -113,6 +116,7 @@ class PlayKeys {
   }
 
   up(key) {
+    if (key === " ") this.play.holdKey?.set(false);
     const name = this.moving.get(key);
     if (name === undefined) return;
     this.moving.delete(key);

@@ -20,8 +20,9 @@ class PlayPanel {
         <div class="play-plots"></div>
         <p class="play-help">Drag a handle, an obstacle or a link; drag beside them to turn
           the view. <kbd>Tab</kbd> selects, <kbd>← → ↑ ↓</kbd> <kbd>Page ↑ ↓</kbd> move by
-          1 cm, with <kbd>Shift</kbd> by 1 mm. <kbd>Space</kbd> pauses, <kbd>.</kbd> steps,
-          <kbd>R</kbd> resets, <kbd>S</kbd> saves, <kbd>P</kbd> presents.</p></div>`;
+          1 cm, with <kbd>Shift</kbd> by 1 mm. <span class="simulated"><kbd>Space</kbd>
+          pauses, <kbd>.</kbd> steps, <kbd>R</kbd> resets, <kbd>S</kbd> saves.</span>
+          <kbd>P</kbd> presents.</p></div>`;
     this.title = this.box.querySelector("h2");
     this.controls = this.box.querySelector(".play-controls");
     this.plots = this.box.querySelector(".play-plots");

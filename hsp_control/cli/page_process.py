@@ -1,0 +1,110 @@
+"""Run a live loop's page in a process of its own, which always ends."""
+
+import json
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from hsp_control.cli.live_experiment import live_period
+from hsp_control.common.exceptions import ViewerError
+from hsp_control.config import Experiment
+from hsp_control.config.streams import without_sources
+from hsp_control.play.channel import channel_pair
+
+
+class PageProcess:
+    """The process of a page that shows and steers a live loop; a context manager.
+
+    Attributes:
+        channel: The way to it.
+        url: The page's address, with its key.
+        held: Whether somebody must hold a key.
+    """
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        journal: Path,
+        *,
+        port: int | None,
+        host: str,
+        held: bool,
+    ) -> None:
+        """Prepare the process; entering the context starts it.
+
+        Args:
+            experiment: What the loop controls.
+            journal: The loop's journal; an old one is removed.
+            port: The page's port; None: a free one.
+            host: The page's address.
+            held: Whether somebody must hold a key.
+        """
+        self.held = held
+        self.channel, self._there = channel_pair()
+        self.url = ""
+        journal.unlink(missing_ok=True)  # of another run
+        self._settings = {
+            "config": without_sources(experiment.config),
+            "journal": str(journal.absolute()),
+            "period": live_period(experiment),
+            "channel": self._there.fileno(),
+            "port": port,
+            "host": host,
+            "held": held,
+        }
+
+    def __enter__(self) -> Self:
+        """Start the process, and wait for the page's address.
+
+        Raises:
+            ViewerError: If it does not start; it has then said why.
+        """
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "hsp_control.cli.live_page"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            pass_fds=[self._there.fileno()],
+            start_new_session=True,  # Ctrl-C reaches the loop only
+        )
+        self._there.close()
+        assert self._process.stdout is not None
+        self._say(json.dumps(self._settings))
+        self.url = self._process.stdout.readline().decode().strip()
+        if not self.url:
+            self.close()
+            raise ViewerError("the loop's page did not start")
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def begin(self) -> None:
+        """Let it draw: what it needs is compiled."""
+        self._say("begin")
+
+    def close(self) -> None:
+        """End the process; a second call does nothing."""
+        self.channel.close()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                with suppress(OSError):
+                    pipe.close()
+        try:
+            self._process.wait(5.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _say(self, line: str) -> None:
+        assert self._process.stdin is not None
+        with suppress(OSError):  # it has ended, and said why
+            self._process.stdin.write(line.encode() + b"\n")
+            self._process.stdin.flush()

@@ -1,0 +1,4 @@
+"""Messages of ROS 2 over DDS, as ROS 2 itself sends them; without ROS 2.
+
+Only `address` may be imported without Cyclone DDS, which `hsp_control[ros2]` brings.
+"""
