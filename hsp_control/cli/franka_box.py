@@ -13,6 +13,7 @@ from hsp_control.config import Experiment, load_experiment
 from hsp_control.franka_box import PERIOD, PORT, VERSION, Arm, Box, Server
 from hsp_control.live.latency import real_time_priority
 from hsp_control.live.simulated_robot import sampled
+from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import example_robots
 
 MOTOR_INERTIA = 0.1
@@ -36,7 +37,6 @@ def franka_box(options: argparse.Namespace) -> int:
     box = _box(experiment, terminal.say)
     terminal.box = box
     with (
-        BoxLog(options.log, experiment, box) if options.log else nullcontext() as log,
         _ended_by_signals() as running,
         _priority(options.priority),
         Server(
@@ -48,6 +48,7 @@ def franka_box(options: argparse.Namespace) -> int:
             patience=options.patience,
             cut=options.cut,
         ) as server,
+        BoxLog(options.log, experiment, box) if options.log else nullcontext() as log,
     ):
         terminal.server = server
         time = "in lockstep" if options.lockstep else "in real time"
@@ -76,6 +77,7 @@ def _experiment(options: argparse.Namespace) -> Experiment:
     source, name = options.config, str(options.config)
     robots = {*bundled_robots(), *example_robots()} - {*bundled_configs()}
     if name in robots or name.endswith(".urdf"):
+        Arm(Robot.load(name))  # says what is wrong with it, not with a task
         source = {
             "robot": {"name": name},
             "tasks": {"hand": {"type": "frame_pose"}},

@@ -173,8 +173,10 @@ def _parser() -> argparse.ArgumentParser:
         _command(commands, "live", "control a simulated robot in another process")
     )
 
-    box = _command(commands, "franka-box", "be a Franka's control box, without a robot")
-    _add_configuration(box, "the arm: a robot's name, or ", "panda")
+    box = _command(
+        commands, "franka-box", "serve libfranka's research interface, without a robot"
+    )
+    _add_configuration(box, "the arm: a robot's name, its URDF, ", "panda")
     add_box_options(box)
 
     model = _command(commands, "franka-model", "save a Franka arm's model as a URDF")

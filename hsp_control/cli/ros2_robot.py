@@ -13,7 +13,7 @@ from threading import Event
 from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import load_experiment
-from hsp_control.live.ros2.backend import check_installed
+from hsp_control.ros2.installed import check_installed
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -420,8 +420,8 @@ def load_robot(document: Document, scenario: Scenario) -> Robot:
     Raises:
         HspControlError: If it cannot be loaded; with a location.
     """
-    parts = scenario.robot.parts is not None
-    with document.at("robot", *(() if parts else ("name",))):
+    named = scenario.robot.name is not None
+    with document.at("robot", *(("name",) if named else ())):
         return Robot.load(scenario.robot, access=document.access)
 
 

@@ -118,6 +118,8 @@ class Box:
             wanted = motion.reference or Reference(measured.q, measured.v, _ZERO)
         hand = motion.generator.hand if motion and motion.generator else None
         self.readings.set_desired(self.model, wanted, hand)
+        if motion is not None and motion.external:
+            fields["tau_J_d"][:] = motion.effort  # from which its rate is taken
         fields["message_id"][0] = self._id
         fields["robot_mode"][0] = self.mode
         idle = MotionGenerator.IDLE, Controller.OTHER
@@ -171,7 +173,11 @@ class Box:
         An arm beyond a limit first returns to where it was last clear of all limits.
         """
         if self.mode is not RobotMode.REFLEX:
-            self._respond(Command.AUTOMATIC_ERROR_RECOVERY, number, Status.SUCCESS)
+            recovers = self.mode is RobotMode.AUTOMATIC_ERROR_RECOVERY
+            status = (
+                Status.COMMAND_NOT_POSSIBLE_REJECTED if recovers else Status.SUCCESS
+            )
+            self._respond(Command.AUTOMATIC_ERROR_RECOVERY, number, status)
             return
         self.mode, self._recovery = RobotMode.AUTOMATIC_ERROR_RECOVERY, number
         if not self._is_allowed():

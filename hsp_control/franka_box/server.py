@@ -94,7 +94,7 @@ class Server:
         """Serve clients.
 
         Args:
-            on_period: Called after each period; false ends the service.
+            on_period: Called before each period; false ends the service.
         """
         advance = self._in_lockstep if self._lockstep else self._in_real_time
         with no_garbage_collection():
@@ -115,14 +115,17 @@ class Server:
         return number
 
     def _in_real_time(self, number: int) -> None:
-        """Wait for the command, step, and wait for the end of the period."""
-        self._due += PERIOD
+        """Wait for the command, step, and wait for the end of the period.
+
+        A state that was sent late leaves its client the whole time until the deadline.
+        """
         now = monotonic()
-        if now > self._due:
-            self.overrun += now - self._due
+        late = now - self._due
+        if late > PERIOD:  # it will not be made up for: the clock is moved
+            self.overrun += late
             self._due = now
-        command = self._await(number, min(now + self._deadline, self._due))
-        self.box.step(command)
+        self._due += PERIOD
+        self.box.step(self._await(number, now + self._deadline))
         self._await(0, self._due)
 
     def _in_lockstep(self, number: int) -> None:

@@ -11,6 +11,10 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
+from hsp_control.geometry.body_geometry import (
+    body_geometry,
+    enclosing_ellipsoid_capsule,
+)
 from hsp_control.geometry.capsule_fit import enclosing_capsule
 from hsp_control.geometry.hulls import convex_hull, hull_corners
 from hsp_control.robot import Robot
@@ -104,6 +108,21 @@ def part_of(robot: Robot, name: str) -> Part:
 
 
 def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
+    """Return the collision geometry of a part, fixed to the joints of the robot."""
+    if part.source.shapes is None:
+        return _shapes_of_urdf(robot, part)
+    shapes = []
+    for shape in part.source.shapes:
+        if shape.collides:
+            name = part.prefix + shape.body
+            frame = robot.model.frames[robot.frame_id(name)]
+            place = frame.placement * pin.SE3(shape.pose)
+            geometry = body_geometry(shape)
+            shapes.append(LinkShape(name, frame.parentJoint, place, geometry))
+    return shapes
+
+
+def _shapes_of_urdf(robot: Robot, part: Part) -> list[LinkShape]:
     """Return the URDF's collision geometry, fixed to the joints of the robot.
 
     The robot may have fewer joints than the URDF, since joints can be locked. So the
@@ -238,8 +257,11 @@ def _capsule(shape: LinkShape) -> LinkShape:
         return _replaced(
             shape, coal.Capsule(geometry.radius, 2.0 * geometry.halfLength)
         )
-    first, second, radius = enclosing_capsule(_points(shape))
-    placement, length = _placement_along(first, second)
+    if isinstance(geometry, coal.Ellipsoid):
+        placement, radius, length = enclosing_ellipsoid_capsule(geometry)
+    else:
+        first, second, radius = enclosing_capsule(_points(shape))
+        placement, length = _placement_along(first, second)
     return LinkShape(
         shape.link,
         shape.joint,

@@ -34,6 +34,8 @@ from hsp_control.robot.description.loading import (
     load_model,
     reference_posture,
 )
+from hsp_control.robot.description.mujoco.selection import select
+from hsp_control.robot.description.mujoco.source import load_mjcf, load_selection
 from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
 from hsp_control.robot.description.sources import RobotSource, Root, find_robot
 from hsp_control.robot.kinematics import (
@@ -150,9 +152,53 @@ class Robot(ConfigurationSpace):
         return cls._described(name, access)
 
     @classmethod
+    def from_mujoco(
+        cls,
+        model: Any,
+        root: str | None = None,
+        joints: Sequence[str] | None = None,
+        *,
+        qpos: ArrayLike | None = None,
+        keyframe: str | None = None,
+        locked: Mapping[str, float] | None = None,
+        tool_frames: Mapping[str, ToolFrame] | None = None,
+    ) -> Self:
+        """Return a robot in a compiled MuJoCo model: with the numbers MuJoCo uses.
+
+        Bodies and sites are its frames, under their names. Bodies that are not below
+        the root are no part of it; what moves them, they stand still. What MuJoCo has
+        and the robot lacks, such as a closed loop, is in `source.omitted`, and logged
+        as a warning. `MujocoCoordinates` converts states.
+
+        Args:
+            model: The scene, a ``mujoco.MjModel``.
+            root: Name of the body whose subtree is the robot, with the body's own
+                joints; None: the whole scene.
+            joints: Names of its joints that move; None: all. The others are locked.
+                q and v have MuJoCo's order, whatever the order here.
+            qpos: The scene's configuration, shape (model.nq,), in which the other
+                joints are locked and the robot is at home; None: ``model.qpos0``, but
+                then the home of a joint that is not within its limits there is in
+                their middle.
+            keyframe: The name of that configuration in the model, instead.
+            locked: Hinges and slides to lock elsewhere, name to value [rad or m].
+            tool_frames: Frames to add, by name.
+
+        Raises:
+            ModelError: If MuJoCo is not installed, the configuration is not one of the
+                scene, no joint moves, or the mass matrix is singular.
+            FrameNotFoundError: If the root or a tool frame's parent does not exist.
+            JointNotFoundError: If a joint does not exist or is not below the root.
+        """
+        selection = select(model, root, joints, qpos, keyframe, locked)
+        return cls(*load_selection(selection, tool_frames or {}))
+
+    @classmethod
     def _described(cls, description: RobotDescription, access: Access) -> Self:
         """Return the robot of a description."""
         gravity = description.gravity
+        if description.mjcf is not None:
+            return cls(*load_mjcf(description, access), description=description)
         if description.parts is None:
             assert description.name is not None
             source = find_robot(description.name, access)

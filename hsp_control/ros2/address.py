@@ -10,7 +10,6 @@ from hsp_control.common.exceptions import HardwareError
 from hsp_control.common.suggestions import did_you_mean, listing
 
 SCHEME = "ros2://"
-INSTALL = "pip install 'hsp_control[ros2]'"
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _LARGEST_DOMAIN = 232  # beyond, RTPS has no ports for it
 

@@ -34,6 +34,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.suggestions import listing
 from hsp_control.ros2.messages import TYPE_HASHES, ros_name
 
 M = TypeVar("M", bound=IdlStruct)
@@ -126,8 +127,8 @@ class _End(Generic[M]):
             )
         same = sorted(name[2:] for name, kind in there if kind == needed)
         return (
-            f"nobody {verb} {self.topic} (with {ros_name(needed)} there is "
-            f"{', '.join(same[:8]) or 'no topic'})"
+            f"nobody {verb} {self.topic} in domain {self._participant.get_domain_id()} "
+            f"(topics with {ros_name(needed)}: {listing(same) if same else 'none'})"
         )
 
 
@@ -172,7 +173,7 @@ class Subscription(_End[M]):
     """Hears messages of a topic.
 
     Attributes:
-        malformed: Number of messages whose bytes were not of the type.
+        malformed: Number of messages with a text that is not UTF-8.
     """
 
     def __init__(
@@ -221,7 +222,8 @@ class Subscription(_End[M]):
     def take(self) -> list[Received[M]]:
         """Return the messages that wait, oldest first; at most as many as may wait.
 
-        Bytes that are no message of the type are counted and dropped.
+        One with a text that is not UTF-8 is counted and dropped. Other bytes that are
+        no message of the type do not get so far: Cyclone DDS drops them.
         """
         found: list[Received[M]] = []
         for _ in range(_DEPTH):
@@ -229,7 +231,7 @@ class Subscription(_End[M]):
                 taken = self._reader.take(1)
             except DDSException as error:
                 raise HardwareError(f"cannot hear {self.topic}: {error}") from error
-            except Exception:  # whatever the decoder stumbles over
+            except UnicodeDecodeError:  # all else Cyclone has checked
                 self.malformed += 1
                 continue
             if not taken:

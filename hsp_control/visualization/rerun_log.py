@@ -223,6 +223,10 @@ def _archetypes(rerun: Any, visual: Visual, owner: str) -> Iterator[Any]:
             yield rerun.Capsules3D(
                 radii=[size[0]], lengths=[size[1]], translations=down, **solid
             )
+        case "ellipsoid":
+            yield rerun.Ellipsoids3D(radii=[size], **solid)
+        case _ if visual.mesh is not None:
+            yield _mesh(rerun, *visual.mesh, color)
         case _ if visual.file is not None:
             collada = visual.file.suffix.lower() == ".dae"
             thing = (

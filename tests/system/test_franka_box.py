@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from franka_boxes import LONGEST, PRELUDE, addresses, home, panda, plant, served
 
-from hsp_control import load_experiment
+from hsp_control import Rollout, load_experiment
 from hsp_control.franka_box.wire import Error
 from hsp_control.simulation.plants import Payload
 
@@ -301,6 +301,7 @@ CIRCLE: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow
 def test_a_circle_with_a_posture_is_the_one_that_is_simulated() -> None:
     """The same law and plant with and without the box: they differ by single precision.
 
@@ -313,7 +314,7 @@ def test_a_circle_with_a_posture_is_the_one_that_is_simulated() -> None:
         rig.run(
             f"config = {CIRCLE!r}"
             + """
-from hsp_control import load_experiment
+from hsp_control import Rollout, load_experiment
 experiment = load_experiment(config)
 arm, state, rest = experiment.robot, experiment.robot.state, np.zeros(7)
 experiment.controller.compute(0.0, experiment.q0, rest)  # compile before the motion
@@ -376,6 +377,13 @@ while True:
         assert "its client is disconnected" in rig.tells("motion ended")
 
 
+def await_start(box: "subprocess.Popen[str]") -> None:
+    assert box.stdout is not None
+    while "research interface 10" not in (line := box.stdout.readline()):
+        assert line, "the box did not start"
+
+
+@pytest.mark.slow
 def test_a_client_sees_that_its_box_was_killed() -> None:
     host = next(addresses())
     command = [sys.executable, "-m", "hsp_control", "franka-box", "--lockstep"]
@@ -384,8 +392,7 @@ def test_a_client_sees_that_its_box_was_killed() -> None:
     ) as box:
         assert box.stdout is not None
         try:
-            while "research interface 10" not in (line := box.stdout.readline()):
-                assert line, "the box did not start"
+            await_start(box)
             client = subprocess.Popen(
                 [
                     sys.executable,
@@ -431,16 +438,33 @@ except franka.NetworkException as error:
     assert "is connected" in rig.tells("refused: ")
 
 
-def test_the_example_in_the_documentation_runs() -> None:
+@pytest.mark.slow
+def test_the_example_in_the_documentation_runs(tmp_path: Path) -> None:
+    """As a user does it: the command, the example, Ctrl-C, and the log."""
     page = Path(__file__).parents[2] / "docs" / "franka_box.md"
     example = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
     assert len(example.strip().splitlines()) <= 14
-    with served() as rig:
-        source = example.replace("127.0.0.1", rig.host)
-        client = subprocess.run(
-            [sys.executable, "-c", source],
-            capture_output=True, text=True, timeout=LONGEST,
-        )  # fmt: skip
-        assert client.returncode == 0, client.stderr
-        assert "finished" in rig.tells("motion ended")
-        assert rig.box.q - home() == pytest.approx([0, 0, 0, 0.3, 0, 0, 0], abs=0.01)
+    host, log = next(addresses()), tmp_path / "example.npz"
+    command = [sys.executable, "-m", "hsp_control", "franka-box", "--lockstep"]
+    with subprocess.Popen(
+        [*command, "--host", host, "--log", log], stdout=subprocess.PIPE, text=True
+    ) as box:
+        try:
+            await_start(box)
+            source = example.replace("127.0.0.1", host)
+            client = subprocess.run(
+                [sys.executable, "-c", source],
+                capture_output=True, text=True, timeout=LONGEST,
+            )  # fmt: skip
+            assert client.returncode == 0, client.stderr
+            box.send_signal(signal.SIGINT)
+            said, _ = box.communicate(timeout=LONGEST)
+        finally:
+            box.kill()
+    assert box.returncode == 0
+    assert "motion ended: the client has finished it (2999 commands, 0 lost)" in said
+    assert f"Log: {log}" in said
+    run = Rollout.load(log)
+    moved = np.asarray(run["q"])[-1] - home()
+    assert moved == pytest.approx([0, 0, 0, 0.3, 0, 0, 0], abs=0.01)
+    assert np.asarray(run["t"])[-1] == pytest.approx(3.0, abs=0.2)

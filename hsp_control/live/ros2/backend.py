@@ -6,7 +6,8 @@ from hsp_control.common.exceptions import HardwareError
 from hsp_control.live.effort_source import EffortSource
 from hsp_control.live.hardware import Hardware
 from hsp_control.robot import Robot
-from hsp_control.ros2.address import INSTALL, SCHEME
+from hsp_control.ros2.address import SCHEME
+from hsp_control.ros2.installed import check_installed
 
 
 def connect(address: str, robot: Robot, period: float) -> Hardware:
@@ -42,17 +43,3 @@ def publish(address: str, effort_source: EffortSource) -> Callable[[float], None
     from hsp_control.live.ros2.watch import Watched
 
     return Watched(address, effort_source)
-
-
-def check_installed() -> None:
-    """Raise if Cyclone DDS cannot be imported.
-
-    Raises:
-        HardwareError: Then; says how to install it.
-    """
-    try:
-        import cyclonedds.domain  # noqa: F401
-    except ImportError as error:
-        raise HardwareError(
-            f"ros2:// needs Cyclone DDS; install it with: {INSTALL}"
-        ) from error

@@ -29,11 +29,11 @@ _POLL = 0.01
 class Ros2Hardware:
     """`Hardware` that hears ``sensor_msgs/JointState`` and sends efforts.
 
-    ros2_control's ``joint_state_broadcaster`` publishes these states, and its
-    ``effort_controllers/JointGroupEffortController`` takes these efforts, as
-    ``std_msgs/Float64MultiArray``. Joints are matched by name. The field ``effort`` is
-    not read: whether it is commanded or measured, and with or without gravity, differs
-    from robot to robot.
+    ros2_control's ``JointStateBroadcaster`` publishes these states, and its
+    ``ForwardCommandController`` of efforts, once ``JointGroupEffortController``, takes
+    these efforts as ``std_msgs/Float64MultiArray``. Joints are matched by name. The
+    field ``effort`` is not read: whether it is commanded or measured, and with or
+    without gravity, differs from robot to robot.
 
     A state has no number. Its stamp counts: one that is not later than the last one is
     old, and a step of n periods means that n - 1 states were lost. The clock of the
@@ -124,7 +124,7 @@ class Ros2Hardware:
     def close(self) -> None:
         """Leave the domain; a second call does nothing.
 
-        A `JointGroupEffortController` then holds the last effort: its interface has no
+        A ``ForwardCommandController`` then holds the last effort: its interface has no
         word for an end. A robot of `serve` stops.
         """
         if not self._closed:

@@ -19,6 +19,8 @@ from hsp_control.ros2.address import checked_name, parse
 from hsp_control.ros2.messages import Float64MultiArray, JointState
 from hsp_control.ros2.node import Node
 
+_CATCH_UP = 10
+"""Most periods that are made up for when the process did not get the processor."""
 _POLL = 0.1
 """How often a robot that waits for an effort looks for reasons to stop [s]."""
 
@@ -99,9 +101,11 @@ def serve(
     """Run a robot until it has stopped and was held.
 
     Each period: receive efforts, advance the plant, publish the state. Stamps begin at
-    the time of day, and grow by a period each.
+    the time of day, and grow by a period each. If the process overruns by some periods,
+    it makes up for them, as a robot moves on; if by more, the plant stands still, but
+    not the stamps.
 
-    The robot stops as a `SimulatedRobot` does, and where a `JointGroupEffortController`
+    The robot stops as a `SimulatedRobot` does, and where a ``ForwardCommandController``
     would not: if whoever sent efforts has gone, if a second publisher sends some, and
     at an effort of a wrong size.
 
@@ -134,5 +138,8 @@ def serve(
                     pass
                 due = monotonic()
                 continue
-            due = max(due + robot.period, monotonic() - robot.period)
+            due += robot.period
+            behind = int((monotonic() - due) / robot.period)
+            if behind > _CATCH_UP:
+                due, stamp = due + behind * robot.period, stamp + behind * step
             sleep(max(due - monotonic(), 0.0))

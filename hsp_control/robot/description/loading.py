@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pinocchio as pin
@@ -61,11 +61,28 @@ def load_model(
     """
     if settings is None:
         settings = RobotDescription(source.name)
-    model = _parse(source, settings.root or source.root, mimic=settings.mimic)
+    root = cast("Root", settings.root or source.root)  # text is for MJCF only
+    model = _parse(source, root, mimic=settings.mimic)
     locks = source.locked if settings.locked is None else settings.locked
     if locks:
         model = _lock(model, locks)
-    for name, tool in settings.tool_frames.items():
+    return completed(model, source, settings.tool_frames, gravity)
+
+
+def completed(
+    model: pin.Model,
+    source: RobotSource,
+    tool_frames: Mapping[str, ToolFrame],
+    gravity: ArrayLike | None,
+) -> pin.Model:
+    """Return a checked model, with frames and gravity of one's own.
+
+    Raises:
+        ModelError: If a tool frame's name exists already, a joint's limits are
+            reversed, or the mass matrix is singular.
+        FrameNotFoundError: If a tool frame's parent does not exist.
+    """
+    for name, tool in tool_frames.items():
         _add_frame(model, name, tool)
     if gravity is not None:
         model.gravity.linear = np.asarray(gravity)

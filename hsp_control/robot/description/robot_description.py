@@ -3,15 +3,17 @@
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, field, replace
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Self, get_args
 
 from hsp_control.common.exceptions import ModelError
-from hsp_control.declaration import Part
+from hsp_control.common.suggestions import did_you_mean
+from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     READ_ONLY,
     FileName,
     Flag,
     Name,
+    Names,
     Number,
     ReadOnlyDict,
     Vector3,
@@ -63,7 +65,7 @@ class PlacedRobot(Part, error=ModelError):
 
 
 class RobotDescription(Part, error=ModelError):
-    """A robot: one of a name or file, or several robots in one workspace.
+    """A robot: one of a name or file, one in a MuJoCo scene, or several robots.
 
     `Robot.load` makes the robot.
     """
@@ -71,8 +73,16 @@ class RobotDescription(Part, error=ModelError):
     name: FileName | None = None
     """Name of a bundled robot or of example-robot-data, or the path of a URDF file."""
     _: KW_ONLY
-    root: Root | None = None
-    """Connection of the root to the world; by default as the robot's source defines."""
+    mjcf: FileName | None = None
+    """Instead of `name`: the path of an MJCF, a scene that contains the robot."""
+    root: Root | Name | None = None
+    """Connection of the root to the world; by default as the robot's source defines.
+    With `mjcf`: the body whose subtree is the robot; by default the whole scene."""
+    joints: Names | None = None
+    """With `mjcf`: the joints that move; by default all. The others are locked."""
+    keyframe: Name | None = None
+    """With `mjcf`: the keyframe where the robot is at home, and the other joints are
+    locked; by default the scene's reference configuration."""
     locked: Annotated[Mapping[str, Number], READ_ONLY] | None = None
     """Locked joints: position [rad or m] by name; by default as the robot's source
     defines."""
@@ -94,20 +104,38 @@ class RobotDescription(Part, error=ModelError):
         Raises:
             ModelError: If it is neither, or both.
         """
-        if (self.name is None) == (self.parts is None):
-            raise ModelError("give one of name and parts")
+        if sum(x is not None for x in (self.name, self.mjcf, self.parts)) != 1:
+            raise ModelError("give one of name, mjcf and parts")
+        if self.mjcf is None:
+            self._check_without_mjcf()
+        elif not self.mimic:
+            raise ModelError("mimic is not for mjcf, which has equality constraints")
         of_one = {"root", "locked", "tool_frames", "mimic"} & {*self.changed_fields()}
         if self.parts is not None and of_one:
             raise ModelError(
                 f"{', '.join(sorted(of_one))}: give it for each of the parts"
             )
 
+    def _check_without_mjcf(self) -> None:
+        allowed = get_args(Root)
+        if self.root is not None and self.root not in allowed:
+            with within("root"):
+                raise ModelError(
+                    f"unknown value {self.root!r}{did_you_mean(self.root, allowed)} "
+                    f"(allowed: {', '.join(allowed)})"
+                )
+        for key in ("joints", "keyframe"):
+            if getattr(self, key) is not None:
+                raise ModelError(f"{key} is only for mjcf")
+
     def located(self, folder: Path) -> Self:
-        """Return it with the full path of each URDF that is in a folder.
+        """Return it with the full path of each file that is in a folder.
 
         A relative path is first looked up there, so that a folder with a configuration
         and its robots can be moved.
         """
+        if self.mjcf is not None:
+            return replace(self, mjcf=_located(self.mjcf, folder))
         if self.parts is None:
             return replace(self, name=_located(self.name, folder))
         parts = {name: part.located(folder) for name, part in self.parts.items()}

@@ -14,6 +14,7 @@ from hsp_control.common.exceptions import RobotNotFoundError
 from hsp_control.common.resources import bundled_robots
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.access import ANYWHERE, Access
+from hsp_control.robot.description.body_shape import BodyShape
 
 Root = Literal["fixed", "planar", "free_flyer"]
 
@@ -36,11 +37,13 @@ class RobotSource:
 
     Attributes:
         name: Name of a known robot, or the URDF file's name without ``.urdf``.
-        urdf: The URDF file.
+        urdf: The URDF file. Of a robot in a MuJoCo model, whose `shapes` are given:
+            the MJCF file, or the model's name if it was compiled in Python.
         srdf: The SRDF file (reference postures, disabled collision pairs), if any.
         root: The default root: ``fixed``, ``planar`` or ``free_flyer``.
         package_dirs: Folders in which ``package://`` is looked up.
-        origin: ``bundled``, ``example-robot-data``, ``file`` or ``combined``.
+        origin: ``bundled``, ``example-robot-data``, ``file``, ``mujoco`` or
+            ``combined``.
         locked: Joints that are locked by default, name to value [rad or m].
         end_effector: The frame that tasks use by default, if known.
         home: Joint values of a good start posture, shape (nv,) [rad or m], if known.
@@ -48,6 +51,9 @@ class RobotSource:
         joint_coordinates: Which coordinates theta = A q the literature uses for this
             robot (``absolute`` for the planar arm), if not q.
         access: Which files its URDF may name.
+        shapes: The shapes of its bodies, if they are not in a URDF.
+        excluded: Pairs of bodies that never collide, besides those of the SRDF.
+        omitted: What the model that it comes from has and the robot lacks, in words.
     """
 
     name: str
@@ -62,6 +68,9 @@ class RobotSource:
     posture: str | None = None
     joint_coordinates: str | None = None
     access: Access = ANYWHERE
+    shapes: tuple[BodyShape, ...] | None = field(default=None, repr=False)
+    excluded: frozenset[frozenset[str]] = frozenset()
+    omitted: tuple[str, ...] = ()
 
 
 def find_robot(name: str | Path, access: Access = ANYWHERE) -> RobotSource:

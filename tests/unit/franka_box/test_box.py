@@ -103,6 +103,18 @@ def test_a_payload_sinks_unless_its_load_is_set() -> None:
     assert sunk[1] < 1e-9
 
 
+def test_a_motion_begins_at_the_effort_that_its_client_is_told() -> None:
+    """What holds a payload is the box's effort: a client's rate is taken from zero."""
+    box = Talking(plant(payload=Payload("panda_link8", 2.0)))
+    for _ in range(300):
+        box.step(None)
+    assert np.abs(state(box)["tau_J_d"]).max() > 5.0
+    box.begin(1, *TORQUE)
+    assert not state(box)["tau_J_d"].any()
+    box.step(command(tau_J_d=state(box)["tau_J_d"] + 0.9))
+    assert box.motion is not None
+
+
 def test_the_same_commands_give_the_same_bits() -> None:
     random = np.random.default_rng(3)
     efforts = np.cumsum(random.uniform(-0.5, 0.5, (100, 7)), axis=0)

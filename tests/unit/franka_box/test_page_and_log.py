@@ -5,12 +5,14 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 import yaml
 from franka_boxes import home, panda, plant
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli.franka_box_log import BoxLog
-from hsp_control.cli.main import _parser
+from hsp_control.cli.main import _parser, main
+from hsp_control.common.exceptions import LogError
 from hsp_control.franka_box import PERIOD, Arm, Box, generators, reflexes
 from hsp_control.franka_box.wire import COMMAND, Controller, Error, MotionGenerator
 from hsp_control.live.simulated_robot import sampled
@@ -65,3 +67,31 @@ def test_the_log_has_the_true_motion(tmp_path: Path) -> None:
         assert true[t].tolist() == q.tolist()
     assert set(run["box.mode"].tolist()) == {2.0}
     assert not log.path.with_suffix(".journal").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["planar3r"], "planar3r has the joints"),
+        (["panda", "--host", "10.1.1.1"], "listens on loopback only"),
+        (["panda", "--deadline", "0"], "deadline 0 µs; must be above 0"),
+        (["panda", "--priority", "100"], "real-time priority 100"),
+        (["panda", "--set", "start.velocity=[1, 0, 0, 0, 0, 0, 0]"], "at rest"),
+    ],
+)
+def test_a_mistake_is_one_line(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["franka-box", *arguments]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("hsp: ")
+    assert said in line
+
+
+def test_a_log_has_the_name_of_one(tmp_path: Path) -> None:
+    box = Box(panda(), plant(), home(), print)
+    experiment = load_experiment(
+        {"robot": {"name": "panda"}, "tasks": {"hand": {"type": "frame_pose"}}}
+    )
+    with pytest.raises(LogError, match=r"the name of a log ends in \.npz"):
+        BoxLog(tmp_path / "run.csv", experiment, box)

@@ -49,7 +49,7 @@ def test_a_pose_has_its_orientation_and_a_plane_is_no_pose() -> None:
     prefix, _, _ = fresh()
     gains = Gains(natural_frequency=5.0)
     pose = FramePose("panda_tcp", StreamPose(), gains=gains, name="whole-hand")
-    plane = FramePosition("panda_link5", Stream(), axes="xz", gains=gains, name="plane")
+    plane = FramePosition("panda_link5", Stream(), axes="x", gains=gains, name="plane")
     command = Command(Controller(panda(), [pose, plane]))
     watched = publish(f"ros2:/{prefix}?domain={DOMAIN}", command)
     hand, flat = heard(f"{prefix}/whole_hand/actual"), heard(f"{prefix}/plane/actual")
