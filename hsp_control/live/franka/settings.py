@@ -16,12 +16,13 @@ from hsp_control.declaration.quantities import (
     ArrayField,
     Flag,
     NonNegative,
+    Number,
     Positive,
     Vector3,
     read_only,
 )
 
-_Row3 = Annotated[list[float], Field(min_length=3, max_length=3)]
+_Row3 = Annotated[list[Number], Field(min_length=3, max_length=3)]
 _Matrix3 = Annotated[
     ArrayLike,
     ArrayField(Annotated[list[_Row3], Field(min_length=3, max_length=3)], read_only),

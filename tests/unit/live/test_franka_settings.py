@@ -41,6 +41,7 @@ def test_text_and_file_say_what_python_says(tmp_path: Path) -> None:
         ("a?recover=3", "recover: "),
         ("a?load.mass=-1", "load.mass: -1 is negative"),
         ("a?load.mas=1", r"load.*'mas'; did you mean 'mass'"),
+        ("a?load.mass=1&load.inertia=[[a,0,0],[0,1,0],[0,0,1]]", "load.inertia"),
         ("a?load=1&load.mass=1", "load is 1, not a mapping"),
         ("a?collision_torque=[1, 2]", "collision_torque"),
         ("a?cutoff_frequency=[", "cutoff_frequency=.*flow"),
