@@ -254,6 +254,13 @@ def franka_box(options: argparse.Namespace) -> int:
     return boxes.franka_box(options)
 
 
+def franka_model(options: argparse.Namespace) -> int:
+    """Save a Franka arm's own model."""
+    from hsp_control.cli import franka_model as models
+
+    return models.franka_model(options)
+
+
 def robots(options: argparse.Namespace) -> int:
     """List all robots, or describe one."""
     if options.name is not None:

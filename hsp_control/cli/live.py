@@ -15,18 +15,21 @@ from rich.table import Table
 from hsp_control.cli.consoles import out
 from hsp_control.cli.live_experiment import live_period, simulated_robot
 from hsp_control.cli.robot_process import RobotProcess
+from hsp_control.cli.robot_start import begun_where_it_is
 from hsp_control.cli.steering import let_steer, steering_page
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.control.compensation import Command
 from hsp_control.live import (
     Faults,
+    Hardware,
     InProcessRobot,
     LoopReport,
     OperatorRequests,
     connect,
     run_loop,
 )
+from hsp_control.live.adapting import AdaptingHardware
 from hsp_control.live.latency import Quantiles
 from hsp_control.live.ros2 import publish
 from hsp_control.live.settings import check_fixed
@@ -64,8 +67,6 @@ def live(options: argparse.Namespace) -> int:
     }
     command = Command(experiment.controller, experiment.compensation)
     on_period: list[Callable[[float], object]] = []
-    if options.publish is not None:
-        on_period.append(publish(options.publish, command))
     with stop_signals(requests, takes_over=True), ExitStack() as stack:
         page = stack.enter_context(steering_page(options, experiment, loop_log))
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
@@ -75,10 +76,22 @@ def live(options: argparse.Namespace) -> int:
             duration=min(duration, _DRY_RUN),
             **options_of_loop,
         )
-        if page is not None:
-            on_period.append(let_steer(page, experiment, requests))
+        hardware: Hardware | None = None
         if options.robot is not None:
             hardware = connect(options.robot, experiment.robot, live_period(experiment))
+            stack.callback(hardware.close)
+        if isinstance(hardware, AdaptingHardware):
+            settings = hardware.adapted(experiment.scenario.live)
+            experiment = begun_where_it_is(experiment, options, hardware.q)
+            options_of_loop |= {"settings": settings, "scene": experiment.scene}
+            command = Command(experiment.controller, experiment.compensation)
+            for line in hardware.lines:
+                out.print(line, highlight=False)
+        if options.publish is not None:
+            on_period.append(publish(options.publish, command))
+        if page is not None:
+            on_period.append(let_steer(page, experiment, requests))
+        if hardware is not None:
             report = run_loop(
                 command,
                 hardware,
@@ -91,8 +104,12 @@ def live(options: argparse.Namespace) -> int:
             )
             out.print(_times(report, experiment))
             out.print(f"The loop: {report.reason}")
+            fault = getattr(hardware, "fault", None)
+            if fault is not None and fault not in report.reason:
+                out.print(f"The robot: {fault}", highlight=False)
             _convert(loop_log)
-            return 0 if report.ended in {"completed", "operator"} else 2
+            regular = report.ended in {"completed", "operator"} and fault is None
+            return 0 if regular else 2
         with RobotProcess(
             experiment, faults=faults, log=robot_log, log_period=simulation.log_period
         ) as robot:

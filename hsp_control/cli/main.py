@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from hsp_control.cli.franka_box_options import add_box_options
+from hsp_control.cli.franka_model_options import add_model_options
 from hsp_control.cli.startup import end_quietly, is_command
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.common.resources import bundled_configs, bundled_robots
@@ -177,6 +178,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_configuration(box, "the arm: a robot's name, its URDF, ", "panda")
     add_box_options(box)
+
+    model = _command(commands, "franka-model", "save a Franka arm's model as a URDF")
+    _complete(add_model_options(model), bundled_robots)
 
     robots = _command(
         commands, "robots", "list the robots that can be loaded, or describe one"
@@ -374,7 +378,8 @@ def _add_live(live: argparse.ArgumentParser) -> None:
     live.add_argument(
         "--robot",
         metavar="NAME://ADDRESS",
-        help="a robot that an installed package can reach; default: a simulated one",
+        help="franka://ADDRESS, or another robot that an installed package can reach; "
+        "default: a simulated one",
     )
     live.add_argument("--publish", metavar="ros2://NAME", help="topics for watchers")
     live.add_argument(

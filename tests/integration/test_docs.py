@@ -2,20 +2,17 @@
 
 import re
 import shlex
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
-from live_rigs import law, watched
 from places import ROOT
 
 import hsp_control
 from hsp_control import load_experiment
 from hsp_control.cli.main import _parser
-from hsp_control.live import LiveSettings, run_loop
+from hsp_control.live import LiveSettings
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.visualization.viewer import ShownItems
 
@@ -196,42 +193,13 @@ def test_pictures_that_documents_show_exist() -> None:
                 assert (document.parent / target).exists(), f"{document.name}: {target}"
 
 
-PANDA = LiveSettings(compensates_gravity=True, effort_rate=1000.0)
-
-
-class _FakeFranka:
-    """pylibfranka as far as the page uses it, around a simulated Panda."""
-
-    def __init__(self, address: str) -> None:
-        self.watched = watched(PANDA)
-        self.efforts: list[np.ndarray] = []
-        self.stopped = False
-
-    def read_once(self) -> SimpleNamespace:
-        return SimpleNamespace(q=self.watched.q.tolist(), dq=self.watched.v.tolist())
-
-    def start_torque_control(self) -> "_FakeFranka":
-        return self
-
-    def readOnce(self) -> tuple[SimpleNamespace, SimpleNamespace]:
-        self.watched.advance(self.efforts)
-        self.efforts = []
-        return self.read_once(), SimpleNamespace(to_sec=lambda: 0.001)
-
-    def writeOnce(self, torques: list[float]) -> None:
-        self.efforts.append(np.array(torques))
-
-    def stop(self) -> None:
-        self.stopped = True
-
-
 def test_the_live_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
     (shell,) = blocks(text, "sh")
     for line in shell.splitlines():
         _parser().parse_args(shlex.split(line.split("#")[0])[1:])
-    example, panda = blocks(text, "python")
+    (example,) = blocks(text, "python")
     space: dict = {}
     exec(compile(example, "live.md", "exec"), space)
     assert space["report"].ended == "completed"
@@ -239,17 +207,6 @@ def test_the_live_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     weights = {each.name: sample_weight(each.weight, state)[0] for each in fields}
     assert weights == {"obstacle_clearance": 0.0, "target_posture": 0.0, "calm": 1.0}
     assert space["run"].status == "completed"
-
-    module = SimpleNamespace(
-        Robot=_FakeFranka, Torques=list, FrankaException=type("F", (Exception,), {})
-    )
-    monkeypatch.setitem(sys.modules, "pylibfranka", module)
-    exec(compile(panda, "live.md", "exec"), space)
-    robot = space["Panda"]("fake")
-    report = run_loop(law(), robot, duration=0.2, settings=PANDA)
-    assert report.ended == "completed", report.reason
-    assert robot._robot.stopped
-    assert robot._robot.watched.t > 0.2
 
 
 def test_the_live_page_s_defaults_are_the_code_s() -> None:
