@@ -184,6 +184,14 @@ def test_what_is_no_mjcf(text: str, message: str, folder: Path) -> None:
         Robot.load(RobotDescription(mjcf=path))
 
 
+def test_a_scene_may_be_too_large(folder: Path) -> None:
+    path = folder / "cell.xml"
+    free = "<body><freejoint/><geom size='.1'/></body>" * 34
+    path.write_text(f"<mujoco><worldbody>{free}</worldbody></mujoco>")
+    with pytest.raises(ModelError, match="204 degrees of freedom; at most 200"):
+        Robot.load(RobotDescription(mjcf=path))
+
+
 # --- files of strangers --------------------------------------------------------------
 
 MESH = (
@@ -220,9 +228,13 @@ def test_strict_reading_loads_no_plugins_and_ends(folder: Path) -> None:
     strict = only_within([folder])
     path = folder / "cell.xml"
     assert Robot.load(RobotDescription(mjcf=path), access=strict).nv == 11
-    path.write_text("<mujoco><extension><plugin plugin='x'/></extension></mujoco>")
-    with pytest.raises(AccessError, match="strict reading allows no <plugin>"):
-        Robot.load(RobotDescription(mjcf=path), access=strict)
+    for text, tag in (
+        ("<mujoco><extension><plugin plugin='x'/></extension></mujoco>", "plugin"),
+        ("<mujoco><worldbody><replicate count='9'/></worldbody></mujoco>", "replicate"),
+    ):
+        path.write_text(text)
+        with pytest.raises(AccessError, match=f"strict reading allows no <{tag}>"):
+            Robot.load(RobotDescription(mjcf=path), access=strict)
     path.write_text("<mujoco><include file='cell.xml'/></mujoco>")
     with pytest.raises(AccessError, match="includes more than 200 files"):
         Robot.load(RobotDescription(mjcf=path), access=strict)

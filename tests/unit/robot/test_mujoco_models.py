@@ -387,6 +387,7 @@ def test_a_mocap_body_stands_still() -> None:
         ({"keyframe": "home", "qpos": [0.0]}, ModelError, "give one of qpos and key"),
         ({"qpos": [0.0]}, ModelError, "qpos has shape (1,); the scene's configuration"),
         ({"qpos": [np.nan] * 12}, ModelError, "qpos has shape (12,)"),
+        ({"locked": {"f": np.inf}}, ModelError, "locked: 'f' at inf; needs a finite"),
         ({"locked": {"g": 0.0}}, JointNotFoundError, "locked: no joint 'g'"),
         ({"locked": {"ball": 0.0}}, ModelError, "locked: 'ball' is neither a hin"),
         ({"locked": {"f": 0.0}, "joints": ["j1", "f"]}, ModelError,
