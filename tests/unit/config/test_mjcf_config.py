@@ -2,11 +2,13 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 from mjcf_texts import CELL
+from places import ROOT
 
 from hsp_control import Experiment, Robot, load_experiment
 from hsp_control.cli import main
@@ -108,6 +110,28 @@ def test_the_plant_may_be_another_mjcf_or_no_mjcf(folder: Path) -> None:
         load_experiment(
             write(folder, scene, "{type: rigid_body, robot: {name: panda}}")
         )
+
+
+def test_the_examples_of_the_documentation_run(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (ROOT / "docs" / "mujoco.md").read_text(encoding="utf-8")
+    (folder / "scene.xml").write_text(CELL)
+    monkeypatch.chdir(folder)
+    blocks = re.findall(r"```(python|yaml)\n(.*?)```", text, flags=re.DOTALL)
+    names: dict[str, Any] = {}
+    for language, block in blocks:
+        if language == "python":
+            exec(block, names)
+    assert names["rollout"].t[-1] == pytest.approx(0.1)
+    task = (
+        "tasks: {tip: {type: frame_position, frame: tip, trajectory: {type: hold}}}\n"
+    )
+    config = task + "".join(block for kind, block in blocks if kind == "yaml")
+    (folder / "docs.yaml").write_text(config)
+    experiment = load_experiment(folder / "docs.yaml")
+    assert isinstance(experiment.plant, MujocoScenePlant)
+    assert experiment.robot.source.locked == {"f": 0.02}
 
 
 MISTAKES = [
