@@ -166,7 +166,7 @@ class Robot(ConfigurationSpace):
         """Return a robot in a compiled MuJoCo model: with the numbers MuJoCo uses.
 
         Bodies and sites are its frames, under their names. Bodies that are not below
-        the root are no part of it; what moves them, they stand still. What MuJoCo has
+        the root are no part of it; those above the root stand still. What MuJoCo has
         and the robot lacks, such as a closed loop, is in `source.omitted`, and logged
         as a warning. `MujocoCoordinates` converts states.
 

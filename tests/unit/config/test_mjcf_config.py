@@ -2,11 +2,13 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 from mjcf_texts import CELL
+from places import ROOT
 
 from hsp_control import Experiment, Robot, load_experiment
 from hsp_control.cli import main
@@ -110,6 +112,28 @@ def test_the_plant_may_be_another_mjcf_or_no_mjcf(folder: Path) -> None:
         )
 
 
+def test_the_examples_of_the_documentation_run(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (ROOT / "docs" / "mujoco.md").read_text(encoding="utf-8")
+    (folder / "scene.xml").write_text(CELL)
+    monkeypatch.chdir(folder)
+    blocks = re.findall(r"```(python|yaml)\n(.*?)```", text, flags=re.DOTALL)
+    names: dict[str, Any] = {}
+    for language, block in blocks:
+        if language == "python":
+            exec(block, names)
+    assert names["rollout"].t[-1] == pytest.approx(0.1)
+    task = (
+        "tasks: {tip: {type: frame_position, frame: tip, trajectory: {type: hold}}}\n"
+    )
+    config = task + "".join(block for kind, block in blocks if kind == "yaml")
+    (folder / "docs.yaml").write_text(config)
+    experiment = load_experiment(folder / "docs.yaml")
+    assert isinstance(experiment.plant, MujocoScenePlant)
+    assert experiment.robot.source.locked == {"f": 0.02}
+
+
 MISTAKES = [
     ("cell.xml", "cel.xml", RobotNotFoundError,
      "robot.mjcf: cel.xml: no such file"),
@@ -184,6 +208,14 @@ def test_what_is_no_mjcf(text: str, message: str, folder: Path) -> None:
         Robot.load(RobotDescription(mjcf=path))
 
 
+def test_a_scene_may_be_too_large(folder: Path) -> None:
+    path = folder / "cell.xml"
+    free = "<body><freejoint/><geom size='.1'/></body>" * 34
+    path.write_text(f"<mujoco><worldbody>{free}</worldbody></mujoco>")
+    with pytest.raises(ModelError, match="204 degrees of freedom; at most 200"):
+        Robot.load(RobotDescription(mjcf=path))
+
+
 # --- files of strangers --------------------------------------------------------------
 
 MESH = (
@@ -220,9 +252,13 @@ def test_strict_reading_loads_no_plugins_and_ends(folder: Path) -> None:
     strict = only_within([folder])
     path = folder / "cell.xml"
     assert Robot.load(RobotDescription(mjcf=path), access=strict).nv == 11
-    path.write_text("<mujoco><extension><plugin plugin='x'/></extension></mujoco>")
-    with pytest.raises(AccessError, match="strict reading allows no <plugin>"):
-        Robot.load(RobotDescription(mjcf=path), access=strict)
+    for text, tag in (
+        ("<mujoco><extension><plugin plugin='x'/></extension></mujoco>", "plugin"),
+        ("<mujoco><worldbody><replicate count='9'/></worldbody></mujoco>", "replicate"),
+    ):
+        path.write_text(text)
+        with pytest.raises(AccessError, match=f"strict reading allows no <{tag}>"):
+            Robot.load(RobotDescription(mjcf=path), access=strict)
     path.write_text("<mujoco><include file='cell.xml'/></mujoco>")
     with pytest.raises(AccessError, match="includes more than 200 files"):
         Robot.load(RobotDescription(mjcf=path), access=strict)

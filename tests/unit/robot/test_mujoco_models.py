@@ -347,6 +347,23 @@ def test_what_the_robot_lacks_is_named(
     assert sentence in caplog.text
 
 
+def test_a_servo_of_an_orientation_acts_on_its_ball_joint() -> None:
+    """Of MuJoCo 4: three controls on the joint, or a torque between two sites."""
+    ball = "<joint name='n' type='ball'/><site name='base'/>"
+    for target, kind in (
+        ("joint='n'", "torque motors"),
+        ("site='end' refsite='base'", "tendon"),
+    ):
+        servo = f"<actuator><orientation name='o' {target} kp='1'/></actuator>"
+        try:
+            model = compiled(body(ball, servo))
+        except ValueError:
+            pytest.skip("this MuJoCo has no such actuator")
+        (sentence,) = Robot.from_mujoco(model).source.omitted[:1]
+        assert sentence.startswith("actuators o: they ")
+        assert kind in sentence
+
+
 def test_what_does_not_touch_the_robot_is_not_named() -> None:
     text = CELL.replace(
         "</mujoco>", "<equality><weld body1='ball' active='false'/></equality></mujoco>"
@@ -387,6 +404,7 @@ def test_a_mocap_body_stands_still() -> None:
         ({"keyframe": "home", "qpos": [0.0]}, ModelError, "give one of qpos and key"),
         ({"qpos": [0.0]}, ModelError, "qpos has shape (1,); the scene's configuration"),
         ({"qpos": [np.nan] * 12}, ModelError, "qpos has shape (12,)"),
+        ({"locked": {"f": np.inf}}, ModelError, "locked: 'f' at inf; needs a finite"),
         ({"locked": {"g": 0.0}}, JointNotFoundError, "locked: no joint 'g'"),
         ({"locked": {"ball": 0.0}}, ModelError, "locked: 'ball' is neither a hin"),
         ({"locked": {"f": 0.0}, "joints": ["j1", "f"]}, ModelError,

@@ -246,6 +246,7 @@ SERVO = CELL.replace('<motor name="m4"', '<position name="p4" kp="50"')
 
 def test_servos_on_the_robots_joints_are_refused_or_switched_off() -> None:
     robot, model, data = cell(SERVO)
+    data.ctrl[4] = 0.04
     message = r"^actuators p4 of the scene are no torque motors .* disable_servos=True$"
     with pytest.raises(SimulationError, match=message):
         MujocoScenePlant(robot, model, data)
@@ -254,7 +255,33 @@ def test_servos_on_the_robots_joints_are_refused_or_switched_off() -> None:
     plant.advance(0.0, 0.001, EFFORT)
     assert data.qfrc_actuator[3] == 0.0
     assert data.qfrc_applied[3] == EFFORT[3]
-    assert model.actuator_gainprm[4, 0] == 100.0  # the gripper's is the user's
+    assert data.actuator_force[4] != 0.0  # the gripper's is the user's
+    MujocoScenePlant(robot, model, data)  # it is off now
+
+
+@pytest.mark.parametrize(
+    "servo",
+    [
+        "<position joint='j4' kp='9'/>",
+        "<velocity joint='j4' kv='3'/>",
+        "<damper joint='j4' kv='2' ctrlrange='0 1'/>",
+        "<muscle joint='j4' lengthrange='.1 2'/>",
+        "<general joint='j4' dyntype='filter' dynprm='.1' gainprm='4'/>",
+        "<general joint='j4' gaintype='affine' gainprm='1 2 3'/>",
+    ],
+)
+def test_every_kind_of_servo_can_be_switched_off(servo: str) -> None:
+    text = without_gripper().replace("</actuator>", f"{servo}</actuator>")
+    robot, model, data = cell(re.sub(r'<motor name="m4".*?/>', "", text))
+    data.ctrl[3], data.qvel[:4] = 0.5, 1.0
+    data.act[:] = 0.5
+    mujoco.mj_forward(model, data)
+    assert abs(data.qfrc_actuator[3]) > 0.1
+    with pytest.raises(SimulationError, match="are no torque motors"):
+        MujocoScenePlant(robot, model, data)
+    MujocoScenePlant(robot, model, data, disable_servos=True)
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_actuator[3] == 0.0
 
 
 def test_a_floating_root_has_no_motor() -> None:
