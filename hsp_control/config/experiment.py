@@ -420,8 +420,8 @@ def load_robot(document: Document, scenario: Scenario) -> Robot:
     Raises:
         HspControlError: If it cannot be loaded; with a location.
     """
-    parts = scenario.robot.parts is not None
-    with document.at("robot", *(() if parts else ("name",))):
+    keys = [key for key in ("name", "description") if getattr(scenario.robot, key)]
+    with document.at("robot", *keys):
         return Robot.load(scenario.robot, access=document.access)
 
 

@@ -34,8 +34,18 @@ from hsp_control.robot.description.loading import (
     load_model,
     reference_posture,
 )
-from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
-from hsp_control.robot.description.sources import RobotSource, Root, find_robot
+from hsp_control.robot.description.robot_description import (
+    PlacedRobot,
+    RobotDescription,
+    ToolFrame,
+)
+from hsp_control.robot.description.sources import (
+    RobotSource,
+    Root,
+    find_description,
+    find_robot,
+)
+from hsp_control.robot.description.xacro_files import xacro_text
 from hsp_control.robot.kinematics import (
     FrameKinematics,
     joint_placements,
@@ -103,13 +113,15 @@ class Robot(ConfigurationSpace):
         tool_frames: Mapping[str, ToolFrame] | None = None,
         gravity: ArrayLike | None = None,
         mimic: bool = True,
+        project_inertias: bool = False,
+        xacro_args: Mapping[str, str | bool | float] | None = None,
         access: Access = ANYWHERE,
     ) -> Self:
-        """Load a bundled robot, one of example-robot-data, or a URDF file.
+        """Load a bundled robot, one of an installed package, or a URDF or xacro file.
 
         Args:
-            name: For example ``"panda"``, ``"talos_arm"`` or ``"my_arm/arm.urdf"``; or
-                a whole description, and then nothing else.
+            name: For example ``"panda"``, ``"talos_arm"``, ``"gen3_description"`` or
+                ``"my_arm/arm.urdf"``; or a whole description, and then nothing else.
             root: How its base is attached to the world: ``fixed``, ``planar``
                 (x, y, yaw) or ``free_flyer``. None: as its source says; ``fixed`` for a
                 file.
@@ -120,6 +132,9 @@ class Robot(ConfigurationSpace):
                 -9.81 along z.
             mimic: Whether ``<mimic>`` joints follow their leader. False: they are
                 independent joints.
+            project_inertias: Whether inertias that no body can have are replaced by the
+                nearest that one can have; mass and centre of mass stay.
+            xacro_args: Arguments of a xacro file, by name.
             access: Which files may be read: a URDF given by path, and the meshes that
                 it names. Use `access.only_within` for untrusted files.
 
@@ -139,13 +154,20 @@ class Robot(ConfigurationSpace):
                 tool_frames=tool_frames or {},
                 gravity=gravity,
                 mimic=mimic,
+                project_inertias=project_inertias,
+                xacro_args=xacro_args or {},
             )
-        elif not mimic or any(
-            option is not None for option in (root, locked, tool_frames, gravity)
+        elif (
+            not mimic
+            or project_inertias
+            or any(
+                option is not None
+                for option in (root, locked, tool_frames, gravity, xacro_args)
+            )
         ):
             raise ModelError(
                 "a RobotDescription says all about the robot: give root, locked, "
-                "tool_frames, gravity and mimic in it"
+                "tool_frames, gravity, mimic, project_inertias and xacro_args in it"
             )
         return cls._described(name, access)
 
@@ -154,14 +176,13 @@ class Robot(ConfigurationSpace):
         """Return the robot of a description."""
         gravity = description.gravity
         if description.parts is None:
-            assert description.name is not None
-            source = find_robot(description.name, access)
+            source = _source_of(description, access)
             model = load_model(source, description, gravity)
             return cls(model, source, description=description)
         robots = {}
         for name, part in description.parts.items():
-            with within("parts", name, "name"):
-                source = find_robot(part.name, access)
+            with within("parts", name, "name" if part.name else "description"):
+                source = _source_of(part, access)
                 robot = cls(load_model(source, part, gravity), source)
             robots[name] = robot, placement(part.position, part.rotation)
         with within("parts"):
@@ -577,6 +598,15 @@ class WorldKinematics(NamedTuple):
     jacobian: Array
     jacobian_dot: Array
     v: Array
+
+
+def _source_of(robot: RobotDescription | PlacedRobot, access: Access) -> RobotSource:
+    """Return where one robot comes from."""
+    arguments = {name: xacro_text(value) for name, value in robot.xacro_args.items()}
+    if robot.description is not None:
+        return find_description(robot.description, access, arguments)
+    assert robot.name is not None
+    return find_robot(robot.name, access, arguments)
 
 
 @cache

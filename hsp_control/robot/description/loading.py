@@ -6,8 +6,9 @@ import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
@@ -20,19 +21,28 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.combining import placement
+from hsp_control.robot.description.inertias import (
+    impossible_inertias,
+    project_inertias,
+)
 from hsp_control.robot.description.mesh_files import check_mesh_name
 from hsp_control.robot.description.robot_description import (
     PlacedRobot,
     RobotDescription,
     ToolFrame,
 )
-from hsp_control.robot.description.sources import RobotSource, Root
+from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf_checks import named_files, read_urdf
 
 _ROOT_JOINTS = {
     "planar": pin.JointModelPlanar,
     "free_flyer": pin.JointModelFreeFlyer,
 }
+_NEGATIVE_MOMENT = 1e-6
+"""A principal moment of inertia may be negative by this much [kg·m²].
+
+Many files contain rounded or guessed inertias; the mass matrix is checked later.
+"""
 
 
 def load_model(
@@ -61,7 +71,7 @@ def load_model(
     """
     if settings is None:
         settings = RobotDescription(source.name)
-    model = _parse(source, settings.root or source.root, mimic=settings.mimic)
+    model = _parse(source, settings)
     locks = source.locked if settings.locked is None else settings.locked
     if locks:
         model = _lock(model, locks)
@@ -127,26 +137,45 @@ def end_effector_frame(model: pin.Model) -> str:
     return str((hands or links)[-1])
 
 
-def _parse(source: RobotSource, root: Root, *, mimic: bool) -> pin.Model:
-    urdf = source.urdf
-    xml = read_urdf(urdf)
+def _parse(source: RobotSource, settings: RobotDescription | PlacedRobot) -> pin.Model:
+    urdf, mimic = source.urdf, settings.mimic
+    xml = read_urdf(source)
     if source.access.strict:
         for name, where in named_files(xml):
             check_mesh_name(source, name, f"{urdf}: {where}", source.access)
+    if settings.project_inertias:
+        project_inertias(xml)
+    else:
+        _check_inertias(xml, source)
+    text = ElementTree.tostring(xml, encoding="unicode")
     parser_errors: list[str] = []
+    root = settings.root or source.root
     try:
         with _collect_parser_errors(parser_errors):
             if root == "fixed":
-                return pin.buildModelFromUrdf(str(urdf), mimic=mimic)
+                return pin.buildModelFromXML(text, mimic=mimic)
             joint = _ROOT_JOINTS[root]()
-            return pin.buildModelFromUrdf(str(urdf), joint, "root_joint", mimic=mimic)
+            return pin.buildModelFromXML(text, joint, "root_joint", mimic=mimic)
     except (ValueError, RuntimeError) as error:
         reason = str(error).strip().splitlines()[-1].removeprefix("hint: ")
         reason = parser_errors[0] if parser_errors else reason
         if mimic and "mimic" in reason:
-            reason = _explain_mimic(urdf) or reason
+            reason = _explain_mimic(xml, text) or reason
             reason += "; load its mimic joints as independent joints with mimic=False"
         raise ModelError(f"{urdf}: Pinocchio cannot build a model: {reason}") from error
+
+
+def _check_inertias(xml: Element, source: RobotSource) -> None:
+    """Check that no principal moment is negative, but for rounding.
+
+    Greater ones than a body can have are accepted, as by other programs.
+    """
+    for found in impossible_inertias(xml):
+        if found.moments[0] < -_NEGATIVE_MOMENT:
+            raise ModelError(
+                f"{source.urdf}: link {found.link!r}: <inertia>: {found.reason}; "
+                "project_inertias: true takes the nearest that a body can have"
+            )
 
 
 @contextmanager
@@ -171,10 +200,10 @@ def _collect_parser_errors(errors: list[str]) -> Iterator[None]:
             )
 
 
-def _explain_mimic(urdf: Path) -> str:
+def _explain_mimic(xml: Element, text: str) -> str:
     """Return which mimic joint Pinocchio cannot handle, and why; empty if unknown."""
-    order = list(pin.buildModelFromUrdf(str(urdf), mimic=False).names)
-    for joint in read_urdf(urdf).iter("joint"):
+    order = list(pin.buildModelFromXML(text, mimic=False).names)
+    for joint in xml.iter("joint"):
         mimic, follower = joint.find("mimic"), joint.get("name")
         if mimic is None or follower not in order:
             continue

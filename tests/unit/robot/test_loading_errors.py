@@ -99,7 +99,40 @@ def test_file_that_may_not_be_read(
         (robot_xml(link("a"), joint("j", "a", "b")), "Pinocchio cannot build a model"),
         (robot_xml(link("b"), joint("j", "a", "b")), "Pinocchio cannot build a model"),
         (robot_xml(link("a"), link("b")), "Pinocchio cannot build a model"),
-        (robot_xml(link("a"), link("a")), "Pinocchio cannot build a model"),
+        (robot_xml(link("a"), link("a")), "link 'a': 2 links have this name"),
+        (
+            ARM.replace("</robot>", joint("elbow", "base", "lower") + "</robot>"),
+            "joint 'elbow': 2 joints have this name",
+        ),
+        (
+            ARM.replace('<mass value="2"/>', '<mass value="2"/><mass value="3"/>', 1),
+            "link 'upper': <inertial>: contains 2 elements <mass>; must be one",
+        ),
+        (
+            ARM.replace(INERTIA, 2 * INERTIA, 1),
+            "link 'upper': <link>: contains 2 elements <inertial>; must be one",
+        ),
+        (
+            ARM.replace("<axis", '<axis xyz="1 0 0"/><axis', 1),
+            "joint 'shoulder': <joint>: contains 2 elements <axis>; must be one",
+        ),
+        (
+            ARM.replace(
+                INERTIA,
+                '<collision><geometry><sphere radius="1"/><box size="1 1 1"/>'
+                "</geometry></collision>",
+                1,
+            ),
+            "link 'upper': <geometry>: contains sphere, box; must be one shape",
+        ),
+        (
+            ARM.replace('<mass value="2"/>', '<mass value="٢"/>', 1),
+            "link 'upper': <mass>: value=\"٢\" must be a number in the digits 0 to 9",
+        ),
+        (
+            ARM.replace('xyz="0.2 0.1 0.3"', 'xyz="0.2 0.1 ３"', 1),
+            'xyz="0.2 0.1 ３" must be 3 numbers in the digits 0 to 9',
+        ),
         (
             ARM.replace('type="revolute"', 'type="bent"'),
             "Pinocchio cannot build a model",
