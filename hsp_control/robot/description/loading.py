@@ -38,6 +38,10 @@ _ROOT_JOINTS = {
     "planar": pin.JointModelPlanar,
     "free_flyer": pin.JointModelFreeFlyer,
 }
+_NO_HAND = re.compile(
+    "finger|thumb|camera|imu|sensor|range|accelerometer|laser|optical"
+)
+"""Names of links on a last joint that are less likely the hand than others."""
 _NEGATIVE_MOMENT = 1e-6
 """A principal moment of inertia may be negative by this much [kg·m²].
 
@@ -114,9 +118,13 @@ def end_effector_frame(model: pin.Model) -> str:
     """Return the frame that is most likely the hand, found from the kinematic tree.
 
     It is the last link on the last joint of the longest chain of joints (of the last
-    such chain if several are equally long). If this chain branches in its second half,
-    the branches are taken for fingers, and the chain ends at the joint where it
-    branches first.
+    such chain if several are equally long). Links named after fingers or sensors come
+    after all others.
+
+    Where this chain branches in its second half into three or more chains, or into two
+    of similar lengths, these are taken for fingers, and it ends at the joint where it
+    branches so first. One much shorter branch is none: it is a part of the arm's own
+    mechanism, and the hand is not at the elbow where it begins.
     """
     chains: list[list[int]] = [[]]
     for joint in range(1, model.njoints):
@@ -125,7 +133,7 @@ def end_effector_frame(model: pin.Model) -> str:
     branching = [
         joint
         for depth, joint in enumerate(longest, start=1)
-        if 2 * depth >= len(longest) and len(model.children[joint]) > 1
+        if 2 * depth >= len(longest) and _carries_fingers(chains, joint)
     ]
     end = branching[0] if branching else longest[-1]
     links = [
@@ -133,8 +141,19 @@ def end_effector_frame(model: pin.Model) -> str:
         for frame in model.frames
         if frame.parentJoint == end and frame.type == pin.FrameType.BODY
     ]
-    hands = [link for link in links if not re.search("finger|thumb", link.lower())]
+    hands = [link for link in links if not _NO_HAND.search(link.lower())]
     return str((hands or links)[-1])
+
+
+def _carries_fingers(chains: list[list[int]], joint: int) -> bool:
+    """Return whether the chains beyond a joint are three, or two of similar lengths."""
+    beyond: dict[int, int] = {}  # the longest chain, by its first joint
+    for chain in chains:
+        if joint in chain[:-1]:
+            after = chain[chain.index(joint) + 1 :]
+            beyond[after[0]] = max(beyond.get(after[0], 0), len(after))
+    lengths = sorted(beyond.values())
+    return len(lengths) > 2 or (len(lengths) == 2 and 2 * lengths[0] > lengths[1])
 
 
 def _parse(source: RobotSource, settings: RobotDescription | PlacedRobot) -> pin.Model:
@@ -328,6 +347,11 @@ def _check_mass_matrix(model: pin.Model, source: RobotSource) -> None:
     idle = np.diag(mass_matrix) <= 1e-12 * values[-1]
     if not idle.any():  # a combination of joints: name the one that moves most
         idle[np.argmax(np.abs(vectors[:, 0]))] = True
+    if not mass_matrix.any():
+        raise ModelError(
+            f"{source.urdf}: no link that moves has a mass: this URDF describes shapes "
+            "and joints only; efforts need <inertial> elements"
+        )
     massless = {
         name: joint.nv
         for name, joint in moving_joints(model).items()

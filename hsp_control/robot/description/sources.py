@@ -99,7 +99,7 @@ def find_robot(
     text = os.fspath(name)
     if is_path(text):
         return _from_path(Path(text), access, xacro_args)
-    if text in described_names():
+    if text.endswith("_description"):
         return find_description(text, access, xacro_args)
     if xacro_args:
         raise ModelError(f"xacro_args: {text} is no xacro file")
@@ -114,8 +114,6 @@ def find_robot(
             f"robot {text!r} of example-robot-data has no URDF; robots can only be "
             "loaded from a URDF"
         )
-    if text.endswith("_description"):
-        find_described(text)  # says what is missing
     known = [*bundled, *sorted(set(others) - set(bundled)), *described_names()]
     hint = (
         "list all with: hsp robots"

@@ -13,6 +13,7 @@ from hsp_control.common.exceptions import ModelError
 from hsp_control.robot.description.packages import package_folders
 from hsp_control.robot.description.xml_files import MAX_SIZE
 
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)  # xacro leaves its own as comments
 _MACRO = re.compile(rb"<xacro:\w")
 
 
@@ -22,9 +23,10 @@ def is_xacro(file: Path) -> bool:
         return True
     try:
         with file.open("rb") as opened:
-            return _MACRO.search(opened.read(MAX_SIZE)) is not None
+            text = _COMMENT.sub(b"", opened.read(MAX_SIZE))
     except OSError:  # reported by who reads the URDF
         return False
+    return _MACRO.search(text) is not None
 
 
 def xacro_text(value: str | bool | float) -> str:
@@ -97,5 +99,5 @@ def _packages_found(
 
 
 def _expanded_name(file: Path) -> str:
-    name = file.name.removesuffix(".xacro")
-    return name if name.endswith(".urdf") else f"{name}.urdf"
+    stem = Path(file.name.removesuffix(".xacro")).stem
+    return f"{stem}.urdf" if f"{stem}.urdf" != file.name else f"{stem}_expanded.urdf"

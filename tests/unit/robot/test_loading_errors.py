@@ -214,6 +214,11 @@ def test_joint_that_moves_no_mass_is_named(
     assert Robot.load(path, locked={last: 0.0}).joint_names == ("shoulder",)
 
 
+def test_a_robot_without_any_mass(write: Callable[..., Path]) -> None:
+    with pytest.raises(ModelError, match=r"no link that moves has a mass: .*inertial"):
+        Robot.load(write(ARM.replace(INERTIA, "")))
+
+
 def test_massless_link_between_heavy_ones_is_no_error(
     write: Callable[..., Path],
 ) -> None:

@@ -89,6 +89,14 @@ def test_without_xacro_the_message_says_what_to_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "xacro", None)
+    macros = '<!-- <xacro:property name="mass" value="2"/> -->'
+    commented = tmp_path / "expanded.urdf"
+    commented.write_text(ARM.replace("<link", macros + "<link", 1))
+    assert Robot.load(commented).nv == 2
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(XACRO)
+    with pytest.raises(ModelError, match=r"xacro arm\.urdf > arm_expanded\.urdf$"):
+        Robot.load(urdf)
     path = tmp_path / "arm.urdf.xacro"
     path.write_text(XACRO)
     message = (
