@@ -19,6 +19,7 @@ from hsp_control.cli.consoles import errors as _errors
 from hsp_control.cli.consoles import message_of, renamed_keys_printed
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import DeferredInterrupt
+from hsp_control.cli.start_advice import start_advice
 from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema, load_experiment
@@ -170,11 +171,8 @@ def check(options: argparse.Namespace) -> int:
     table.add_row("largest effort", f"{np.abs(output.tau).max():.3g} at the start")
     _out.print(table)
     _warn_of_rates(experiment)
-    if output.damped:
-        _out.print(
-            f"The tasks {output.damped} are singular at the start: the law is damped "
-            "there, not exact."
-        )
+    for line in start_advice(experiment, damped=output.damped):
+        _out.print(line, markup=False)
     _out.print(f"{options.config}: OK")
     return 0
 

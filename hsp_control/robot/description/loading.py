@@ -42,7 +42,7 @@ _NO_HAND = re.compile(
     "finger|thumb|camera|imu|sensor|range|accelerometer|laser|optical"
 )
 """Names of links on a last joint that are less likely the hand than others."""
-_NEGATIVE_MOMENT = 1e-6
+NEGATIVE_MOMENT = 1e-6
 """A principal moment of inertia may be negative by this much [kg·m²].
 
 Many files contain rounded or guessed inertias; the mass matrix is checked later.
@@ -190,7 +190,7 @@ def _check_inertias(xml: Element, source: RobotSource) -> None:
     Greater ones than a body can have are accepted, as by other programs.
     """
     for found in impossible_inertias(xml):
-        if found.moments[0] < -_NEGATIVE_MOMENT:
+        if found.moments[0] < -NEGATIVE_MOMENT:
             raise ModelError(
                 f"{source.urdf}: link {found.link!r}: <inertia>: {found.reason}; "
                 "project_inertias: true takes the nearest that a body can have"

@@ -1,0 +1,61 @@
+"""What ``hsp check`` says about a start at which a robot cannot work well."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hsp_control.common.exceptions import ConfigurationError
+from hsp_control.config import Experiment
+from hsp_control.geometry.good_postures import Judgement
+from hsp_control.robot import Robot
+from hsp_control.simulation.start_search import posture_search
+
+
+def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
+    """Yield lines about a start that is singular or in collision, and a better one.
+
+    Args:
+        experiment: The experiment.
+        damped: The tasks that are singular at the start, as the law found; empty: none.
+    """
+    robot, null_space = experiment.robot, experiment.scenario.null_space
+    if damped:
+        yield (
+            f"The tasks {damped} are singular at the start: the law is damped there, "
+            "not exact."
+        )
+    if robot.unactuated:
+        return
+    tasks = experiment.scenario.tasks.values()
+    search = posture_search(robot, tasks, experiment.scene)
+    start = search.judge(experiment.q0)
+    if start.distance <= 0.0:
+        yield (
+            f"The start is in collision: {start.pair} overlap by {-start.distance:.3g} "
+            "m, as capsules."
+        )
+    if not damped and start.distance > 0.0:
+        return
+    try:
+        found = search.judge(
+            _rounded(robot, search.find(null_space.singularity_threshold))
+        )
+    except ConfigurationError as error:
+        yield f"No better start is known: {error}."
+        return
+    yield (
+        "A better start (smallest singular value of the tasks "
+        f"{found.regularity:.3g} instead of {start.regularity:.3g}):"
+    )
+    yield f"    start: {start_line(robot, found)}"
+    yield "or start: auto, which finds it."
+
+
+def start_line(robot: Robot, found: Judgement) -> str:
+    """Return what a configuration says under ``start`` to begin at a posture."""
+    joints = ", ".join(f"{x:.3f}" for x in robot.joint_positions(found.q) + 0.0)
+    return f"{{joints: [{joints}]}}"
+
+
+def _rounded(robot: Robot, found: Judgement) -> np.ndarray:
+    return robot.integrate(robot.neutral(), np.round(robot.joint_positions(found.q), 3))
