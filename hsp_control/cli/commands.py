@@ -245,6 +245,13 @@ def live(options: argparse.Namespace) -> int:
     return lives.live(options)
 
 
+def inspect(options: argparse.Namespace) -> int:
+    """Print what is odd about a robot's description."""
+    from hsp_control.cli import inspect as inspections
+
+    return inspections.inspect(options)
+
+
 def robots(options: argparse.Namespace) -> int:
     """List all robots, or describe one."""
     if options.name is not None:

@@ -2,12 +2,8 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from hsp_control.common.exceptions import ConfigurationError
 from hsp_control.config import Experiment
-from hsp_control.geometry.good_postures import Judgement
-from hsp_control.robot import Robot
 from hsp_control.simulation.start_search import posture_search
 
 
@@ -37,9 +33,7 @@ def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
     if not damped and start.distance > 0.0:
         return
     try:
-        found = search.judge(
-            _rounded(robot, search.find(null_space.singularity_threshold))
-        )
+        found = search.rounded(search.find(null_space.singularity_threshold))
     except ConfigurationError as error:
         yield f"No better start is known: {error}."
         return
@@ -47,15 +41,5 @@ def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
         "A better start (smallest singular value of the tasks "
         f"{found.regularity:.3g} instead of {start.regularity:.3g}):"
     )
-    yield f"    start: {start_line(robot, found)}"
+    yield f"    start: {search.start_line(found)}"
     yield "or start: auto, which finds it."
-
-
-def start_line(robot: Robot, found: Judgement) -> str:
-    """Return what a configuration says under ``start`` to begin at a posture."""
-    joints = ", ".join(f"{x:.3f}" for x in robot.joint_positions(found.q) + 0.0)
-    return f"{{joints: [{joints}]}}"
-
-
-def _rounded(robot: Robot, found: Judgement) -> np.ndarray:
-    return robot.integrate(robot.neutral(), np.round(robot.joint_positions(found.q), 3))

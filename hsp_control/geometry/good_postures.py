@@ -142,6 +142,15 @@ class PostureSearch:
             key=_eccentricity,
         )
 
+    def rounded(self, found: Judgement) -> Judgement:
+        """Return a posture with the numbers that `start_line` writes."""
+        return self.judge(self._at(np.round(self.robot.joint_positions(found.q), 3)))
+
+    def start_line(self, found: Judgement) -> str:
+        """Return what a configuration says under ``start`` to begin at a posture."""
+        positions = self.robot.joint_positions(found.q) + 0.0  # no -0.000
+        return f"{{joints: [{', '.join(f'{x:.3f}' for x in positions)}]}}"
+
     def find_with(self, target: Target, least: float) -> Judgement:
         """Return a good posture at which a frame is at a target.
 

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 from weakref import WeakKeyDictionary, WeakSet
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import coal
@@ -20,6 +19,7 @@ from hsp_control.geometry.hulls import convex_hull, hull_corners
 from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files
 from hsp_control.robot.description.combining import Part
+from hsp_control.robot.description.loading import parser_text
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf_checks import read_urdf
 
@@ -120,7 +120,7 @@ def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
     source = part.source
     xml = read_urdf(source)
     missing = _locate_meshes(xml, source)
-    text = ElementTree.tostring(xml, encoding="unicode")
+    text = parser_text(xml, "visual")
     full = pin.buildModelFromXML(text, mimic=False)
     try:
         geometry = pin.buildGeomFromUrdfString(full, text, pin.GeometryType.COLLISION)

@@ -34,18 +34,8 @@ from hsp_control.robot.description.loading import (
     load_model,
     reference_posture,
 )
-from hsp_control.robot.description.robot_description import (
-    PlacedRobot,
-    RobotDescription,
-    ToolFrame,
-)
-from hsp_control.robot.description.sources import (
-    RobotSource,
-    Root,
-    find_description,
-    find_robot,
-)
-from hsp_control.robot.description.xacro_files import xacro_text
+from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
+from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.kinematics import (
     FrameKinematics,
     joint_placements,
@@ -176,13 +166,13 @@ class Robot(ConfigurationSpace):
         """Return the robot of a description."""
         gravity = description.gravity
         if description.parts is None:
-            source = _source_of(description, access)
+            source = description.find(access)
             model = load_model(source, description, gravity)
             return cls(model, source, description=description)
         robots = {}
         for name, part in description.parts.items():
             with within("parts", name, "name" if part.name else "description"):
-                source = _source_of(part, access)
+                source = part.find(access)
                 robot = cls(load_model(source, part, gravity), source)
             robots[name] = robot, placement(part.position, part.rotation)
         with within("parts"):
@@ -598,15 +588,6 @@ class WorldKinematics(NamedTuple):
     jacobian: Array
     jacobian_dot: Array
     v: Array
-
-
-def _source_of(robot: RobotDescription | PlacedRobot, access: Access) -> RobotSource:
-    """Return where one robot comes from."""
-    arguments = {name: xacro_text(value) for name, value in robot.xacro_args.items()}
-    if robot.description is not None:
-        return find_description(robot.description, access, arguments)
-    assert robot.name is not None
-    return find_robot(robot.name, access, arguments)
 
 
 @cache

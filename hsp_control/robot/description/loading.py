@@ -166,15 +166,16 @@ def _parse(source: RobotSource, settings: RobotDescription | PlacedRobot) -> pin
         project_inertias(xml)
     else:
         _check_inertias(xml, source)
-    text = ElementTree.tostring(xml, encoding="unicode")
+    text = parser_text(xml, "visual", "collision")
     parser_errors: list[str] = []
     root = settings.root or source.root
     try:
         with _collect_parser_errors(parser_errors):
             if root == "fixed":
-                return pin.buildModelFromXML(text, mimic=mimic)
-            joint = _ROOT_JOINTS[root]()
-            return pin.buildModelFromXML(text, joint, "root_joint", mimic=mimic)
+                model = pin.buildModelFromXML(text, mimic=mimic)
+            else:
+                joint = _ROOT_JOINTS[root]()
+                model = pin.buildModelFromXML(text, joint, "root_joint", mimic=mimic)
     except (ValueError, RuntimeError) as error:
         reason = str(error).strip().splitlines()[-1].removeprefix("hint: ")
         reason = parser_errors[0] if parser_errors else reason
@@ -182,6 +183,28 @@ def _parse(source: RobotSource, settings: RobotDescription | PlacedRobot) -> pin
             reason = _explain_mimic(xml, text) or reason
             reason += "; load its mimic joints as independent joints with mimic=False"
         raise ModelError(f"{urdf}: Pinocchio cannot build a model: {reason}") from error
+    if parser_errors:
+        left_out = "; ".join(parser_errors)
+        raise ModelError(
+            f"{urdf}: Pinocchio leaves out a part of the model: {left_out}"
+        )
+    return model
+
+
+def parser_text(xml: Element, *unused: str) -> str:
+    """Return the text of a URDF for the parser, without what it does not need.
+
+    The tree is changed, too.
+
+    Args:
+        xml: The URDF.
+        unused: Elements of links that are deleted, such as ``visual``: their faults are
+            no business of who reads the rest.
+    """
+    for link in xml.iter("link"):
+        for element in [each for each in link if each.tag in unused]:
+            link.remove(element)
+    return ElementTree.tostring(xml, encoding="unicode")
 
 
 def _check_inertias(xml: Element, source: RobotSource) -> None:

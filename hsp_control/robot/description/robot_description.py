@@ -17,7 +17,15 @@ from hsp_control.declaration.quantities import (
     Vector3,
 )
 from hsp_control.declaration.rotation import Rotation
-from hsp_control.robot.description.sources import FILE_ENDINGS, Root
+from hsp_control.robot.description.access import ANYWHERE, Access
+from hsp_control.robot.description.sources import (
+    FILE_ENDINGS,
+    RobotSource,
+    Root,
+    find_description,
+    find_robot,
+)
+from hsp_control.robot.description.xacro_files import xacro_text
 
 _ZERO = (0.0, 0.0, 0.0)
 _OF_ONE = ("root", "locked", "tool_frames", "mimic", "project_inertias", "xacro_args")
@@ -77,6 +85,10 @@ class PlacedRobot(Part, error=ModelError):
         """
         _check_one(self, "name", "description")
 
+    def find(self, access: Access = ANYWHERE) -> RobotSource:
+        """Return where it comes from; see `find_robot` and `find_description`."""
+        return _find(self, access)
+
     def located(self, folder: Path) -> Self:
         """Return it with the full path of a URDF that is in a folder."""
         if self.name is None:
@@ -134,6 +146,14 @@ class RobotDescription(Part, error=ModelError):
                 f"{', '.join(sorted(of_one))}: give it for each of the parts"
             )
 
+    def find(self, access: Access = ANYWHERE) -> RobotSource:
+        """Return where it comes from; see `find_robot` and `find_description`.
+
+        Raises:
+            ModelError: If it is several robots.
+        """
+        return _find(self, access)
+
     def located(self, folder: Path) -> Self:
         """Return it with the full path of each URDF that is in a folder.
 
@@ -152,6 +172,15 @@ def _check_one(robot: Part, *names: str) -> None:
     given = [name for name in names if getattr(robot, name) is not None]
     if len(given) != 1:
         raise ModelError(f"give one of {', '.join(names[:-1])} and {names[-1]}")
+
+
+def _find(robot: PlacedRobot | RobotDescription, access: Access) -> RobotSource:
+    arguments = {name: xacro_text(value) for name, value in robot.xacro_args.items()}
+    if robot.description is not None:
+        return find_description(robot.description, access, arguments)
+    if robot.name is None:
+        raise ModelError("several robots come from several files")
+    return find_robot(robot.name, access, arguments)
 
 
 def _located(name: str | Path, folder: Path) -> str:

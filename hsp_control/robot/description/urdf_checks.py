@@ -58,6 +58,8 @@ _WITH_AXIS = {"revolute", "continuous", "prismatic"}
 def read_urdf(source: RobotSource) -> Element:
     """Return the top element of a URDF that is safe to pass to any parser.
 
+    Its numbers are written so that all parsers read them.
+
     Raises:
         RobotNotFoundError, ModelError: See `parse_urdf`.
         ModelError: If an element is wrong; the message says where.
@@ -65,6 +67,10 @@ def read_urdf(source: RobotSource) -> Element:
     robot = parse_urdf(source)
     for where, problem in problems(robot):
         raise ModelError(f"{source.urdf}: {where}: {problem}")
+    for element in robot.iter():
+        for name in (*_NUMBERS.get(element.tag, ()), *_LIMITS.get(element.tag, ())):
+            if (text := element.get(name)) is not None:
+                element.set(name, _plain(text))
     return robot
 
 
@@ -207,6 +213,15 @@ def _parsed(text: str) -> list[float]:
     if "_" in text:  # Python accepts 1_000, other parsers do not
         raise ValueError(text)
     return [float(word) for word in text.split()]
+
+
+def _plain(text: str) -> str:
+    """Return numbers with one space between them, and none that are subnormal.
+
+    At a space behind a number, or at 1e-320, one parser drops the whole inertia.
+    """
+    words = text.split()
+    return " ".join("0" if 0.0 < abs(float(word)) < 1e-300 else word for word in words)
 
 
 def _short(text: str) -> str:

@@ -18,6 +18,7 @@ from hsp_control.common.exceptions import (
     ModelError,
     RobotNotFoundError,
 )
+from hsp_control.geometry import link_shapes
 from hsp_control.robot import ToolFrame
 
 
@@ -217,6 +218,32 @@ def test_joint_that_moves_no_mass_is_named(
 def test_a_robot_without_any_mass(write: Callable[..., Path]) -> None:
     with pytest.raises(ModelError, match=r"no link that moves has a mass: .*inertial"):
         Robot.load(write(ARM.replace(INERTIA, "")))
+
+
+@pytest.mark.parametrize("number", ["0 ", "\n0", "1e-320"])
+def test_no_inertia_is_lost_to_how_a_number_is_written(
+    number: str, write: Callable[..., Path]
+) -> None:
+    """The parser drops the whole element at each of these."""
+    written = Robot.load(write(ARM.replace('ixy="0"', f'ixy="{number}"', 1)))
+    plain = Robot.load(write(ARM, "plain.urdf"))
+    assert written.model.inertias[1] == plain.model.inertias[1]
+
+
+def test_what_the_parser_leaves_out_is_an_error(write: Callable[..., Path]) -> None:
+    text = ARM.replace('ixy="0"', "", 1)
+    with pytest.raises(ModelError, match=r"leaves out a part of the model: .*upper\]"):
+        Robot.load(write(text))
+
+
+def test_visuals_are_no_business_of_the_model(
+    write: Callable[..., Path], capfd: pytest.CaptureFixture[str]
+) -> None:
+    nameless = '<visual><geometry><box size="1 1 1"/></geometry><material/></visual>'
+    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    robot = Robot.load(write(ARM.replace(INERTIA, INERTIA + nameless + ball, 1)))
+    assert len(link_shapes(robot)) == 1
+    assert capfd.readouterr().err == ""
 
 
 def test_massless_link_between_heavy_ones_is_no_error(
