@@ -15,11 +15,11 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from hsp_control.cli import robot_table
+from hsp_control.cli.advice import robot_advice, start_advice
 from hsp_control.cli.consoles import errors as _errors
 from hsp_control.cli.consoles import message_of, renamed_keys_printed
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import DeferredInterrupt
-from hsp_control.cli.start_advice import start_advice
 from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema, load_experiment
@@ -171,7 +171,11 @@ def check(options: argparse.Namespace) -> int:
     table.add_row("largest effort", f"{np.abs(output.tau).max():.3g} at the start")
     _out.print(table)
     _warn_of_rates(experiment)
-    for line in start_advice(experiment, damped=output.damped):
+    advice = [
+        *robot_advice(experiment.robot),
+        *start_advice(experiment, damped=output.damped),
+    ]
+    for line in advice:
         _out.print(line, markup=False)
     _out.print(f"{options.config}: OK")
     return 0

@@ -5,11 +5,12 @@ import json
 import logging
 import textwrap
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from hsp_control.cli.consoles import out
-from hsp_control.common.exceptions import ModelError
-from hsp_control.inspection import Finding, Inspection
+from hsp_control.common.exceptions import ExportError, ModelError
+from hsp_control.inspection import Inspection
 from hsp_control.inspection import inspect as inspect_robot
 from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.access import ANYWHERE, only_within
@@ -22,12 +23,12 @@ _SHOWN = 12
 
 def inspect(options: argparse.Namespace) -> int:
     """Print what is odd about a robot; return 2 if it does not load."""
-    logging.getLogger("hsp_control").setLevel(logging.ERROR)  # warnings are findings
     description = RobotDescription(options.robot, xacro_args=_arguments(options.args))
     strict = options.strict or bool(options.allow)
     access = only_within(_folders(options)) if strict else ANYWHERE
     source = description.find(access)
-    inspection = inspect_robot(source, description)
+    with _no_warnings():
+        inspection = inspect_robot(source, description)
     if options.json:
         print(json.dumps(inspection.to_dict(), indent=2, ensure_ascii=False))
     else:
@@ -37,6 +38,10 @@ def inspect(options: argparse.Namespace) -> int:
         file = write_repaired(source, options.fix)
         if not options.json:
             out.print(f"Written with projected inertias: {file}", markup=False)
+    if options.html is not None:
+        file = _write_page(inspection, options.html)
+        if not options.json:
+            out.print(f"Page: {file}", markup=False)
     return 0 if inspection.loads else 2
 
 
@@ -50,11 +55,7 @@ def report(inspection: Inspection) -> Iterator[str]:
             subsequent_indent=indent,
             break_on_hyphens=False,
         )
-    groups: dict[tuple[str, str, str], list[Finding]] = {}
-    for finding in inspection.findings:
-        key = finding.severity, finding.check, finding.cure
-        groups.setdefault(key, []).append(finding)
-    for (severity, check, cure), findings in groups.items():
+    for (severity, check, cure), findings in inspection.groups().items():
         yield ""
         yield f"{severity}: {check}"
         for finding in findings[:_SHOWN]:
@@ -69,6 +70,38 @@ def report(inspection: Inspection) -> Iterator[str]:
         for severity in ("error", "warning", "note")
     }
     yield ", ".join(f"{n} {s}{'s' * (n != 1)}" for s, n in counts.items())
+
+
+def _write_page(inspection: Inspection, path: Path) -> Path:
+    """Write a page with the robot at home, and beside it what is odd.
+
+    Raises:
+        ExportError: If the robot does not load, or the page cannot be written.
+    """
+    from hsp_control.visualization.viewer.export.still import Note, export_still
+
+    if inspection.robot is None:
+        raise ExportError(f"{path}: there is no picture of a robot that does not load")
+    facts = [f"{name}: {text}" for name, text in inspection.facts() if name != "file"]
+    notes = [
+        Note(f"{severity}: {check}", [f"{f.element}: {f.message}" for f in found], cure)
+        for (severity, check, cure), found in inspection.groups().items()
+    ]
+    notes = notes or [Note("nothing is odd", [], "")]
+    with _no_warnings():
+        return export_still(inspection.robot, path, [*notes, Note("robot", facts, "")])
+
+
+@contextmanager
+def _no_warnings() -> Iterator[None]:
+    """Keep the package's warnings from being printed: they are findings here."""
+    logger = logging.getLogger("hsp_control")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 def _wrapped(text: str, first: str, rest: str) -> list[str]:

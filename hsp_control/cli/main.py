@@ -213,6 +213,12 @@ def _add_inspect(inspect: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write a URDF whose inertias are the nearest that a body can have",
     )
+    inspect.add_argument(
+        "--html",
+        type=Path,
+        metavar="FILE",
+        help="write a page: a picture of the robot, and beside it what is odd",
+    )
     inspect.add_argument("--json", action="store_true", help="print JSON")
     _add_strict(inspect)
 

@@ -25,6 +25,8 @@ _ALWAYS = 0.9
 """Pairs of links that overlap in this share of all samples touch by construction."""
 _MARGIN = 0.05
 """Distance from a limit, as a share of the joint's range."""
+_WIDE = 8.0 * np.pi
+"""A joint with a greater range has no middle: files write 1e5 for no limit."""
 _GAP = 0.02
 """Least distance from an obstacle [m]; links only must not overlap."""
 _SHARE = 0.5
@@ -83,7 +85,7 @@ class PostureSearch:
         self.robot = robot
         self._rows = tuple(rows)
         lower, upper = robot.position_limits()
-        bounded = np.isfinite(lower) & np.isfinite(upper)
+        bounded = upper - lower < _WIDE  # also not where there is no limit
         home = robot.joint_positions(robot.home())
         half = np.full(robot.nv, np.pi)
         half[bounded] = 0.5 * (upper[bounded] - lower[bounded])

@@ -56,6 +56,14 @@ class Inspection:
         home = ", ".join(f"{x:.3g}" for x in robot.joint_positions(robot.home()) + 0.0)
         yield "home", f"[{home}]"
 
+    def groups(self) -> dict[tuple[str, str, str], list[Finding]]:
+        """Return the findings by severity, check and cure."""
+        groups: dict[tuple[str, str, str], list[Finding]] = {}
+        for finding in self.findings:
+            key = finding.severity, finding.check, finding.cure
+            groups.setdefault(key, []).append(finding)
+        return groups
+
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
         return {

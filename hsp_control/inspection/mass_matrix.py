@@ -17,15 +17,15 @@ def worst_condition(robot: Robot) -> tuple[float, str]:
     """Return the largest condition number of M at home and at random configurations.
 
     Returns:
-        The number, and the degree of freedom that moves most in the direction of the
-        smallest eigenvalue.
+        The number, inf where M is not positive definite, and the degree of freedom
+        that moves most in the direction of the smallest eigenvalue.
     """
     rng, rest = np.random.default_rng(0), np.zeros(robot.nv)
     worst, which = 0.0, 0
     for sample in range(_SAMPLES + 1):
         q: Array = robot.random_configuration(rng) if sample else robot.home()
         values, vectors = np.linalg.eigh(robot.state(0.0, q, rest).mass_matrix)
-        condition = float(values[-1] / max(values[0], np.finfo(float).tiny))
+        condition = float(values[-1] / values[0]) if values[0] > 0.0 else np.inf
         if condition > worst:
             worst, which = condition, int(np.argmax(np.abs(vectors[:, 0])))
     return worst, robot.dof_names[which]
@@ -40,6 +40,8 @@ def check_mass_matrix(robot: Robot) -> Iterator[Finding]:
             "mass matrix",
             f"joint {dof!r}",
             f"the condition number of M reaches {condition:.1e}: hardly any mass moves "
-            "with this joint",
+            "with this joint somewhere"
+            if np.isfinite(condition)
+            else "M is not positive definite everywhere",
             "check the inertias beyond it, or lock it",
         )

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
+from hsp_control.common.suggestions import listing
 from hsp_control.inspection.finding import Finding
 from hsp_control.robot.description.mesh_files import (
     find_file,
@@ -32,6 +33,6 @@ def check_meshes(xml: Element, source: RobotSource) -> Iterator[Finding]:
                     links.setdefault(link.get("name", ""), name)
         for (reason, cure), names in unusable.items():
             first = next(iter(names.values()))
-            meshes = f"{use} mesh{'es' * (len(names) > 1)} of {', '.join(names)}"
+            meshes = f"{use} mesh{'es' * (len(names) > 1)} of {listing(names)}"
             message = f"{reason}: {first}{', ...' * (len(names) > 1)}; {without}"
             yield Finding("warning", "mesh", meshes, message, cure)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from robot_texts import ARM, INERTIA
 
 from hsp_control import Experiment, FramePosition, Rollout, load_experiment
 from hsp_control.cli import main
@@ -126,6 +127,23 @@ def test_check_names_what_collides(
     printed = capsys.readouterr().out
     assert "The start is in collision: iiwa_link_" in printed
     assert "to ball overlap by 0." in printed
+
+
+def test_check_names_inertias_that_no_body_can_have(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wrong = INERTIA.replace('izz="0.1"', 'izz="0.5"')
+    (tmp_path / "arm.urdf").write_text(ARM.replace(INERTIA, wrong, 1))
+    tasks = {"hand": {"type": "frame_position", "axes": "xy"}}
+    robot: dict[str, Any] = {"name": "arm.urdf"}
+    assert main(["check", write(tmp_path, robot=robot, tasks=tasks)]) == 0
+    printed = capsys.readouterr().out
+    assert (
+        "arm: no body can have the inertias of upper; project_inertias: true" in printed
+    )
+    robot["project_inertias"] = True
+    assert main(["check", write(tmp_path, robot=robot, tasks=tasks)]) == 0
+    assert "no body" not in capsys.readouterr().out
 
 
 def test_a_description_is_located_at_its_key(tmp_path: Path) -> None:

@@ -1,10 +1,14 @@
 """Each finding names what is odd, with its value and a cure that helps."""
 
+import base64
+import gzip
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import umsgpack
 from odd_robots import FACES, OCTAHEDRON, write_stl
 from robot_texts import ARM, INERTIA, joint, link, robot_xml
 
@@ -158,6 +162,7 @@ def test_printed_lines_fit_a_terminal_and_many_elements_are_cut(
     path.write_text(robot_xml(*(link(name, wrong) for name in names), *joints))
     assert main(["inspect", str(path)]) == 0
     printed = capsys.readouterr().out
+    assert "condition number" in printed
     assert max(map(len, printed.replace(str(tmp_path), "").splitlines())) <= 80
     assert "... 15 in all; --json lists them" in printed
     assert "project_inertias: true takes the nearest possible one" in printed
@@ -184,6 +189,29 @@ def test_fix_writes_a_robot_without_findings(
     assert main(["inspect", str(fixed)]) == 0
     assert main(["inspect", str(path), "--fix", str(path)]) == 2
     assert "is the robot's own file; give another" in capsys.readouterr().err
+
+
+def test_page_has_the_robot_and_its_findings(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, page = tmp_path / "arm.urdf", tmp_path / "arm.html"
+    path.write_text(ARM.replace(INERTIA, INERTIA.replace('izz="0.1"', 'izz="0.5"'), 1))
+    assert main(["inspect", str(path), "--html", str(page)]) == 0
+    assert f"Page: {page}" in capsys.readouterr().out
+    text = page.read_text()
+    block = re.search(r'id="content">([^<]*)<', text)
+    assert block is not None
+    content = umsgpack.unpackb(gzip.decompress(base64.b64decode(block[1])))
+    headings = [note["heading"] for note in content["notes"]]
+    assert headings[0] == "warning: inertia"
+    assert headings[-1] == "robot"
+    assert "link 'upper'" in content["notes"][0]["items"][0]
+    assert str(tmp_path) not in str(content)  # a page is for others, too
+    drawn = {command.get("path", "") for command in content["commands"]}
+    assert any(name.startswith("/robot/") for name in drawn)
+    path.write_text(ARM.replace(INERTIA, ""))
+    assert main(["inspect", str(path), "--html", str(page)]) == 2
+    assert "no picture of a robot that does not load" in capsys.readouterr().err
 
 
 def test_mistakes_of_the_command(

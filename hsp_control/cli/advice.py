@@ -1,10 +1,32 @@
-"""What ``hsp check`` says about a start at which a robot cannot work well."""
+"""What ``hsp check`` says about a robot or a start that will make trouble."""
 
 from collections.abc import Iterator
 
 from hsp_control.common.exceptions import ConfigurationError
+from hsp_control.common.suggestions import listing
 from hsp_control.config import Experiment
+from hsp_control.robot import Robot
+from hsp_control.robot.description.inertias import impossible_inertias
+from hsp_control.robot.description.urdf_checks import read_urdf
 from hsp_control.simulation.start_search import posture_search
+
+
+def robot_advice(robot: Robot) -> Iterator[str]:
+    """Yield lines about links whose inertias no body can have."""
+    description = robot.description
+    if description is None or description.project_inertias:
+        return
+    for part in robot.parts:
+        placed = (description.parts or {}).get(part.prefix.removesuffix("_"))
+        if placed is not None and placed.project_inertias:
+            continue
+        links = [found.link for found in impossible_inertias(read_urdf(part.source))]
+        if links:
+            yield (
+                f"{part.prefix}{part.source.name}: no body can have the inertias of "
+                f"{listing(links, limit=6)}; project_inertias: true takes the nearest "
+                "possible ones (see hsp inspect)."
+            )
 
 
 def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
