@@ -48,13 +48,8 @@ def inspect(options: argparse.Namespace) -> int:
 def report(inspection: Inspection) -> Iterator[str]:
     """Yield the lines that are printed, of at most 80 characters."""
     for name, text in inspection.facts():
-        indent = " " * 14
-        yield from textwrap.wrap(
-            f"{name:12}  {text}",
-            _WIDTH,
-            subsequent_indent=indent,
-            break_on_hyphens=False,
-        )
+        line = f"{name:12}  {text}"
+        yield from [line] if name == "file" else _wrapped(line, "", " " * 14)
     for (severity, check, cure), findings in inspection.groups().items():
         yield ""
         yield f"{severity}: {check}"

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from hsp_control.inspection.finding import Finding
+from hsp_control.inspection.finding import Finding, Severity
 from hsp_control.robot.description.inertias import impossible_inertias, tensor_of
 from hsp_control.robot.description.loading import NEGATIVE_MOMENT
 
@@ -14,7 +14,7 @@ def check_inertias(xml: Element) -> Iterator[Finding]:
     """Yield the links whose inertia no body can have, and moments without a mass."""
     for found in impossible_inertias(xml):
         refused = found.moments[0] < -NEGATIVE_MOMENT
-        severity = "error" if refused else "warning"
+        severity: Severity = "error" if refused else "warning"
         yield Finding(severity, "inertia", f"link {found.link!r}", found.reason, _CURE)
     for link in xml.findall("link"):
         mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")

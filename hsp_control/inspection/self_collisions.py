@@ -34,5 +34,5 @@ def check_self_collisions(robot: Robot) -> Iterator[Finding]:
                 f"{first!r} and {second!r}",
                 f"their capsules overlap at home by {-distance:.3g} m: self_clearance "
                 "leaves this pair out",
-                "disable the pair in an SRDF, or choose another home",
+                "if they can collide, bound their joints by limits: position",
             )

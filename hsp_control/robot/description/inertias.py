@@ -68,7 +68,7 @@ def impossible_inertias(robot: Element) -> Iterator[ImpossibleInertia]:
             continue
         tensor = tensor_of(element)
         if not is_possible(tensor):
-            moments = np.linalg.eigvalsh(tensor)
+            moments = np.asarray(np.linalg.eigvalsh(tensor), dtype=float)
             nearest = nearest_possible(tensor)
             yield ImpossibleInertia(link.get("name", ""), element, moments, nearest)
 
@@ -82,7 +82,7 @@ def project_inertias(robot: Element) -> None:
 
 def is_possible(tensor: Array) -> bool:
     """Return whether a body can have an inertia, shape (3, 3), to rounding."""
-    moments = _second_moments(np.linalg.eigvalsh(tensor))
+    moments = _second_moments(np.asarray(np.linalg.eigvalsh(tensor), dtype=float))
     return bool(moments.min() >= -ROUNDING * np.abs(moments).sum())
 
 

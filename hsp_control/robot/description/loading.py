@@ -39,7 +39,7 @@ _ROOT_JOINTS = {
     "free_flyer": pin.JointModelFreeFlyer,
 }
 _NO_HAND = re.compile(
-    "finger|thumb|camera|imu|sensor|range|accelerometer|laser|optical"
+    "finger|thumb|camera|imu|sensor|range|accelerometer|laser|optical|force|(^|_)ft_frame"
 )
 """Names of links on a last joint that are less likely the hand than others."""
 NEGATIVE_MOMENT = 1e-6

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 from hsp_control.common.exceptions import ModelError
 from hsp_control.robot.description.packages import package_folders
@@ -76,7 +76,7 @@ def expand(
 
 @contextmanager
 def _packages_found(
-    substitution_args: ModuleType, package_dirs: Sequence[Path]
+    substitution_args: Any, package_dirs: Sequence[Path]
 ) -> Iterator[None]:
     """Let ``$(find package)`` look in folders; xacro itself asks an installed ROS 2."""
 
