@@ -94,17 +94,13 @@ class PostureSearch:
         self._half = half
         self._root = np.array(["root_joint" in name for name in robot.dof_names])
         inner = (1.0 - 2.0 * _MARGIN) * half
-        self._lower, self._upper = self.middle - inner, self.middle + inner
+        self._lower = np.maximum(self.middle - inner, lower)
+        self._upper = np.minimum(self.middle + inner, upper)
         self._lower[self._root] = self._upper[self._root] = home[self._root]
         self._proximity = self._pairs_that_can_be_apart(obstacles)
-        self._gaps = np.array(
-            [
-                _GAP if j >= len(self._proximity.links) else 0.0
-                for _, j in self._proximity.pairs
-            ]
-            if self._proximity
-            else []
-        )
+        pairs = self._proximity.pairs if self._proximity else ()
+        links = len(self._proximity.links) if self._proximity else 0
+        self._gaps = np.array([_GAP if j >= links else 0.0 for _, j in pairs])
 
     def judge(self, q: Array) -> Judgement:
         """Return what counts for a configuration, shape (nq,)."""

@@ -26,11 +26,7 @@ class InitialState(Part, error=ConfigurationError):
     """
 
     joints: (
-        Annotated[
-            Literal["auto"] | Vector | Annotated[Mapping[str, Number], READ_ONLY],
-            "joints",
-        ]
-        | None
+        Literal["auto"] | Vector | Annotated[Mapping[str, Number], READ_ONLY] | None
     ) = None
     """Joint positions [rad or m]: nv numbers, some by name with the others at home, or
     ``auto``."""
@@ -66,9 +62,7 @@ class InitialState(Part, error=ConfigurationError):
     @property
     def is_found(self) -> bool:
         """Whether the configuration is not given, but found."""
-        return self.pose is not None or (
-            isinstance(self.joints, str) and self.joints == "auto"
-        )
+        return self.pose is not None or isinstance(self.joints, str)
 
     def configuration_of(
         self,

@@ -30,7 +30,7 @@ _LIBRARY = re.compile(rb"^[ \t]*mtllib[ \t]+(.+)$", re.M)
 def find_problem(file: Path) -> str:
     """Return why a mesh file cannot be used, or an empty string."""
     if not file.is_file():  # reading a pipe would block
-        return "not a file" if file.exists() else "no such file"
+        return "not a file" if _is_there(file) else "no such file"
     try:
         size = file.stat().st_size
         if size > MAX_SIZE:
@@ -60,8 +60,8 @@ def find_file(source: RobotSource, name: str) -> Path | None:
     It is no file only if there is something else at its place, such as a pipe.
     """
     places = candidates(source, name)
-    file = next(filter(_exists, places), None)
-    return file or next((place for place in places if place.exists()), None)
+    file = next(filter(_is_file, places), None)
+    return file or next(filter(_is_there, places), None)
 
 
 def where_to_put(name: str) -> str:
@@ -93,7 +93,7 @@ def check_mesh_name(source: RobotSource, name: str, what: str, access: Access) -
     if not access.strict:
         return
     places = candidates(source, name)
-    found = [place for place in places if _exists(place)]
+    found = [place for place in places if _is_file(place)]
     named_outside = name.rpartition("://")[0] not in ("package", "model")
     # A missing file is reported later. But a path outside the allowed folders is an
     # error in any case, so that the message does not reveal which files exist there.
@@ -131,8 +131,15 @@ def _references(file: Path) -> Iterator[str]:
             yield unquote(text)
 
 
-def _exists(path: Path) -> bool:
+def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
+    except (OSError, ValueError):  # too long for a path, or with a null character
+        return False
+
+
+def _is_there(path: Path) -> bool:
+    try:
+        return path.exists()
     except (OSError, ValueError):
         return False
