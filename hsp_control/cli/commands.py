@@ -15,6 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from hsp_control.cli import robot_table
+from hsp_control.cli.advice import robot_advice, start_advice
 from hsp_control.cli.consoles import errors as _errors
 from hsp_control.cli.consoles import message_of, renamed_keys_printed
 from hsp_control.cli.consoles import out as _out
@@ -170,11 +171,12 @@ def check(options: argparse.Namespace) -> int:
     table.add_row("largest effort", f"{np.abs(output.tau).max():.3g} at the start")
     _out.print(table)
     _warn_of_rates(experiment)
-    if output.damped:
-        _out.print(
-            f"The tasks {output.damped} are singular at the start: the law is damped "
-            "there, not exact."
-        )
+    advice = [
+        *robot_advice(experiment.robot),
+        *start_advice(experiment, damped=output.damped),
+    ]
+    for line in advice:
+        _out.print(line, markup=False)
     _out.print(f"{options.config}: OK")
     return 0
 
@@ -259,6 +261,13 @@ def franka_model(options: argparse.Namespace) -> int:
     from hsp_control.cli import franka_model as models
 
     return models.franka_model(options)
+
+
+def inspect(options: argparse.Namespace) -> int:
+    """Print what is odd about a robot's description."""
+    from hsp_control.cli import inspect as inspections
+
+    return inspections.inspect(options)
 
 
 def robots(options: argparse.Namespace) -> int:

@@ -192,6 +192,7 @@ def _parser() -> argparse.ArgumentParser:
     _complete(name, bundled_robots)
     which.add_argument("--markdown", action="store_true", help="print docs/robots.md")
 
+    _add_inspect(_command(commands, "inspect", "say what is odd about a robot's URDF"))
     _command(commands, "schema", "print the JSON Schema of a configuration")
     return parser
 
@@ -202,6 +203,30 @@ def _command(
     text: str,
 ) -> argparse.ArgumentParser:
     return commands.add_parser(name, help=text, description=text.capitalize() + ".")
+
+
+def _add_inspect(inspect: argparse.ArgumentParser) -> None:
+    robot = inspect.add_argument(
+        "robot", metavar="ROBOT", help="a name, a URDF or a xacro file"
+    )
+    _complete(robot, bundled_robots)
+    inspect.add_argument(
+        "args", nargs="*", metavar="NAME:=VALUE", help="arguments of a xacro file"
+    )
+    inspect.add_argument(
+        "--fix",
+        type=Path,
+        metavar="FILE",
+        help="write a URDF whose inertias are the nearest that a body can have",
+    )
+    inspect.add_argument(
+        "--html",
+        type=Path,
+        metavar="FILE",
+        help="write a page: a picture of the robot, and beside it what is odd",
+    )
+    inspect.add_argument("--json", action="store_true", help="print JSON")
+    _add_strict(inspect)
 
 
 def _add_export(export: argparse.ArgumentParser) -> None:
@@ -443,7 +468,7 @@ def _complete(action: argparse.Action, names: Callable[[], Iterable[str]]) -> No
     def completer(prefix: str, **_: object) -> list[str]:
         from argcomplete.completers import FilesCompleter
 
-        files = FilesCompleter(("yaml", "npz", "urdf"))(prefix)
+        files = FilesCompleter(("yaml", "npz", "urdf", "xacro"))(prefix)
         return [*(name for name in names() if name.startswith(prefix)), *files]
 
     vars(action)["completer"] = completer

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 import yaml
@@ -94,7 +94,7 @@ class Experiment:
         base: Base | None = None,
         scene: Scene | Iterable[Obstacle] = (),
         changes: Sequence[Change] = (),
-        start: InitialState | None = None,
+        start: InitialState | Literal["auto"] | None = None,
         plant: PlantPart | str = "rigid_body",
         compensation: Compensation | None = None,
         simulation: SimulationSettings | None = None,
@@ -119,7 +119,8 @@ class Experiment:
             base: What else moves a floating base.
             scene: The obstacles; those that fields and limits hold are added.
             changes: Changes while running.
-            start: Where the run begins; at home and at rest by default.
+            start: Where the run begins; at home and at rest by default. ``auto``: at a
+                good configuration that is found.
             plant: What the efforts act on; the controller's own model by default.
             compensation: Compensators for what the model lacks.
             simulation: Duration, periods and integrator.
@@ -373,15 +374,21 @@ def build(document: Document) -> Experiment:
     for contact in contacts:
         with document.at("contacts", contact.name, "frame"):
             robot.frame_id(contact.frame)
-    with document.at("start"):
-        q0 = scenario.start.configuration_of(robot, contacts)
     with document.at():
         scene = located_scene(scenario.scene, folder, document.access)
         scenario = replace(scenario, scene=scene)
-        null_space = scenario.null_space
+    null_space, tasks = scenario.null_space, tuple(scenario.tasks.values())
+    with document.at("start"):
+        q0 = scenario.start.configuration_of(
+            robot, contacts, tasks, scene, null_space.singularity_threshold
+        )
+        if scenario.start.is_found:  # the log repeats the run where another is found
+            found = InitialState(configuration=q0, velocity=scenario.start.velocity)
+            scenario = replace(scenario, start=found)
+    with document.at():
         controller = Controller(
             robot,
-            tuple(scenario.tasks.values()),
+            tasks,
             null_space.field,
             null_space_gain=null_space.gain,
             metric=null_space.metric,
@@ -420,8 +427,8 @@ def load_robot(document: Document, scenario: Scenario) -> Robot:
     Raises:
         HspControlError: If it cannot be loaded; with a location.
     """
-    named = scenario.robot.name is not None
-    with document.at("robot", *(("name",) if named else ())):
+    keys = [key for key in ("name", "description") if getattr(scenario.robot, key)]
+    with document.at("robot", *keys):
         return Robot.load(scenario.robot, access=document.access)
 
 

@@ -1,9 +1,11 @@
 """Shapes of the robot's links for distances: capsules or its collision geometry."""
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 from weakref import WeakKeyDictionary, WeakSet
+from xml.etree.ElementTree import Element
 
 import coal
 import numpy as np
@@ -11,6 +13,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
+from hsp_control.common.suggestions import listing
 from hsp_control.geometry.body_geometry import (
     body_geometry,
     enclosing_ellipsoid_capsule,
@@ -20,6 +23,7 @@ from hsp_control.geometry.hulls import convex_hull, hull_corners
 from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files
 from hsp_control.robot.description.combining import Part
+from hsp_control.robot.description.loading import parser_text
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf_checks import read_urdf
 
@@ -33,6 +37,7 @@ _MAX_SPHERES = 100
 
 _log = logging.getLogger(__name__)
 _warned: "WeakSet[Robot]" = WeakSet()
+_incomplete: "WeakKeyDictionary[Robot, set[str]]" = WeakKeyDictionary()
 _found: "WeakKeyDictionary[Robot, dict[Proxy, tuple[LinkShape, ...]]]" = (
     WeakKeyDictionary()
 )
@@ -68,8 +73,11 @@ def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
             smooth for all convex obstacles. ``hulls``, ``meshes``: the robot's own
             collision geometry, as convex hulls or as it is.
 
+    Meshes that do not exist are left out, with a warning.
+
     Raises:
-        ModelError: If a collision mesh cannot be read, or the proxy is unknown.
+        ModelError: If a collision mesh cannot be read, none exists and no other shape
+            is left, or the proxy is unknown.
     """
     if proxy not in get_args(Proxy):
         raise ModelError(f"proxy {proxy!r} is not one of {', '.join(get_args(Proxy))}")
@@ -129,19 +137,17 @@ def _shapes_of_urdf(robot: Robot, part: Part) -> list[LinkShape]:
     joint of a shape is found by the name of the shape's frame.
     """
     source = part.source
-    for name in _collision_meshes(source):
-        _check_mesh(source, name)
-    full = pin.buildModelFromUrdf(str(source.urdf), mimic=False)
+    xml = read_urdf(source)
+    missing = _locate_meshes(xml, source)
+    text = parser_text(xml, "visual")
+    full = pin.buildModelFromXML(text, mimic=False)
     try:
-        geometry = pin.buildGeomFromUrdf(
-            full,
-            str(source.urdf),
-            pin.GeometryType.COLLISION,
-            package_dirs=[str(folder) for folder in source.package_dirs],
-        )
+        geometry = pin.buildGeomFromUrdfString(full, text, pin.GeometryType.COLLISION)
     except (ValueError, RuntimeError) as error:
         reason = (str(error).strip() or type(error).__name__).splitlines()[0]
         raise ModelError(f"{source.urdf}: a collision mesh: {reason}") from error
+    if missing:
+        _report_missing(robot, part, missing, left=len(geometry.geometryObjects))
     shapes = []
     for item in geometry.geometryObjects:
         frame = full.frames[item.parentFrame]
@@ -163,18 +169,55 @@ def _shapes_of_urdf(robot: Robot, part: Part) -> list[LinkShape]:
     return shapes
 
 
-def _collision_meshes(source: RobotSource) -> list[str]:
-    elements = read_urdf(source.urdf).iter("collision")
-    meshes = (mesh for element in elements for mesh in element.iter("mesh"))
-    return list(dict.fromkeys(mesh.get("filename", "") for mesh in meshes))
+def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:
+    """Put the path of each collision mesh into a URDF; delete those that do not exist.
+
+    Returns:
+        For each link without one of its meshes: the name of the first one.
+
+    Raises:
+        ModelError: If a mesh exists, but cannot be used.
+    """
+    missing: dict[str, str] = {}
+    for link in xml.iter("link"):
+        for element in link.findall("collision"):
+            for mesh in element.iter("mesh"):
+                name = mesh.get("filename", "")
+                file = mesh_files.find_file(source, name)
+                if file is None:
+                    missing.setdefault(link.get("name", ""), name)
+                    link.remove(element)
+                    break
+                if reason := mesh_files.find_problem(file):
+                    raise ModelError(
+                        f"{source.urdf}: a collision mesh: {file}: {reason}"
+                    )
+                mesh.set("filename", str(file.resolve()))
+    return missing
 
 
-def _check_mesh(source: RobotSource, name: str) -> None:
-    """Check a mesh before Assimp reads it; Pinocchio reports a missing one."""
-    found = (file for file in mesh_files.candidates(source, name) if file.is_file())
-    file = next(found, None)
-    if file is not None and (reason := mesh_files.find_problem(file)):
-        raise ModelError(f"{source.urdf}: a collision mesh: {file}: {reason}")
+def _report_missing(
+    robot: Robot, part: Part, missing: Mapping[str, str], left: int
+) -> None:
+    """Warn of meshes that do not exist, once for each robot.
+
+    Raises:
+        ModelError: If no other shape is left.
+    """
+    name = next(iter(missing.values()))
+    hint = mesh_files.where_to_put(name)
+    if not left:
+        raise ModelError(
+            f"{part.source.urdf}: a collision mesh: no file {name!r}, and no other "
+            f"shape of a link is left; {hint}, or give the links primitives"
+        )
+    if part.prefix not in _incomplete.setdefault(robot, set()):
+        _incomplete[robot].add(part.prefix)
+        _log.warning(
+            "%s: collision meshes of %d links are missing, which distances therefore "
+            "do not see: %s (%s); %s",
+            part.prefix + part.source.name, len(missing), listing(missing), name, hint,
+        )  # fmt: skip
 
 
 def _finite(geometry: Any) -> bool:

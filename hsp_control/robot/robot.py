@@ -37,7 +37,7 @@ from hsp_control.robot.description.loading import (
 from hsp_control.robot.description.mujoco.selection import select
 from hsp_control.robot.description.mujoco.source import load_mjcf, load_selection
 from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
-from hsp_control.robot.description.sources import RobotSource, Root, find_robot
+from hsp_control.robot.description.sources import RobotSource, Root
 from hsp_control.robot.kinematics import (
     FrameKinematics,
     joint_placements,
@@ -105,13 +105,15 @@ class Robot(ConfigurationSpace):
         tool_frames: Mapping[str, ToolFrame] | None = None,
         gravity: ArrayLike | None = None,
         mimic: bool = True,
+        project_inertias: bool = False,
+        xacro_args: Mapping[str, str | bool | float] | None = None,
         access: Access = ANYWHERE,
     ) -> Self:
-        """Load a bundled robot, one of example-robot-data, or a URDF file.
+        """Load a bundled robot, one of an installed package, or a URDF or xacro file.
 
         Args:
-            name: For example ``"panda"``, ``"talos_arm"`` or ``"my_arm/arm.urdf"``; or
-                a whole description, and then nothing else.
+            name: For example ``"panda"``, ``"talos_arm"``, ``"gen3_description"`` or
+                ``"my_arm/arm.urdf"``; or a whole description, and then nothing else.
             root: How its base is attached to the world: ``fixed``, ``planar``
                 (x, y, yaw) or ``free_flyer``. None: as its source says; ``fixed`` for a
                 file.
@@ -122,6 +124,9 @@ class Robot(ConfigurationSpace):
                 -9.81 along z.
             mimic: Whether ``<mimic>`` joints follow their leader. False: they are
                 independent joints.
+            project_inertias: Whether inertias that no body can have are replaced by the
+                nearest that one can have; mass and centre of mass stay.
+            xacro_args: Arguments of a xacro file, by name.
             access: Which files may be read: a URDF given by path, and the meshes that
                 it names. Use `access.only_within` for untrusted files.
 
@@ -141,13 +146,20 @@ class Robot(ConfigurationSpace):
                 tool_frames=tool_frames or {},
                 gravity=gravity,
                 mimic=mimic,
+                project_inertias=project_inertias,
+                xacro_args=xacro_args or {},
             )
-        elif not mimic or any(
-            option is not None for option in (root, locked, tool_frames, gravity)
+        elif (
+            not mimic
+            or project_inertias
+            or any(
+                option is not None
+                for option in (root, locked, tool_frames, gravity, xacro_args)
+            )
         ):
             raise ModelError(
                 "a RobotDescription says all about the robot: give root, locked, "
-                "tool_frames, gravity and mimic in it"
+                "tool_frames, gravity, mimic, project_inertias and xacro_args in it"
             )
         return cls._described(name, access)
 
@@ -200,14 +212,13 @@ class Robot(ConfigurationSpace):
         if description.mjcf is not None:
             return cls(*load_mjcf(description, access), description=description)
         if description.parts is None:
-            assert description.name is not None
-            source = find_robot(description.name, access)
+            source = description.find(access)
             model = load_model(source, description, gravity)
             return cls(model, source, description=description)
         robots = {}
         for name, part in description.parts.items():
-            with within("parts", name, "name"):
-                source = find_robot(part.name, access)
+            with within("parts", name, "name" if part.name else "description"):
+                source = part.find(access)
                 robot = cls(load_model(source, part, gravity), source)
             robots[name] = robot, placement(part.position, part.rotation)
         with within("parts"):

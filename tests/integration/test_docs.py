@@ -14,6 +14,8 @@ from hsp_control import load_experiment
 from hsp_control.cli.main import _parser
 from hsp_control.live import LiveSettings
 from hsp_control.null_space.fields.weight import sample_weight
+from hsp_control.robot import RobotDescription
+from hsp_control.simulation import InitialState, StartPose
 from hsp_control.visualization.viewer import ShownItems
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -218,3 +220,17 @@ def test_the_live_page_s_defaults_are_the_code_s() -> None:
     for name, value in settings.items():
         shown = "none" if value is None else str(value).lower().removesuffix(".0")
         assert re.split("[ ,:]", told[name])[0] == shown, name
+
+
+def test_the_page_of_one_s_own_robot_is_true() -> None:
+    text = (ROOT / "docs" / "own_robot.md").read_text(encoding="utf-8")
+    for line in "".join(blocks(text, "sh")).splitlines():
+        _parser().parse_args(shlex.split(line.split("#")[0])[1:])
+    (configuration,) = blocks(text, "yaml")
+    lines = [yaml.safe_load(line) for line in configuration.splitlines()]
+    for line in lines:
+        if "robot" in line:
+            RobotDescription(**line["robot"])
+        else:
+            start = line["start"]
+            assert start == "auto" or InitialState(pose=StartPose(**start["pose"]))

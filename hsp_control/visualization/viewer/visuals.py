@@ -13,7 +13,7 @@ from hsp_control.common.exceptions import ModelError, RobotNotFoundError
 from hsp_control.robot import Robot
 from hsp_control.robot.description.body_shape import BodyShape
 from hsp_control.robot.description.combining import Part
-from hsp_control.robot.description.mesh_files import find_problem
+from hsp_control.robot.description.mesh_files import candidates, find_problem
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf_checks import read_urdf
 
@@ -70,7 +70,7 @@ def _of_part(robot: Robot, part: Part) -> Iterator[Visual]:
         yield from _given(robot, part, part.source.shapes)
         return
     try:
-        tree = read_urdf(part.source.urdf)
+        tree = read_urdf(part.source)
     except (ModelError, RobotNotFoundError):
         return
     materials = dict(_materials(tree))
@@ -154,19 +154,10 @@ def _pose(origin: Element | None) -> Array:
 
 def _mesh_file(source: RobotSource, name: str) -> Path | None:
     """Return the file that a mesh's name refers to, if it exists and can be shown."""
-    scheme, _, rest = name.rpartition("://")
-    if scheme == "package":
-        package, _, inside = rest.partition("/")
-        candidates = [folder / rest for folder in source.package_dirs]
-        candidates += [
-            folder / inside for folder in source.package_dirs if folder.name == package
-        ]
-    else:
-        candidates = [source.urdf.parent / rest]  # an absolute path stays as it is
     return next(
         (
             file
-            for file in candidates
+            for file in candidates(source, name)
             if file.suffix.lower() in _MESHES
             and not find_problem(file)
             and source.access.allows(file)

@@ -60,8 +60,15 @@ def export_html(
             is given for several, a mesh cannot be read, the library for it is not
             installed, or the file cannot be written.
     """
-    path = Path(path)
-    text = page_of(_runs(rollout, robot, controller), view)
+    return write_page(Path(path), page_of(_runs(rollout, robot, controller), view))
+
+
+def write_page(path: Path, text: str) -> Path:
+    """Write a page, as a whole or not at all.
+
+    Raises:
+        ExportError: If it cannot be written.
+    """
     part = path.with_name(f".{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
