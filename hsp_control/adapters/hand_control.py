@@ -71,6 +71,7 @@ class HandControl:
                 scene=settings.scene,
             )
             self.command = Command(controller, settings.compensation)
+        self._strongest = robot.model.upperEffortLimit
         self._expected, self._period = nan, nan
 
     def begin(self, t: float, q: Array, v: Array) -> None:
@@ -112,12 +113,17 @@ class HandControl:
         self._rotation.aim(rotation)
 
     def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
-        """Return the effort to hold from t on for a period [s]; see `Command.effort`.
+        """Return the effort to hold from t on for a period [s].
+
+        It is clipped to what the motors can give.
 
         Raises:
-            HspControlError: If the state or the target is not finite.
+            HspControlError: See `Command.effort`.
         """
-        effort = self.command.effort(t, q, v, period)
+        wanted = self.command.effort(t, q, v, period)
+        effort = np.clip(wanted, -self._strongest, self._strongest)
+        if (effort != wanted).any():
+            self.command.applied(effort, period)
         self._expected, self._period = t + period, period
         return effort
 

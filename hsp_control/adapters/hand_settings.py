@@ -38,8 +38,9 @@ class HandSettings(Part, error=ConfigError):
         gain=_POSTURE_RATE, fields=(TargetPosture("start", weights=_POSTURE_RATE),)
     )
     """The control of self-motion; by default the posture of the start attracts."""
-    limits: LimitsOrNone = Limits()
-    """Limits on efforts and motion: those of the simulated robot by default."""
+    limits: LimitsOrNone = Limits(effort="none")
+    """Limits that the law keeps: by default those of the joints' motion. Efforts are
+    also clipped, as a simulator clips those of its own controllers."""
     compensation: Compensation = Compensation(friction_feed_forward="urdf")
     """Compensators; by default the friction of the simulated joints is fed forward."""
     scene: Scene = Scene()
