@@ -12,6 +12,7 @@ a table into docs/simulators.md.
 
 import logging
 from collections.abc import Callable, Iterator
+from itertools import chain
 from time import perf_counter_ns
 from typing import Any, NamedTuple
 
@@ -31,7 +32,7 @@ LAGS = np.arange(0.0, 0.3, 0.001)  # that are tried [s]
 RISE, TURNS = 1.0, 5  # [s, -]
 START = [0.0, 0.2, 0.0, -2.2, 0.0, 2.4, 0.785]  # robosuite's own is near a limit [rad]
 SETTLED = 0.001  # [m]
-ROUNDS, BLOCK, BLOCK_RATE = 15, 200, 500  # of the timing [-, -, Hz]
+ROUNDS, BLOCK = 21, 200  # of the timing; steps of the simulation in a block [-]
 
 CIRCLE = (
     "| goals [Hz] | controller | error [mm] | [mrad] | lag [ms] | without it [mm] "
@@ -45,7 +46,7 @@ JUMP = (
     "| largest in 2 ms [N·m] |\n"
     "|--:|---|--:|--:|--:|--:|--:|--:|\n"
 )
-COST = "| controller | OSC_POSE = 1 | µs |\n|---|--:|--:|\n"
+COST = "| goals [Hz] | controller | OSC_POSE = 1 | µs |\n|--:|---|--:|--:|\n"
 
 
 class Way(NamedTuple):
@@ -233,27 +234,27 @@ def jump_row(way: Way) -> str:
     )
 
 
-def cost_rows() -> Iterator[str]:
+def cost_rows(frequency: int) -> Iterator[str]:
     """Yield the time of `robot.control` at a step, as a ratio to OSC_POSE's.
 
     Blocks of all controllers follow one another, so that disturbances of the machine
-    affect all of them.
+    affect all of them. A block's steps count with their mean: some have a new goal.
     """
-    ways = [way for way in WAYS if way.frequency == BLOCK_RATE]
+    ways = [way for way in WAYS if way.frequency == frequency]
     envs, costs = [made(way) for way in ways], np.zeros((len(ways), ROUNDS))
     starts = [_pose_of(env) for env in envs]
+    steps = BLOCK * frequency // 500  # of the environment
     for k in range(ROUNDS):
         for which in np.roll(range(len(ways)), -k):
-            env, spent = envs[which], []
-            _watch(env, lambda cost, spent=spent: spent.append(cost))
-            for step in range(BLOCK):
-                t = (k * BLOCK + step) / BLOCK_RATE
-                env.step(_action(circle(t, starts[which])))
-            costs[which, k] = np.median(spent)
+            spent: list[int] = []
+            _watch(envs[which], spent.append)
+            for step in range(k * steps, (k + 1) * steps):
+                envs[which].step(_action(circle(step / frequency, starts[which])))
+            costs[which, k] = np.mean(spent)
     for way, own in zip(ways, costs, strict=True):
         low, middle, high = np.quantile(own / costs[0], [0.25, 0.5, 0.75])
         yield (
-            f"| {way.name} | {middle:.2f} ({low:.2f} to {high:.2f}) "
+            f"| {frequency} | {way.name} | {middle:.2f} ({low:.2f} to {high:.2f}) "
             f"| {1e-3 * np.median(own):.0f} |\n"
         )
 
@@ -264,7 +265,7 @@ def main() -> None:
     for name, head, rows in (
         ("circle", CIRCLE, map(circle_row, WAYS)),
         ("set point", JUMP, map(jump_row, WAYS)),
-        ("time", COST, cost_rows()),
+        ("time", COST, chain(cost_rows(20), cost_rows(500))),
     ):
         lines = [head]
         for row in rows:

@@ -34,7 +34,9 @@ _NEEDED = "model", "data", "frame_skip", "do_simulation"
 """What Gymnasium's ``MujocoEnv`` has."""
 
 
-class HandTargets(gymnasium.Wrapper):  # type: ignore[misc]
+class HandTargets(  # type: ignore[misc]
+    gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
+):
     """An environment whose actions are targets of a hand, instead of controls.
 
     At every step of the simulation the law computes the efforts of the arm: all joints
@@ -80,7 +82,16 @@ class HandTargets(gymnasium.Wrapper):  # type: ignore[misc]
             ControllerError: If it is not such an environment.
             HspControlError: If the hand does not exist, or a setting is wrong.
         """
-        super().__init__(env)
+        gymnasium.utils.RecordConstructorArgs.__init__(
+            self,
+            frame=frame,
+            config=config,
+            axes=axes,
+            absolute=absolute,
+            scale=scale,
+            disable_servos=disable_servos,
+        )
+        gymnasium.Wrapper.__init__(self, env)
         base = env.unwrapped
         missing = [name for name in _NEEDED if not hasattr(base, name)]
         if missing:
@@ -112,9 +123,11 @@ class HandTargets(gymnasium.Wrapper):  # type: ignore[misc]
         )
         base.do_simulation = self._simulate  # its method, which ``step`` calls
 
-    def reset(self, **options: Any) -> tuple[Any, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
         """Reset the environment, and aim at where the hand is."""
-        observation, info = self.env.reset(**options)
+        observation, info = self.env.reset(seed=seed, options=options)
         self.hand.begin(self._time, *self._state)
         return observation, info
 
@@ -123,7 +136,7 @@ class HandTargets(gymnasium.Wrapper):  # type: ignore[misc]
 
         Raises:
             ShapeError: If the action has another shape.
-            StreamError: If a target is not finite.
+            NonFiniteError: If it contains NaN or inf.
         """
         given = np.asarray(action, dtype=float)
         if given.shape != self.action_space.shape:

@@ -9,6 +9,7 @@ import pinocchio as pin
 from hsp_control.adapters.hand_settings import Source, read_settings
 from hsp_control.adapters.held_goal import HeldPoint, HeldRotation
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import NonFiniteError
 from hsp_control.control.compensation import Command
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
@@ -101,8 +102,10 @@ class HandControl:
             t: The present time [s].
 
         Raises:
-            StreamError: If it is not finite.
+            NonFiniteError: If it contains NaN or inf.
         """
+        if not np.isfinite(goal.homogeneous).all():
+            raise NonFiniteError(f"the target contains NaN or inf at t = {t:.6g} s")
         rotation = pin.Quaternion(goal.rotation).normalized().toRotationMatrix()
         point = goal.translation
         if self._stream is not None:

@@ -17,7 +17,7 @@ def arm_text(drive: str = "motor") -> str:
     """Return the MJCF, with actuators of one kind on the arm's joints."""
     inside = """
 <body name="finger" pos="0 0 0.05">
-  <joint name="finger" type="slide" axis="1 0 0" range="0 0.05"/>
+  <joint name="finger" type="slide" axis="1 0 0" range="0 0.05" damping="10"/>
   <geom type="box" size="0.01 0.01 0.02" mass="0.05"/>
 </body>
 <site name="hand" pos="0 0 0.1"/>"""
@@ -41,7 +41,7 @@ def arm_text(drive: str = "motor") -> str:
   <worldbody><light pos="0 0 3"/>{inside}</worldbody>
   <actuator>
     {drives}
-    <position joint="finger" kp="100" ctrllimited="true" ctrlrange="0 0.05"/>
+    <position joint="finger" kp="2000" ctrllimited="true" ctrlrange="0 0.05"/>
   </actuator>
 </mujoco>"""
 

@@ -15,9 +15,9 @@ from hsp_control.adapters.gymnasium import HandTargets
 from hsp_control.common.exceptions import (
     ControllerError,
     FrameNotFoundError,
+    NonFiniteError,
     ShapeError,
     SimulationError,
-    StreamError,
 )
 
 FREE = {"limits": "none", "compensation": {}}
@@ -54,16 +54,14 @@ def test_the_engine_does_what_the_law_wants(arm: ArmEnv) -> None:
     tau = env.hand.effort(data.time, data.qpos[:7], data.qvel[:7], 0.001)
     assert np.abs(tau).max() < STRONGEST
     wanted = env.hand.command.output.acceleration
-    # The finger moves on its own; the arm's rows with its joint locked are the law's.
-    data.ctrl[:7], data.qvel[7] = tau, 0.0
+    # With the finger where the arm's model has it; the arm's joints alone accelerate.
+    data.ctrl[:7], data.qpos[7], data.qvel[7] = tau, 0.0, 0.0
     mujoco.mj_forward(model, data)
     M = np.zeros((8, 8))
     for column in range(8):
         mujoco.mj_mulM(model, data, M[column], np.eye(8)[column])
     given = np.linalg.solve(M[:7, :7], data.qfrc_actuator[:7] - data.qfrc_bias[:7])
-    finger_moved = np.abs(data.qpos[7]) < 1e-3  # the model has it at 0
-    assert finger_moved
-    np.testing.assert_allclose(given, wanted, atol=0.05 * np.abs(wanted).max())
+    np.testing.assert_allclose(given, wanted, atol=1e-9 * np.abs(wanted).max())
     # And the rows of the position are a_x = -Kv x' + Kp (x_d - x), Kp = 12², Kv = 24.
     state = env.hand.robot.state(data.time, data.qpos[:7], data.qvel[:7])
     hand = state.frame("hand")
@@ -86,8 +84,9 @@ def test_the_hand_arrives_and_the_finger_obeys(arm: ArmEnv) -> None:
     for _ in range(100):
         _, reward, *_ = env.step(action_of(goal, 0.03))
     reached = pose_of(env)
-    assert np.linalg.norm(reached.translation - goal.translation) < 1e-3
-    assert np.linalg.norm(pin.log3(goal.rotation.T @ reached.rotation)) < 1e-3
+    # The finger's weight is not where the model has it: 0.05 kg of 10.5.
+    assert np.linalg.norm(reached.translation - goal.translation) < 2e-3
+    assert np.linalg.norm(pin.log3(goal.rotation.T @ reached.rotation)) < 4e-3
     assert arm.data.qpos[7] == pytest.approx(0.03, abs=5e-3)
     assert reward == pytest.approx(-(0.03**2))  # the arm's own action is zero
 
@@ -143,6 +142,7 @@ def test_a_loaded_state_begins_a_new_run(arm: ArmEnv) -> None:
     assert np.linalg.norm(moved) < 1e-4  # it aims at where it is now
 
 
+@pytest.mark.filterwarnings("ignore:.*WARN")  # about Pusher itself
 def test_it_is_an_environment_like_others() -> None:
     """Gymnasium's own check, and seven joints that can give 2 N·m each."""
     env = HandTargets(gymnasium.make("Pusher-v5"), "tips_arm", axes="xyz")
@@ -164,8 +164,8 @@ def test_an_arm_with_two_joints_follows_in_the_plane() -> None:
     for _ in range(25):
         env.step([-0.2, 0.2])
     moved = data.body("fingertip").xpos - before
-    assert moved[0] < -0.02
-    assert moved[1] > 0.02
+    assert moved[0] < -0.01
+    assert moved[1] > 0.01
 
 
 def test_what_does_not_fit_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
@@ -179,7 +179,7 @@ def test_what_does_not_fit_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
     env.reset()
     with pytest.raises(ShapeError, match=r"shape \(6,\); needs \(7,\)"):
         env.step(np.zeros(6))
-    with pytest.raises(StreamError, match="not finite"):
+    with pytest.raises(NonFiniteError, match="the target contains NaN"):
         env.step(np.full(7, np.nan))
 
 
