@@ -56,7 +56,7 @@ def calibrated(urdf: str, carried: dict[str, Any], like: Robot) -> str:
     Raises:
         ModelError: If it has other joints.
     """
-    own, top = _parsed(urdf), read_urdf(like.source.urdf)
+    own, top = _parsed(urdf), read_urdf(like.source)
     names = list(like.dof_names)
     joints = {joint.get("name", ""): joint for joint in top.iter("joint")}
     if len(names) != 7:
