@@ -153,7 +153,7 @@ def test_a_description_is_located_at_its_key(tmp_path: Path) -> None:
     ):
         load_experiment(path)
     with pytest.raises(
-        ModelError, match="robot: give one of name, description and parts"
+        ModelError, match="robot: give one of name, description, mjcf and parts"
     ):
         load_experiment({**IIWA, "robot": {"locked": {}}})
     assert (

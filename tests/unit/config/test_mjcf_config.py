@@ -144,7 +144,7 @@ MISTAKES = [
     ("keyframe: home", "keyframe: rest", ModelError,
      "robot.keyframe: no keyframe 'rest' (the scene has home)"),
     ("mjcf: cell.xml", "name: panda, mjcf: cell.xml", ModelError,
-     "robot: give one of name, mjcf and parts"),
+     "robot: give one of name, description, mjcf and parts"),
     ("mjcf: cell.xml, root: base", "name: panda", ModelError,
      "robot: joints is only for mjcf"),
     ("mjcf: cell.xml, root: base, joints: [j1, j2, j3, j4]", "name: panda", ModelError,

@@ -79,7 +79,7 @@ def test_without_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_one_robot_has_one_origin() -> None:
-    message = "give one of name, description and parts"
+    message = "give one of name, description, mjcf and parts"
     with pytest.raises(ModelError, match=message):
         RobotDescription("panda", description="panda_description")
     with pytest.raises(ModelError, match=message):
