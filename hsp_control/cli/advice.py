@@ -47,12 +47,10 @@ def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
     tasks = experiment.scenario.tasks.values()
     search = posture_search(robot, tasks, experiment.scene)
     start = search.judge(experiment.q0)
-    if start.distance <= 0.0:
-        yield (
-            f"The start is in collision: {start.pair} overlap by {-start.distance:.3g} "
-            "m, as capsules."
-        )
-    if not damped and start.distance > 0.0:
+    depth, pair = search.overlap(experiment.q0)
+    if depth > 0.0:
+        yield f"The start is in collision: {pair} overlap by {depth:.3g} m."
+    elif not damped:
         return
     try:
         found = search.rounded(search.find(null_space.singularity_threshold))

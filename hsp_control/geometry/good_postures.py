@@ -119,6 +119,39 @@ class PostureSearch:
         eccentricity = float(np.sqrt(np.mean(offset**2))) if offset.size else 0.0
         return Judgement(q, regularity, distance, pair, spare > 0.0, eccentricity)
 
+    def overlap(self, q: Array) -> tuple[float, str]:
+        """Return how deep links and obstacles overlap at a configuration, and which.
+
+        Capsules are larger than the links; so what overlaps as capsules is measured
+        again with the convex hulls of the links.
+
+        Returns:
+            The depth [m], 0 if nothing overlaps, and the pair, ``a to b``.
+        """
+        rough = self._proximity
+        if rough is None:
+            return 0.0, ""
+        robot = self.robot
+        state = robot.state(0.0, q, np.zeros(robot.nv))
+        names = [each.link for each in rough.links] + [o.name for o in rough.obstacles]
+        suspected = {
+            (names[i], names[j])
+            for (i, j), d in zip(rough.pairs, rough.measure(state), strict=True)
+            if d <= 0.0
+        }
+        hulls = link_shapes(robot, "hulls")
+        names = [each.link for each in hulls] + [o.name for o in rough.obstacles]
+        pairs = [
+            (i, j)
+            for j in range(len(names))
+            for i in range(min(j, len(hulls)))
+            if {(names[i], names[j]), (names[j], names[i])} & suspected
+        ]
+        if not pairs:
+            return 0.0, ""
+        distance, pair = Proximity(robot, hulls, rough.obstacles, pairs).nearest(state)
+        return max(-distance, 0.0), pair
+
     def find(self, least: float) -> Judgement:
         """Return a good posture near the middle, with as few joints away as possible.
 

@@ -28,8 +28,9 @@ def check_home(robot: Robot) -> Iterator[Finding]:
             f"singular for {robot.end_effector!r} (smallest singular value "
             f"{home.regularity:.2g})"
         )
-    if home.distance <= 0.0:
-        wrong.append(f"in collision ({home.pair}: {-home.distance:.2g} m, as capsules)")
+    depth, pair = search.overlap(robot.home())
+    if depth > 0.0:
+        wrong.append(f"in collision ({pair} overlap by {depth:.2g} m)")
     if wrong:
         message = f"it is {' and '.join(wrong)}"
         yield Finding("warning", "home", "home posture", message, _cure(search))

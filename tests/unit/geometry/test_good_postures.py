@@ -71,6 +71,21 @@ def test_it_keeps_clear_of_obstacles() -> None:
     assert search.find(LEAST).clear
 
 
+def test_what_overlaps_as_capsules_only_is_no_collision(tmp_path: Path) -> None:
+    """A ball above a plate, which is inside the plate's capsule; then in the plate."""
+    box = '<box size="0.4 0.4 0.02"/>'
+    robot = odd_robot(tmp_path, arm=collision(box, xyz="0 0 0", rpy="0 0 0"))
+    q = robot.neutral()
+    for height, depth in ((0.1, 0.0), (0.02, 0.01)):
+        ball = Obstacle("ball", Sphere(0.02), Hold([0.0, 0.0, 0.3 + height]))
+        search = PostureSearch(robot, [("hand", (0, 1))], [ball])
+        assert search.judge(q).distance < -0.02
+        found, pair = search.overlap(q)
+        assert found == pytest.approx(depth, abs=1e-6)
+        assert pair == "arm to ball"
+    assert PostureSearch(robot, [("hand", (0, 1))]).overlap(q) == (0.0, "")
+
+
 def test_a_pose_is_reached_in_a_good_posture() -> None:
     robot = Robot.load("iiwa14")
     search = PostureSearch(robot, hand(robot))
