@@ -20,7 +20,7 @@ from hsp_control.common.exceptions import (
     SimulationError,
 )
 
-FREE = {"limits": "none", "compensation": {}}
+FREE = {"stream": None, "limits": "none", "compensation": {}}
 """The law alone."""
 
 
@@ -92,7 +92,7 @@ def test_the_hand_arrives_and_the_finger_obeys(arm: ArmEnv) -> None:
 
 
 def test_a_change_begins_where_the_hand_is_and_is_clipped(arm: ArmEnv) -> None:
-    env = HandTargets(arm, "hand", axes="xz", scale=(0.02, 0.0))
+    env = HandTargets(arm, "hand", FREE, axes="xz", scale=(0.02, 0.0))
     env.reset(seed=0)
     assert env.action_space.shape == (3,)
     before = pose_of(env).translation
