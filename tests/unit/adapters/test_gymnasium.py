@@ -47,7 +47,7 @@ def test_the_engine_does_what_the_law_wants(arm: ArmEnv) -> None:
     env.reset(seed=0)
     start = pose_of(env)
     turned = start.rotation @ pin.exp3(np.array([0.1, 0.0, 0.2]))
-    goal = pin.SE3(turned, start.translation + [0.02, 0.05, -0.03])
+    goal = pin.SE3(turned, start.translation + np.array([0.02, 0.05, -0.03]))
     for _ in range(5):
         env.step(action_of(goal))
     model, data = arm.model, arm.data
@@ -79,7 +79,7 @@ def test_the_hand_arrives_and_the_finger_obeys(arm: ArmEnv) -> None:
     start = pose_of(env)
     goal = pin.SE3(
         pin.exp3(np.array([0.0, 0.0, 0.3])) @ start.rotation,
-        start.translation + [0.0, 0.1, 0.05],
+        start.translation + np.array([0.0, 0.1, 0.05]),
     )
     for _ in range(100):
         _, reward, *_ = env.step(action_of(goal, 0.03))
@@ -107,7 +107,7 @@ def test_a_stream_s_reference_has_bounds(arm: ArmEnv) -> None:
     env = HandTargets(arm, "hand", {"stream": stream}, absolute=True)
     env.reset(seed=0)
     start = pose_of(env)
-    goal = pin.SE3(start.rotation, start.translation + [0.0, 0.1, 0.0])
+    goal = pin.SE3(start.rotation, start.translation + np.array([0.0, 0.1, 0.0]))
     speeds = []
     for _ in range(60):
         env.step(action_of(goal))
@@ -169,11 +169,13 @@ def test_an_arm_with_two_joints_follows_in_the_plane() -> None:
 
 
 def test_what_does_not_fit_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
-    with pytest.raises(ControllerError, match="CartPoleEnv is none of .* has no model"):
+    with pytest.raises(
+        ControllerError, match=r"CartPoleEnv is none of .* has no model"
+    ):
         HandTargets(gymnasium.make("CartPole-v1"), "hand")
     with pytest.raises(FrameNotFoundError, match="'hnad'; did you mean 'hand'"):
         HandTargets(arm, "hnad")
-    with pytest.raises(SimulationError, match="no torque motors.*disable_servos=True"):
+    with pytest.raises(SimulationError, match=r"no torque motors.*disable_servos=True"):
         HandTargets(ArmEnv(tmp_path, drive="position"), "hand")
     env = HandTargets(arm, "hand", absolute=True)
     env.reset()
@@ -189,7 +191,7 @@ def test_servos_may_be_switched_off(tmp_path: Path) -> None:
     assert env.action_space.shape == (6 + 8,)  # their controls have no effect any more
     env.reset(seed=0)
     start = pose_of(env)
-    goal = pin.SE3(start.rotation, start.translation + [0.0, 0.05, 0.0])
+    goal = pin.SE3(start.rotation, start.translation + np.array([0.0, 0.05, 0.0]))
     others = np.zeros(7)
     for _ in range(60):
         env.step(np.concatenate([action_of(goal, 0.0)[:6], others, [0.0]]))

@@ -100,9 +100,7 @@ def test_efforts_are_clipped_and_the_observer_knows(robot: hsp.Robot) -> None:
     assert (np.abs(effort) == strongest).any()
     # What the clipped effort does is no disturbance.
     state = robot.state(0.0, q, rest)
-    acceleration = np.linalg.solve(
-        state.mass_matrix, effort - state.nonlinear_effects
-    )
+    acceleration = np.linalg.solve(state.mass_matrix, effort - state.nonlinear_effects)
     hand.effort(PERIOD, q, PERIOD * acceleration, PERIOD)
     channels = hand.command.log_channels()
     assert np.abs(channels["observer.disturbance"].value).max() < 0.5
@@ -113,9 +111,7 @@ def test_two_hands_do_not_hear_each_other_s_targets(
     robot: hsp.Robot, axes: str | None
 ) -> None:
     q, rest = robot.home(), np.zeros(7)
-    hands = [
-        HandControl(robot, "panda_tcp", gains=GAINS, axes=axes) for _ in range(2)
-    ]
+    hands = [HandControl(robot, "panda_tcp", gains=GAINS, axes=axes) for _ in range(2)]
     goal = hands[0].pose(q)
     goal.translation = goal.translation + np.array([0.0, 0.0, 0.1])
     for hand in hands:
@@ -184,7 +180,7 @@ def test_the_arm_is_what_carries_the_hand() -> None:
     for frame in ("tip", "hand"):
         arm = arm_of(model, np.zeros(4), frame)
         assert arm.joint_names == ("rail", "shoulder", "elbow")  # no finger
-    with pytest.raises(ModelError, match="also moved by rail.*must stand still"):
+    with pytest.raises(ModelError, match=r"also moved by rail.*must stand still"):
         arm_of(model, np.zeros(4), "tip", ["shoulder", "elbow"])
     with pytest.raises(ModelError, match="no joint moves 'table'"):
         arm_of(model, np.zeros(4), "table")
