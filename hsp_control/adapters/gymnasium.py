@@ -33,8 +33,9 @@ _NEEDED = "model", "data", "frame_skip", "do_simulation"
 """What Gymnasium's ``MujocoEnv`` has."""
 
 
-class HandTargets(  # type: ignore[misc]
-    gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
+class HandTargets(
+    gymnasium.Wrapper,  # type: ignore[misc]
+    gymnasium.utils.RecordConstructorArgs,  # type: ignore[misc]
 ):
     """An environment whose actions are targets of a hand, instead of controls.
 

@@ -4,6 +4,7 @@ robosuite needs another MuJoCo than the other tests, and an environment of its o
 """
 
 import json
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -197,3 +198,12 @@ def test_what_it_cannot_do_is_refused(settings: Any, error: Any, message: str) -
 def test_a_base_that_moves_is_refused() -> None:
     with pytest.raises(ModelError, match="its base must stand still"), made("Tiago"):
         pass
+
+
+def test_what_the_page_shows_runs() -> None:
+    page = Path(__file__).parents[2] / "docs" / "simulators.md"
+    text = page.read_text(encoding="utf-8")
+    snippet, _ = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    space: dict[str, Any] = {}
+    exec(compile(snippet, "simulators.md", "exec"), space)
+    assert isinstance(arm_of(space["env"]), HspPose)

@@ -1,5 +1,6 @@
 """A hand's targets as actions of Gymnasium's environments."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,10 +9,13 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 from arm_environment import STRONGEST, ArmEnv
 from gymnasium.utils.env_checker import check_env
+from places import ROOT
 
 from hsp_control.adapters.gymnasium import HandTargets
+from hsp_control.adapters.hand_settings import read_settings
 from hsp_control.common.exceptions import (
     ControllerError,
     FrameNotFoundError,
@@ -196,3 +200,13 @@ def test_servos_may_be_switched_off(tmp_path: Path) -> None:
     for _ in range(60):
         env.step(np.concatenate([action_of(goal, 0.0)[:6], others, [0.0]]))
     assert np.linalg.norm(pose_of(env).translation - goal.translation) < 1e-3
+
+
+def test_what_the_page_shows_runs() -> None:
+    text = (ROOT / "docs" / "simulators.md").read_text(encoding="utf-8")
+    _, snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    space: dict[str, Any] = {}
+    exec(compile(snippet, "simulators.md", "exec"), space)
+    assert np.isfinite(space["observation"]).all()
+    (settings,) = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    read_settings(yaml.safe_load(settings))
