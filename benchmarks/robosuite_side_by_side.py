@@ -82,15 +82,21 @@ def stream(delay: float, **compensation: Any) -> dict[str, Any]:
 
 
 OBSERVER = {"momentum_observer": {"bandwidth": 50, "cancel": True}}
-WAYS = (
-    Way("OSC_POSE", "OSC_POSE", None, 20),
-    Way("HSP_POSE", "HSP_POSE", None, 20),
-    Way("HSP_POSE, stream", "HSP_POSE", stream(0.11), 20),
-    Way("HSP_POSE, stream, observer", "HSP_POSE", stream(0.11, **OBSERVER), 20),
-    Way("OSC_POSE", "OSC_POSE", None, 500),
-    Way("HSP_POSE", "HSP_POSE", None, 500),
-    Way("HSP_POSE, stream", "HSP_POSE", stream(0.02), 500),
-    Way("HSP_POSE, stream, observer", "HSP_POSE", stream(0.02, **OBSERVER), 500),
+KINDS: tuple[tuple[str, str, dict[int, Any]], ...] = (
+    ("OSC_POSE", "OSC_POSE", {20: None, 500: None}),
+    ("goals held", "HSP_POSE", {20: {"stream": None}, 500: {"stream": None}}),
+    ("bounded (default)", "HSP_POSE", {20: None, 500: None}),
+    ("all goals passed", "HSP_POSE", {20: stream(0.11), 500: stream(0.02)}),
+    (
+        "and observer",
+        "HSP_POSE",
+        {20: stream(0.11, **OBSERVER), 500: stream(0.02, **OBSERVER)},
+    ),
+)
+WAYS = tuple(
+    Way(name, kind, settings[frequency], frequency)
+    for frequency in (20, 500)
+    for name, kind, settings in KINDS
 )
 
 

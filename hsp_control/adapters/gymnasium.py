@@ -1,10 +1,9 @@
 """Targets of a hand as actions of a Gymnasium environment with MuJoCo.
 
-    env = HandTargets(gymnasium.make("Pusher-v5"), "tips_arm", "hand.yaml", axes="xyz")
-    observation, reward, terminated, truncated, info = env.step([0.0, 0.5, 0.0])
+env = HandTargets(gymnasium.make("Pusher-v5"), "tips_arm", "hand.yaml", axes="xyz")
+observation, reward, terminated, truncated, info = env.step([0.0, 0.5, 0.0])
 """
 
-from collections.abc import Sequence
 from math import inf
 from typing import Any
 
@@ -34,8 +33,9 @@ _NEEDED = "model", "data", "frame_skip", "do_simulation"
 """What Gymnasium's ``MujocoEnv`` has."""
 
 
-class HandTargets(  # type: ignore[misc]
-    gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs
+class HandTargets(
+    gymnasium.Wrapper,  # type: ignore[misc]
+    gymnasium.utils.RecordConstructorArgs,  # type: ignore[misc]
 ):
     """An environment whose actions are targets of a hand, instead of controls.
 

@@ -1,7 +1,8 @@
 """A controller of one hand that is given targets while it runs."""
 
+from dataclasses import fields
 from math import nan
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pinocchio as pin
@@ -137,15 +138,11 @@ class HandControl:
         return pin.SE3(frame.rotation, frame.position)
 
     def _task(self, gains: Gains, stream: StreamPose | None) -> Task:
-        """Return the hand's task, which follows what `aim` leads.
-
-        Raises:
-            TrajectoryError: If a setting of the stream is none of a position's.
-        """
+        """Return the hand's task, which follows what `aim` leads."""
         if self.axes is not None:
             point: HeldPoint | Stream = self._point
             if stream is not None:
-                point = self._stream = cast(Stream, stream.like(Stream))
+                point = self._stream = _linear(stream)
             return FramePosition(
                 self.frame, point, gains=gains, axes=self.axes, name="hand"
             )
@@ -155,3 +152,9 @@ class HandControl:
         held = ComposedPose(self._point, self._rotation)
         return FramePose(self.frame, held, gains=gains, name="hand")
 
+
+def _linear(stream: StreamPose) -> Stream:
+    """Return the stream of a point with the linear bounds of a pose's."""
+    known = {field.name for field in fields(cast(Any, Stream))}
+    settings = stream.changed_fields()
+    return Stream(**{name: settings[name] for name in settings if name in known})

@@ -1,7 +1,7 @@
 """What a configuration says about a hand whose targets come from a simulator."""
 
 from collections.abc import Mapping
-from dataclasses import KW_ONLY
+from dataclasses import KW_ONLY, replace
 from os import PathLike
 from typing import Any
 
@@ -21,6 +21,17 @@ _POSTURE_RATE = 10.0**0.5
 """With it as weight and as gain, the posture obeys e'' + 2√10 e' + 10 e = 0 in the null
 space: what robosuite's OSC_POSE asks for there [1/s]."""
 
+_UNHURRIED = StreamPose(
+    delay=0.05,
+    speed=0.5,
+    acceleration=2.0,
+    jerk=40.0,
+    angular_speed=1.5,
+    angular_acceleration=5.0,
+    angular_jerk=100.0,
+)
+"""Bounds that efforts bear, also where the motors are weak for the wrist's rotors."""
+
 Source = str | PathLike[str] | Mapping[str, Any] | None
 """Where settings come from: a YAML file, its data, or nothing: the defaults."""
 
@@ -31,9 +42,9 @@ class HandSettings(Part, error=ConfigError):
     _: KW_ONLY
     gains: Gains | None = None
     """Gains of the hand's task; those of the simulator's own controller by default."""
-    stream: StreamPose | None = None
-    """How the reference moves from target to target, within which bounds; by default
-    it jumps to each target and stays there."""
+    stream: StreamPose | None = _UNHURRIED
+    """How the reference moves from target to target, within which bounds; ``null``: it
+    jumps to each target and stays there. Of a position the linear bounds count."""
     null_space: NullSpaceSettings = NullSpaceSettings(
         gain=_POSTURE_RATE, fields=(TargetPosture("start", weights=_POSTURE_RATE),)
     )
@@ -71,4 +82,7 @@ def read_settings(source: Source) -> tuple[HandSettings, Document]:
         document = Document.read(source)
     else:
         document = Document(dict(source or {}), {}, "hand settings")
-    return validate(document, HandSettings), document
+    settings = validate(document, HandSettings)
+    if settings.stream is not None:  # what is sent to it is for one hand
+        settings = replace(settings, stream=replace(settings.stream))
+    return settings, document

@@ -76,7 +76,7 @@ class HspPose(OperationalSpaceController):  # type: ignore[misc]
                 )
         super().__init__(**settings)
         model, qpos = self.sim.model._model, self.sim.data.qpos
-        frame = _frame_of(model, self.ref_name)
+        frame = Names(model).sites[model.site(self.ref_name).id]
         robot = arm_of(model, qpos, frame, self.joint_names)
         self._coordinates = MujocoCoordinates.of(robot, model)
         self._factors = _motor_factors(model, robot.joint_names)
@@ -156,11 +156,6 @@ class HspComposite(composite_controller.CompositeController):  # type: ignore[mi
                     controller_params=settings,
                 )
             self.part_controllers[part] = made
-
-
-def _frame_of(model: Any, site: str) -> str:
-    """Return the frame of a site."""
-    return Names(model).sites[model.site(site).id]
 
 
 def _motor_factors(model: Any, joints: tuple[str, ...]) -> Array:

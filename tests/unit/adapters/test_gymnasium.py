@@ -1,5 +1,6 @@
 """A hand's targets as actions of Gymnasium's environments."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,10 +9,13 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 from arm_environment import STRONGEST, ArmEnv
 from gymnasium.utils.env_checker import check_env
+from places import ROOT
 
 from hsp_control.adapters.gymnasium import HandTargets
+from hsp_control.adapters.hand_settings import read_settings
 from hsp_control.common.exceptions import (
     ControllerError,
     FrameNotFoundError,
@@ -20,7 +24,7 @@ from hsp_control.common.exceptions import (
     SimulationError,
 )
 
-FREE = {"limits": "none", "compensation": {}}
+FREE = {"stream": None, "limits": "none", "compensation": {}}
 """The law alone."""
 
 
@@ -47,7 +51,7 @@ def test_the_engine_does_what_the_law_wants(arm: ArmEnv) -> None:
     env.reset(seed=0)
     start = pose_of(env)
     turned = start.rotation @ pin.exp3(np.array([0.1, 0.0, 0.2]))
-    goal = pin.SE3(turned, start.translation + [0.02, 0.05, -0.03])
+    goal = pin.SE3(turned, start.translation + np.array([0.02, 0.05, -0.03]))
     for _ in range(5):
         env.step(action_of(goal))
     model, data = arm.model, arm.data
@@ -79,7 +83,7 @@ def test_the_hand_arrives_and_the_finger_obeys(arm: ArmEnv) -> None:
     start = pose_of(env)
     goal = pin.SE3(
         pin.exp3(np.array([0.0, 0.0, 0.3])) @ start.rotation,
-        start.translation + [0.0, 0.1, 0.05],
+        start.translation + np.array([0.0, 0.1, 0.05]),
     )
     for _ in range(100):
         _, reward, *_ = env.step(action_of(goal, 0.03))
@@ -92,7 +96,7 @@ def test_the_hand_arrives_and_the_finger_obeys(arm: ArmEnv) -> None:
 
 
 def test_a_change_begins_where_the_hand_is_and_is_clipped(arm: ArmEnv) -> None:
-    env = HandTargets(arm, "hand", axes="xz", scale=(0.02, 0.0))
+    env = HandTargets(arm, "hand", FREE, axes="xz", scale=(0.02, 0.0))
     env.reset(seed=0)
     assert env.action_space.shape == (3,)
     before = pose_of(env).translation
@@ -107,7 +111,7 @@ def test_a_stream_s_reference_has_bounds(arm: ArmEnv) -> None:
     env = HandTargets(arm, "hand", {"stream": stream}, absolute=True)
     env.reset(seed=0)
     start = pose_of(env)
-    goal = pin.SE3(start.rotation, start.translation + [0.0, 0.1, 0.0])
+    goal = pin.SE3(start.rotation, start.translation + np.array([0.0, 0.1, 0.0]))
     speeds = []
     for _ in range(60):
         env.step(action_of(goal))
@@ -169,11 +173,13 @@ def test_an_arm_with_two_joints_follows_in_the_plane() -> None:
 
 
 def test_what_does_not_fit_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
-    with pytest.raises(ControllerError, match="CartPoleEnv is none of .* has no model"):
+    with pytest.raises(
+        ControllerError, match=r"CartPoleEnv is none of .* has no model"
+    ):
         HandTargets(gymnasium.make("CartPole-v1"), "hand")
     with pytest.raises(FrameNotFoundError, match="'hnad'; did you mean 'hand'"):
         HandTargets(arm, "hnad")
-    with pytest.raises(SimulationError, match="no torque motors.*disable_servos=True"):
+    with pytest.raises(SimulationError, match=r"no torque motors.*disable_servos=True"):
         HandTargets(ArmEnv(tmp_path, drive="position"), "hand")
     env = HandTargets(arm, "hand", absolute=True)
     env.reset()
@@ -189,8 +195,18 @@ def test_servos_may_be_switched_off(tmp_path: Path) -> None:
     assert env.action_space.shape == (6 + 8,)  # their controls have no effect any more
     env.reset(seed=0)
     start = pose_of(env)
-    goal = pin.SE3(start.rotation, start.translation + [0.0, 0.05, 0.0])
+    goal = pin.SE3(start.rotation, start.translation + np.array([0.0, 0.05, 0.0]))
     others = np.zeros(7)
     for _ in range(60):
         env.step(np.concatenate([action_of(goal, 0.0)[:6], others, [0.0]]))
     assert np.linalg.norm(pose_of(env).translation - goal.translation) < 1e-3
+
+
+def test_what_the_page_shows_runs() -> None:
+    text = (ROOT / "docs" / "simulators.md").read_text(encoding="utf-8")
+    _, snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    space: dict[str, Any] = {}
+    exec(compile(snippet, "simulators.md", "exec"), space)
+    assert np.isfinite(space["observation"]).all()
+    (settings,) = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    read_settings(yaml.safe_load(settings))
