@@ -11,7 +11,7 @@ from places import ROOT
 
 import hsp_control
 from hsp_control import load_experiment
-from hsp_control.cli.main import _parser
+from hsp_control.cli.options.command_line import command_line
 from hsp_control.live import LiveSettings
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.robot import RobotDescription
@@ -78,7 +78,7 @@ def test_the_pages_python_runs_and_their_commands_exist(page: str) -> None:
     used = [shlex.split(line)[1:] for line in commands if line.startswith("hsp ")]
     assert used
     for command in used:
-        _parser().parse_args(command)
+        command_line().parse_args(command)
 
 
 def test_the_readme_s_yaml_is_a_configuration() -> None:
@@ -99,7 +99,7 @@ def test_the_readme_s_commands_exist() -> None:
         "live", "play",
     }  # fmt: skip
     for command in commands:
-        _parser().parse_args(command)
+        command_line().parse_args(command)
 
 
 def test_the_compensators_of_the_document_are_a_configuration() -> None:
@@ -117,7 +117,7 @@ def test_the_view_s_document_is_true(monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / "docs" / "view.md").read_text(encoding="utf-8")
     (commands,) = blocks(text, "sh")
     for command in commands.splitlines():
-        _parser().parse_args(command.split("#")[0].split()[1:])
+        command_line().parse_args(command.split("#")[0].split()[1:])
     (view,) = blocks(text, "yaml")
     configuration = {**yaml.safe_load(view), **yaml.safe_load(SMALL)}
     assert load_experiment(configuration).scenario.view.show.ellipsoid
@@ -135,8 +135,8 @@ def test_the_export_s_document_is_true(
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
     for command in "".join(blocks(text, "sh")).splitlines():
-        _parser().parse_args(command.split("#")[0].split()[1:])
-    known = _parser().parse_args(["export", "log.npz"])
+        command_line().parse_args(command.split("#")[0].split()[1:])
+    known = command_line().parse_args(["export", "log.npz"])
     for option in re.findall(r"`--(?:no-)?(\w+)`", text):
         assert {"from": "first", "to": "last"}.get(option, option) in vars(known)
     *pages, _ = blocks(text, "python")  # the film is taken in test_browser.py
@@ -200,7 +200,7 @@ def test_the_live_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     text = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
     (shell,) = blocks(text, "sh")
     for line in shell.splitlines():
-        _parser().parse_args(shlex.split(line.split("#")[0])[1:])
+        command_line().parse_args(shlex.split(line.split("#")[0])[1:])
     (example,) = blocks(text, "python")
     space: dict = {}
     exec(compile(example, "live.md", "exec"), space)
@@ -225,7 +225,7 @@ def test_the_live_page_s_defaults_are_the_code_s() -> None:
 def test_the_page_of_one_s_own_robot_is_true() -> None:
     text = (ROOT / "docs" / "own_robot.md").read_text(encoding="utf-8")
     for line in "".join(blocks(text, "sh")).splitlines():
-        _parser().parse_args(shlex.split(line.split("#")[0])[1:])
+        command_line().parse_args(shlex.split(line.split("#")[0])[1:])
     (configuration,) = blocks(text, "yaml")
     lines = [yaml.safe_load(line) for line in configuration.splitlines()]
     for line in lines:

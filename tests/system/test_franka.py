@@ -24,7 +24,7 @@ from places import ROOT
 
 from hsp_control import Robot, Rollout, load_experiment
 from hsp_control.cli import main
-from hsp_control.cli.main import _parser
+from hsp_control.cli.options.command_line import command_line
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.live import (
     InProcessRobot,
@@ -328,7 +328,7 @@ def test_the_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     assert {command[0] for command in used if command} >= {"live", "franka-model"}
     for command in used:
         if command[0] != "install":
-            _parser().parse_args(command)
+            command_line().parse_args(command)
     (snippet,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     monkeypatch.setattr("hsp_control.live.franka.connect", connect_patiently)
     with serving(load_experiment("panda_obstacle")) as box:

@@ -11,7 +11,8 @@ from franka_boxes import home, panda, plant
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli.franka_box_log import BoxLog
-from hsp_control.cli.main import _parser, main
+from hsp_control.cli.main import main
+from hsp_control.cli.options.command_line import command_line
 from hsp_control.common.exceptions import LogError
 from hsp_control.franka_box import PERIOD, Arm, Box, generators, reflexes
 from hsp_control.franka_box.wire import COMMAND, Controller, Error, MotionGenerator
@@ -33,7 +34,7 @@ def test_the_options_of_the_page_exist() -> None:
     values = {"ADDRESS": "127.0.0.2", "FILE": "x.npz", "KEY=VALUE": "a=1"}
     for option, _, value in re.findall(r"^\| `(--[a-z]+)( (\S+))?` \|", PAGE, re.M):
         given = [values.get(value, "1")] if value else []
-        assert _parser().parse_args(["franka-box", option, *given])
+        assert command_line().parse_args(["franka-box", option, *given])
 
 
 def test_the_plant_of_the_page_is_one() -> None:
