@@ -30,14 +30,12 @@ from hsp_control.robot.configuration_space import ConfigurationSpace, as_numbers
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.combining import Part, combine, placement
 from hsp_control.robot.description.loading import (
-    completed,
     end_effector_frame,
     load_model,
     reference_posture,
 )
-from hsp_control.robot.description.mujoco.compiling import compile_mjcf
 from hsp_control.robot.description.mujoco.selection import select
-from hsp_control.robot.description.mujoco.source import load_selection
+from hsp_control.robot.description.mujoco.source import load_mjcf, load_selection
 from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
 from hsp_control.robot.description.sources import RobotSource, Root, find_robot
 from hsp_control.robot.kinematics import (
@@ -168,7 +166,7 @@ class Robot(ConfigurationSpace):
         """Return a robot in a compiled MuJoCo model: with the numbers MuJoCo uses.
 
         Bodies and sites are its frames, under their names. Bodies that are not below
-        the root are no part of it; what moves them, they stand still. What MuJoCo has
+        the root are no part of it; those above the root stand still. What MuJoCo has
         and the robot lacks, such as a closed loop, is in `source.omitted`, and logged
         as a warning. `MujocoCoordinates` converts states.
 
@@ -193,15 +191,14 @@ class Robot(ConfigurationSpace):
             JointNotFoundError: If a joint does not exist or is not below the root.
         """
         selection = select(model, root, joints, qpos, keyframe, locked)
-        found, source = load_selection(selection)
-        return cls(completed(found, source, tool_frames or {}, None), source)
+        return cls(*load_selection(selection, tool_frames or {}))
 
     @classmethod
     def _described(cls, description: RobotDescription, access: Access) -> Self:
         """Return the robot of a description."""
         gravity = description.gravity
         if description.mjcf is not None:
-            return cls._in_mjcf(description, Path(description.mjcf), access)
+            return cls(*load_mjcf(description, access), description=description)
         if description.parts is None:
             assert description.name is not None
             source = find_robot(description.name, access)
@@ -217,27 +214,6 @@ class Robot(ConfigurationSpace):
             whole = cls.combine(robots)
         whole.description = description
         return whole
-
-    @classmethod
-    def _in_mjcf(
-        cls, description: RobotDescription, file: Path, access: Access
-    ) -> Self:
-        """Return the robot of a description that names an MJCF."""
-        with within("mjcf"):
-            scene = compile_mjcf(file, access)
-        model, source = load_selection(
-            select(
-                scene,
-                description.root,
-                description.joints,
-                keyframe=description.keyframe,
-                locked=description.locked,
-            ),
-            file,
-            access,
-        )
-        model = completed(model, source, description.tool_frames, description.gravity)
-        return cls(model, source, description=description)
 
     @classmethod
     def combine(cls, robots: Mapping[str, tuple["Robot", pin.SE3]]) -> Self:

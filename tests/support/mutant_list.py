@@ -36,6 +36,9 @@ PLANTS = SIMULATION + "plants/"
 DECLARATION = PACKAGE + "declaration/"
 CONFIG, CLI = PACKAGE + "config/", PACKAGE + "cli/"
 
+MODELS = ROBOT + "description/mujoco/"
+IN_MUJOCO = PLANTS + "mujoco/"
+
 UNIT = "tests/unit/"
 EVERY_FIELD = UNIT + "null_space/test_every_field.py -k "
 EVERY_SHAPE = UNIT + "null_space/test_clearance_rates.py -k "
@@ -765,6 +768,48 @@ MUTANTS = (
         "    strict = options.strict or bool(options.allow)",
         "    strict = bool(options.allow)",
         "tests/integration/test_trust.py -k refused",
+    ),
+    Mutant(
+        "MuJoCo models: reference of joints ignored",
+        MODELS + "dynamics.py",
+        "place = place * self._moved(joint, 0.0)",
+        "place = place * self._moved(joint, scene.qpos0[scene.jnt_qposadr[joint]])",
+        UNIT + "robot/test_mujoco_models.py -k random_scene",
+    ),
+    Mutant(
+        "MuJoCo models: gear of armatures not squared",
+        MODELS + "motors.py",
+        "return gear**2 *",
+        "return gear *",
+        UNIT + "robot/test_mujoco_models.py -k armature",
+    ),
+    Mutant(
+        "MuJoCo models: locked elsewhere than told",
+        MODELS + "selection.py",
+        "configuration[model.jnt_qposadr[inside[name]]] = value",
+        "pass",
+        UNIT + "robot/test_mujoco_models.py -k home",
+    ),
+    Mutant(
+        "MuJoCo models: strict reading ignored",
+        MODELS + "compiling.py",
+        "    if access.strict:",
+        "    if False:",
+        UNIT + "config/test_mjcf_config.py -k strict",
+    ),
+    Mutant(
+        "MuJoCo scene: pushes ignored",
+        IN_MUJOCO + "scene_plant.py",
+        "        applied += self.pushes.effort(t, q)\n",
+        "",
+        UNIT + "simulation/test_mujoco_scene.py -k pushes",
+    ),
+    Mutant(
+        "MuJoCo contacts: action without reaction",
+        IN_MUJOCO + "engine.py",
+        "touched = [(-1.0, contact.geom1)",
+        "touched = [(1.0, contact.geom1)",
+        UNIT + "simulation/test_mujoco_scene.py -k push_each_other",
     ),
 )
 """All of them, from the lowest room to the highest."""

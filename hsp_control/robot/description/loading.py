@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pinocchio as pin
@@ -61,7 +61,8 @@ def load_model(
     """
     if settings is None:
         settings = RobotDescription(source.name)
-    model = _parse(source, settings.root or source.root, mimic=settings.mimic)
+    root = cast("Root", settings.root or source.root)  # text is for MJCF only
+    model = _parse(source, root, mimic=settings.mimic)
     locks = source.locked if settings.locked is None else settings.locked
     if locks:
         model = _lock(model, locks)

@@ -73,8 +73,9 @@ def read_urdf(urdf: Path) -> Element:
     except (LookupError, ValueError) as error:  # an unknown encoding
         raise ModelError(f"{urdf}: malformed XML: {error}") from error
     if robot.tag != "robot":
+        hint = "; give an MJCF as mjcf, not as name" if robot.tag == "mujoco" else ""
         raise ModelError(
-            f"{urdf}: the top element is <{robot.tag}>; in a URDF it is <robot>"
+            f"{urdf}: the top element is <{robot.tag}>; in a URDF it is <robot>{hint}"
         )
     count = sum(1 for _ in robot.iter("link"))
     if count > MAX_LINKS:

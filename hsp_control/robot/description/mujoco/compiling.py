@@ -11,9 +11,12 @@ from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFound
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.robot.description.access import Access
 from hsp_control.robot.description.mujoco.constants import import_mujoco
+from hsp_control.robot.description.urdf_checks import MAX_DOFS, MAX_LINKS
 from hsp_control.robot.description.xml_files import XmlError, read_xml
 
 _FOLDERS = "meshdir", "texturedir", "assetdir"
+_REFUSED = "plugin", "replicate", "composite", "flexcomp"
+"""Elements that run code, or that stand for any number of bodies."""
 _MAX_FILES = 200
 """Maximum number of files that an MJCF may include; a loop of them ends there."""
 
@@ -30,7 +33,8 @@ def compile_mjcf(path: Path, access: Access) -> Any:
     Raises:
         RobotNotFoundError: If there is no such file, or it cannot be read.
         AccessError: If it, or a file that it names, is not allowed.
-        ModelError: If it is no MJCF, MuJoCo rejects it, or MuJoCo is not installed.
+        ModelError: If it is no MJCF, MuJoCo rejects it, it is too large, or MuJoCo is
+            not installed.
     """
     access.check(path, "mjcf")
     if not path.is_file():
@@ -48,10 +52,17 @@ def compile_mjcf(path: Path, access: Access) -> Any:
     if mujoco.get_mju_user_warning() is None:  # otherwise MuJoCo writes a log file
         mujoco.set_mju_user_warning(_log.info)
     try:
-        return mujoco.MjModel.from_xml_path(str(path))
+        model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise ModelError(f"{path}: MuJoCo rejects it: {reason}") from error
+    for count, limit, what in (
+        (model.nbody, MAX_LINKS, "bodies"),
+        (model.nv, MAX_DOFS, "degrees of freedom"),
+    ):
+        if count > limit:
+            raise ModelError(f"{path}: {count} {what}; at most {limit}")
+    return model
 
 
 def _read(path: Path) -> Element:
@@ -75,7 +86,7 @@ def _check_access(path: Path, top: Element, access: Access) -> None:
     """Check every file that an MJCF names, also in the files that it includes.
 
     Raises:
-        AccessError: If one is not allowed, or code would be loaded.
+        AccessError: If one is not allowed, or an element runs code or makes copies.
     """
     pending, checked = [(path, top)], 0
     while pending:
@@ -83,8 +94,9 @@ def _check_access(path: Path, top: Element, access: Access) -> None:
         checked += 1
         if checked > _MAX_FILES:
             raise AccessError(f"{path}: includes more than {_MAX_FILES} files")
-        if next(root.iter("plugin"), None) is not None:
-            raise AccessError(f"{file}: strict reading allows no <plugin>")
+        for tag in _REFUSED:
+            if next(root.iter(tag), None) is not None:
+                raise AccessError(f"{file}: strict reading allows no <{tag}>")
         for name, element in _named(root):
             for place in _places(path.parent, file.parent, root, name):
                 access.check(place, f"{file}: <{element.tag}>")

@@ -32,11 +32,12 @@ def joint_actuators(model: Any) -> dict[int, list[int]]:
     """Return the actuators that act on a joint directly, by joint."""
     kinds = constants("mjtTrn")
     direct = {kinds.mjTRN_JOINT, kinds.mjTRN_JOINTINPARENT}
+    of_balls = getattr(kinds, "mjTRN_SO3", None)  # since MuJoCo 4: of two sites, too
     found: dict[int, list[int]] = {}
-    for actuator, kind in enumerate(model.actuator_trntype):
-        if int(kind) in direct:
-            joint = int(model.actuator_trnid[actuator, 0])
-            found.setdefault(joint, []).append(actuator)
+    for actuator, kind in enumerate(map(int, model.actuator_trntype)):
+        target, second = map(int, model.actuator_trnid[actuator])
+        if kind in direct or (kind == of_balls and second < 0):
+            found.setdefault(target, []).append(actuator)
     return found
 
 

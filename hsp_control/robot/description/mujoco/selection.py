@@ -111,9 +111,12 @@ def select(
         )
     configuration = _configuration(model, qpos, keyframe)
     for name, value in (locked or {}).items():
-        if model.jnt_type[inside[name]] < constants("mjtJoint").mjJNT_SLIDE:
+        if model.jnt_type[inside[name]] not in _scalar_kinds():
             with within("locked"):
                 raise ModelError(f"{name!r} is neither a hinge nor a slide")
+        if not np.isfinite(value):
+            with within("locked"):
+                raise ModelError(f"{name!r} at {value}; needs a finite number")
         configuration[model.jnt_qposadr[inside[name]]] = value
     return Selection(
         model,
@@ -124,6 +127,11 @@ def select(
         configuration,
         chosen=qpos is not None or keyframe is not None,
     )
+
+
+def _scalar_kinds() -> tuple[int, int]:
+    kinds = constants("mjtJoint")
+    return kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE
 
 
 def _subtree(model: Any, top: int) -> set[int]:

@@ -42,12 +42,17 @@ def check_motion(data: Any, end: float) -> None:
         SimulationError: If MuJoCo found a number that is not finite, or very large.
     """
     kinds = import_mujoco().mjtWarning
-    for kind in (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC):
-        if data.warning[kind].number:
-            raise SimulationError(
-                f"the motion diverged before t = {end:.6g} s: MuJoCo's state or "
-                "acceleration is not finite, or beyond 1e10"
-            )
+    bad = (
+        kinds.mjWARN_BADQPOS,
+        kinds.mjWARN_BADQVEL,
+        kinds.mjWARN_BADQACC,
+        kinds.mjWARN_BADCTRL,  # which MuJoCo replaces by zero
+    )
+    if any(data.warning[kind].number for kind in bad):
+        raise SimulationError(
+            f"the motion diverged before t = {end:.6g} s: MuJoCo's state, acceleration "
+            "or control is not finite, or beyond 1e10"
+        )
 
 
 def contact_wrenches(

@@ -26,6 +26,9 @@ from hsp_control.simulation.plants.mujoco.engine import (
 from hsp_control.simulation.plants.plant import SampledPlant
 from hsp_control.simulation.plants.push import Push, Pushes
 
+_GROUPS = 31
+"""Number of groups of actuators that MuJoCo can disable."""
+
 
 class MujocoScenePlant(SampledPlant):
     """A robot in a MuJoCo scene: the user's own ``MjModel`` and ``MjData``.
@@ -64,9 +67,9 @@ class MujocoScenePlant(SampledPlant):
             model: The scene.
             data: Its state, where a run begins.
             contacts: Names of the bodies whose contact forces are logged.
-            disable_servos: Whether servos on the robot's joints are switched off:
-                their gains and biases in ``model`` become zero. Without it they are an
-                error, since they would work against the controller.
+            disable_servos: Whether servos on the robot's joints are switched off: they
+                get a group of their own in ``model``, which is disabled. Without it
+                they are an error, since they would work against the controller.
             pushes: External wrenches on the robot.
 
         Raises:
@@ -218,7 +221,7 @@ def _works(model: Any, actuator: int) -> bool:
     """Return whether an actuator is not disabled, with its group or all of them."""
     flags = importlib.import_module("mujoco").mjtDisableBit
     group = int(model.actuator_group[actuator])
-    of_group = 0 <= group < 31 and int(model.opt.disableactuator) >> group & 1
+    of_group = 0 <= group < _GROUPS and int(model.opt.disableactuator) >> group & 1
     return not (of_group or int(model.opt.disableflags) & int(flags.mjDSBL_ACTUATION))
 
 
@@ -238,5 +241,7 @@ def _switch_off_servos(
             "against the controller: remove them from the MJCF, or give "
             "disable_servos=True"
         )
-    model.actuator_gainprm[servos] = 0.0
-    model.actuator_biasprm[servos] = 0.0
+    if servos:
+        unused = max({*range(_GROUPS)} - {*map(int, model.actuator_group)})
+        model.actuator_group[servos] = unused
+        model.opt.disableactuator |= 1 << unused
