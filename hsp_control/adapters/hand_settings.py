@@ -3,10 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, replace
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.config.document import Document
+from hsp_control.config.located_scene import located_scene
 from hsp_control.config.validation import validate
 from hsp_control.constraints.limits import Limits, LimitsOrNone
 from hsp_control.control.compensation import Compensation
@@ -83,6 +85,9 @@ def read_settings(source: Source) -> tuple[HandSettings, Document]:
     else:
         document = Document(dict(source or {}), {}, "hand settings")
     settings = validate(document, HandSettings)
-    if settings.stream is not None:  # what is sent to it is for one hand
-        settings = replace(settings, stream=replace(settings.stream))
-    return settings, document
+    with document.at():
+        folder = Path(document.name).resolve().parent
+        scene = located_scene(settings.scene, folder, document.access)
+    stream = settings.stream  # what is sent to it is for one hand
+    stream = None if stream is None else replace(stream)
+    return replace(settings, scene=scene, stream=stream), document

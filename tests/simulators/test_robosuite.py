@@ -94,6 +94,35 @@ def test_every_arm_goes_where_it_is_told(name: str) -> None:
         assert orientation < 2e-2
 
 
+@pytest.mark.parametrize("robots", [["Panda", "Panda"], ["Baxter"]])
+def test_each_of_two_arms_obeys_its_own_actions(robots: list[str]) -> None:
+    configs = []
+    for name in robots:
+        config = robosuite.load_composite_controller_config(robot=name)
+        config["type"] = "HSP"
+        for arm in {"right", "left"} & set(config["body_parts"]):
+            config["body_parts"][arm]["type"] = "HSP_POSE"
+        configs.append(config)
+    env = robosuite.make(
+        "TwoArmLift",
+        robots=robots,
+        controller_configs=configs,
+        has_renderer=False,
+        has_offscreen_renderer=False,
+        use_camera_obs=False,
+        seed=0,
+    )
+    env.reset()
+    arms = [robot.part_controllers[arm] for robot in env.robots for arm in robot.arms]
+    begun = [arm.ref_pos.copy() for arm in arms]
+    for _ in range(20):
+        env.step(np.array([0.0, 0.0, 0.5] + [0.0] * (env.action_dim - 3)))
+    moved = [arm.ref_pos - where for arm, where in zip(arms, begun, strict=True)]
+    assert moved[0][2] > 0.1
+    assert np.abs(moved[1]).max() < 2e-3
+    env.close()
+
+
 def test_the_model_is_the_simulation_s() -> None:
     """Without what it leaves out, MuJoCo's acceleration is the law's: 7 of 9 joints."""
     with made(hsp=LAW) as env:

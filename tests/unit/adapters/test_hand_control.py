@@ -18,6 +18,7 @@ from hsp_control.common.exceptions import (
     FrameNotFoundError,
     ModelError,
     NonFiniteError,
+    SceneError,
 )
 
 GAINS = hsp.Gains(kp=150.0, kv=24.0)
@@ -151,6 +152,14 @@ def test_what_is_wrong_is_named_with_its_place(
     )
     with pytest.raises(FieldError, match=r"hand\.yaml:3: null_space\.fields\.0"):
         HandControl(robot, "panda_tcp", file, gains=GAINS)
+    file.write_text(
+        "scene:\n  obstacles:\n    wall:\n"
+        "      center: {type: hold, point: [0, 0, 0]}\n"
+        "      shape: {type: mesh, file: wall.stl}\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(SceneError, match=rf"hand\.yaml:5: .*{tmp_path}/wall\.stl"):
+        read_settings(file)
     with pytest.raises(ConfigError, match="remove source"):
         read_settings({"stream": {"source": "udp://127.0.0.1:5005"}})
     hand = HandControl(robot, "panda_tcp", gains=GAINS)
