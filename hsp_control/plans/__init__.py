@@ -1,0 +1,6 @@
+"""Plans: what a robot is to do, decided once a period from what is measured."""
+
+from .plan import Plan as Plan
+from .plan import PlanParts as PlanParts
+from .plan import RunningPlan as RunningPlan
+from .walk import Walk as Walk
