@@ -3,4 +3,5 @@
 from .plan import Plan as Plan
 from .plan import PlanParts as PlanParts
 from .plan import RunningPlan as RunningPlan
+from .trot import Trot as Trot
 from .walk import Walk as Walk

@@ -165,7 +165,7 @@ def stance_of(feet: Mapping[float, Foot], state: RobotState, crouch: float) -> S
     ]
     # Each leg reaches half of the step.
     longest = 2.0 * _STRETCH * float(np.sqrt(max(min(squares), 0.0)))
-    return Stance(width, narrowest, max(2.5 * width, width + 0.1), longest)
+    return Stance(width, narrowest, max(3.0 * width, width + 0.1), longest)
 
 
 def _beside(place: Footstep, target: Footstep) -> bool:

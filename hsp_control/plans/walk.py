@@ -1,8 +1,7 @@
 """A biped that walks: what YAML and Python say, and the tasks that it needs."""
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, replace
-from typing import Any
+from dataclasses import KW_ONLY
 
 from hsp_control.common.exceptions import PlanError
 from hsp_control.common.suggestions import did_you_mean, listing
@@ -18,6 +17,7 @@ from hsp_control.declaration.quantities import (
     Positive,
     PositiveCount,
 )
+from hsp_control.plans.composing import composed
 from hsp_control.plans.footsteps import Velocity
 from hsp_control.plans.legs import root_frame
 from hsp_control.plans.plan import Plan, PlanParts
@@ -25,9 +25,7 @@ from hsp_control.plans.walking import RunningWalk
 from hsp_control.robot import Robot
 from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePose, Gains, Task
 from hsp_control.tasks.frame_task import TrackingTask
-from hsp_control.trajectories import ComposedPose, Trajectory
-from hsp_control.trajectories.fed import Fed, FedOrientation
-from hsp_control.trajectories.switch import Switch
+from hsp_control.trajectories import Trajectory
 
 BODY, TRUNK = "center_of_mass", "trunk"
 """The names of the tasks that every walk has, besides one for each foot."""
@@ -63,19 +61,19 @@ class Walk(Plan, type="walk"):
     """Names of the two contacts that walk [-]; all of them by default."""
     trunk: str | None = None
     """Frame of the trunk that stays upright [-]; by default that of the root."""
-    swing: Positive = 0.65
+    swing: Positive = 0.6
     """Duration of a swing, on one foot [s]."""
-    double_support: Positive = 0.2
+    double_support: Positive = 0.15
     """Duration of the time on both feet between two swings [s]."""
     lift: Positive = 0.05
     """How high a foot is lifted [m]."""
-    crouch: NonNegative = 0.02
+    crouch: NonNegative = 0.04
     """How far the centre of mass is lowered, so that the knees stay bent [m]."""
     acceleration: Positive = 0.4
     """How fast the velocity changes, from step to step [m/s²]."""
     feedback: Positive = 4.0
     """k, the rate at which an error of the divergent component decays [1/s]."""
-    margin: Fraction = 0.8
+    margin: Fraction = 0.9
     """Share of the sole that feedback uses [-]."""
     adjusts: Flag = True
     """Whether a push moves the next step [-]."""
@@ -112,12 +110,6 @@ class Walk(Plan, type="walk"):
                     "to the world"
                 )
             names = self._feet(contacts)
-        switched = []
-        for contact in contacts:
-            if contact.name in names:
-                with within("contacts", contact.name):
-                    contact = _switched(contact)
-            switched.append(contact)
         frames = {each.name: each.frame for each in contacts}
         trunk = root_frame(robot) if self.trunk is None else self.trunk
         with within("plan", "trunk"):
@@ -137,12 +129,7 @@ class Walk(Plan, type="walk"):
                 for name in names
             ),
         ]
-        given = {task.name: task for task in tasks}
-        made = []
-        for task in own:
-            with within("tasks", task.name):
-                made.append(_followed(given.pop(task.name, task), task, names))
-        return PlanParts((*given.values(), *made), tuple(switched))
+        return composed(own, tasks, contacts, names)
 
     def begin(self, controller: Controller) -> RunningWalk:
         """Return what walks; see `Plan.begin`."""
@@ -175,46 +162,3 @@ class Walk(Plan, type="walk"):
                 + ("; name two with feet" if len(names) > 2 else "")
             )
         return names
-
-
-def _switched(contact: Contact) -> Contact:
-    """Return a contact that the plan switches.
-
-    Raises:
-        PlanError: If a schedule switches it already.
-    """
-    if contact.schedule is not None:
-        raise PlanError("it has a schedule, but the plan switches it; give only one")
-    return replace(contact, schedule=Switch())
-
-
-def _followed(task: Task, own: TrackingTask, feet: Sequence[str]) -> Task:
-    """Return a task whose reference, and if it is a foot's its presence, is the plan's.
-
-    Args:
-        task: The task, perhaps one that was given.
-        own: What the plan would take.
-        feet: The names of the feet.
-
-    Raises:
-        PlanError: If the task that was given is another one.
-    """
-    if type(task) is not type(own):
-        raise PlanError(
-            f"it is a {task.yaml_type}; the plan needs a {own.yaml_type} of this name"
-        )
-    assert isinstance(task, TrackingTask)
-    frame = getattr(own, "frame", None)
-    if own.name in feet and getattr(task, "frame", None) != frame:
-        raise PlanError(
-            f"its frame is {getattr(task, 'frame', None)!r}; the foot's is {frame!r}"
-        )
-    if task.schedule is not None:
-        raise PlanError("it has a schedule, but the plan says when it counts")
-    changes: dict[str, Any] = {"blend": None, "trajectory": Fed(3)}
-    if isinstance(task, FrameOrientation):
-        changes["trajectory"] = FedOrientation()
-    elif isinstance(task, FramePose):
-        changes["trajectory"] = ComposedPose(Fed(3), FedOrientation())
-        changes["schedule"] = Switch(on=False)
-    return replace(task, **changes)

@@ -115,8 +115,8 @@ def test_a_velocity_is_given_once_and_has_three_numbers():
     [
         (
             ["plan.speed=1.2"],
-            "talos_walk.yaml:12: plan: 1.2 m/s with 0.85 s per step are strides of "
-            "1.02 m; the legs of talos reach 0.6",
+            "talos_walk.yaml:12: plan: 1.2 m/s with 0.75 s per step are strides of "
+            "0.9 m; the legs of talos reach 0.715 m. Walk slower",
         ),
         (
             ["plan.crouch=0.9"],
