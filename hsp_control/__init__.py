@@ -7,8 +7,8 @@ of a field that may move in time.
 The names that most programs need are here. All others are in namespaces:
 ``hsp.trajectories``, ``hsp.tasks``, ``hsp.fields``, ``hsp.metrics``, ``hsp.contacts``,
 ``hsp.limits``, ``hsp.shapes``, ``hsp.changes``, ``hsp.compensation``,
-``hsp.integrators``, ``hsp.robot``, ``hsp.plants``, ``hsp.simulation``, ``hsp.live``,
-``hsp.config``, ``hsp.sweeps``, ``hsp.viewer`` and ``hsp.errors``.
+``hsp.integrators``, ``hsp.robot``, ``hsp.plans``, ``hsp.plants``, ``hsp.simulation``,
+``hsp.live``, ``hsp.config``, ``hsp.sweeps``, ``hsp.viewer`` and ``hsp.errors``.
 """
 
 from importlib import import_module
@@ -19,6 +19,7 @@ from hsp_control.common.version import __version__ as __version__
 if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from . import config as config
     from . import live as live
+    from . import plans as plans
     from . import robot as robot
     from . import simulation as simulation
     from . import sweeps as sweeps
@@ -110,6 +111,7 @@ _NAMESPACES = {
     "limits": "constraints.limits",
     "live": "live",
     "metrics": "null_space.metrics",
+    "plans": "plans",
     "plants": "simulation.plants",
     "robot": "robot",
     "shapes": "geometry.shapes",

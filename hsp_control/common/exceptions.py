@@ -123,6 +123,14 @@ class UnstableRateError(HspControlError, ValueError):
     """The sampled control loop is unstable with these gains, delays and period."""
 
 
+class PlanError(HspControlError, ValueError):
+    """A plan is invalid, or does not fit the robot, its contacts or its tasks."""
+
+
+class FallError(HspControlError, RuntimeError):
+    """The robot falls: no plan can go on."""
+
+
 class SimulationError(HspControlError, RuntimeError):
     """A simulation cannot start, or it diverged.
 

@@ -36,6 +36,7 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import IdentityMetric, Metric
+from hsp_control.plans import Plan
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import only_within
 from hsp_control.robot.description.robot_description import RobotDescription
@@ -92,6 +93,7 @@ class Experiment:
         limits: Limits | None = Limits(),
         contacts: Sequence[Contact] = (),
         base: Base | None = None,
+        plan: Plan | None = None,
         scene: Scene | Iterable[Obstacle] = (),
         changes: Sequence[Change] = (),
         start: InitialState | Literal["auto"] | None = None,
@@ -117,6 +119,7 @@ class Experiment:
             limits: Limits on efforts and motion; None: no limits.
             contacts: The contacts of a floating base.
             base: What else moves a floating base.
+            plan: What writes references and switches contacts; it adds its own tasks.
             scene: The obstacles; those that fields and limits hold are added.
             changes: Changes while running.
             start: Where the run begins; at home and at rest by default. ``auto``: at a
@@ -161,6 +164,7 @@ class Experiment:
             "limits": limits,
             "contacts": keyed(contacts),
             "base": base,
+            "plan": plan,
             "scene": scene,
             "changes": changes,
             "plant": plant,
@@ -236,6 +240,7 @@ class Experiment:
             integrator=self.integrator,
             plant=self.plant,
             compensation=self.compensation,
+            plan=self.scenario.plan,
             scene=self.scene,
             on_progress=on_progress,
             on_row=on_row,
@@ -365,6 +370,8 @@ def build(document: Document) -> Experiment:
         HspControlError: If the configuration is wrong; see `load_experiment`.
     """
     scenario = validate(document, Scenario)
+    if not scenario.tasks and scenario.plan is None:
+        raise document.error(("tasks",), "needs at least one task, or a plan")
     folder = Path(document.name).resolve().parent
     scenario = replace(scenario, robot=scenario.robot.located(folder))
     with document.at():
@@ -386,6 +393,8 @@ def build(document: Document) -> Experiment:
             found = InitialState(configuration=q0, velocity=scenario.start.velocity)
             scenario = replace(scenario, start=found)
     with document.at():
+        if scenario.plan is not None:
+            tasks, contacts = scenario.plan.parts(robot, tasks, contacts)
         controller = Controller(
             robot,
             tasks,
@@ -404,6 +413,9 @@ def build(document: Document) -> Experiment:
         v0 = scenario.start.velocity_of(controller, q0)
         if controller.limits is not None:
             controller.limits.check_start(q0, v0)
+    if scenario.plan is not None:
+        with document.at("plan"):
+            scenario.plan.begin(controller).start(robot.state(0.0, q0, v0))
     scenario = replace(scenario, plant=scenario.plant.located(folder))
     plant = _plant(document, scenario, robot)
     check_compensation(document, scenario, controller)

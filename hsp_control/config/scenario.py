@@ -24,6 +24,7 @@ from hsp_control.declaration.quantities import READ_ONLY, Name, ReadOnlyDict
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.settings import LiveSettings
 from hsp_control.null_space.settings import NullSpaceSettings
+from hsp_control.plans import Plan
 from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.simulation.initial_state import InitialState, StartOrAuto
 from hsp_control.simulation.plants import AnyPlant, RigidBody
@@ -45,10 +46,14 @@ class Scenario(Part, error=ConfigError):
     """Configuration and velocity at t = 0; ``auto``: a good configuration is found."""
     scene: Scene = Scene()
     """The obstacles."""
-    tasks: Annotated[
-        dict[Name, Task], Field(min_length=1, max_length=100), BY_NAME, READ_ONLY
-    ]
-    """The tasks, by name; tasks of the same priority form one level."""
+    tasks: Annotated[dict[Name, Task], Field(max_length=100), BY_NAME, READ_ONLY] = (
+        field(default_factory=ReadOnlyDict)
+    )
+    """The tasks, by name; tasks of the same priority form one level. A plan adds
+    its own."""
+    plan: Plan | None = None
+    """What writes references and switches contacts while the robot moves; none by
+    default."""
     contacts: Annotated[
         dict[Name, Contact], Field(max_length=100), BY_NAME, READ_ONLY
     ] = field(default_factory=ReadOnlyDict)

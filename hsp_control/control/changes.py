@@ -36,10 +36,10 @@ from hsp_control.trajectories import (
     crossfade,
 )
 from hsp_control.trajectories.crossfade import AnyReference
+from hsp_control.trajectories.remembering import with_memories_copied
 from hsp_control.trajectories.streams.stream import (
     Streamed,
     stream_for,
-    with_streams_copied,
 )
 
 __all__ = [
@@ -75,8 +75,8 @@ class Change(Part, ABC, family="changes", error=ControllerError):
     """How long it takes [s]; 0 is a jump."""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return the change, with streams of its own if it has any."""
-        return with_streams_copied(self, memo)
+        """Return the change; what has a memory in it goes on by itself."""
+        return with_memories_copied(self, memo)
 
     @property
     def end(self) -> float:

@@ -18,6 +18,7 @@ from hsp_control.common.exceptions import (
     ImmutableError,
     NonFiniteError,
 )
+from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.active_stack import ActiveStack
@@ -745,6 +746,20 @@ class Controller:
             ControllerError: If there is no such task.
         """
         return self._setup.tasks[self._setup.find_task(task)].weight(t)
+
+    def bearing_of(self, contact: str, t: float) -> float:
+        """Return how much a contact bears at time t [s], in [0, 1].
+
+        Raises:
+            ControllerError: If there is no such contact.
+        """
+        there = {each.contact.name: each for each in self._setup.contacts}
+        if contact not in there:
+            raise ControllerError(
+                f"there is no contact {contact!r}{did_you_mean(contact, there)} "
+                f"(there are {listing(there) or 'none'})"
+            )
+        return there[contact].weight(t)
 
     def priority_of(self, task: str) -> int:
         """Return the priority of a task, 1 the highest.

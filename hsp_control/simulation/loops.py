@@ -11,7 +11,9 @@ from hsp_control.common.kernels import kernel
 from hsp_control.control.compensation import Command
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import Measurement
 from hsp_control.control.output import ControlOutput
+from hsp_control.plans import RunningPlan
 from hsp_control.robot import RobotState
 from hsp_control.robot.integrators import Integrator, bound
 from hsp_control.simulation.plants import ContinuousPlant, SampledPlant
@@ -27,7 +29,7 @@ class Instant(NamedTuple):
         state: The true state.
         output: The controller's output for the true state.
         tau: The commanded effort, computed from the measured state, shape (nv,).
-        log_channels: What the command logs, by name: its compensators' channels.
+        log_channels: What the command and the plan log, by name.
     """
 
     state: RobotState
@@ -80,6 +82,7 @@ def sampled_loop(
     times: Sequence[float],
     q: Array,
     v: Array,
+    plan: RunningPlan | None = None,
 ) -> Iterator[Instant]:
     """Yield the instants of a loop that holds each effort for a control period.
 
@@ -90,24 +93,34 @@ def sampled_loop(
         times: When to yield an instant [s], increasing.
         q: Start configuration, shape (nq,).
         v: Start velocity, shape (nv,).
+        plan: Writes references and switches contacts, before each effort.
 
     Raises:
+        FallError: If the plan finds that the robot falls.
         SimulationError: If the motion diverges.
     """
     plant.reset(times[0], q, v)
     command.restart()
     period = (times[1] - times[0]) / periods
+    tau = np.zeros(plant.robot.nv)
     for start, end in zip(times, (*times[1:], times[-1]), strict=True):
         if end > start:
             period = (end - start) / periods
         for k in range(periods):
             t = start + k * (end - start) / periods
-            tau = command.effort(t, *plant.measure(t, q, v), period).copy()
+            measured = plant.measure(t, q, v)
+            if plan is not None:
+                wrenches = plant.contact_wrenches(t, q, v, tau)
+                plan.update(Measurement(t, *measured, wrenches))
+            tau = command.effort(t, *measured, period).copy()
             if k == 0:
                 output, state = command.output, command.state
                 if not (t == state.t and _equal(state.q, q) and _equal(state.v, v)):
                     output = command.evaluate(t, q, v)
-                yield Instant(state, output, tau, command.log_channels())
+                channels = command.log_channels()
+                if plan is not None:
+                    channels = {**channels, **plan.log_channels()}
+                yield Instant(state, output, tau, channels)
             if end == start:  # the last row
                 return
             stop = start + (k + 1) * (end - start) / periods

@@ -96,6 +96,7 @@ class Recorder:
             prefix = f"contact.{contact.name}"
             column(f"{prefix}.force", (3,), "N", "on the robot, in world axes")
             column(f"{prefix}.position", (3,), "m", "centre of pressure")
+            column(f"{prefix}.weight", (), "-", "how much it bears, 0 to 1")
             column(
                 f"{prefix}.friction_used", (), "-", "largest ‖f_t‖/(μ f_n) of a point"
             )
@@ -308,6 +309,9 @@ class Recorder:
             center = columns[f"{prefix}.position"][self._rows]
             used = columns[f"{prefix}.friction_used"]
             force[:], center[:] = 0.0, np.nan
+            t = self._columns["t"][self._rows]
+            bearing = self._controller.bearing_of(contact.name, t)
+            columns[f"{prefix}.weight"][self._rows] = bearing
             if contact not in support.contacts:
                 continue
             points = support.points[support.contacts.index(contact)]

@@ -5,11 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import HspControlError, SimulationError
+from hsp_control.common.exceptions import (
+    FallError,
+    HspControlError,
+    SimulationError,
+)
 from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
 from hsp_control.geometry.scene import Scene
+from hsp_control.plans import Plan
 from hsp_control.robot.integrators import Dop853, Integrator
 from hsp_control.simulation.loops import continuous_loop, sampled_loop
 from hsp_control.simulation.plants import (
@@ -42,6 +47,7 @@ def simulate(
     integrator: Integrator | None = None,
     plant: Plant | PlantPart | None = None,
     compensation: Compensation | None = None,
+    plan: Plan | None = None,
     scene: Scene | None = None,
     start_time: float = 0.0,
     on_progress: Callable[[float], None] | None = None,
@@ -65,6 +71,8 @@ def simulate(
             control period.
         compensation: Compensators for what the model lacks; they need a control
             period.
+        plan: What writes references and switches contacts; the controller is made of
+            its `Plan.parts`. It needs a control period.
         scene: Obstacles to log; None: those of the controller.
         start_time: Time of the first row [s].
         on_progress: Called at every row with the fraction of the run that is done.
@@ -73,7 +81,7 @@ def simulate(
 
     Returns:
         The rollout. Ctrl-C ends it early, with the status ``interrupted`` and all rows
-        computed so far.
+        computed so far; a fall ends it with the status ``stopped``.
 
     Raises:
         SimulationError: If durations, periods and plant do not fit, or the motion
@@ -100,11 +108,17 @@ def simulate(
             f"compensation ({', '.join(compensation.names)}) is computed once a "
             "period: it needs a control_period [s], for example 0.001"
         )
+    if plan is not None and not periods:
+        raise SimulationError(
+            "a plan decides once a period: it needs a control_period [s], for example "
+            "0.001"
+        )
     if isinstance(plant, ContinuousPlant):
         loop = continuous_loop(controller, plant, integrator, times, q, v)
     elif isinstance(plant, SampledPlant) and periods:
         command = Command(controller, compensation)
-        loop = sampled_loop(command, plant, periods, times, q, v)
+        running = None if plan is None else plan.begin(controller)
+        loop = sampled_loop(command, plant, periods, times, q, v, running)
     else:
         raise SimulationError(
             f"{type(plant).__name__} holds the effort during a period: it needs a "
@@ -125,6 +139,8 @@ def simulate(
                 on_row(recorder)
     except KeyboardInterrupt:
         status, message = "interrupted", "stopped by the user"
+    except FallError as error:
+        status, message = "stopped", str(error)
     except HspControlError as error:
         failure = SimulationError(f"the simulation stopped: {error}")
         failure.rollout = recorder.rollout("diverged", str(error), **meta)

@@ -21,7 +21,8 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.gains import Gains
 from hsp_control.trajectories import Schedule
 from hsp_control.trajectories.crossfade import AnyReference
-from hsp_control.trajectories.streams.stream import Streamed, with_streams_copied
+from hsp_control.trajectories.remembering import with_memories_copied
+from hsp_control.trajectories.streams.stream import Streamed
 
 
 class TaskSample(NamedTuple):
@@ -267,8 +268,8 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         return any(True for _ in parts_within(self, Streamed))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return the task, with streams of its own if it has any."""
-        return with_streams_copied(self, memo)
+        """Return the task; what has a memory in it goes on by itself."""
+        return with_memories_copied(self, memo)
 
     def following(self, trajectory: AnyReference) -> Self:
         """Return the task with another trajectory.

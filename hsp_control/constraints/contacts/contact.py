@@ -19,6 +19,7 @@ from hsp_control.geometry.start import Start
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks import TaskSample
+from hsp_control.trajectories.remembering import with_memories_copied
 from hsp_control.trajectories.schedule import Schedule
 
 
@@ -77,6 +78,10 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         if self.name == self.frame:
             changed.pop("name", None)
         return changed
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return the contact; what has a memory in it goes on by itself."""
+        return with_memories_copied(self, memo)
 
     def placed(self, start: Start) -> Self:
         """Return the contact, checked.

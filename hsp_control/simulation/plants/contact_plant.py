@@ -81,6 +81,12 @@ class ContactPlant(ContinuousPlant):
         """Return the force and moment of every contact, zero while it is off."""
         return contact_channels(self._solve(t, q, v, tau)[1])
 
+    def contact_wrenches(
+        self, t: float, q: Array, v: Array, tau: Array
+    ) -> Mapping[str, Array]:
+        """Return the wrenches of all contacts; see `Plant.contact_wrenches`."""
+        return self._solve(t, q, v, tau)[1]
+
     def describe(self) -> dict[str, Any]:
         """Return its contacts and pushes."""
         return {

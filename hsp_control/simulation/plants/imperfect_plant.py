@@ -103,6 +103,13 @@ class ImperfectPlant(SampledPlant):
             **self.plant.log_channels(t, q, v, applied),
         }
 
+    def contact_wrenches(
+        self, t: float, q: Array, v: Array, tau: Array
+    ) -> Mapping[str, Array]:
+        """Return the plant's, under the effort that acted; these are exact."""
+        applied = tau if self._applied is None else self._applied
+        return self.plant.contact_wrenches(t, q, v, applied)
+
     def describe(self) -> dict[str, Any]:
         """Return the plant's description, and its sensors and drives."""
         return {

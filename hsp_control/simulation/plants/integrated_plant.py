@@ -52,6 +52,12 @@ class IntegratedPlant(SampledPlant):
         """Return the continuous plant's log channels."""
         return self.plant.log_channels(t, q, v, tau)
 
+    def contact_wrenches(
+        self, t: float, q: Array, v: Array, tau: Array
+    ) -> Mapping[str, Array]:
+        """Return the continuous plant's; see `Plant.contact_wrenches`."""
+        return self.plant.contact_wrenches(t, q, v, tau)
+
     def describe(self) -> dict[str, Any]:
         """Return the continuous plant's description."""
         return self.plant.describe()

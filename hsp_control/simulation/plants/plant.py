@@ -9,6 +9,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import NO_WRENCHES
 from hsp_control.robot import Robot
 
 
@@ -43,6 +44,23 @@ class Plant:
     def describe(self) -> dict[str, Any]:
         """Return the type and the settings as JSON data, for the log."""
         return {"type": type(self).__name__}
+
+    def contact_wrenches(
+        self, t: float, q: Array, v: Array, tau: Array
+    ) -> Mapping[str, Array]:
+        """Return what sensors in the contacts measure, by the name of the frame.
+
+        Force and moment of the world on the robot, the moment about the frame's origin,
+        in world axes, shape (6,) [N, N·m]; by default there are no sensors. An engine
+        returns those of its last step, so that they belong to the period that ends.
+
+        Args:
+            t: Time [s].
+            q: True configuration, shape (nq,).
+            v: True velocity, shape (nv,).
+            tau: Effort of the period that ends, shape (nv,).
+        """
+        return NO_WRENCHES
 
 
 class ContinuousPlant(Plant, ABC):

@@ -1,11 +1,10 @@
 """References that are streamed while the robot moves: points, orientations, poses."""
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import KW_ONLY, replace
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import pinocchio as pin
@@ -13,8 +12,6 @@ from numpy.typing import ArrayLike
 from pydantic import AfterValidator
 
 from hsp_control.common.exceptions import StreamError, TrajectoryError
-from hsp_control.declaration import Part
-from hsp_control.declaration.nested import with_parts_replaced
 from hsp_control.declaration.part import value_fields
 from hsp_control.declaration.quantities import (
     NonNegative,
@@ -29,6 +26,7 @@ from hsp_control.trajectories.orientation import (
     OrientationTrajectory,
 )
 from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
+from hsp_control.trajectories.remembering import Remembering
 from hsp_control.trajectories.streams.bounds import (
     MotionBounds,
     angular_bounds,
@@ -43,7 +41,7 @@ from hsp_control.trajectories.streams.running import Policy, RunningStream, Sour
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
-class Streamed(Part, error=TrajectoryError):
+class Streamed(Remembering, error=TrajectoryError):
     """A reference that any thread or process feeds while the robot moves.
 
     `send` gives targets, velocities or chunks of waypoints, at any rate, late or out of
@@ -504,17 +502,3 @@ def stream_for(followed: object, stream: Streamed) -> Any:
     if isinstance(followed, OrientationTrajectory):
         return stream.like(StreamOrientation)
     return stream.like(Stream)
-
-
-Holder = TypeVar("Holder", bound=Part)
-
-
-def with_streams_copied(part: Holder, memo: dict[int, Any]) -> Holder:
-    """Return the deep copy of a part: the part itself, but for its streams.
-
-    Args:
-        part: The part.
-        memo: That of `copy.deepcopy`.
-    """
-    copied: Holder = with_parts_replaced(part, Streamed, lambda s: deepcopy(s, memo))
-    return copied

@@ -169,6 +169,12 @@ class MujocoPlant(SampledPlant):
         self._mujoco.mj_forward(self.model, self.data)
         return contact_channels(self._wrenches(q))
 
+    def contact_wrenches(
+        self, t: float, q: Array, v: Array, tau: Array
+    ) -> Mapping[str, Array]:
+        """Return those of MuJoCo's last step; zeros before the first one."""
+        return self._wrenches(q)
+
     def clearance(self, q: Array) -> float:
         """Return the height of the lowest contact above the ground [m], negative below.
 

@@ -1,0 +1,91 @@
+"""Six quadrupeds trot on MuJoCo, with one set of parameters.
+
+    .venv/bin/python benchmarks/trotting.py [robot ...]
+
+Prints one line for each robot and speed: whether it stood at the end, how far it came,
+and its mean speed while it trotted at full speed.
+"""
+
+import sys
+from typing import Any
+
+import numpy as np
+
+from hsp_control import load_experiment
+from hsp_control.common.exceptions import SimulationError
+
+FEET = {
+    "solo12": ("FL_FOOT FR_FOOT HL_FOOT HR_FOOT", 0.0165),
+    "go2": ("FL_foot FR_foot RL_foot RR_foot", 0.022),
+    "a1": ("FL_foot FR_foot RL_foot RR_foot", 0.02),
+    "anymal": ("LF_FOOT RF_FOOT LH_FOOT RH_FOOT", 0.03),
+    "b1": ("FL_foot FR_foot RL_foot RR_foot", 0.035),
+    "hyq": ("lf_foot rf_foot lh_foot rh_foot", 0.021),
+}
+"""The frames of the feet, and their radius [m]."""
+SPEEDS = ((0.3, 0.0), (0.6, 0.0), (0.2, 0.4))
+"""Speed forward [m/s], and rate of turning [rad/s]."""
+UNTIL, DURATION = 4.0, 6.0
+"""When they slow down, and when the run ends [s]."""
+
+
+def configuration(robot: str, speed: float, turn: float) -> dict[str, Any]:
+    """Return the configuration of a robot that trots."""
+    feet, radius = FEET[robot]
+    frames, shape = feet.split(), {"type": "sphere", "radius": radius}
+    return {
+        "robot": {"name": robot},
+        "start": {"ground": 0},
+        "contacts": {
+            f: {"type": "ball", "frame": f, "radius": radius, "friction": 0.65}
+            for f in frames
+        },
+        "plan": {"type": "trot", "speed": speed, "turn": turn, "until": UNTIL},
+        "null_space": {"fields": [{"type": "target_posture", "target": "start"}]},
+        "limits": {"velocity": "none", "position": "none"},
+        "simulation": {
+            "duration": DURATION,
+            "control_period": 0.001,
+            "integrator": {"type": "rk4", "step": 0.001},
+        },
+        "plant": {
+            "type": "mujoco",
+            "contacts": {f: {"shape": shape} for f in frames},
+            "ground": {"friction": 0.7},
+        },
+    }
+
+
+def said(robot: str, speed: float, turn: float) -> str:
+    """Return how a run went."""
+    try:
+        run = load_experiment(configuration(robot, speed, turn)).run()
+    except SimulationError as error:
+        return str(error)
+    if run.status != "completed":
+        return str(run.meta["message"])
+    fast = (run.t > 2.0) & (run.t < UNTIL)
+    points = run.q[fast][::30, :2]  # of whole cycles, so that swaying does not count
+    mean = np.hypot(*np.diff(points, axis=0).T).sum() / (0.3 * (len(points) - 1))
+    stands = run["plan.phase"][-1] == 0 and np.abs(run.v[-1]).max() < 0.3
+    limited, relaxed = ((run["status"] == s).mean() for s in (2, 3))
+    return (
+        f"{'stands' if stands else 'does not stand'} | {mean:.2f} m/s | "
+        f"{run['plan.steps'][-1]:.0f} swings | limited {100 * limited:.0f} %, relaxed "
+        f"{100 * relaxed:.1f} %"
+    )
+
+
+def main(robots: list[str]) -> None:
+    """Run all speeds of some robots, or of all."""
+    for robot in robots or FEET:
+        for speed, turn in SPEEDS:
+            print(
+                f"{robot:8} {speed:.1f} m/s {turn:.1f} rad/s | "
+                f"{said(robot, speed, turn)}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

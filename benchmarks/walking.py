@@ -1,0 +1,91 @@
+"""Talos walks on MuJoCo: far, fast, turning, pushed, with other masses and friction.
+
+    .venv/bin/python benchmarks/walking.py [part of a case's name ...]
+
+Prints one line for each case: whether it stood at the end, how far it came, and how
+well the plan was followed. Each case is ``whole_body/talos_walk`` with other values.
+"""
+
+import sys
+from collections.abc import Iterator
+from math import cos, pi, sin
+from typing import Any
+
+import numpy as np
+
+from hsp_control import Rollout, load_experiment
+from hsp_control.common.exceptions import SimulationError
+
+WALK = "whole_body/talos_walk"
+PUSH = 200.0
+"""Force of a push [N], for a tenth of a second."""
+
+
+def cases() -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the name and the values of each case."""
+    yield "5 m at 0.35 m/s, stands 2 s", {"plan.steps": 20, "simulation.duration": 19}
+    yield (
+        "3 m at 0.55 m/s, stands 2 s",
+        {"plan.speed": 0.55, "plan.steps": 8, "simulation.duration": 11.5},
+    )
+    turn = {"plan.speed": 0.2, "plan.turn": 0.3, "simulation.duration": 10}
+    yield "turns left", turn | {"plan.steps": 9}
+    yield "turns right", turn | {"plan.steps": 9, "plan.turn": -0.3}
+    left = {"plan.speed": 0, "plan.sideways": 0.1}
+    yield "sideways", left | {"plan.steps": 7, "simulation.duration": 9}
+    yield "friction 0.4", {"plan.steps": 8, "simulation.duration": 10} | slippery()
+    for seed in range(3):
+        yield (
+            f"masses +5 % ± 10 %, seed {seed}",
+            {
+                "plan.steps": 8,
+                "simulation.duration": 10,
+                "plant.inertias": "{mass_factor: 1.05, random_mass: 0.1}",
+                "plant.seed": seed,
+            },
+        )
+    for phase, start in (("swing", 2.7), ("on two feet", 3.15)):
+        for k in range(8):
+            force = [PUSH * cos(k * pi / 4), PUSH * sin(k * pi / 4), 0.0]
+            push = f"frame: torso_2_link, force: {force}, start: {start}, duration: 0.1"
+            values = {"plan.steps": 6, "simulation.duration": 9}
+            yield f"push {phase}, {45 * k}°", values | {"plant.pushes": f"[{{{push}}}]"}
+
+
+def slippery() -> dict[str, Any]:
+    """Return a ground of friction 0.4, of which the contacts know."""
+    known = {f"contacts.{side}_foot.friction": 0.38 for side in ("left", "right")}
+    return known | {"plant.ground.friction": 0.4}
+
+
+def summary(run: Rollout) -> str:
+    """Return how a walk went."""
+    error = run["plan.dcm"] - run["plan.dcm_reference"]
+    rms = 1e3 * np.sqrt((error**2).sum(axis=1).mean())
+    came = np.hypot(*(run.q[-1, :2] - run.q[0, :2]))
+    stands = run["plan.phase"][-1] == 0 and np.abs(run.v[-1]).max() < 0.1
+    ends = "stands" if stands and run.status == "completed" else run.meta["message"]
+    limited = (run["status"] == 2).mean()
+    relaxed = (run["status"] == 3).mean()
+    return (
+        f"{ends or 'still walks'} | {came:.2f} m, {run['plan.steps'][-1]:.0f} steps | "
+        f"DCM {rms:.1f} mm rms | limited {100 * limited:.0f} %, relaxed "
+        f"{100 * relaxed:.1f} %"
+    )
+
+
+def main(wanted: list[str]) -> None:
+    """Run the cases whose names contain one of the words, or all."""
+    for name, values in cases():
+        if wanted and not any(word in name for word in wanted):
+            continue
+        overrides = [f"{key}={value}" for key, value in values.items()]
+        try:
+            said = summary(load_experiment(WALK, *overrides).run())
+        except SimulationError as error:
+            said = str(error)
+        print(f"{name:32} | {said}", flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

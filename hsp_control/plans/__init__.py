@@ -1,0 +1,7 @@
+"""Plans: what a robot is to do, decided once a period from what is measured."""
+
+from .plan import Plan as Plan
+from .plan import PlanParts as PlanParts
+from .plan import RunningPlan as RunningPlan
+from .trot import Trot as Trot
+from .walk import Walk as Walk

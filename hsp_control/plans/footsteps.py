@@ -1,0 +1,104 @@
+"""Footsteps in the plane: where feet stand, and where a speed puts the next one."""
+
+from math import cos, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+
+
+class Footstep(NamedTuple):
+    """Where a foot stands on the ground: x and y [m], and its yaw [rad]."""
+
+    x: float
+    y: float
+    yaw: float
+
+    @property
+    def point(self) -> Array:
+        """X and y, shape (2,) [m]."""
+        return np.array([self.x, self.y])
+
+    def ahead(self, forward: float, left: float, turn: float = 0.0) -> "Footstep":
+        """Return what lies this far forward and left [m], turned by an angle [rad]."""
+        c, s = cos(self.yaw), sin(self.yaw)
+        return Footstep(
+            self.x + c * forward - s * left,
+            self.y + s * forward + c * left,
+            self.yaw + turn,
+        )
+
+    def local(self, point: Array) -> Array:
+        """Return a point of the ground in the foot's axes, shape (2,) [m]."""
+        c, s = cos(self.yaw), sin(self.yaw)
+        x, y = point[0] - self.x, point[1] - self.y
+        return np.array([c * x + s * y, -s * x + c * y])
+
+    def world(self, point: Array) -> Array:
+        """Return a point of the foot's axes in the world, shape (2,) [m]."""
+        return self.ahead(float(point[0]), float(point[1])).point
+
+
+class Velocity(NamedTuple):
+    """How fast the body goes forward and to the left [m/s], and turns [rad/s]."""
+
+    forward: float
+    left: float
+    turn: float
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether it stands."""
+        return self.forward == self.left == self.turn == 0.0
+
+
+class Stance(NamedTuple):
+    """How the feet of a biped stand beside each other.
+
+    Attributes:
+        width: From the right to the left foot, when it stands [m].
+        narrowest: The smallest distance of the feet across the walk [m].
+        widest: The largest one [m].
+        longest: The longest step along the walk, from the standing foot [m].
+    """
+
+    width: float
+    narrowest: float
+    widest: float
+    longest: float
+
+    def next(
+        self, standing: Footstep, side: float, velocity: Velocity, duration: float
+    ) -> Footstep:
+        """Return where the swing foot goes at a velocity of the body.
+
+        The middle between the feet goes on by the velocity, and the foot stands beside
+        it; never nearer to the standing foot than the feet are wide, nor farther than
+        the legs reach.
+
+        Args:
+            standing: The standing foot.
+            side: 1 if the left foot swings, -1 for the right one.
+            velocity: That of the body.
+            duration: From one touchdown to the next [s].
+        """
+        turn = velocity.turn * duration
+        middle = standing.ahead(0.0, 0.5 * side * self.width)
+        along = velocity.forward * duration, velocity.left * duration
+        foot = middle.ahead(*along, turn).ahead(0.0, 0.5 * side * self.width)
+        return self.kept(standing, side, foot)
+
+    def kept(self, standing: Footstep, side: float, foot: Footstep) -> Footstep:
+        """Return the nearest place to a footstep that the other foot allows."""
+        x, y = standing.local(foot.point)
+        x = min(max(float(x), -self.longest), self.longest)
+        y = side * min(max(side * float(y), self.narrowest), self.widest)
+        place = standing.world(np.array([x, y]))
+        return Footstep(float(place[0]), float(place[1]), foot.yaw)
+
+
+def between(a: Footstep, b: Footstep) -> Footstep:
+    """Return the middle of two feet."""
+    turn = (b.yaw - a.yaw + np.pi) % (2.0 * np.pi) - np.pi
+    return Footstep(0.5 * (a.x + b.x), 0.5 * (a.y + b.y), a.yaw + 0.5 * float(turn))

@@ -1,0 +1,88 @@
+"""The abstract plan: it writes references and switches contacts while a robot moves."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from hsp_control.common.exceptions import PlanError
+from hsp_control.constraints.contacts import Contact
+from hsp_control.control.controller import Controller
+from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import Measurement
+from hsp_control.declaration import Part
+from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks import Task
+
+
+class PlanParts(NamedTuple):
+    """The tasks and contacts of a controller that follows a plan.
+
+    Attributes:
+        tasks: The tasks that were given, and those that the plan adds.
+        contacts: The contacts that were given; the plan switches some.
+    """
+
+    tasks: tuple[Task, ...]
+    contacts: tuple[Contact, ...]
+
+
+class Plan(Part, ABC, family="plans", error=PlanError):
+    """What a robot is to do, decided once a control period from what is measured.
+
+    A plan writes references of tasks and switches contacts; it owns no part of the law.
+    It adds the tasks that it needs. A task that already has the name of one of these
+    is used instead, with its own gains and priority; only its reference and its
+    schedule become the plan's.
+
+    A subclass declares its parameters as fields (see `Part`) and implements `parts` and
+    `begin`. What remembers something during a run is what `begin` returns.
+    """
+
+    @abstractmethod
+    def parts(
+        self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact]
+    ) -> PlanParts:
+        """Return the parts of a controller that follows this plan.
+
+        Args:
+            robot: The robot.
+            tasks: The tasks that are given.
+            contacts: The contacts that are given.
+
+        Raises:
+            PlanError: If they do not fit the plan.
+        """
+
+    @abstractmethod
+    def begin(self, controller: Controller) -> "RunningPlan":
+        """Return what runs, for a controller that is made of `parts`.
+
+        Raises:
+            PlanError: If the controller has other parts, or the robot cannot follow.
+        """
+
+
+class RunningPlan(ABC):
+    """What a plan became for one run of one controller."""
+
+    @abstractmethod
+    def start(self, state: RobotState) -> None:
+        """Begin at a state; the first `update` does it.
+
+        Raises:
+            PlanError: If the robot cannot follow the plan from there.
+        """
+
+    @abstractmethod
+    def update(self, measured: Measurement) -> None:
+        """Write references and switch contacts for the period that begins.
+
+        It is called once a period, in order of time, before the effort is computed.
+
+        Raises:
+            FallError: If the robot falls.
+        """
+
+    @abstractmethod
+    def log_channels(self) -> Mapping[str, LogChannel]:
+        """Return what to log of the last update, by name: ``plan.<...>``."""

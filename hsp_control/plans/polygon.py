@@ -1,0 +1,54 @@
+"""The convex hull of points of the ground, and its nearest point."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+
+
+def convex_hull(points: Array) -> Array:
+    """Return the corners of the convex hull, anticlockwise, shape (m, 2).
+
+    Andrew's monotone chain (1979).
+
+    Args:
+        points: Points that are not on one line, shape (k, 2) [m].
+    """
+    ordered = sorted(map(tuple, points.tolist()))
+    lower, upper = _chain(ordered), _chain(ordered[::-1])
+    return np.array([*lower[:-1], *upper[:-1]])
+
+
+def nearest_inside(corners: Array, point: Array) -> Array:
+    """Return the point of a convex polygon that is nearest to a point, shape (2,).
+
+    Args:
+        corners: The corners, anticlockwise, shape (m, 2) [m].
+        point: The point, shape (2,) [m].
+    """
+    edges = np.roll(corners, -1, axis=0) - corners
+    to_point = point - corners
+    if (edges[:, 0] * to_point[:, 1] - edges[:, 1] * to_point[:, 0] >= 0.0).all():
+        return point
+    lengths = np.maximum((edges * edges).sum(axis=1), 1e-18)
+    shares = np.clip((edges * to_point).sum(axis=1) / lengths, 0.0, 1.0)
+    nearest = corners + shares[:, None] * edges
+    distances = ((nearest - point) ** 2).sum(axis=1)
+    return np.asarray(nearest[int(distances.argmin())])
+
+
+def _chain(points: Sequence[tuple[float, ...]]) -> list[tuple[float, ...]]:
+    chain: list[tuple[float, ...]] = []
+    for p in points:
+        while len(chain) > 1 and _turns_right(chain[-2], chain[-1], p):
+            chain.pop()
+        chain.append(p)
+    return chain
+
+
+def _turns_right(
+    a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]
+) -> bool:
+    """Return whether the way from a over b to c does not turn left."""
+    return (b[0] - a[0]) * (c[1] - a[1]) <= (b[1] - a[1]) * (c[0] - a[0])

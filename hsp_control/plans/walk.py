@@ -1,0 +1,164 @@
+"""A biped that walks: what YAML and Python say, and the tasks that it needs."""
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY
+
+from hsp_control.common.exceptions import PlanError
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.constraints.contacts import Contact, SurfaceContact
+from hsp_control.control.controller import Controller
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import (
+    Flag,
+    Fraction,
+    Names,
+    NonNegative,
+    Number,
+    Positive,
+    PositiveCount,
+)
+from hsp_control.plans.composing import composed
+from hsp_control.plans.footsteps import Velocity
+from hsp_control.plans.legs import root_frame
+from hsp_control.plans.plan import Plan, PlanParts
+from hsp_control.plans.walking import RunningWalk
+from hsp_control.robot import Robot
+from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePose, Gains, Task
+from hsp_control.tasks.frame_task import TrackingTask
+from hsp_control.trajectories import Trajectory
+
+BODY, TRUNK = "center_of_mass", "trunk"
+"""The names of the tasks that every walk has, besides one for each foot."""
+
+
+class Walk(Plan, type="walk"):
+    """A biped walks on flat ground: a plan of the divergent component of motion.
+
+    It stands, walks with the given velocity, and stands again when that is zero or the
+    steps are done. The centre of mass follows the pendulum with feedback within the
+    sole (`plans/pendulum.py`); a push that the sole cannot hold moves the next step,
+    in place and in time (`plans/step_adjustment.py`). A swing foot starts from where it
+    is and becomes a contact when it is felt on the ground, early or late.
+
+    It has the tasks ``center_of_mass`` and ``trunk``, and one for each foot with the
+    name of its contact.
+    """
+
+    speed: Number = 0.0
+    """Speed forward [m/s]."""
+    _: KW_ONLY
+    sideways: Number = 0.0
+    """Speed to the left [m/s]."""
+    turn: Number = 0.0
+    """Rate of turning to the left [rad/s]."""
+    velocity: Trajectory | None = None
+    """Instead of these three: all of them as functions of time, for example a stream
+    [m/s, m/s, rad/s]."""
+    steps: PositiveCount | None = None
+    """How many steps it takes before it slows down and stands [-]; by default it walks
+    until the end."""
+    feet: Names | None = None
+    """Names of the two contacts that walk [-]; all of them by default."""
+    trunk: str | None = None
+    """Frame of the trunk that stays upright [-]; by default that of the root."""
+    swing: Positive = 0.6
+    """Duration of a swing, on one foot [s]."""
+    double_support: Positive = 0.15
+    """Duration of the time on both feet between two swings [s]."""
+    lift: Positive = 0.05
+    """How high a foot is lifted [m]."""
+    crouch: NonNegative = 0.04
+    """How far the centre of mass is lowered, so that the knees stay bent [m]."""
+    acceleration: Positive = 0.4
+    """How fast the velocity changes, from step to step [m/s²]."""
+    feedback: Positive = 4.0
+    """k, the rate at which an error of the divergent component decays [1/s]."""
+    margin: Fraction = 0.9
+    """Share of the sole that feedback uses [-]."""
+    adjusts: Flag = True
+    """Whether a push moves the next step [-]."""
+    contact_force: Positive = 0.03
+    """Normal force at which a swing foot counts as landed, in robot weights [-]."""
+
+    def __post_init__(self) -> None:
+        """Check that the velocity is given once."""
+        if self.velocity is None:
+            return
+        for name in ("speed", "sideways", "turn"):
+            if getattr(self, name):
+                raise PlanError(f"give either velocity or {name}, not both")
+        if not self.velocity.relative and self.velocity.dimension != 3:
+            raise PlanError(
+                f"velocity has dimension {self.velocity.dimension}; needs 3: forward, "
+                "to the left, turning"
+            )
+
+    def velocity_at(self, t: float) -> Velocity:
+        """Return the velocity that is wanted at time t [s]."""
+        if self.velocity is None:
+            return Velocity(self.speed, self.sideways, self.turn)
+        return Velocity(*self.velocity.sample(t).position.tolist())
+
+    def parts(
+        self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact]
+    ) -> PlanParts:
+        """Return the parts of a controller that walks; see `Plan.parts`."""
+        with within("plan"):
+            if not robot.unactuated:
+                raise PlanError(
+                    f"{robot.name} cannot walk: it has no free-flyer root, it is fixed "
+                    "to the world"
+                )
+            names = self._feet(contacts)
+        frames = {each.name: each.frame for each in contacts}
+        trunk = root_frame(robot) if self.trunk is None else self.trunk
+        with within("plan", "trunk"):
+            robot.frame_id(trunk)
+        own: list[TrackingTask] = [
+            CenterOfMass(gains=Gains(natural_frequency=10.0), name=BODY, priority=1),
+            FrameOrientation(
+                trunk, gains=Gains(natural_frequency=10.0), name=TRUNK, priority=2
+            ),
+            *(
+                FramePose(
+                    frames[name],
+                    gains=Gains(natural_frequency=20.0),
+                    name=name,
+                    priority=1,
+                )
+                for name in names
+            ),
+        ]
+        return composed(own, tasks, contacts, names)
+
+    def begin(self, controller: Controller) -> RunningWalk:
+        """Return what walks; see `Plan.begin`."""
+        names = self._feet(controller.contacts)
+        return RunningWalk(self, controller, names, BODY, TRUNK)
+
+    def _feet(self, contacts: Sequence[Contact]) -> tuple[str, ...]:
+        """Return the names of the two contacts that walk.
+
+        Raises:
+            PlanError: If they are not two flat soles.
+        """
+        there = {each.name: each for each in contacts}
+        names = tuple(there) if self.feet is None else tuple(self.feet)
+        for name in names:
+            if name not in there:
+                raise PlanError(
+                    f"there is no contact {name!r}{did_you_mean(name, there)} to walk "
+                    f"on (there are {listing(there) or 'none'})"
+                )
+            if not isinstance(there[name], SurfaceContact):
+                raise PlanError(
+                    f"contact {name!r} is a {there[name].yaml_type}; a biped walks on "
+                    "flat soles: type surface"
+                )
+        if len(set(names)) != 2:
+            raise PlanError(
+                f"a biped walks on two feet; there are {len(set(names))} "
+                f"({listing(names) or 'declare contacts'})"
+                + ("; name two with feet" if len(names) > 2 else "")
+            )
+        return names

@@ -1,0 +1,386 @@
+"""A biped that walks: one run, from phase to phase."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import PlanError
+from hsp_control.control.controller import Controller
+from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import Measurement
+from hsp_control.plans.falling import FallDetector
+from hsp_control.plans.foot import Foot
+from hsp_control.plans.footsteps import Velocity, between
+from hsp_control.plans.pendulum import (
+    GRAVITY,
+    Phase,
+    dcm_of,
+    error_after,
+    plan_dcm,
+)
+from hsp_control.plans.plan import RunningPlan
+from hsp_control.plans.polygon import convex_hull, nearest_inside
+from hsp_control.plans.quintic import at_rest, to_rest
+from hsp_control.plans.step_adjustment import adjust, shift_gain
+from hsp_control.plans.step_planner import StepPlanner, stance_of
+from hsp_control.plans.swing import Swing, turned
+from hsp_control.robot import RobotState
+from hsp_control.trajectories.fed import Fed, FedOrientation
+
+if TYPE_CHECKING:
+    from hsp_control.plans.walk import Walk
+
+FIRST_SHIFT = (0.4, 0.6)
+"""Time to get ready, and time to shift the weight for the first step [s]."""
+LATE = 0.08
+"""How long a foot without ground under it is waited for [s]."""
+EARLY = 0.6
+"""Share of a swing before which no force counts as touchdown."""
+LANDING = 0.5
+"""How long the force of a foot that lands takes to rise, in double supports [-]."""
+_DEADBAND = 0.005
+"""Error of the divergent component at touchdown that needs no adjustment [m]."""
+_COMMITTED = 0.12
+"""A step is not adjusted so shortly before it lands [s]."""
+_SHORTEST = 0.55
+"""The shortest swing that an adjustment may choose, in swings [-]."""
+_LONGEST = 1.25
+"""The longest one, in swings [-]."""
+
+Mode = Literal["standing", "double", "single"]
+
+
+class RunningWalk(RunningPlan):
+    """What a `Walk` became for one run: phases, footsteps and feedback.
+
+    On two feet the repellent point moves from sole to sole while the force of the foot
+    that is to swing fades; on one foot it rests there. The references are those of the
+    pendulum from where the centre of mass is, so that an error of the divergent
+    component decays as exp(-k t) while the repellent point stays within the soles.
+    """
+
+    def __init__(
+        self,
+        walk: "Walk",
+        controller: Controller,
+        feet: tuple[str, ...],
+        body: str,
+        trunk: str,
+    ) -> None:
+        """Find the references and the switches.
+
+        Args:
+            walk: The plan.
+            controller: A controller that is made of its parts.
+            feet: The names of the contacts that walk.
+            body: The name of the task of the centre of mass.
+            trunk: The name of the task of the trunk.
+
+        Raises:
+            PlanError: If the controller is made of other parts.
+        """
+        self.walk = walk
+        self._state = RobotState(controller.robot)
+        tasks = {task.name: task for task in controller.tasks}
+        missing = [name for name in (body, trunk, *feet) if name not in tasks]
+        if missing:
+            raise PlanError(
+                f"the controller has no task {missing[0]!r}: make it of the plan's "
+                "parts"
+            )
+        moved, turned_by = tasks[body].followed, tasks[trunk].followed
+        if not (isinstance(moved, Fed) and isinstance(turned_by, FedOrientation)):
+            raise PlanError(
+                f"the tasks {body!r} and {trunk!r} do not follow the plan: make the "
+                "controller of the plan's parts"
+            )
+        self._body, self._trunk = moved, turned_by
+        self._trunk_frame: str = tasks[trunk].frame  # type: ignore[attr-defined]
+        found = [Foot(name, controller) for name in feet]
+        weight = sum(inertia.mass for inertia in controller.robot.model.inertias)
+        self._touch = walk.contact_force * weight * GRAVITY
+        self._feet: dict[float, Foot] = dict(zip((1.0, -1.0), found, strict=True))
+        self._begun = False
+        self._mode: Mode = "standing"
+
+    def update(self, measured: Measurement) -> None:
+        """Write references and switch contacts; see `RunningPlan.update`."""
+        t, state = measured.t, self._state
+        state.update(*measured[:3])
+        if not self._begun:
+            self.start(state)
+        self._falling.check(state)
+        mass = state.centroidal
+        self._dcm = dcm_of(mass.position, mass.velocity, self._frequency)
+        self._go_on(measured)
+        if self._mode == "single" and self.walk.adjusts:
+            self._adjust(t)
+        self._write(t, mass.position, mass.velocity)
+
+    def log_channels(self) -> Mapping[str, LogChannel]:
+        """Return the phase, the divergent component, and the next footstep."""
+        phase = {"standing": 0.0, "double": 1.0, "single": 2.0}[self._mode]
+        if self._mode == "single" and self._side < 0.0:
+            phase = 3.0
+        return {
+            "plan.phase": LogChannel(
+                phase, "-", "0 stands; 1 on two feet; 2 left, 3 right foot swings"
+            ),
+            "plan.steps": LogChannel(float(self._taken), "-", "steps that were taken"),
+            "plan.dcm": LogChannel(self._dcm, "m", "divergent component of motion"),
+            "plan.dcm_reference": LogChannel(self._dcm_wanted, "m", "what is wanted"),
+            "plan.repellent_point": LogChannel(
+                self._point, "m", "where the feet are to push, within the soles"
+            ),
+            "plan.footstep": LogChannel(
+                np.array(self._target), "m and rad", "where the swing foot lands"
+            ),
+        }
+
+    # -- the start --------------------------------------------------------------------
+
+    def start(self, state: RobotState) -> None:
+        """Stand where the robot is; see `RunningPlan.start`."""
+        t, walk = state.t, self.walk
+        trunk = state.frame(self._trunk_frame).rotation
+        feet = list(self._feet.values())
+        # The left foot is the one on the left of the trunk.
+        left = trunk.T @ (state.position(feet[0].frame) - state.position(feet[1].frame))
+        if left[1] < 0.0:
+            feet.reverse()
+        self._feet = dict(zip((1.0, -1.0), feet, strict=True))
+        for foot in feet:
+            foot.begin(state)
+        mass = state.centroidal.position
+        ground = max(foot.height for foot in feet)
+        self._height = float(mass[2])
+        pendulum = self._height - walk.crouch - ground
+        if pendulum <= 0.0:
+            raise PlanError(
+                f"crouch is {walk.crouch} m; the centre of mass is only "
+                f"{self._height - ground:.3g} m above the feet"
+            )
+        self._frequency = float(np.sqrt(GRAVITY / pendulum))
+        self._stance = stance_of(self._feet, state, walk.crouch)
+        self._planner = StepPlanner(walk, self._stance, state.robot.name)
+        self._trunk_rotation = trunk.copy()
+        self._first_yaw = between(feet[0].place, feet[1].place).yaw
+        self._yaw = to_rest(at_rest([self._first_yaw]), [self._first_yaw], t, 1.0)
+        self._sinking = to_rest(
+            at_rest([self._height]), [self._height - walk.crouch], t, 1.0
+        )
+        frames = feet[0].frame, feet[1].frame
+        self._falling = FallDetector(self._trunk_frame, frames, state)
+        self._taken, self._side = 0, 1.0
+        self._now = Velocity(0.0, 0.0, 0.0)
+        self._swing: Swing | None = None
+        self._dcm = self._dcm_wanted = self._point = self._middle()
+        self._target = self._feet[1.0].place
+        self._stand(t)
+        self._begun = True
+
+    # -- from phase to phase ----------------------------------------------------------
+
+    def _go_on(self, measured: Measurement) -> None:
+        """Begin the next phase where one ends."""
+        t = measured.t
+        while self._index + 1 < len(self._times) and t >= self._times[self._index + 1]:
+            if self._swings[self._index]:
+                break  # a swing ends when the foot has landed
+            self._index += 1
+            if self._mode == "double" and self._swings[self._index]:
+                self._lift_off(t)
+        if self._mode == "single":
+            if self._has_landed(measured):
+                self._land(t)
+        elif self._mode == "standing":
+            if not self._planner.wanted(t, self._taken).is_zero:
+                self._set_out(t)
+        elif self._index + 1 == len(self._phases):
+            self._mode = "standing"
+
+    def _stand(self, t: float) -> None:
+        self._mode = "standing"
+        middle = self._middle()
+        self._follow(t, [Phase(1.0, middle, middle)], [False])
+
+    def _set_out(self, t: float) -> None:
+        """Shift the weight for the first step."""
+        wanted = self._planner.wanted(t, self._taken)
+        self._side = -1.0 if wanted.left < 0.0 or wanted.turn < 0.0 else 1.0
+        ready, shift = FIRST_SHIFT
+        middle = self._middle()
+        self._mode = "double"
+        self._plan(t, [Phase(ready, middle, middle)], shift, middle)
+        self._feet[self._side].contact.throw(False, t + ready, shift)
+
+    def _lift_off(self, t: float) -> None:
+        """Let the foot swing that bears no more."""
+        foot, walk = self._feet[self._side], self.walk
+        foot.contact.throw(False, t)
+        foot.task.throw(True, t)
+        self._mode = "single"
+        here = self._state.frame(foot.frame)
+        self._swing = Swing(
+            t,
+            walk.swing,
+            here.position,
+            here.rotation,
+            foot.origin_of(self._target),
+            foot.flat(self._target.yaw),
+            self._feet[-self._side].frame_height,
+            walk.lift,
+        )
+        yaw = between(self._feet[-self._side].place, self._target).yaw
+        self._yaw = to_rest(self._yaw.sample(t), [yaw], t, walk.swing)
+        # The plan begins anew, because a phase ends at a control period.
+        self._times[self._index :] += t - self._times[self._index]
+
+    def _has_landed(self, measured: Measurement) -> bool:
+        assert self._swing is not None
+        t, foot = measured.t, self._feet[self._side]
+        force = measured.normal_force(foot.frame, foot.normal)
+        if force is None:
+            return t >= self._swing.end
+        if t > self._swing.end + LATE:
+            return True
+        return self._swing.share(t) > EARLY and force > self._touch
+
+    def _land(self, t: float) -> None:
+        """Let the foot bear, and plan what follows from where it stands."""
+        foot, walk = self._feet[self._side], self.walk
+        foot.contact.throw(False, t)
+        foot.contact.throw(True, t, LANDING * walk.double_support)
+        foot.task.throw(False, t)
+        foot.stand(self._state)
+        self._taken += 1
+        self._swing, self._mode = None, "double"
+        self._side = -self._side
+        self._hull = self._soles()
+        self._plan(t, [], walk.double_support, self._feet[self._side].place.point)
+        if any(self._swings):
+            self._feet[self._side].contact.throw(False, t, walk.double_support)
+
+    def _plan(self, t: float, before: list[Phase], shift: float, point: Array) -> None:
+        """Plan the steps to come, from a phase on two feet on, until it stands.
+
+        Args:
+            t: The present time [s].
+            before: Phases before that.
+            shift: How long the weight takes to shift to the standing foot [s].
+            point: Where the repellent point is, shape (2,) [m].
+        """
+        places = {side: foot.place for side, foot in self._feet.items()}
+        preview = self._planner.look_ahead(
+            t, self._taken, self._now, self._side, places, shift, point
+        )
+        self._now = preview.velocity
+        if preview.target is not None:
+            self._target = preview.target
+        none = [False] * len(before)
+        self._follow(t, [*before, *preview.phases], [*none, *preview.swings])
+
+    def _follow(self, t: float, phases: list[Phase], swings: list[bool]) -> None:
+        """Follow phases from now on."""
+        self._phases, self._swings = phases, swings
+        self._dcm_starts = plan_dcm(phases, self._frequency)
+        durations = [0.0, *(phase.duration for phase in phases[:-1])]
+        # A control period that begins a rounding error early belongs to the next phase.
+        self._times = t + np.cumsum(durations) - 1e-9
+        self._index = 0
+        self._hull = self._soles()
+
+    # -- feedback ---------------------------------------------------------------------
+
+    def _adjust(self, t: float) -> None:
+        """Move the step, in place and in time, if the sole cannot hold a push."""
+        assert self._swing is not None
+        walk, swing, phase = self.walk, self._swing, self._phases[self._index]
+        remaining = swing.end - t
+        if remaining < _COMMITTED:
+            return
+        standing, reaches = self._feet[-self._side], self._feet[-self._side].reach
+        frequency, gain = self._frequency, walk.feedback
+        since = t - self._times[self._index]
+        first = self._dcm_starts[self._index]
+        wanted = phase.dcm(first, since, frequency)
+        error = standing.place.local(standing.place.point + self._dcm - wanted)
+
+        def dcm_at(T: float) -> Array:
+            left = [
+                error_after(float(e), T, frequency, gain, walk.margin * r)
+                for e, r in zip(error, reaches, strict=True)
+            ]
+            axes = standing.place.world(np.array(left)) - standing.place.point
+            return np.asarray(phase.dcm(first, since + T, frequency) + axes)
+
+        planned = swing.start + walk.swing - t
+        landing = phase.dcm(first, since + planned, frequency)
+        # What the swing foot goes to now, after earlier adjustments.
+        foot = self._feet[self._side]
+        now = foot.place_of(swing.target)
+        shift = shift_gain(frequency, walk.double_support)
+        needed = landing + shift * (now.point - self._target.point)
+        if float(np.abs(dcm_at(remaining) - needed).max()) < _DEADBAND:
+            return
+        earliest = max(swing.start + _SHORTEST * walk.swing - t, _COMMITTED)
+        latest = swing.start + _LONGEST * walk.swing - t
+        chosen = adjust(
+            self._target,
+            planned,
+            (earliest, max(latest, earliest)),
+            dcm_at,
+            landing,
+            shift,
+            lambda place: self._stance.kept(standing.place, self._side, place),
+        )
+        swing.redirect(t, foot.origin_of(chosen.target), t + chosen.remaining)
+
+    def _write(self, t: float, position: Array, velocity: Array) -> None:
+        """Write the references of this period."""
+        frequency, gain = self._frequency, self.walk.feedback
+        phase, since = self._phases[self._index], t - self._times[self._index]
+        since = max(since, 0.0)
+        if self._index + 1 == len(self._phases):
+            since = min(since, phase.duration)
+        wanted = phase.dcm(self._dcm_starts[self._index], since, frequency)
+        point = phase.point(since)
+        displaced = (1.0 + gain / frequency) * (self._dcm - wanted)
+        self._dcm_wanted = wanted
+        self._point = nearest_inside(self._hull_now(), point + displaced)
+        height, yaw = self._sinking.sample(t), self._yaw.sample(t)
+        acceleration = frequency**2 * (position[:2] - self._point)
+        self._body.write(
+            t,
+            np.append(position[:2], height.position),
+            np.append(velocity[:2], height.velocity),
+            np.append(acceleration, height.acceleration),
+        )
+        up = np.array([0.0, 0.0, 1.0])
+        self._trunk.write(
+            t,
+            turned(float(yaw.position[0]) - self._first_yaw, self._trunk_rotation),
+            yaw.velocity * up,
+            yaw.acceleration * up,
+        )
+        if self._swing is not None:
+            foot = self._feet[self._side]
+            foot.position.write(t, *self._swing.position(t))
+            foot.orientation.write(t, *self._swing.orientation(t))
+
+    def _hull_now(self) -> Array:
+        """Return where the repellent point may be, corners of shape (m, 2) [m]."""
+        if self._mode == "single":
+            return self._feet[-self._side].corners(self.walk.margin)
+        return self._hull
+
+    def _soles(self) -> Array:
+        corners = [each.corners(self.walk.margin) for each in self._feet.values()]
+        return convex_hull(np.vstack(corners))
+
+    def _middle(self) -> Array:
+        return np.asarray(
+            0.5 * (self._feet[1.0].place.point + self._feet[-1.0].place.point)
+        )

@@ -1,0 +1,136 @@
+"""References that a plan writes while the robot moves: points and orientations."""
+
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.common.kernels import kernel
+from hsp_control.common.rotations import turn
+from hsp_control.declaration.quantities import PositiveCount
+from hsp_control.trajectories.following import Compiled, Kernel
+from hsp_control.trajectories.orientation import OrientationTrajectory
+from hsp_control.trajectories.remembering import Written
+from hsp_control.trajectories.trajectory import Trajectory
+
+
+class Fed(Written, Compiled, Trajectory):
+    """x(t) in Rⁿ that a plan writes, once a control period.
+
+    From one writing to the next it is x + x' (t - t0) + ½ x'' (t - t0)², so that its
+    derivatives fit it. Before the first writing it rests where the robot starts.
+    """
+
+    size: PositiveCount
+    """The number n of coordinates [-]."""
+
+    points: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def dimension(self) -> int:
+        """The number n of coordinates."""
+        return self.size
+
+    @property
+    def relative(self) -> bool:
+        """Whether nothing was written, so that it depends on where the robot starts."""
+        return bool(np.isnan(self.memory[0]))
+
+    def _unwritten(self) -> Array:
+        memory = np.zeros(1 + 3 * self.size)
+        memory[0] = np.nan
+        return memory
+
+    def anchored(self, start: ArrayLike | None) -> Self:
+        """Return the reference itself, at rest where the robot starts.
+
+        Raises:
+            TrajectoryError: If nothing starts there, or with another dimension.
+        """
+        if start is None:
+            raise TrajectoryError("a fed reference is missing: nothing starts here")
+        where = np.asarray(start, dtype=float)
+        if where.shape != (self.size,):
+            raise TrajectoryError(
+                f"the fed reference has {self.size} coordinates; needs {where.size}"
+            )
+        if self.relative:
+            self.write(0.0, where)
+        return self
+
+    def write(
+        self,
+        t: float,
+        position: ArrayLike,
+        velocity: ArrayLike = 0.0,
+        acceleration: ArrayLike = 0.0,
+    ) -> None:
+        """Write x, x' and x'' at time t [s], shape (n,) each."""
+        rows = self.memory[1:].reshape(3, self.size)
+        rows[0], rows[1], rows[2] = position, velocity, acceleration
+        self.memory[0] = t
+
+    def _kernel(self) -> Kernel:
+        return _go_on, (self.memory,)
+
+
+class FedOrientation(Written, Compiled, OrientationTrajectory):
+    """R(t) that a plan writes, once a control period; see `Fed`.
+
+    From one writing to the next ω' is constant, and R turns about ω + ½ ω' (t - t0).
+    """
+
+    @property
+    def relative(self) -> bool:
+        """Whether nothing was written, so that it depends on where the robot starts."""
+        return bool(np.isnan(self.memory[0]))
+
+    def _unwritten(self) -> Array:
+        memory = np.zeros(16)
+        memory[0] = np.nan
+        return memory
+
+    def anchored(self, start: ArrayLike) -> Self:
+        """Return the reference itself, at rest as the robot starts."""
+        if self.relative:
+            self.write(0.0, start)
+        return self
+
+    def write(
+        self,
+        t: float,
+        rotation: ArrayLike,
+        velocity: ArrayLike = 0.0,
+        acceleration: ArrayLike = 0.0,
+    ) -> None:
+        """Write R, ω and ω' at time t [s], shapes (3, 3), (3,) and (3,)."""
+        rows = self.memory[1:].reshape(5, 3)
+        rows[:3], rows[3], rows[4] = rotation, velocity, acceleration
+        self.memory[0] = t
+
+    def _kernel(self) -> Kernel:
+        return _turn_on, (self.memory[:1], self.memory[1:].reshape(5, 3))
+
+
+@kernel
+def _go_on(memory: Array, x: Array, x_dot: Array, x_ddot: Array, t: float) -> None:
+    n, dt = x.shape[0], max(t - memory[0], 0.0)
+    for i in range(n):
+        x_ddot[i] = memory[1 + 2 * n + i]
+        x_dot[i] = memory[1 + n + i] + dt * x_ddot[i]
+        x[i] = memory[1 + i] + dt * (x_dot[i] - 0.5 * dt * x_ddot[i])
+
+
+@kernel
+def _turn_on(
+    time: Array, rows: Array, R: Array, omega: Array, omega_dot: Array, t: float
+) -> None:
+    dt = max(t - time[0], 0.0)
+    for i in range(3):
+        omega_dot[i] = rows[4, i]
+        omega[i] = rows[3, i] + 0.5 * dt * rows[4, i]
+    turn(rows[:3], omega, dt, R)
+    for i in range(3):
+        omega[i] = rows[3, i] + dt * rows[4, i]

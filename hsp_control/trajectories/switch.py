@@ -1,0 +1,67 @@
+"""A schedule that somebody throws while the robot moves."""
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.declaration.quantities import Flag, NonNegative
+from hsp_control.trajectories.remembering import Written
+from hsp_control.trajectories.schedule import Intervals, Schedule
+from hsp_control.trajectories.timing import smooth_step
+
+
+class Switch(Written, Schedule):
+    """w(t) in [0, 1] that a plan throws: on, off, each with a ramp.
+
+    Off, it is active until its ramp ends: the force of a contact fades before the
+    contact goes. On, it is active at once: the force of a contact rises from zero. A
+    throw during a ramp continues from the weight of that time.
+    """
+
+    intervals: Intervals = ((None, None),)
+    """Not used: events say when it is active."""
+    ramp: NonNegative = 0.0
+    """Not used: each throw has its own."""
+    on: Flag = True
+    """Whether it is on before the first throw [-]."""
+
+    @property
+    def constant(self) -> bool:
+        """Whether it never changes: False."""
+        return False
+
+    def _unwritten(self) -> Array:
+        weight = float(self.on)
+        return np.array([-np.inf, 0.0, weight, weight])
+
+    def throw(self, on: bool, t: float, ramp: float = 0.0) -> None:
+        """Turn it on or off, from a time on.
+
+        Args:
+            on: Whether it shall be on.
+            t: When the ramp begins [s].
+            ramp: How long it takes [s]; 0 is a jump.
+        """
+        self.memory[:] = t, ramp, self.weight(t), float(on)
+
+    def reset(self) -> None:
+        """Return to the state before the first throw."""
+        self.memory[:] = self._unwritten()
+
+    @property
+    def is_on(self) -> bool:
+        """Whether it was last thrown on, or is on from the beginning."""
+        return bool(self.memory[3] > 0.0)
+
+    def active(self, t: float) -> bool:
+        """Return whether it counts at time t [s]."""
+        start, ramp, _, target = map(float, self.memory)
+        return target > 0.0 or t < start + ramp
+
+    def weight(self, t: float) -> float:
+        """Return w(t), t in s; in a ramp it is C² in t."""
+        start, ramp, origin, target = map(float, self.memory)
+        if t >= start + ramp:
+            return target
+        if t <= start:
+            return origin
+        return origin + (target - origin) * smooth_step(t, start, ramp)[0]

@@ -1,0 +1,114 @@
+"""Talos takes two steps and stands: on MuJoCo, as its configuration says."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hsp_control import Rollout, load_experiment
+
+pytest.importorskip("example_robot_data")
+pytest.importorskip("mujoco")
+pytestmark = pytest.mark.slow
+FEET = {"left_foot": "left_sole_link", "right_foot": "right_sole_link"}
+
+
+@cache
+def walk() -> Rollout:
+    """Return a walk of one step, the step that closes, and a second of standing."""
+    settings = (
+        "plan.steps=1",
+        "simulation.duration=4.2",
+        "simulation.log_period=0.002",
+    )
+    return load_experiment("whole_body/talos_walk", *settings).run()
+
+
+def test_it_walks_and_stands_again():
+    run = walk()
+    assert run.status == "completed"
+    assert run["plan.steps"][-1] == 2
+    assert run["plan.phase"][-1] == 0
+    # One step of 0.75 s, at what 0.4 m/s² give in this time.
+    assert run.q[-1, 0] == pytest.approx(0.4 * 0.75**2, abs=0.02)
+    assert np.abs(run.v[-1]).max() < 0.05
+    error = run["plan.dcm"] - run["plan.dcm_reference"]
+    assert np.sqrt((error**2).sum(axis=1).mean()) < 0.01
+
+
+def test_it_stands_on_feet_that_bear():
+    run = walk()
+    weight = (
+        run["plant.contact.left_sole_link.force"][:, 2]
+        + (run["plant.contact.right_sole_link.force"][:, 2])
+    )
+    assert weight[-1] == pytest.approx(weight[0], rel=0.05)
+    for name, phase in (("left_foot", 2), ("right_foot", 3)):
+        swings = run["plan.phase"] == phase
+        assert swings.any()
+        assert (run[f"contact.{name}.weight"][swings] == 0.0).all()
+        force = run[f"plant.contact.{FEET[name]}.force"][swings, 2]
+        inner = force[int(0.05 * len(force)) : int(0.6 * len(force))]
+        assert not inner.any()  # it left the ground, and stayed off it
+    standing = run["plan.phase"] == 0
+    for name in FEET:
+        assert (run[f"contact.{name}.weight"][standing] == 1.0).all()
+
+
+def test_feet_touch_down_softly():
+    """The height of a foot changes little in the last hundredth of a swing."""
+    run = walk()
+    for name, phase in (("left_foot", 2), ("right_foot", 3)):
+        heights = run[f"task.{name}.actual"][:, 2]
+        last = np.flatnonzero(run["plan.phase"] == phase)[-1]
+        assert abs(heights[last] - heights[last - 5]) / 0.01 < 0.05
+        assert heights.max() > 0.04
+
+
+def test_a_contact_changes_no_effort_by_a_jump():
+    """Before the foot lifts its force has faded; after it lands the force rises."""
+    run = walk()
+    jumps = np.abs(np.diff(run.tau, axis=0)).max(axis=1)
+    phase = run["plan.phase"]
+    lifts = np.flatnonzero((phase[:-1] == 1) & (phase[1:] > 1))
+    assert len(lifts) == 2
+    assert jumps[lifts].max() < 0.1 * np.abs(run.tau).max()
+
+
+def test_the_null_space_error_decays_within_each_phase():
+    """‖e_N‖ obeys exp(-K_N t) where the law is exact and no contact changes."""
+    run, gain = walk(), 6.0
+    phase, t = run["plan.phase"], run.t
+    changes = np.flatnonzero(np.diff(phase)) + 1
+    compared = 0
+    for first, last in zip(changes, [*changes[1:], len(t)], strict=True):
+        if phase[first] in {2, 3}:  # until the foot feels the ground
+            foot = FEET["left_foot" if phase[first] == 2 else "right_foot"]
+            force = run[f"plant.contact.{foot}.force"][first + 10 : last, 2]
+            last = first + 10 + int((force == 0.0).sum())
+        part = slice(first + 10, last)
+        e_N, status = run["null_space_norm"][part], run["status"][part]
+        if (status > 1).any() or phase[first] == 1:
+            continue
+        decay = e_N[0] * np.exp(-gain * (t[part] - t[part][0]))
+        # Efforts are held for a millisecond, and the contacts are MuJoCo's.
+        assert (e_N < 1.1 * decay + 0.05).all()
+        compared += 1
+    assert compared >= 2
+
+
+def test_the_same_run_again_is_the_same_to_the_bit(tmp_path):
+    settings = ("plan.steps=1", "simulation.duration=0.2")
+    first = load_experiment("whole_body/talos_walk", *settings).run()
+    again = load_experiment(first.save(tmp_path / "walk.npz")).run()
+    for name in first.columns:
+        assert np.array_equal(first[name], again[name], equal_nan=True), name
+
+
+def test_a_push_that_fells_is_said():
+    push = "{frame: torso_2_link, force: [0, 900, 0], start: 0.1, duration: 0.3}"
+    settings = (f"plant.pushes=[{push}]", "simulation.duration=3")
+    run = load_experiment("whole_body/talos_walk", *settings).run()
+    assert run.status == "stopped"
+    assert run.meta["message"].startswith("the robot falls: at t = ")
+    assert run.t[-1] < 2.0

@@ -1,0 +1,169 @@
+"""A walk is a value; what does not fit it is said before the first step."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hsp_control import FramePose, Gains, Robot, load_experiment
+from hsp_control.common.exceptions import FallError, HspControlError, PlanError
+from hsp_control.constraints.contacts import BallContact, SurfaceContact
+from hsp_control.plans import Walk
+from hsp_control.plans.falling import FallDetector
+from hsp_control.tasks import CenterOfMass
+from hsp_control.trajectories import Hold, Schedule, Stops
+from hsp_control.trajectories.switch import Switch
+
+pytest.importorskip("example_robot_data")
+WALK = "whole_body/talos_walk"
+SOLE = {"length": 0.16, "width": 0.1}
+FEET = [
+    SurfaceContact(f"{side}_sole_link", name=f"{side}_foot", **SOLE)
+    for side in ("left", "right")
+]
+
+
+@pytest.fixture(scope="module")
+def talos() -> Robot:
+    return load_experiment(WALK).robot
+
+
+def test_it_adds_what_it_needs_and_keeps_what_is_given(talos):
+    own = FramePose(
+        "left_sole_link", gains=Gains(natural_frequency=33.0), name="left_foot"
+    )
+    made = Walk(speed=0.3).parts(talos, [own], FEET)
+    tasks = {task.name: task for task in made.tasks}
+    assert set(tasks) == {"center_of_mass", "trunk", "left_foot", "right_foot"}
+    assert tasks["left_foot"].gains == own.gains
+    assert isinstance(tasks["left_foot"].schedule, Switch)
+    assert tasks["trunk"].frame == "base_link"
+    assert [contact.name for contact in made.contacts] == ["left_foot", "right_foot"]
+    assert all(isinstance(contact.schedule, Switch) for contact in made.contacts)
+
+
+@pytest.mark.parametrize(
+    ("walk", "tasks", "contacts", "message"),
+    [
+        (Walk(), [], [], "^plan: a biped walks on two feet; there are 0 .declare cont"),
+        (Walk(), [], FEET[:1], r"^plan: a biped walks on two feet; there are 1 \(left"),
+        (
+            Walk(),
+            [],
+            [*FEET, SurfaceContact("base_link", name="seat", **SOLE)],
+            r"there are 3 \(.*\); name two with feet$",
+        ),
+        (Walk(feet=["left_foot", "rigt"]), [], FEET, "no contact 'rigt'.* to walk on"),
+        (
+            Walk(),
+            [],
+            [FEET[0], BallContact("right_sole_link", radius=0.1)],
+            "^plan: contact 'right_sole_link' is a ball; a biped walks on flat soles",
+        ),
+        (
+            Walk(),
+            [],
+            [FEET[0], replace(FEET[1], schedule=Schedule([(0, 9)]))],
+            "^contacts.right_foot: it has a schedule, but the plan switches it",
+        ),
+        (
+            Walk(),
+            [CenterOfMass(name="trunk")],
+            FEET,
+            "^tasks.trunk: it is a center_of_mass; the plan needs a frame_orientation",
+        ),
+        (
+            Walk(),
+            [FramePose("base_link", name="left_foot")],
+            FEET,
+            "^tasks.left_foot: its frame is 'base_link'; the foot's is 'left_sole",
+        ),
+        (
+            Walk(),
+            [CenterOfMass(schedule=Schedule([(0, 9)]))],
+            FEET,
+            "^tasks.center_of_mass: it has a schedule, but the plan says when",
+        ),
+        (Walk(trunk="base_lnk"), [], FEET, "^plan.trunk: no frame 'base_lnk'; did you"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_said(talos, walk, tasks, contacts, message):
+    with pytest.raises(HspControlError, match=message):
+        walk.parts(talos, tasks, contacts)
+
+
+def test_an_arm_cannot_walk():
+    with pytest.raises(
+        PlanError, match=r"^plan: panda cannot walk: it has no free-fly"
+    ):
+        Walk().parts(Robot.load("panda"), [], [])
+
+
+def test_a_velocity_is_given_once_and_has_three_numbers():
+    with pytest.raises(
+        PlanError, match=r"^Walk: give either velocity or turn, not both$"
+    ):
+        Walk(turn=0.1, velocity=Hold([0.1, 0.0, 0.0]))
+    with pytest.raises(PlanError, match=r"^Walk: velocity has dimension 2; needs 3"):
+        Walk(velocity=Hold([0.1, 0.0]))
+    stops = Stops(waypoints=[[0, 0, 0], [0.2, 0, 0.1]], times=[1.0, 2.0])
+    assert Walk(velocity=stops).velocity_at(3.0) == (0.2, 0.0, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (
+            ["plan.speed=1.2"],
+            "talos_walk.yaml:12: plan: 1.2 m/s with 0.75 s per step are strides of "
+            "0.9 m; the legs of talos reach 0.715 m. Walk slower",
+        ),
+        (
+            ["plan.crouch=0.9"],
+            "plan: crouch is 0.9 m; the centre of mass is only 0.877",
+        ),
+        (
+            ["start.joints={leg_left_5_joint: -0.5}"],
+            "plan: the sole of 'left_foot' does not lie on flat ground at the start",
+        ),
+        (
+            ["contacts.left_foot.width=0.2", "contacts.right_foot.width=0.2"],
+            "plan: the feet 'left_foot' and 'right_foot' stand 0.17 m apart; their "
+            "soles are 0.2 m wide and would meet",
+        ),
+    ],
+)
+def test_what_the_robot_cannot_do_is_said_before_it_runs(overrides, message):
+    with pytest.raises(HspControlError) as caught:
+        load_experiment(WALK, *overrides)
+    assert message in str(caught.value)
+
+
+def test_a_controller_of_other_parts_is_refused(talos):
+    experiment = load_experiment("whole_body/talos_circle")
+    with pytest.raises(PlanError, match="has no task 'left_foot': make it of the plan"):
+        Walk().begin(experiment.controller)
+
+
+def test_falls_are_found(talos):
+    q = talos.home()
+    start = talos.state(0.0, q, np.zeros(talos.nv))
+    feet = ("left_sole_link", "right_sole_link")
+    detector = FallDetector("base_link", feet, start)
+    detector.check(start)
+
+    def moved(step):
+        return talos.state(3.2, talos.integrate(q, step), np.zeros(talos.nv))
+
+    tilted, step = 0.9, np.zeros(talos.nv)
+    step[4] = tilted
+    with pytest.raises(FallError, match=r"t = 3.200 s base_link is tilted by 52° \(at"):
+        detector.check(moved(step))
+    step[4] = 0.7
+    detector.check(moved(step))
+    knees = np.zeros(talos.nv)
+    for side in ("left", "right"):
+        for joint, angle in ((3, -1.2), (4, 2.2), (5, -1.0)):
+            knees[talos.velocity_index(f"leg_{side}_{joint}_joint")] = angle
+    with pytest.raises(FallError, match=r"its centre of mass is at \d+ % of its first"):
+        detector.check(moved(knees))

@@ -1,0 +1,129 @@
+"""What a plan is told once a period: contact forces obey the balance of momentum."""
+
+import numpy as np
+import pytest
+
+from hsp_control import load_experiment
+from hsp_control.common.exceptions import FallError, SimulationError
+from hsp_control.control.compensation import Command
+from hsp_control.control.measurement import Measurement
+from hsp_control.plans import Plan, PlanParts, RunningPlan
+from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation import simulate
+from hsp_control.simulation.loops import sampled_loop
+from hsp_control.simulation.plants import (
+    IntegratedPlant,
+    RigidBody,
+    RigidContact,
+    RigidContacts,
+)
+from hsp_control.simulation.plants.sensors import PositionNoise
+
+pytest.importorskip("example_robot_data")
+FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
+
+
+class Listening(RunningPlan):
+    """Keeps what it is told; says that the robot falls at a time."""
+
+    def __init__(self, falls_at: float = np.inf) -> None:
+        self.heard: list[Measurement] = []
+        self.falls_at = falls_at
+
+    def start(self, state):
+        pass
+
+    def update(self, measured):
+        self.heard.append(measured._replace(wrenches=dict(measured.wrenches)))
+        if measured.t >= self.falls_at:
+            raise FallError(f"the robot falls: at t = {measured.t:.3f} s")
+
+    def log_channels(self):
+        return {}
+
+
+class Falls(Plan):
+    """A plan that only falls."""
+
+    def parts(self, robot, tasks, contacts):
+        return PlanParts(tuple(tasks), tuple(contacts))
+
+    def begin(self, controller):
+        return Listening(falls_at=0.02)
+
+
+def momentum_balance(plant, tolerance):
+    """Assert m c'' = Σ F - m g, with c'' from one period to the next."""
+    experiment = load_experiment("whole_body/solo12_trunk")
+    robot, h = experiment.robot, 0.001
+    plan, times = Listening(), np.arange(60) * h
+    loop = sampled_loop(
+        Command(experiment.controller), plant, 1, times, experiment.q0,
+        experiment.v0, plan,
+    )  # fmt: skip
+    for _ in loop:
+        pass
+    mass = sum(inertia.mass for inertia in robot.model.inertias)
+    rates = [
+        robot.state(each.t, each.q, each.v).centroidal.velocity.copy()
+        for each in plan.heard
+    ]
+    assert [each.t for each in plan.heard] == pytest.approx(times)
+    for k in range(20, 59):
+        total = sum(plan.heard[k].wrenches[foot][:3] for foot in FEET)
+        acceleration = (rates[k] - rates[k - 1]) / h
+        missing = total - mass * (acceleration + np.array([0.0, 0.0, 9.81]))
+        assert np.abs(missing).max() < tolerance * mass * 9.81
+    return plan
+
+
+def test_mujoco_measures_the_forces_of_the_period_that_ends():
+    pytest.importorskip("mujoco")
+    plan = momentum_balance(load_experiment("whole_body/solo12_trunk").plant, 1e-5)
+    up = np.array([0.0, 0.0, 1.0])
+    last = plan.heard[-1]
+    assert last.normal_force(FEET[0], up) == last.wrenches[FEET[0]][2] > 3.0
+    assert last.normal_force("base_link", up) is None
+    assert not any(wrench.any() for wrench in plan.heard[0].wrenches.values())
+
+
+def test_rigid_contacts_measure_them_too():
+    robot = load_experiment("whole_body/solo12_trunk").robot
+    part = RigidContacts([RigidContact(foot, kind="point") for foot in FEET])
+    rk4 = Rk4(step=0.001)
+    plant = part.build(robot, rk4)
+    # The force is that of the end of a period, the balance its mean.
+    momentum_balance(IntegratedPlant(plant, rk4), 2e-3)
+
+
+def test_sensors_of_other_things_leave_the_forces_as_they_are():
+    pytest.importorskip("mujoco")
+    experiment = load_experiment("whole_body/solo12_trunk")
+    part = experiment.scenario.plant
+    noisy = type(part)(contacts=part.contacts, sensors=[PositionNoise(1e-3)])
+    plant = noisy.build(experiment.robot, experiment.integrator)
+    plant.reset(0.0, experiment.q0, experiment.v0)
+    tau = np.zeros(experiment.robot.nv)
+    q, v = plant.advance(0.0, 0.001, tau)
+    theirs = plant.contact_wrenches(0.001, q, v, tau)
+    assert theirs.keys() == set(FEET)
+    for foot, wrench in plant.plant.contact_wrenches(0.001, q, v, tau).items():
+        assert theirs[foot] == pytest.approx(wrench)
+
+
+def test_a_plant_without_contacts_measures_none():
+    experiment = load_experiment("paper/2_rest")
+    plant = RigidBody().build(experiment.robot, experiment.integrator)
+    tau = np.zeros(experiment.robot.nv)
+    assert plant.contact_wrenches(0.0, experiment.q0, experiment.v0, tau) == {}
+
+
+def test_a_fall_is_said_and_stops_the_run():
+    experiment = load_experiment("paper/2_rest")
+    given = (experiment.controller, experiment.q0)
+    run = simulate(*given, duration=0.1, control_period=0.001, plan=Falls())
+    assert run.status == "stopped"
+    assert run.meta["message"] == "the robot falls: at t = 0.020 s"
+    assert run.t[-1] <= 0.02
+    with pytest.raises(SimulationError, match="a plan decides once a period"):
+        simulate(*given, duration=0.1, plan=Falls())
