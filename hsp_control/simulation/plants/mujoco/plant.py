@@ -219,8 +219,12 @@ class MujocoPlant(SampledPlant):
     def _wrenches(self, q: Array) -> dict[str, Array]:
         """Return each contact's wrench about its frame's origin, in world axes."""
         model, data = self.model, self.data
-        pin.framesForwardKinematics(self.robot.model, self._data, q)
+        pin.forwardKinematics(self.robot.model, self._data, q)
         wrenches = {contact.frame: np.zeros(6) for contact in self.contacts}
+        origins = {
+            name: pin.updateFramePlacement(self.robot.model, self._data, frame)
+            for name, frame in self._origins.items()
+        }
         local = np.zeros(6)
         for k, contact in enumerate(data.contact[: data.ncon]):
             self._mujoco.mj_contactForce(model, data, k, local)
@@ -229,9 +233,11 @@ class MujocoPlant(SampledPlant):
             name = self._geoms[contact.geom2 if sign > 0.0 else contact.geom1]
             rows = contact.frame.reshape(3, 3)
             force, moment = sign * rows.T @ local[:3], sign * rows.T @ local[3:]
-            origin = self._data.oMf[self._origins[name]].translation
+            # Ten times faster than np.cross.
+            (x, y, z), (a, b, c) = contact.pos - origins[name].translation, force
             wrenches[name][:3] += force
-            wrenches[name][3:] += moment + np.cross(contact.pos - origin, force)
+            wrenches[name][3:] += moment
+            wrenches[name][3:] += y * c - z * b, z * a - x * c, x * b - y * a
         return wrenches
 
     def _check_warnings(self, end: float) -> None:
