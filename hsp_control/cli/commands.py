@@ -342,16 +342,20 @@ def _summary(rollout: Rollout) -> Table:
     )
     for task in rollout.meta["tasks"]:
         error = np.linalg.norm(rollout[f"task.{task}.error"], axis=1)
-        rms = float(np.sqrt(np.mean(error**2)))
-        table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {error[-1]:.3g}")
+        tracked = error[np.isfinite(error)]  # a task may be off for a while
+        if not len(tracked):
+            table.add_row(f"task {task}", "was never active")
+            continue
+        rms = float(np.sqrt(np.mean(tracked**2)))
+        table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {tracked[-1]:.3g}")
     norm = rollout["null_space_norm"]
     table.add_row(
         "null space", f"|e_N| {norm[0]:.3g} at the start, {norm[-1]:.3g} at the end"
     )
     table.add_row(
         "det(J W⁻¹ Jᵀ)",
-        f"minimum {rollout['manipulability'].min():.4g}, "
-        f"smallest singular value {rollout['singular_values'].min():.3g}",
+        f"minimum {np.nanmin(rollout['manipulability']):.4g}, "
+        f"smallest singular value {np.nanmin(rollout['singular_values']):.3g}",
     )
     table.add_row("effort", f"largest {np.abs(rollout.tau).max():.3g}")
     for row in _limits(rollout):

@@ -325,7 +325,11 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
             )
         _check_heard(path, run)
         made = run.meta.get("changes") or []
-        config = with_recordings(run.config, run.meta.get("streams") or {})
+        config = with_recordings(
+            run.config,
+            run.meta.get("streams") or {},
+            run.meta.get("plan_streams") or [],
+        )
         return Document(config | {"changes": made}, {}, str(path))
     known = bundled_configs()
     if path.suffix in {".yaml", ".yml"} or _is_file(path):

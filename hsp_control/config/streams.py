@@ -35,7 +35,11 @@ def with_messages(scenario: Scenario, folder: Path, access: Access) -> Scenario:
                 _check_listening(stream, access)
             return stream.recorded_in(folder, lambda p: access.check(p, "recording"))
 
-    given = {"tasks": scenario.tasks, "changes": scenario.changes}
+    given = {
+        "tasks": scenario.tasks,
+        "changes": scenario.changes,
+        "plan": scenario.plan,
+    }
     found = with_parts_replaced(given, Streamed, located)
     return scenario if found is given else replace(scenario, **found)
 
@@ -51,7 +55,9 @@ def _check_listening(stream: Streamed, access: Access) -> None:
 
 
 def with_recordings(
-    config: Mapping[str, Any], heard: Mapping[str, Sequence[Any]]
+    config: Mapping[str, Any],
+    heard: Mapping[str, Sequence[Any]],
+    planned: Sequence[Any] = (),
 ) -> dict[str, Any]:
     """Return a log's configuration in which its streams repeat what they heard.
 
@@ -59,11 +65,13 @@ def with_recordings(
         config: The configuration's data.
         heard: For each task what its streams have taken, in their order; see
             `recorder.repeatable`.
+        planned: What the streams of the plan have taken.
     """
     repeated = deepcopy(dict(config))
-    for name, recordings in heard.items():
-        task = repeated.get("tasks", {}).get(name, {})
-        for stream, messages in zip(_streams(task), recordings, strict=False):
+    tasks = repeated.get("tasks", {})
+    told = [(tasks.get(name, {}), recordings) for name, recordings in heard.items()]
+    for part, recordings in (*told, (repeated.get("plan"), planned)):
+        for stream, messages in zip(_streams(part), recordings, strict=False):
             stream.pop("source", None)
             stream["messages"] = messages
     return repeated

@@ -1,6 +1,6 @@
 """The controller: from tasks, a null-space field and a metric to one effort."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
 from copy import deepcopy
 from dataclasses import replace
 from itertools import pairwise, takewhile
@@ -549,6 +549,12 @@ class Controller:
     def _stack_without(self, t: float, off: Set[int]) -> ActiveStack:
         """Return the stack of the contacts that are active now, without some tasks."""
         bearing = [each for each in self._setup.contacts if each.active(t)]
+        return self._stack_of(bearing, off)
+
+    def _stack_of(
+        self, bearing: Sequence[PlannedContact], off: Set[int]
+    ) -> ActiveStack:
+        """Return the stack of some contacts, without some tasks."""
         on = [each.key for each in self._setup.tasks if each.key not in off]
         # By identity: to compare values would cost more than the step.
         key = (*map(id, bearing), -1, *on, id(self._field))
@@ -567,6 +573,29 @@ class Controller:
             self._actuation.prepare(self._state, stack.resolution, stack.support)
             self._stacks[key] = stack
         return self._stacks[key]
+
+    def prepare(
+        self,
+        state: RobotState,
+        lifted: Collection[str] = (),
+        without: Collection[str] = (),
+    ) -> None:
+        """Compile the law for some contacts and tasks now, instead of in a step.
+
+        A plan that switches contacts asks for each combination that it will use.
+
+        Args:
+            state: A state in which these contacts bear.
+            lifted: The names of the contacts that do not bear.
+            without: The names of the tasks that do not count.
+        """
+        with self._lock:
+            if state is not self._state:
+                self._adopt(state)
+            setup = self._setup
+            bearing = [c for c in setup.contacts if c.contact.name not in lifted]
+            off = {each.key for each in setup.tasks if each.task.name in without}
+            self._stack_of(bearing, off).prepare()
 
     # -- changes while running --------------------------------------------------------
 

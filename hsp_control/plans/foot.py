@@ -100,8 +100,10 @@ class Foot:
         return float(np.ptp(self._corners[:, 1]))
 
     def stand(self, state: RobotState) -> None:
-        """Take where the foot is for where it stands."""
+        """Take where the foot is for where it stands; its references rest there."""
         here = state.frame(self.frame)
+        self.position.write(state.t, here.position)
+        self.orientation.write(state.t, here.rotation)
         yaw = float(np.arctan2(here.rotation[1, 0], here.rotation[0, 0]))
         origin = Footstep(float(here.position[0]), float(here.position[1]), yaw)
         self.place = self.place_of(origin)

@@ -63,7 +63,15 @@ class Plan(Part, ABC, family="plans", error=PlanError):
 
 
 class RunningPlan(ABC):
-    """What a plan became for one run of one controller."""
+    """What a plan became for one run of one controller.
+
+    Attributes:
+        plan: The plan, with the streams of this run.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        """Set the plan."""
+        self.plan = plan
 
     @abstractmethod
     def start(self, state: RobotState) -> None:

@@ -8,19 +8,19 @@ from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
-from hsp_control.declaration.quantities import Names, Number, Positive
+from hsp_control.declaration.quantities import Names, Positive
 from hsp_control.plans.composing import composed
 from hsp_control.plans.footsteps import Velocity
 from hsp_control.plans.legs import root_frame
-from hsp_control.plans.plan import Plan, PlanParts
+from hsp_control.plans.moving import MovingPlan
+from hsp_control.plans.plan import PlanParts
 from hsp_control.plans.trotting import RunningTrot
 from hsp_control.robot import Robot
 from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePosition, Gains, Task
 from hsp_control.tasks.frame_task import TrackingTask
-from hsp_control.trajectories import Trajectory
 
 
-class Trot(Plan, type="trot"):
+class Trot(MovingPlan, type="trot"):
     """A quadruped trots on flat ground: two diagonal feet swing while two bear.
 
     It stands, trots with the given velocity, and stands again when that is zero. A
@@ -32,15 +32,7 @@ class Trot(Plan, type="trot"):
     with the name of its contact.
     """
 
-    speed: Number = 0.0
-    """Speed forward [m/s]."""
     _: KW_ONLY
-    sideways: Number = 0.0
-    """Speed to the left [m/s]."""
-    turn: Number = 0.0
-    """Rate of turning to the left [rad/s]."""
-    velocity: Trajectory | None = None
-    """Instead of these three: all of them as functions of time [m/s, m/s, rad/s]."""
     until: Positive | None = None
     """When it slows down and stands [s]; by default it trots until the end."""
     feet: Names | None = None
@@ -58,26 +50,11 @@ class Trot(Plan, type="trot"):
     contact_force: Positive = 0.01
     """Normal force at which a swing foot counts as landed, in robot weights [-]."""
 
-    def __post_init__(self) -> None:
-        """Check that the velocity is given once."""
-        if self.velocity is None:
-            return
-        for name in ("speed", "sideways", "turn"):
-            if getattr(self, name):
-                raise PlanError(f"give either velocity or {name}, not both")
-        if not self.velocity.relative and self.velocity.dimension != 3:
-            raise PlanError(
-                f"velocity has dimension {self.velocity.dimension}; needs 3: forward, "
-                "to the left, turning"
-            )
-
     def velocity_at(self, t: float) -> Velocity:
-        """Return the velocity that is wanted at time t [s]."""
+        """Return the velocity that is wanted at time t [s]; zero at the end."""
         if self.until is not None and t >= self.until:
             return Velocity(0.0, 0.0, 0.0)
-        if self.velocity is None:
-            return Velocity(self.speed, self.sideways, self.turn)
-        return Velocity(*self.velocity.sample(t).position.tolist())
+        return super().velocity_at(t)
 
     def parts(
         self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact]
@@ -110,7 +87,7 @@ class Trot(Plan, type="trot"):
 
     def begin(self, controller: Controller) -> RunningTrot:
         """Return what trots; see `Plan.begin`."""
-        return RunningTrot(self, controller, self._feet(controller.contacts))
+        return RunningTrot(self.begun(), controller, self._feet(controller.contacts))
 
     def _feet(self, contacts: Sequence[Contact]) -> tuple[str, ...]:
         """Return the names of the four contacts that trot.

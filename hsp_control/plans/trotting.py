@@ -105,7 +105,9 @@ class RunningTrot(RunningPlan):
         Raises:
             PlanError: If the controller is made of other parts.
         """
+        super().__init__(trot)
         self.trot = trot
+        self._controller = controller
         self._state = RobotState(controller.robot)
         tasks = {task.name: task for task in controller.tasks}
         fed = [
@@ -154,6 +156,13 @@ class RunningTrot(RunningPlan):
         self._velocity = Velocity(0.0, 0.0, 0.0)
         self._last, self._since = state.t, state.t
         self._mode, self._swings, self._idle = "standing", 0, 0
+        names = [foot.name for foot in self._feet]
+        self._controller.prepare(state, without=names)
+        for pair in self._pairs:
+            for aloft in (pair, pair[:1], pair[1:]):  # one may land before the other
+                lifted = [foot.name for foot in aloft]
+                down = [name for name in names if name not in lifted]
+                self._controller.prepare(state, lifted=lifted, without=down)
         self._begun = True
 
     def _diagonals(self) -> tuple[list[PointFoot], list[PointFoot]]:

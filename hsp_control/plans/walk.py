@@ -13,25 +13,23 @@ from hsp_control.declaration.quantities import (
     Fraction,
     Names,
     NonNegative,
-    Number,
     Positive,
     PositiveCount,
 )
 from hsp_control.plans.composing import composed
-from hsp_control.plans.footsteps import Velocity
 from hsp_control.plans.legs import root_frame
-from hsp_control.plans.plan import Plan, PlanParts
+from hsp_control.plans.moving import MovingPlan
+from hsp_control.plans.plan import PlanParts
 from hsp_control.plans.walking import RunningWalk
 from hsp_control.robot import Robot
 from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePose, Gains, Task
 from hsp_control.tasks.frame_task import TrackingTask
-from hsp_control.trajectories import Trajectory
 
 BODY, TRUNK = "center_of_mass", "trunk"
 """The names of the tasks that every walk has, besides one for each foot."""
 
 
-class Walk(Plan, type="walk"):
+class Walk(MovingPlan, type="walk"):
     """A biped walks on flat ground: a plan of the divergent component of motion.
 
     It stands, walks with the given velocity, and stands again when that is zero or the
@@ -44,16 +42,7 @@ class Walk(Plan, type="walk"):
     name of its contact.
     """
 
-    speed: Number = 0.0
-    """Speed forward [m/s]."""
     _: KW_ONLY
-    sideways: Number = 0.0
-    """Speed to the left [m/s]."""
-    turn: Number = 0.0
-    """Rate of turning to the left [rad/s]."""
-    velocity: Trajectory | None = None
-    """Instead of these three: all of them as functions of time, for example a stream
-    [m/s, m/s, rad/s]."""
     steps: PositiveCount | None = None
     """How many steps it takes before it slows down and stands [-]; by default it walks
     until the end."""
@@ -79,25 +68,6 @@ class Walk(Plan, type="walk"):
     """Whether a push moves the next step [-]."""
     contact_force: Positive = 0.03
     """Normal force at which a swing foot counts as landed, in robot weights [-]."""
-
-    def __post_init__(self) -> None:
-        """Check that the velocity is given once."""
-        if self.velocity is None:
-            return
-        for name in ("speed", "sideways", "turn"):
-            if getattr(self, name):
-                raise PlanError(f"give either velocity or {name}, not both")
-        if not self.velocity.relative and self.velocity.dimension != 3:
-            raise PlanError(
-                f"velocity has dimension {self.velocity.dimension}; needs 3: forward, "
-                "to the left, turning"
-            )
-
-    def velocity_at(self, t: float) -> Velocity:
-        """Return the velocity that is wanted at time t [s]."""
-        if self.velocity is None:
-            return Velocity(self.speed, self.sideways, self.turn)
-        return Velocity(*self.velocity.sample(t).position.tolist())
 
     def parts(
         self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact]
@@ -134,7 +104,7 @@ class Walk(Plan, type="walk"):
     def begin(self, controller: Controller) -> RunningWalk:
         """Return what walks; see `Plan.begin`."""
         names = self._feet(controller.contacts)
-        return RunningWalk(self, controller, names, BODY, TRUNK)
+        return RunningWalk(self.begun(), controller, names, BODY, TRUNK)
 
     def _feet(self, contacts: Sequence[Contact]) -> tuple[str, ...]:
         """Return the names of the two contacts that walk.

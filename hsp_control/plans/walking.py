@@ -81,7 +81,9 @@ class RunningWalk(RunningPlan):
         Raises:
             PlanError: If the controller is made of other parts.
         """
+        super().__init__(walk)
         self.walk = walk
+        self._controller = controller
         self._state = RobotState(controller.robot)
         tasks = {task.name: task for task in controller.tasks}
         missing = [name for name in (body, trunk, *feet) if name not in tasks]
@@ -179,6 +181,10 @@ class RunningWalk(RunningPlan):
         self._dcm = self._dcm_wanted = self._point = self._middle()
         self._target = self._feet[1.0].place
         self._stand(t)
+        left, right = (foot.name for foot in feet)
+        self._controller.prepare(state, without=(left, right))
+        self._controller.prepare(state, lifted=(left,), without=(right,))
+        self._controller.prepare(state, lifted=(right,), without=(left,))
         self._begun = True
 
     # -- from phase to phase ----------------------------------------------------------
@@ -222,6 +228,7 @@ class RunningWalk(RunningPlan):
         foot.contact.throw(False, t)
         foot.task.throw(True, t)
         self._mode = "single"
+        self._hull = self._feet[-self._side].corners(walk.margin)
         here = self._state.frame(foot.frame)
         self._swing = Swing(
             t,
@@ -349,7 +356,7 @@ class RunningWalk(RunningPlan):
         point = phase.point(since)
         displaced = (1.0 + gain / frequency) * (self._dcm - wanted)
         self._dcm_wanted = wanted
-        self._point = nearest_inside(self._hull_now(), point + displaced)
+        self._point = nearest_inside(self._hull, point + displaced)
         height, yaw = self._sinking.sample(t), self._yaw.sample(t)
         acceleration = frequency**2 * (position[:2] - self._point)
         self._body.write(
@@ -369,12 +376,6 @@ class RunningWalk(RunningPlan):
             foot = self._feet[self._side]
             foot.position.write(t, *self._swing.position(t))
             foot.orientation.write(t, *self._swing.orientation(t))
-
-    def _hull_now(self) -> Array:
-        """Return where the repellent point may be, corners of shape (m, 2) [m]."""
-        if self._mode == "single":
-            return self._feet[-self._side].corners(self.walk.margin)
-        return self._hull
 
     def _soles(self) -> Array:
         corners = [each.corners(self.walk.margin) for each in self._feet.values()]

@@ -24,6 +24,7 @@ from hsp_control.geometry.shapes import shape_to_log
 from hsp_control.null_space.fields import NullSpaceField, PointDistance
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import FixedMetric, Metric
+from hsp_control.plans import RunningPlan
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.log_file import MAX_SIZE
 from hsp_control.simulation.rollout import FORMAT, Rollout, complete_columns
@@ -44,18 +45,26 @@ _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 class Recorder:
     """Columns for a known number of rows; an incomplete row is never returned."""
 
-    def __init__(self, controller: Controller, scene: Scene, rows: int) -> None:
+    def __init__(
+        self,
+        controller: Controller,
+        scene: Scene,
+        rows: int,
+        plan: RunningPlan | None = None,
+    ) -> None:
         """Allocate all columns.
 
         Args:
             controller: The controller; its tasks and fields may change during the run.
             scene: Obstacles to log.
             rows: The largest number of rows.
+            plan: What the robot follows; its streams are recorded.
 
         Raises:
             SimulationError: If the log would be too large to be loaded.
         """
         self._controller = controller
+        self._plan = plan
         self._scene = scene
         self._rows = 0
         self._capacity = rows
@@ -354,7 +363,8 @@ class Recorder:
     def repeatable(self) -> dict[str, Any]:
         """Return what came during the run, as data, so that the run can be repeated.
 
-        The changes that were made, and for each task what its streams have taken.
+        The changes that were made, and what the streams of each task and of the plan
+        have taken.
         """
         streams = {
             name: list(parts_within(task, Streamed))
@@ -364,6 +374,11 @@ class Recorder:
         heard = {name: [list(s.record) for s in each] for name, each in streams.items()}
         lost = sum(s.unrecorded for each in streams.values() for s in each)
         found = _changes(self._controller) | ({"streams": heard} if heard else {})
+        if self._plan is not None:
+            planned = list(parts_within(self._plan.plan, Streamed))
+            lost += sum(stream.unrecorded for stream in planned)
+            if planned:
+                found["plan_streams"] = [list(stream.record) for stream in planned]
         return found | ({"streams_lost": lost} if lost else {})
 
     def meta(self, status: str, message: str, **meta: Any) -> dict[str, Any]:

@@ -113,18 +113,18 @@ def simulate(
             "a plan decides once a period: it needs a control_period [s], for example "
             "0.001"
         )
+    running = None if plan is None else plan.begin(controller)
     if isinstance(plant, ContinuousPlant):
         loop = continuous_loop(controller, plant, integrator, times, q, v)
     elif isinstance(plant, SampledPlant) and periods:
         command = Command(controller, compensation)
-        running = None if plan is None else plan.begin(controller)
         loop = sampled_loop(command, plant, periods, times, q, v, running)
     else:
         raise SimulationError(
             f"{type(plant).__name__} holds the effort during a period: it needs a "
             "control_period [s], for example 0.001"
         )
-    recorder = Recorder(controller, scene or controller.scene, rows)
+    recorder = Recorder(controller, scene or controller.scene, rows, running)
     description = {**plant.describe(), **differing_bodies(plant, robot)}
     meta = {"plant": description, **(meta or {})}
 

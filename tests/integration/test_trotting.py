@@ -1,11 +1,13 @@
 """Solo takes some diagonal steps and stands: on MuJoCo, as its configuration says."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from hsp_control import Rollout, load_experiment
+from hsp_control import Experiment, Rollout, Stream, TargetPosture, load_experiment
+from hsp_control.plans import Trot
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
@@ -44,3 +46,32 @@ def test_its_velocity_changes_no_faster_than_it_may():
     rates = np.diff(run["plan.velocity"], axis=0) / np.diff(run.t)[:, None]
     assert np.abs(rates).max() < 0.5 * (1.0 + 1e-6)
     assert run["plan.velocity"][:, 0].max() == pytest.approx(0.3, abs=0.12)
+
+
+def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
+    velocity = Stream(acceleration=2.0)
+    given = load_experiment("whole_body/solo12_trot").scenario
+    experiment = Experiment(
+        given.robot,
+        [],
+        TargetPosture(),
+        start=given.start,
+        contacts=list(given.contacts.values()),
+        limits=given.limits,
+        plan=Trot(velocity=velocity),
+        plant=given.plant,
+        simulation=replace(given.simulation, duration=1.5),
+    )
+
+    def drive(recorder):
+        if recorder.count == 20:
+            velocity.send([0.2, 0.0, 0.0])
+        if recorder.count == 90:
+            velocity.send([0.0, 0.0, 0.0])
+
+    run = experiment.run(on_row=drive)
+    assert (run["plan.phase"][:20] == 0).all()  # it stands until it is told
+    assert run["plan.velocity"].max() > 0.1
+    again = load_experiment(run.save(tmp_path / "trot.npz")).run()
+    for name in run.columns:
+        assert np.array_equal(run[name], again[name], equal_nan=True), name

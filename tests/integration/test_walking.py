@@ -1,11 +1,13 @@
 """Talos takes two steps and stands: on MuJoCo, as its configuration says."""
 
 from functools import cache
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from hsp_control import Rollout, load_experiment
+from hsp_control.control.active_stack import ActiveStack
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
@@ -95,6 +97,14 @@ def test_the_null_space_error_decays_within_each_phase():
         assert (e_N < 1.1 * decay + 0.05).all()
         compared += 1
     assert compared >= 2
+
+
+def test_a_switch_compiles_nothing():
+    """All combinations of contacts are compiled before the run, as they are known."""
+    experiment = load_experiment("whole_body/talos_walk", "simulation.duration=1.2")
+    with patch.object(ActiveStack, "__init__", side_effect=AssertionError):
+        run = experiment.run()
+    assert run["plan.phase"][-1] == 2
 
 
 def test_the_same_run_again_is_the_same_to_the_bit(tmp_path):

@@ -27,6 +27,7 @@ class Listening(RunningPlan):
     """Keeps what it is told; says that the robot falls at a time."""
 
     def __init__(self, falls_at: float = np.inf) -> None:
+        super().__init__(Falls())
         self.heard: list[Measurement] = []
         self.falls_at = falls_at
 

@@ -220,9 +220,10 @@ class MujocoPlant(SampledPlant):
 
     def _wrenches(self, q: Array) -> dict[str, Array]:
         """Return each contact's wrench about its frame's origin, in world axes."""
-        pin.framesForwardKinematics(self.robot.model, self._data, q)
+        model, data = self.robot.model, self._data
+        pin.forwardKinematics(model, data, q)
         origins = {
-            name: self._data.oMf[index].translation
-            for name, index in self._origins.items()
+            name: pin.updateFramePlacement(model, data, frame).translation
+            for name, frame in self._origins.items()
         }
         return contact_wrenches(self.model, self.data, self._geoms, origins)
