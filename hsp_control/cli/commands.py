@@ -20,9 +20,10 @@ from hsp_control.cli.consoles import errors as _errors
 from hsp_control.cli.consoles import message_of, renamed_keys_printed
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import DeferredInterrupt
+from hsp_control.cli.loading import load
 from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.common.exceptions import LogError, SimulationError
-from hsp_control.config import Experiment, json_schema, load_experiment
+from hsp_control.config import Experiment, json_schema
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import example_robots
 from hsp_control.simulation import Rollout
@@ -30,14 +31,6 @@ from hsp_control.simulation.recorder import Recorder
 
 if TYPE_CHECKING:
     from hsp_control.cli.screen import Screen
-
-
-def load(options: argparse.Namespace) -> Experiment:
-    """Return the experiment of a command's configuration."""
-    strict = options.strict or bool(options.allow)
-    return load_experiment(
-        options.config, *options.overrides, strict=strict, allow=options.allow
-    )
 
 
 @renamed_keys_printed()
@@ -252,6 +245,7 @@ def live(options: argparse.Namespace) -> int:
     return lives.live(options)
 
 
+@renamed_keys_printed()
 def franka_box(options: argparse.Namespace) -> int:
     """Be a Franka's control box, without a robot."""
     from hsp_control.cli import franka_box as boxes

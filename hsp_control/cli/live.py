@@ -14,11 +14,12 @@ from rich.table import Table
 
 from hsp_control.cli.consoles import out
 from hsp_control.cli.live_experiment import live_period, simulated_robot
+from hsp_control.cli.loading import load
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.cli.robot_start import begun_where_it_is
 from hsp_control.cli.steering import let_steer, steering_page
 from hsp_control.common.exceptions import LiveError, LogError
-from hsp_control.config import Experiment, load_experiment
+from hsp_control.config import Experiment
 from hsp_control.control.compensation import Command
 from hsp_control.live import (
     Faults,
@@ -43,12 +44,17 @@ _DRY_RUN = 0.5
 def live(options: argparse.Namespace) -> int:
     """Run a loop in real time, print its response times and why it ended."""
     faults, kill = Faults.parse(options.faults), _parse_kill(options.kill)
-    experiment = load_experiment(options.config, *options.overrides)
+    experiment = load(options)
     check_fixed(experiment.robot)
     simulation = experiment.scenario.simulation
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:
         raise LiveError(f"--duration {duration:g}; must be positive")
+    if options.robot is not None and (options.faults or options.kill):
+        raise LiveError(
+            "--faults and --kill are for the simulated robot: leave them out with "
+            "--robot"
+        )
     if options.robot is not None and options.steer == "simulated":
         raise LiveError(
             "--steer: a page that moves a real robot needs a dead-man's key; say "
@@ -67,6 +73,19 @@ def live(options: argparse.Namespace) -> int:
     }
     command = Command(experiment.controller, experiment.compensation)
     on_period: list[Callable[[float], object]] = []
+
+    def run(hardware: Hardware) -> LoopReport:
+        return run_loop(
+            command,
+            hardware,
+            duration=None if duration == inf else duration,
+            log=loop_log,
+            meta=_meta(experiment),
+            priority=options.priority,
+            on_period=_in_turn(on_period),
+            **options_of_loop,
+        )
+
     with stop_signals(requests, takes_over=True), ExitStack() as stack:
         page = stack.enter_context(steering_page(options, experiment, loop_log))
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
@@ -92,16 +111,7 @@ def live(options: argparse.Namespace) -> int:
         if page is not None:
             on_period.append(let_steer(page, experiment, requests))
         if hardware is not None:
-            report = run_loop(
-                command,
-                hardware,
-                duration=None if duration == inf else duration,
-                log=loop_log,
-                meta=_meta(experiment),
-                priority=options.priority,
-                on_period=_in_turn(on_period),
-                **options_of_loop,
-            )
+            report = run(hardware)
             out.print(_times(report, experiment))
             out.print(f"The loop: {report.reason}")
             fault = getattr(hardware, "fault", None)
@@ -115,16 +125,7 @@ def live(options: argparse.Namespace) -> int:
         ) as robot:
             if kill is not None:
                 on_period.append(_kill_action(kill, robot))
-            report = run_loop(
-                command,
-                robot.hardware,
-                duration=None if duration == inf else duration,
-                log=loop_log,
-                meta=_meta(experiment),
-                priority=options.priority,
-                on_period=_in_turn(on_period),
-                **options_of_loop,
-            )
+            report = run(robot.hardware)
             robot_report = robot.wait()
     link = robot.hardware.link
     counts = {**link.counts, "lost": link.lost}

@@ -4,9 +4,10 @@ import argparse
 
 import numpy as np
 
+from hsp_control.cli.loading import load
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
-from hsp_control.config import Experiment, load_experiment
+from hsp_control.config import Experiment
 
 _FARTHEST = 0.2
 """Largest distance of a joint from the configuration's start [rad or m].
@@ -39,4 +40,4 @@ def begun_where_it_is(
             f"configuration's start; {_FARTHEST:g} is allowed. Move the robot there, "
             f"or begin where it is, after a rehearsal: --set '{start}'"
         )
-    return load_experiment(options.config, *options.overrides, start)
+    return load(options, start)

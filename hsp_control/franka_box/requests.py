@@ -23,7 +23,7 @@ from hsp_control.franka_box.wire import (
 
 Say = Callable[[str], object]
 _TOLERANCE = 1e-5
-"""How far a matrix may be from a rotation, as in libfranka's ``checkMatrix``."""
+"""How far below zero a moment of inertia may be, by rounding [kg·m²]."""
 
 
 class Requests:

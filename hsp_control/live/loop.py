@@ -1,7 +1,7 @@
 """Run a live loop: check, compile and allocate, then control the robot."""
 
 from collections.abc import Callable, Mapping
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -117,10 +117,7 @@ def run_loop(
                 settings,
                 end,
             )
-            real_time = (
-                nullcontext() if priority is None else real_time_priority(priority)
-            )
-            with real_time, no_garbage_collection():
+            with real_time_priority(priority), no_garbage_collection():
                 loop.run(on_period)
         except BaseException:
             with suppress(Exception):  # the first error is what matters

@@ -1,6 +1,6 @@
 """The result of a live run."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -42,7 +42,7 @@ class LoopReport:
     t: float
     deadlines: Deadlines
     error: Exception | None = None
-    log: Path | None = field(default=None)
+    log: Path | None = None
 
     @property
     def status(self) -> str:

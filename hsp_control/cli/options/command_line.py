@@ -149,4 +149,6 @@ def _command(
     name: str,
     text: str,
 ) -> argparse.ArgumentParser:
-    return commands.add_parser(name, help=text, description=text.capitalize() + ".")
+    return commands.add_parser(
+        name, help=text, description=text[:1].upper() + text[1:] + "."
+    )

@@ -147,7 +147,9 @@ def explained(kind: str, text: str) -> str:
     """
     first, *rest = (line.strip() for line in text.strip().splitlines() or [""])
     plain = first.removeprefix("libfranka: ").removeprefix("libfranka robot: ")
-    names = [name for name in re.findall(r"\w+", first) if name in REFLEXES]
+    # A message spells two of them otherwise: tau_J_..., and ..._invalid_frame_flag.
+    words = [w.lower().removesuffix("_flag") for w in re.findall(r"\w+", first)]
+    names = [word for word in words if word in REFLEXES]
     if names:
         return "; ".join([about(names), *filter(None, rest)])
     for part, advice in _CAUSES.items():

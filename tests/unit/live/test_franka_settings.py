@@ -9,6 +9,7 @@ import pytest
 from places import ROOT
 
 from hsp_control.common.exceptions import LiveError
+from hsp_control.franka_box.wire import Error
 from hsp_control.live import backends
 from hsp_control.live.franka import FrankaSettings, Load, connect
 from hsp_control.live.franka.reflexes import MODES, REFLEXES, explained
@@ -87,6 +88,13 @@ def test_an_exception_is_told_with_its_names() -> None:
     assert "stop button was pressed" in explained("ControlException", stopped)
     other = explained("ValueError", "something new\nand more")
     assert other == "ValueError: something new; and more"
+
+
+@pytest.mark.parametrize("error", Error, ids=lambda error: error.spelling)
+def test_every_error_is_explained_as_its_message_spells_it(error: Error) -> None:
+    text = f'libfranka: motion aborted by reflex! ["{error.spelling}"]'
+    what = REFLEXES[error.spelling.lower().removesuffix("_flag")][0]
+    assert what in explained("ControlException", text)
 
 
 def test_the_package_offers_the_arm() -> None:
