@@ -15,6 +15,7 @@ from hsp_control.control.compensation import Command
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.tasks import FramePose, FramePosition, Gains, Task
+from hsp_control.tasks.axes import axis_indices
 from hsp_control.trajectories import ComposedPose, Stream, StreamPose
 
 _JUMP = 1.5
@@ -57,7 +58,6 @@ class HandControl:
         """
         settings, document = read_settings(source)
         self.robot, self.frame, self.axes = robot, frame, axes
-        self._indices = ["xyz".index(axis) for axis in axes or ""]
         self._stream: Stream | StreamPose | None = None
         self._point, self._rotation = HeldPoint(), HeldRotation()
         with document.at():
@@ -73,6 +73,7 @@ class HandControl:
                 scene=settings.scene,
             )
             self.command = Command(controller, settings.compensation)
+        self._indices = axis_indices(axes or "")  # now that the task has checked them
         self._strongest = robot.model.upperEffortLimit
         self._expected, self._period = nan, nan
 

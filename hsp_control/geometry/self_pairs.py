@@ -1,7 +1,6 @@
 """Pairs of a robot's own links that are checked for self-collision."""
 
 from collections.abc import Sequence
-from xml.etree import ElementTree
 
 from hsp_control.common.exceptions import ModelError
 from hsp_control.geometry.links import LinkShape, part_of
@@ -56,10 +55,10 @@ def _disabled(robot: Robot) -> set[frozenset[str]]:
             continue
         try:
             srdf = read_xml(part.source.srdf)
-        except (XmlError, ElementTree.ParseError, OSError) as error:
-            raise ModelError(
-                f"{part.source.srdf}: cannot read the SRDF: {error}"
-            ) from error
+        except XmlError as error:
+            raise ModelError(error.within(part.source.srdf)) from None
+        except OSError as error:
+            raise ModelError(f"{part.source.srdf}: {error.strerror}") from error
         for element in srdf.iter("disable_collisions"):
             links = (element.get("link1", ""), element.get("link2", ""))
             disabled.add(frozenset(part.prefix + link for link in links))

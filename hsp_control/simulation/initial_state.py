@@ -93,9 +93,11 @@ class InitialState(Part, error=ConfigurationError):
             if self.is_found:
                 search = posture_search(robot, tasks, scene)
                 if self.pose is None:
-                    return search.find(least).q
-                return search.find_with(self.pose.target(robot), least).q
-            q = self._configuration(robot)
+                    q = search.find(least).q
+                else:
+                    q = search.find_with(self.pose.target(robot), least).q
+            else:
+                q = self._configuration(robot)
         if self.ground is None:
             return q
         return _put_on_ground(self.ground, list(contacts), robot, q)

@@ -11,7 +11,7 @@ import pinocchio as pin
 from hsp_control.common.exceptions import ModelError
 from hsp_control.robot import Robot
 from hsp_control.robot.description.urdf_checks import read_urdf
-from hsp_control.robot.description.xml_files import parse_xml
+from hsp_control.robot.description.xml_files import XmlError, parse_xml
 
 _FLANGE = "link8"
 _CARRIED = "carried"
@@ -85,8 +85,8 @@ def calibrated(urdf: str, carried: dict[str, Any], like: Robot) -> str:
 def _parsed(urdf: str) -> Element:
     try:
         return parse_xml(urdf.encode())
-    except (ElementTree.ParseError, ValueError) as error:
-        raise ModelError(f"the robot's description: {error}") from None
+    except XmlError as error:
+        raise ModelError(error.within("the robot's description")) from None
 
 
 def _text(top: Element) -> str:

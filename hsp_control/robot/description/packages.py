@@ -3,7 +3,6 @@
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from xml.etree import ElementTree
 
 from hsp_control.robot.description.xml_files import XmlError, read_xml
 
@@ -36,5 +35,5 @@ def _declared_name(folder: Path) -> str | None:
     """Return the name in a folder's package.xml: a clone may be called otherwise."""
     try:
         return read_xml(folder / "package.xml").findtext("name")
-    except (OSError, XmlError, ElementTree.ParseError, LookupError, ValueError):
+    except (OSError, ValueError, XmlError):  # none, or a path that can be none
         return None

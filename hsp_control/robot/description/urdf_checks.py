@@ -7,7 +7,6 @@ the size. Faults that they detect and report themselves are left to them.
 import math
 from collections import Counter
 from collections.abc import Iterator
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from hsp_control.common.exceptions import ModelError, RobotNotFoundError
@@ -87,18 +86,10 @@ def parse_urdf(source: RobotSource) -> Element:
             robot = read_xml(urdf)
         else:
             robot = parse_xml(source.expanded.encode())
-    except ElementTree.ParseError as error:
-        line, column = error.position
-        raise ModelError(
-            f"{urdf}:{line}:{column + 1}: malformed XML: {error}"
-        ) from error
     except XmlError as error:
-        where = f"{urdf}:{error.line}" if error.line else f"{urdf}"
-        raise ModelError(f"{where}: {error.message}") from None
+        raise ModelError(error.within(urdf)) from None
     except OSError as error:
         raise RobotNotFoundError(f"{urdf}: {error.strerror}") from error
-    except (LookupError, ValueError) as error:  # an unknown encoding
-        raise ModelError(f"{urdf}: malformed XML: {error}") from error
     if robot.tag != "robot":
         hint = "; give an MJCF as mjcf, not as name" if robot.tag == "mujoco" else ""
         raise ModelError(

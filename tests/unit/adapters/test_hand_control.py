@@ -16,6 +16,7 @@ from hsp_control.common.exceptions import (
     ConfigError,
     FieldError,
     FrameNotFoundError,
+    HspControlError,
     ModelError,
     NonFiniteError,
     SceneError,
@@ -84,6 +85,12 @@ def test_by_default_the_posture_obeys_the_simulator_s_equation(
     hand.effort(0.0, q, v, PERIOD)
     wanted = -2.0 * np.sqrt(10.0) * 0.5 * small - 10.0 * small
     assert free @ hand.command.output.acceleration == pytest.approx(wanted, rel=1e-3)
+
+
+@pytest.mark.parametrize("axes", ["", "xw", "xx"])
+def test_axes_that_are_none(robot: hsp.Robot, axes: str) -> None:
+    with pytest.raises(HspControlError, match="axes"):
+        HandControl(robot, "panda_tcp", gains=GAINS, axes=axes)
 
 
 def test_efforts_are_clipped_and_the_observer_knows(robot: hsp.Robot) -> None:

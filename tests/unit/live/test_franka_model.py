@@ -129,5 +129,10 @@ def test_another_robot_is_no_franka() -> None:
         own_model("<robot name='a'><link name='b'/></robot>", said(), [0.0] * 16)
     with pytest.raises(ModelError, match="3 moving joints; needs seven"):
         calibrated(arm_alone(), said(), Robot.load("planar3r"))
-    with pytest.raises(ModelError, match="the robot's description"):
-        own_model("<robot", said(), [0.0] * 16)
+    for text, reason in (
+        ("<robot", r"the robot's description:1:\d: malformed XML"),
+        ("<!DOCTYPE robot><robot/>", "the robot's description:1: a document type"),
+        ("<?xml version='1.0' encoding='ebcdic-9'?><robot/>", "unknown encoding"),
+    ):
+        with pytest.raises(ModelError, match=reason):
+            own_model(text, said(), [0.0] * 16)

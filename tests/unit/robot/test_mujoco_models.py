@@ -21,6 +21,7 @@ from hsp_control.common.exceptions import (
     ModelError,
 )
 from hsp_control.robot import JointFriction, MujocoCoordinates, ToolFrame
+from hsp_control.robot.description.mujoco import source
 from hsp_control.robot.description.mujoco.names import Names
 
 mujoco = pytest.importorskip("mujoco")
@@ -337,6 +338,12 @@ OMISSIONS = [
 ]  # fmt: skip
 
 
+@pytest.fixture
+def _nothing_said() -> None:
+    source._warn.cache_clear()
+
+
+@pytest.mark.usefixtures("_nothing_said")
 @pytest.mark.parametrize(("text", "sentence"), OMISSIONS)
 def test_what_the_robot_lacks_is_named(
     text: str, sentence: str, caplog: pytest.LogCaptureFixture
@@ -345,6 +352,9 @@ def test_what_the_robot_lacks_is_named(
     assert len(robot.source.omitted) == 1
     assert robot.source.omitted[0].startswith(sentence)
     assert sentence in caplog.text
+    caplog.clear()
+    assert Robot.from_mujoco(compiled(text)).source.omitted == robot.source.omitted
+    assert not caplog.records  # once is enough
 
 
 def test_a_servo_of_an_orientation_acts_on_its_ball_joint() -> None:

@@ -4,7 +4,6 @@ import logging
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
@@ -68,18 +67,10 @@ def compile_mjcf(path: Path, access: Access) -> Any:
 def _read(path: Path) -> Element:
     try:
         return read_xml(path)
-    except ElementTree.ParseError as error:
-        line, column = error.position
-        raise ModelError(
-            f"{path}:{line}:{column + 1}: malformed XML: {error}"
-        ) from error
     except XmlError as error:
-        where = f"{path}:{error.line}" if error.line else f"{path}"
-        raise ModelError(f"{where}: {error.message}") from None
+        raise ModelError(error.within(path)) from None
     except OSError as error:
         raise RobotNotFoundError(f"{path}: {error.strerror}") from error
-    except (LookupError, ValueError) as error:  # an unknown encoding
-        raise ModelError(f"{path}: malformed XML: {error}") from error
 
 
 def _check_access(path: Path, top: Element, access: Access) -> None:

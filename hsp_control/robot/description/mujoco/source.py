@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -76,8 +77,8 @@ def load_selection(
     name = model.name if selection.root else _name_of_scene(selection, file)
     floating = any(joint.shortname() == "JointModelFreeFlyer" for joint in model.joints)
     omitted = omissions(selection)
-    if omitted:
-        _log.warning("%s, as MuJoCo has it, but without: %s", name, "; ".join(omitted))
+    for sentence in omitted:
+        _warn(name, sentence)
     source = RobotSource(
         name=name,
         urdf=file or Path(name),
@@ -91,6 +92,12 @@ def load_selection(
         omitted=omitted,
     )
     return completed(model, source, tool_frames, gravity), source
+
+
+@cache
+def _warn(robot: str, sentence: str) -> None:
+    """Log what a robot lacks, once: simulators make the same robot at every reset."""
+    _log.warning("%s, as MuJoCo has it, but without: %s", robot, sentence)
 
 
 def _locked(selection: Selection) -> dict[str, float]:
