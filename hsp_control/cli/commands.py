@@ -340,8 +340,8 @@ def _summary(rollout: Rollout) -> Table:
         if not len(tracked):
             table.add_row(f"task {task}", "was never active")
             continue
-        rms = float(np.sqrt(np.mean(tracked**2)))
-        table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {tracked[-1]:.3g}")
+        rms, last = float(np.sqrt(np.mean(tracked**2))), tracked[-1]
+        table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {last:.3g}")
     norm = rollout["null_space_norm"]
     table.add_row(
         "null space", f"|e_N| {norm[0]:.3g} at the start, {norm[-1]:.3g} at the end"

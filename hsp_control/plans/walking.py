@@ -181,10 +181,10 @@ class RunningWalk(RunningPlan):
         self._dcm = self._dcm_wanted = self._point = self._middle()
         self._target = self._feet[1.0].place
         self._stand(t)
-        left, right = (foot.name for foot in feet)
-        self._controller.prepare(state, without=(left, right))
-        self._controller.prepare(state, lifted=(left,), without=(right,))
-        self._controller.prepare(state, lifted=(right,), without=(left,))
+        first, second = feet[0].name, feet[1].name
+        self._controller.prepare(state, without=(first, second))
+        self._controller.prepare(state, lifted=(first,), without=(second,))
+        self._controller.prepare(state, lifted=(second,), without=(first,))
         self._begun = True
 
     # -- from phase to phase ----------------------------------------------------------
