@@ -82,11 +82,11 @@ def _for_robot(name: str) -> dict[str, Any]:
         )
     center, radius = _beside_the_elbow(robot)
     pose = robot.nv >= 6
-    known = np.any(robot.home() != robot.neutral())
+    has_home = bool(np.any(robot.home() != robot.neutral()))
     return {
         "title": f"{name}: take its hand, move the ball, pull at a link",
         "robot": {"name": name},
-        **({} if known else {"start": "auto"}),
+        **({} if has_home else {"start": "auto"}),
         "scene": {
             "obstacles": {
                 "ball": {
