@@ -1,18 +1,19 @@
 """``hsp franka-box``: a Franka's control box without a robot."""
 
 import argparse
-import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import nullcontext
 
 from hsp_control.cli.franka_box_log import BoxLog
 from hsp_control.common.exceptions import LiveError
 from hsp_control.common.resources import bundled_configs, bundled_robots
 from hsp_control.config import Experiment, load_experiment
 from hsp_control.franka_box import PERIOD, PORT, VERSION, Arm, Box, Server
+from hsp_control.live import OperatorRequests
 from hsp_control.live.latency import real_time_priority
 from hsp_control.live.simulated_robot import sampled
+from hsp_control.live.stop_signals import stop_signals
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import example_robots
 
@@ -36,9 +37,10 @@ def franka_box(options: argparse.Namespace) -> int:
         box.step(None)
     box = _box(experiment, terminal.say)
     terminal.box = box
+    requests = OperatorRequests()
     with (
-        _ended_by_signals() as running,
-        _priority(options.priority),
+        stop_signals(requests, takes_over=True),
+        real_time_priority(options.priority),
         Server(
             box,
             terminal.say,
@@ -59,17 +61,13 @@ def franka_box(options: argparse.Namespace) -> int:
 
         def on_period() -> bool:
             terminal.on_period()
-            return bool(running)
+            return requests.reason is None
 
         server.serve(on_period)
     terminal.end()
     if log is not None:
         print(f"Log: {log.path}")
     return 0
-
-
-def _priority(level: int | None) -> AbstractContextManager[None]:
-    return nullcontext() if level is None else real_time_priority(level)
 
 
 def _experiment(options: argparse.Namespace) -> Experiment:
@@ -146,21 +144,3 @@ def _standing(server: Server) -> str:
     if server.overrun > 0.1:
         parts.append(f"the box is {server.overrun:.1f} s behind real time")
     return " | ".join(parts)
-
-
-@contextmanager
-def _ended_by_signals() -> Iterator[list[bool]]:
-    """Yield a list that Ctrl-C and a termination empty."""
-    running = [True]
-
-    def stop(number: int, frame: object) -> None:
-        running.clear()
-        signal.signal(number, signal.default_int_handler)
-
-    kinds = (signal.SIGINT, signal.SIGTERM)
-    before = {kind: signal.signal(kind, stop) for kind in kinds}
-    try:
-        yield running
-    finally:
-        for kind, handler in before.items():
-            signal.signal(kind, handler)

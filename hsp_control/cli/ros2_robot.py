@@ -5,14 +5,14 @@ docs/ros2.md.
 """
 
 import argparse
-import signal
 import sys
 from collections.abc import Sequence
-from threading import Event
 
 from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.config import load_experiment
+from hsp_control.live import OperatorRequests
+from hsp_control.live.stop_signals import stop_signals
 from hsp_control.ros2.installed import check_installed
 
 
@@ -20,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the robot until it has stopped; return 0, or 2 after one error message."""
     parser = argparse.ArgumentParser(prog="hsp_control.cli.ros2_robot")
     parser.add_argument("config", metavar="CONFIG", help="as of `hsp live`")
-    parser.add_argument("address", metavar="ros2://CONTROLLER?states=TOPIC&domain=N")
+    parser.add_argument("address", metavar="ros2://CONTROLLER")
     parser.add_argument(
         "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE"
     )
@@ -30,11 +30,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="a period passes with each effort, instead of in real time",
     )
     options = parser.parse_args(arguments)
-    stopped = Event()
-    for kind in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(kind, lambda *_: stopped.set())
+    requests = OperatorRequests()
     try:
-        reason = _run(options, stopped)
+        with stop_signals(requests, takes_over=True):
+            reason = _run(options, requests)
+    except KeyboardInterrupt:
+        print("hsp: stopped by the user", file=sys.stderr)
+        return 2
     except HspControlError as error:
         print(f"hsp: {error}", file=sys.stderr)
         return 2
@@ -42,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _run(options: argparse.Namespace, stopped: Event) -> str:
+def _run(options: argparse.Namespace, requests: OperatorRequests) -> str:
     check_installed()
     from hsp_control.live.ros2.simulated import RobotTopics, serve
 
@@ -53,7 +55,7 @@ def _run(options: argparse.Namespace, stopped: Event) -> str:
     serve(
         robot,
         topics,
-        stop_reason=lambda: "stopped by the operator" if stopped.is_set() else None,
+        stop_reason=lambda: requests.reason,
         lockstep=options.lockstep,
     )
     return robot.reason or "no effort arrived"
