@@ -252,9 +252,7 @@ def _from_path(
         raise RobotNotFoundError(f"{path}: no such file{did_you_mean(path.name, near)}")
     # The folder of `package://<folder>/...` is usually one above the URDF.
     above = tuple(path.resolve().parents)[:5]
-    ros = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
-    packages = (*above, *(Path(folder) for folder in ros if folder))
-    allowed = tuple(folder for folder in packages if access.allows(folder))
+    allowed = tuple(folder for folder in above if access.allows(folder))
     return RobotSource(
         name=Path(path.name.removesuffix(".xacro")).stem,
         urdf=path,

@@ -1,6 +1,5 @@
 """Compiles an MJCF file; MuJoCo itself reads it."""
 
-import logging
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,6 @@ _REFUSED = "plugin", "replicate", "composite", "flexcomp"
 """Elements that run code, or that stand for any number of bodies."""
 _MAX_FILES = 200
 """Maximum number of files that an MJCF may include; a loop of them ends there."""
-
-_log = logging.getLogger(__name__)
 
 
 def compile_mjcf(path: Path, access: Access) -> Any:
@@ -48,8 +45,6 @@ def compile_mjcf(path: Path, access: Access) -> Any:
     if access.strict:
         _check_access(path, top, access)
     mujoco = import_mujoco()
-    if mujoco.get_mju_user_warning() is None:  # otherwise MuJoCo writes a log file
-        mujoco.set_mju_user_warning(_log.info)
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:

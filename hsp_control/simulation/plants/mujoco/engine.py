@@ -1,16 +1,13 @@
 """What every plant in MuJoCo needs of it: its module, its warnings, its contacts."""
 
-import importlib
-import logging
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
-
-_log = logging.getLogger(__name__)
+from hsp_control.common.exceptions import ModelError, SimulationError
+from hsp_control.robot.description.mujoco import constants
 
 
 def import_mujoco() -> Any:
@@ -20,15 +17,9 @@ def import_mujoco() -> Any:
         SimulationError: If it is not installed.
     """
     try:
-        mujoco = importlib.import_module("mujoco")
-    except ImportError as error:
-        raise SimulationError(
-            "the plant mujoco needs MuJoCo, which is not installed; install it with: "
-            "pip install 'hsp_control[mujoco]'"
-        ) from error
-    if mujoco.get_mju_user_warning() is None:  # otherwise MuJoCo writes a log file
-        mujoco.set_mju_user_warning(_log.info)
-    return mujoco
+        return constants.import_mujoco()
+    except ModelError as error:
+        raise SimulationError(f"the plant cannot be made: {error}") from error
 
 
 def check_motion(data: Any, end: float) -> None:

@@ -69,7 +69,7 @@ def write_page(path: Path, text: str) -> Path:
     Raises:
         ExportError: If it cannot be written.
     """
-    part = path.with_name(f".{path.name}.part")
+    part = path.parent / f".{path.name}.part"  # also of "."
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part.write_text(text, encoding="utf-8")
