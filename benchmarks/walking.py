@@ -63,7 +63,7 @@ def summary(run: Rollout) -> str:
     error = run["plan.dcm"] - run["plan.dcm_reference"]
     rms = 1e3 * np.sqrt((error**2).sum(axis=1).mean())
     came = np.hypot(*(run.q[-1, :2] - run.q[0, :2]))
-    stands = run["plan.phase"][-1] == 0 and np.abs(run.v[-1]).max() < 0.1
+    stands = run["plan.phase"][-1] == 0 and np.abs(run.v[-1, :6]).max() < 0.1
     ends = "stands" if stands and run.status == "completed" else run.meta["message"]
     limited = (run["status"] == 2).mean()
     relaxed = (run["status"] == 3).mean()

@@ -6,7 +6,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import PlanError
 from hsp_control.constraints.contacts import SurfaceContact
 from hsp_control.control.controller import Controller
-from hsp_control.plans.footsteps import Footstep
+from hsp_control.plans.footsteps import Footstep, near
 from hsp_control.plans.polygon import convex_hull
 from hsp_control.plans.swing import turned
 from hsp_control.robot import RobotState
@@ -63,8 +63,13 @@ class Foot:
         self.position, self.orientation = pose.position, pose.orientation
         self._points: Array = contact.points
 
-    def begin(self, state: RobotState) -> None:
+    def begin(self, state: RobotState, heading: float) -> None:
         """Stand where the robot is.
+
+        Args:
+            state: The state.
+            heading: The yaw of the robot; that of the foot counts from it, so that no
+                full turn is between the feet [rad].
 
         Raises:
             PlanError: If its sole is not flat on the ground.
@@ -86,7 +91,8 @@ class Foot:
                 "that it has no direction to walk; choose another frame for the contact"
             )
         self._rotation = here.rotation.copy()
-        self._yaw = float(np.arctan2(here.rotation[1, 0], here.rotation[0, 0]))
+        yaw = float(np.arctan2(here.rotation[1, 0], here.rotation[0, 0]))
+        self._yaw = self._last_yaw = near(yaw, heading)
         # The sole in axes of its own: x forward, in the ground.
         local = self._points @ turned(-self._yaw, here.rotation).T
         self._middle: Array = local[:, :2].mean(axis=0)
@@ -105,7 +111,9 @@ class Foot:
         self.position.write(state.t, here.position)
         self.orientation.write(state.t, here.rotation)
         yaw = float(np.arctan2(here.rotation[1, 0], here.rotation[0, 0]))
-        origin = Footstep(float(here.position[0]), float(here.position[1]), yaw)
+        self._last_yaw = near(yaw, self._last_yaw)  # several turns may have been made
+        x, y = map(float, here.position[:2])
+        origin = Footstep(x, y, self._last_yaw)
         self.place = self.place_of(origin)
         self.frame_height = float(here.position[2])
         corners = here.position + self._points @ here.rotation.T

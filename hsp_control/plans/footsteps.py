@@ -1,6 +1,6 @@
 """Footsteps in the plane: where feet stand, and where a speed puts the next one."""
 
-from math import cos, sin
+from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -99,6 +99,11 @@ class Stance(NamedTuple):
 
 
 def between(a: Footstep, b: Footstep) -> Footstep:
-    """Return the middle of two feet."""
-    turn = (b.yaw - a.yaw + np.pi) % (2.0 * np.pi) - np.pi
-    return Footstep(0.5 * (a.x + b.x), 0.5 * (a.y + b.y), a.yaw + 0.5 * float(turn))
+    """Return the middle of two feet; its yaw is near that of the first."""
+    yaw = 0.5 * (a.yaw + near(b.yaw, a.yaw))
+    return Footstep(0.5 * (a.x + b.x), 0.5 * (a.y + b.y), yaw)
+
+
+def near(yaw: float, reference: float) -> float:
+    """Return an angle plus those full turns that bring it nearest to another [rad]."""
+    return yaw + 2.0 * pi * round((reference - yaw) / (2.0 * pi))

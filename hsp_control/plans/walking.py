@@ -153,8 +153,9 @@ class RunningWalk(RunningPlan):
         if left[1] < 0.0:
             feet.reverse()
         self._feet = dict(zip((1.0, -1.0), feet, strict=True))
+        heading = float(np.arctan2(trunk[1, 0], trunk[0, 0]))
         for foot in feet:
-            foot.begin(state)
+            foot.begin(state, heading)
         mass = state.centroidal.position
         ground = max(foot.height for foot in feet)
         self._height = float(mass[2])
@@ -181,10 +182,10 @@ class RunningWalk(RunningPlan):
         self._dcm = self._dcm_wanted = self._point = self._middle()
         self._target = self._feet[1.0].place
         self._stand(t)
-        first, second = feet[0].name, feet[1].name
-        self._controller.prepare(state, without=(first, second))
-        self._controller.prepare(state, lifted=(first,), without=(second,))
-        self._controller.prepare(state, lifted=(second,), without=(first,))
+        names = [foot.name for foot in feet]
+        self._controller.prepare(state, without=names)
+        for swinging, standing in (names, names[::-1]):
+            self._controller.prepare(state, lifted=[swinging], without=[standing])
         self._begun = True
 
     # -- from phase to phase ----------------------------------------------------------

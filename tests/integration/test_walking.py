@@ -1,13 +1,17 @@
 """Talos takes two steps and stands: on MuJoCo, as its configuration says."""
 
+import re
 from functools import cache
 from unittest.mock import patch
 
 import numpy as np
 import pytest
+import yaml
+from places import ROOT
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.control.active_stack import ActiveStack
+from hsp_control.plans import Walk
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
@@ -122,3 +126,18 @@ def test_a_push_that_fells_is_said():
     assert run.status == "stopped"
     assert run.meta["message"].startswith("the robot falls: at t = ")
     assert run.t[-1] < 2.0
+
+
+def test_the_page_s_yaml_and_python_run():
+    text = (ROOT / "docs" / "plans.md").read_text(encoding="utf-8")
+    (yaml_text,) = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    (snippet,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert len(yaml_text.splitlines()) <= 10
+    data = yaml.safe_load(yaml_text)
+    data["simulation"]["duration"] = 0.05
+    assert load_experiment(data).run().status == "completed"
+    space: dict = {}
+    exec(compile(snippet, "plans.md", "exec"), space)
+    made = space["walk"].scenario
+    assert made.plan == Walk(speed=0.3, steps=4)
+    assert load_experiment(yaml.safe_load(space["walk"].to_yaml())).scenario == made

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hsp_control.common.rotations import log3, turn
-from hsp_control.plans.footsteps import Footstep, Stance, Velocity, between
+from hsp_control.plans.footsteps import Footstep, Stance, Velocity, between, near
 from hsp_control.plans.polygon import convex_hull, nearest_inside
 from hsp_control.plans.quintic import Motion, to_rest
 from hsp_control.plans.step_adjustment import adjust, shift_gain
@@ -118,8 +118,13 @@ def test_a_step_keeps_away_from_the_other_foot_and_within_reach():
     assert place.local(near.point) == pytest.approx([0.1, 0.12])
     far = STANCE.kept(place, -1.0, place.ahead(0.9, -0.7))
     assert place.local(far.point) == pytest.approx([0.6, -0.4])
+
+
+def test_full_turns_do_not_count_between_feet():
     a, b = Footstep(0.0, 0.0, 3.1), Footstep(0.0, 0.2, -3.1)
-    assert abs(abs(between(a, b).yaw) - np.pi) < 1e-9
+    assert between(a, b).yaw == pytest.approx(np.pi)
+    assert near(0.1, 4 * np.pi) == pytest.approx(0.1 + 4 * np.pi)
+    assert near(-3.0, 3.0) == pytest.approx(2 * np.pi - 3.0)
 
 
 def test_the_nearest_point_of_a_hull():

@@ -8,6 +8,7 @@ import pytest
 from hsp_control import FramePose, Gains, Robot, load_experiment
 from hsp_control.common.exceptions import FallError, HspControlError, PlanError
 from hsp_control.constraints.contacts import BallContact, SurfaceContact
+from hsp_control.control.measurement import Measurement
 from hsp_control.plans import Walk
 from hsp_control.plans.falling import FallDetector
 from hsp_control.tasks import CenterOfMass
@@ -167,3 +168,22 @@ def test_falls_are_found(talos):
             knees[talos.velocity_index(f"leg_{side}_{joint}_joint")] = angle
     with pytest.raises(FallError, match=r"its centre of mass is at \d+ % of its first"):
         detector.check(moved(knees))
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, np.pi, -3.1])
+def test_a_walk_may_begin_in_any_direction(talos, heading):
+    """Also backwards, where the yaw of one foot is π, and that of the other -π."""
+    experiment = load_experiment(WALK)
+    step = np.zeros(talos.nv)
+    step[5] = heading
+    robot = experiment.robot
+    state = robot.state(0.0, robot.integrate(experiment.q0, step), np.zeros(robot.nv))
+    running = experiment.scenario.plan.begin(experiment.controller)
+    running.update(Measurement(0.0, state.q, state.v))
+    trunk = {task.name: task for task in experiment.controller.tasks}["trunk"]
+    frame = state.frame("base_link")
+    assert trunk.followed.sample(0.0).rotation == pytest.approx(frame.rotation)
+    target = running.log_channels()["plan.footstep"].value
+    ahead = frame.rotation.T @ (np.array([*target[:2], 0.0]) - state.q[:3])
+    assert ahead[0] > 0.1
+    assert abs(target[2] - heading) % (2 * np.pi) == pytest.approx(0.0, abs=1e-3)
