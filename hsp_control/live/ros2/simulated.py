@@ -21,6 +21,8 @@ from hsp_control.ros2.node import Node
 
 _CATCH_UP = 10
 """Most periods that are made up for when the process did not get the processor."""
+_WAITING = 0.1
+"""Time between two states of a robot in lockstep that waits for an effort [s]."""
 _POLL = 0.1
 """How often a robot that waits for an effort looks for reasons to stop [s]."""
 
@@ -136,6 +138,11 @@ def serve(
             if lockstep and robot.phase == Phase.RUNNING:
                 while not (topics.wait(_POLL) or topics.left or stop_reason()):
                     pass
+                due = monotonic()
+                continue
+            if lockstep and robot.phase == Phase.WAITING:
+                # Few states, as each that is answered makes all efforts a period late.
+                topics.wait(_WAITING)
                 due = monotonic()
                 continue
             due += robot.period
