@@ -46,6 +46,8 @@ def live(options: argparse.Namespace) -> int:
     faults, kill = Faults.parse(options.faults), _parse_kill(options.kill)
     experiment = load(options)
     check_fixed(experiment.robot)
+    if experiment.scenario.plan is not None:
+        raise LiveError("plan: a live loop follows none; use hsp run or hsp play")
     simulation = experiment.scenario.simulation
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:

@@ -92,11 +92,12 @@ class Session:
         self._command = ComparedCommand(self.controller, experiment.compensation)
         self.let_go()
         self._unrepeatable = ""
-        rows = self._rows()
+        rows, plan = self._rows(), experiment.scenario.plan
         times = [k * self.row for k in range(rows)]
         self._loop: Iterator[Instant] = sampled_loop(
             self._command, self._plant, round(self.row / self.period), times,
             experiment.q0, experiment.v0,
+            None if plan is None else plan.begin(self.controller),
         )  # fmt: skip
         self.recorder = Recorder(self.controller, self.controller.scene, rows)
         self.over = ""
