@@ -10,7 +10,7 @@ from rich.table import Table
 
 from hsp_control.cli.consoles import errors, out
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.exceptions import ConfigError, SimulationError
 from hsp_control.config import load_experiment
 from hsp_control.live.latency import (
     ControlLoop,
@@ -32,6 +32,11 @@ def bench(options: argparse.Namespace) -> int:
         strict=options.strict or bool(options.allow),
         allow=options.allow,
     )
+    if experiment.scenario.plan is not None:
+        raise ConfigError(
+            f"{options.config}: plan: bench measures the controller without a plan; "
+            "remove the plan, or time a run with hsp run"
+        )
     loop = ControlLoop(
         experiment.controller,
         experiment.q0,
