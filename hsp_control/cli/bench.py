@@ -11,7 +11,7 @@ from rich.table import Table
 from hsp_control.cli.consoles import errors, out
 from hsp_control.cli.loading import load
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import SimulationError
+from hsp_control.common.exceptions import ConfigError, SimulationError
 from hsp_control.live.latency import (
     ControlLoop,
     Latency,
@@ -27,6 +27,11 @@ def bench(options: argparse.Namespace) -> int:
             f"--rate {options.rate:g}; must be positive and at most 100000 Hz"
         )
     experiment = load(options)
+    if experiment.scenario.plan is not None:
+        raise ConfigError(
+            f"{options.config}: plan: bench measures the controller without a plan; "
+            "remove the plan, or time a run with hsp run"
+        )
     loop = ControlLoop(
         experiment.controller,
         experiment.q0,

@@ -266,7 +266,6 @@ class RunningWalk(RunningPlan):
         self._taken += 1
         self._swing, self._mode = None, "double"
         self._side = -self._side
-        self._hull = self._soles()
         self._plan(t, [], walk.double_support, self._feet[self._side].place.point)
         if any(self._swings):
             self._feet[self._side].contact.throw(False, t, walk.double_support)

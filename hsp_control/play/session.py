@@ -94,12 +94,12 @@ class Session:
         self._unrepeatable = ""
         rows, plan = self._rows(), experiment.scenario.plan
         times = [k * self.row for k in range(rows)]
+        running = None if plan is None else plan.begin(self.controller)
         self._loop: Iterator[Instant] = sampled_loop(
             self._command, self._plant, round(self.row / self.period), times,
-            experiment.q0, experiment.v0,
-            None if plan is None else plan.begin(self.controller),
+            experiment.q0, experiment.v0, running,
         )  # fmt: skip
-        self.recorder = Recorder(self.controller, self.controller.scene, rows)
+        self.recorder = Recorder(self.controller, self.controller.scene, rows, running)
         self.over = ""
         self._step()
         self.handles = Handles(self.controller, self.period)

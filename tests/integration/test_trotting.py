@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 
 from hsp_control import Experiment, Rollout, Stream, TargetPosture, load_experiment
+from hsp_control.cli.bench import bench
+from hsp_control.cli.options.command_line import command_line
+from hsp_control.common.exceptions import ConfigError
 from hsp_control.plans import Trot
+from hsp_control.play import Session
+from hsp_control.play.playable import playable
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
@@ -75,3 +80,22 @@ def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
     again = load_experiment(run.save(tmp_path / "trot.npz")).run()
     for name in run.columns:
         assert np.array_equal(run[name], again[name], equal_nan=True), name
+
+
+def test_it_trots_where_it_can_be_touched():
+    session = Session(playable("whole_body/solo12_trot"))
+    while session.t < 0.4:
+        session.advance()
+        assert not session.over
+    run = session.rollout()
+    assert run["plan.phase"][-1] == 2
+    untouched = trot()
+    rows = run.t.searchsorted(0.3)
+    same = untouched.t.searchsorted(run.t[rows])
+    assert untouched.t[same] == pytest.approx(run.t[rows])
+    assert run.q[rows] == pytest.approx(untouched.q[same], abs=1e-12)
+
+
+def test_a_plan_is_no_part_of_what_bench_measures():
+    with pytest.raises(ConfigError, match=r"^whole_body/solo12_trot: plan: bench"):
+        bench(command_line().parse_args(["bench", "--latency", "whole_body/solo12_trot"]))
