@@ -97,5 +97,6 @@ def test_it_trots_where_it_can_be_touched():
 
 
 def test_a_plan_is_no_part_of_what_bench_measures():
+    words = ["bench", "--latency", "whole_body/solo12_trot"]
     with pytest.raises(ConfigError, match=r"^whole_body/solo12_trot: plan: bench"):
-        bench(command_line().parse_args(["bench", "--latency", "whole_body/solo12_trot"]))
+        bench(command_line().parse_args(words))
