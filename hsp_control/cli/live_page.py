@@ -38,7 +38,8 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C stops the loop only
     os.nice(_NICENESS)
     try:
-        _run(json.loads(sys.stdin.readline()))
+        if line := sys.stdin.readline():  # else the loop ended at once
+            _run(json.loads(line))
     except HspControlError as error:
         print(f"hsp: the loop's page: {error}", file=sys.stderr)
         return 2
