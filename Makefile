@@ -77,6 +77,11 @@ wheel: $(STAMP) ## build the wheel into dist/, with machine code for every confi
 	@rm -rf dist; $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 	@ls dist
 
+sims: $(STAMP) ## robosuite's own arms and our law in them, in .venv-sims
+	@if ! .venv-sims/bin/python -m pip --version > /dev/null 2>&1; then \
+	  $(call new-venv,$(BIN)/python,.venv-sims); fi
+	@.venv-sims/bin/python tools/simulators.py $(ARGS)
+
 wheel-test: wheel ## build the wheel, install it elsewhere, use it from there
 	@dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; mkdir "$$dir/cwd"; \
 	echo "Installing the wheel into a fresh environment ..."; \
@@ -122,7 +127,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist machine_code out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help figures screenshots animations demo quick test thorough lint coverage fuzz mutants wheel wheel-test format constraints clean
+.PHONY: help figures screenshots animations demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

@@ -31,6 +31,7 @@ imperfections of the plant. The controller keeps its nominal model for every pla
 | `rigid_body` | Pinocchio's articulated-body algorithm, under the simulation's integrator. With `friction`, joints stick and slip (stiction): each step solves for the velocity at its end |
 | `rigid_contacts` | the same, with contacts that neither slip nor break and are switched by time; their forces are in the log. For verification on floating bases |
 | `mujoco` | MuJoCo with its own integrator, friction, joint limits and contacts, built from the Pinocchio model; `pip install 'hsp_control[mujoco]'`. `plant: mujoco` is enough |
+| `mujoco_scene` | the MuJoCo scene of the robot's own MJCF, as it is, with its objects and contacts: [mujoco.md](mujoco.md) |
 
 ```yaml
 robot: {name: panda}

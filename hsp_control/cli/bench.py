@@ -9,9 +9,9 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from hsp_control.cli.consoles import errors, out
+from hsp_control.cli.loading import load
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError, SimulationError
-from hsp_control.config import load_experiment
 from hsp_control.live.latency import (
     ControlLoop,
     Latency,
@@ -26,12 +26,7 @@ def bench(options: argparse.Namespace) -> int:
         raise SimulationError(
             f"--rate {options.rate:g}; must be positive and at most 100000 Hz"
         )
-    experiment = load_experiment(
-        options.config,
-        *options.overrides,
-        strict=options.strict or bool(options.allow),
-        allow=options.allow,
-    )
+    experiment = load(options)
     if experiment.scenario.plan is not None:
         raise ConfigError(
             f"{options.config}: plan: bench measures the controller without a plan; "

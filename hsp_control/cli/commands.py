@@ -15,13 +15,15 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from hsp_control.cli import robot_table
+from hsp_control.cli.advice import robot_advice, start_advice
 from hsp_control.cli.consoles import errors as _errors
 from hsp_control.cli.consoles import message_of, renamed_keys_printed
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import DeferredInterrupt
+from hsp_control.cli.loading import load
 from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.common.exceptions import LogError, SimulationError
-from hsp_control.config import Experiment, json_schema, load_experiment
+from hsp_control.config import Experiment, json_schema
 from hsp_control.robot import Robot
 from hsp_control.robot.description.sources import example_robots
 from hsp_control.simulation import Rollout
@@ -29,14 +31,6 @@ from hsp_control.simulation.recorder import Recorder
 
 if TYPE_CHECKING:
     from hsp_control.cli.screen import Screen
-
-
-def load(options: argparse.Namespace) -> Experiment:
-    """Return the experiment of a command's configuration."""
-    strict = options.strict or bool(options.allow)
-    return load_experiment(
-        options.config, *options.overrides, strict=strict, allow=options.allow
-    )
 
 
 @renamed_keys_printed()
@@ -173,11 +167,12 @@ def check(options: argparse.Namespace) -> int:
     table.add_row("largest effort", f"{np.abs(output.tau).max():.3g} at the start")
     _out.print(table)
     _warn_of_rates(experiment)
-    if output.damped:
-        _out.print(
-            f"The tasks {output.damped} are singular at the start: the law is damped "
-            "there, not exact."
-        )
+    advice = [
+        *robot_advice(experiment.robot),
+        *start_advice(experiment, damped=output.damped),
+    ]
+    for line in advice:
+        _out.print(line, markup=False)
     _out.print(f"{options.config}: OK")
     return 0
 
@@ -250,6 +245,28 @@ def live(options: argparse.Namespace) -> int:
     return lives.live(options)
 
 
+@renamed_keys_printed()
+def franka_box(options: argparse.Namespace) -> int:
+    """Be a Franka's control box, without a robot."""
+    from hsp_control.cli import franka_box as boxes
+
+    return boxes.franka_box(options)
+
+
+def franka_model(options: argparse.Namespace) -> int:
+    """Save a Franka arm's own model."""
+    from hsp_control.cli import franka_model as models
+
+    return models.franka_model(options)
+
+
+def inspect(options: argparse.Namespace) -> int:
+    """Print what is odd about a robot's description."""
+    from hsp_control.cli import inspect as inspections
+
+    return inspections.inspect(options)
+
+
 def robots(options: argparse.Namespace) -> int:
     """List all robots, or describe one."""
     if options.name is not None:
@@ -319,16 +336,20 @@ def _summary(rollout: Rollout) -> Table:
     )
     for task in rollout.meta["tasks"]:
         error = np.linalg.norm(rollout[f"task.{task}.error"], axis=1)
-        rms = float(np.sqrt(np.mean(error**2)))
-        table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {error[-1]:.3g}")
+        tracked = error[np.isfinite(error)]  # a task may be off for a while
+        if not len(tracked):
+            table.add_row(f"task {task}", "was never active")
+            continue
+        rms, last = float(np.sqrt(np.mean(tracked**2))), tracked[-1]
+        table.add_row(f"task {task}", f"|e| rms {rms:.3g}, at the end {last:.3g}")
     norm = rollout["null_space_norm"]
     table.add_row(
         "null space", f"|e_N| {norm[0]:.3g} at the start, {norm[-1]:.3g} at the end"
     )
     table.add_row(
         "det(J W⁻¹ Jᵀ)",
-        f"minimum {rollout['manipulability'].min():.4g}, "
-        f"smallest singular value {rollout['singular_values'].min():.3g}",
+        f"minimum {np.nanmin(rollout['manipulability']):.4g}, "
+        f"smallest singular value {np.nanmin(rollout['singular_values']):.3g}",
     )
     table.add_row("effort", f"largest {np.abs(rollout.tau).max():.3g}")
     for row in _limits(rollout):

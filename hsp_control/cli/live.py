@@ -4,8 +4,8 @@ import argparse
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from math import inf, nan
 from pathlib import Path
 from typing import Any
@@ -14,21 +14,27 @@ from rich.table import Table
 
 from hsp_control.cli.consoles import out
 from hsp_control.cli.live_experiment import live_period, simulated_robot
+from hsp_control.cli.loading import load
 from hsp_control.cli.robot_process import RobotProcess
+from hsp_control.cli.robot_start import begun_where_it_is
 from hsp_control.cli.steering import let_steer, steering_page
 from hsp_control.common.exceptions import LiveError, LogError
-from hsp_control.config import Experiment, load_experiment
+from hsp_control.config import Experiment
 from hsp_control.control.compensation import Command
 from hsp_control.live import (
     Faults,
+    Hardware,
     InProcessRobot,
     LoopReport,
     OperatorRequests,
     connect,
     run_loop,
 )
+from hsp_control.live.adapting import AdaptingHardware
 from hsp_control.live.latency import Quantiles
+from hsp_control.live.ros2 import publish
 from hsp_control.live.settings import check_fixed
+from hsp_control.live.stop_signals import stop_signals
 from hsp_control.simulation import Rollout
 
 _DRY_RUN = 0.5
@@ -38,12 +44,19 @@ _DRY_RUN = 0.5
 def live(options: argparse.Namespace) -> int:
     """Run a loop in real time, print its response times and why it ended."""
     faults, kill = Faults.parse(options.faults), _parse_kill(options.kill)
-    experiment = load_experiment(options.config, *options.overrides)
+    experiment = load(options)
     check_fixed(experiment.robot)
+    if experiment.scenario.plan is not None:
+        raise LiveError("plan: a live loop follows none; use hsp run or hsp play")
     simulation = experiment.scenario.simulation
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:
         raise LiveError(f"--duration {duration:g}; must be positive")
+    if options.robot is not None and (options.faults or options.kill):
+        raise LiveError(
+            "--faults and --kill are for the simulated robot: leave them out with "
+            "--robot"
+        )
     if options.robot is not None and options.steer == "simulated":
         raise LiveError(
             "--steer: a page that moves a real robot needs a dead-man's key; say "
@@ -62,7 +75,20 @@ def live(options: argparse.Namespace) -> int:
     }
     command = Command(experiment.controller, experiment.compensation)
     on_period: list[Callable[[float], object]] = []
-    with _stop_signals(requests), ExitStack() as stack:
+
+    def run(hardware: Hardware) -> LoopReport:
+        return run_loop(
+            command,
+            hardware,
+            duration=None if duration == inf else duration,
+            log=loop_log,
+            meta=_meta(experiment),
+            priority=options.priority,
+            on_period=_in_turn(on_period),
+            **options_of_loop,
+        )
+
+    with stop_signals(requests, takes_over=True), ExitStack() as stack:
         page = stack.enter_context(steering_page(options, experiment, loop_log))
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
         run_loop(
@@ -71,39 +97,37 @@ def live(options: argparse.Namespace) -> int:
             duration=min(duration, _DRY_RUN),
             **options_of_loop,
         )
-        if page is not None:
-            on_period.append(let_steer(page, experiment, requests))
+        hardware: Hardware | None = None
         if options.robot is not None:
             hardware = connect(options.robot, experiment.robot, live_period(experiment))
-            report = run_loop(
-                command,
-                hardware,
-                duration=None if duration == inf else duration,
-                log=loop_log,
-                meta=_meta(experiment),
-                priority=options.priority,
-                on_period=_in_turn(on_period),
-                **options_of_loop,
-            )
+            stack.callback(hardware.close)
+        if isinstance(hardware, AdaptingHardware):
+            settings = hardware.adapted(experiment.scenario.live)
+            experiment = begun_where_it_is(experiment, options, hardware.q)
+            options_of_loop |= {"settings": settings, "scene": experiment.scene}
+            command = Command(experiment.controller, experiment.compensation)
+            for line in hardware.lines:
+                out.print(line, highlight=False)
+        if options.publish is not None:
+            on_period.append(publish(options.publish, command))
+        if page is not None:
+            on_period.append(let_steer(page, experiment, requests))
+        if hardware is not None:
+            report = run(hardware)
             out.print(_times(report, experiment))
             out.print(f"The loop: {report.reason}")
+            fault = getattr(hardware, "fault", None)
+            if fault is not None and fault not in report.reason:
+                out.print(f"The robot: {fault}", highlight=False)
             _convert(loop_log)
-            return 0 if report.ended in {"completed", "operator"} else 2
+            regular = report.ended in {"completed", "operator"} and fault is None
+            return 0 if regular else 2
         with RobotProcess(
             experiment, faults=faults, log=robot_log, log_period=simulation.log_period
         ) as robot:
             if kill is not None:
                 on_period.append(_kill_action(kill, robot))
-            report = run_loop(
-                command,
-                robot.hardware,
-                duration=None if duration == inf else duration,
-                log=loop_log,
-                meta=_meta(experiment),
-                priority=options.priority,
-                on_period=_in_turn(on_period),
-                **options_of_loop,
-            )
+            report = run(robot.hardware)
             robot_report = robot.wait()
     link = robot.hardware.link
     counts = {**link.counts, "lost": link.lost}
@@ -126,28 +150,6 @@ def _meta(experiment: Experiment) -> dict[str, Any]:
         "title": experiment.scenario.title,
         "config": experiment.config,
     }
-
-
-@contextmanager
-def _stop_signals(requests: OperatorRequests) -> Iterator[None]:
-    """Make Ctrl-C and termination signals request the operator's stop.
-
-    A second signal raises `KeyboardInterrupt`: the loop ends at once, and the robot's
-    watchdog stops the robot.
-    """
-    kinds = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
-    def stop(number: int, frame: object) -> None:
-        requests.stop(f"stopped by the operator ({signal.Signals(number).name})")
-        for kind in kinds:
-            signal.signal(kind, signal.default_int_handler)
-
-    before = {kind: signal.signal(kind, stop) for kind in kinds}
-    try:
-        yield
-    finally:
-        for kind, handler in before.items():
-            signal.signal(kind, handler)
 
 
 def _parse_kill(text: str | None) -> tuple[str, float] | None:
@@ -246,7 +248,8 @@ def _print_ends(report: LoopReport, robot_report: dict[str, Any] | None) -> None
         f"{deadlines.without_state} without a new state, {deadlines.skipped_states} "
         "states skipped"
     )
-    end = "fell silent" if report.silent else "held the robot"
+    held = "held the robot" if report.at_rest else "could not bring the robot to rest"
+    end = "fell silent" if report.silent else held
     out.print(
         f"The loop: {report.reason}, at t = {report.t:.3f} s; {end}, the fastest "
         f"joint at {report.speed:.2g}"

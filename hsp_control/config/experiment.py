@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 import yaml
@@ -96,7 +96,7 @@ class Experiment:
         plan: Plan | None = None,
         scene: Scene | Iterable[Obstacle] = (),
         changes: Sequence[Change] = (),
-        start: InitialState | None = None,
+        start: InitialState | Literal["auto"] | None = None,
         plant: PlantPart | str = "rigid_body",
         compensation: Compensation | None = None,
         simulation: SimulationSettings | None = None,
@@ -122,7 +122,8 @@ class Experiment:
             plan: What writes references and switches contacts; it adds its own tasks.
             scene: The obstacles; those that fields and limits hold are added.
             changes: Changes while running.
-            start: Where the run begins; at home and at rest by default.
+            start: Where the run begins; at home and at rest by default. ``auto``: at a
+                good configuration that is found.
             plant: What the efforts act on; the controller's own model by default.
             compensation: Compensators for what the model lacks.
             simulation: Duration, periods and integrator.
@@ -384,13 +385,18 @@ def build(document: Document) -> Experiment:
     for contact in contacts:
         with document.at("contacts", contact.name, "frame"):
             robot.frame_id(contact.frame)
-    with document.at("start"):
-        q0 = scenario.start.configuration_of(robot, contacts)
     with document.at():
         scene = located_scene(scenario.scene, folder, document.access)
         scenario = replace(scenario, scene=scene)
-        null_space = scenario.null_space
-        tasks = tuple(scenario.tasks.values())
+    null_space, tasks = scenario.null_space, tuple(scenario.tasks.values())
+    with document.at("start"):
+        q0 = scenario.start.configuration_of(
+            robot, contacts, tasks, scene, null_space.singularity_threshold
+        )
+        if scenario.start.is_found:  # the log repeats the run where another is found
+            found = InitialState(configuration=q0, velocity=scenario.start.velocity)
+            scenario = replace(scenario, start=found)
+    with document.at():
         if scenario.plan is not None:
             tasks, contacts = scenario.plan.parts(robot, tasks, contacts)
         controller = Controller(
@@ -417,7 +423,7 @@ def build(document: Document) -> Experiment:
     scenario = replace(scenario, plant=scenario.plant.located(folder))
     plant = _plant(document, scenario, robot)
     check_compensation(document, scenario, controller)
-    rates = check_rates(document, scenario, controller, q0)
+    rates = check_rates(document, scenario, controller, q0, plant.robot)
     return _experiment(
         name=Path(document.name).stem,
         scenario=scenario,
@@ -437,8 +443,8 @@ def load_robot(document: Document, scenario: Scenario) -> Robot:
     Raises:
         HspControlError: If it cannot be loaded; with a location.
     """
-    parts = scenario.robot.parts is not None
-    with document.at("robot", *(() if parts else ("name",))):
+    keys = [key for key in ("name", "description") if getattr(scenario.robot, key)]
+    with document.at("robot", *keys):
         return Robot.load(scenario.robot, access=document.access)
 
 

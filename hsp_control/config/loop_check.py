@@ -5,6 +5,7 @@ from hsp_control.config.document import Document
 from hsp_control.config.scenario import Scenario
 from hsp_control.control.compensation import RateFinding, check_rate
 from hsp_control.control.controller import Controller
+from hsp_control.robot import Robot
 
 
 def check_compensation(
@@ -29,11 +30,16 @@ def check_compensation(
 
 
 def check_rates(
-    document: Document, scenario: Scenario, controller: Controller, q0: Array
+    document: Document,
+    scenario: Scenario,
+    controller: Controller,
+    q0: Array,
+    moving: Robot,
 ) -> tuple[RateFinding, ...]:
     """Check that the loop is stable at its rate; return gains that are high for it.
 
-    The delays are those of the plant, whether or not a predictor compensates them.
+    The delays are those of the plant, whether or not a predictor compensates them, and
+    the bodies are those of the robot that moves.
 
     Raises:
         UnstableRateError: If the loop is unstable.
@@ -49,5 +55,6 @@ def check_rates(
             scenario.compensation,
             effort_delay=plant.effort_delay,
             sensor_delay=plant.sensor_delay,
+            plant=moving,
         )
     return tuple(found)

@@ -26,7 +26,7 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.null_space.settings import NullSpaceSettings
 from hsp_control.plans import Plan
 from hsp_control.robot.description.robot_description import RobotDescription
-from hsp_control.simulation.initial_state import InitialState
+from hsp_control.simulation.initial_state import InitialState, StartOrAuto
 from hsp_control.simulation.plants import AnyPlant, RigidBody
 from hsp_control.simulation.settings import SimulationSettings
 from hsp_control.tasks import Task
@@ -42,8 +42,8 @@ class Scenario(Part, error=ConfigError):
     """A longer description, for readers."""
     robot: RobotDescription
     """The robot that is controlled."""
-    start: InitialState = InitialState()
-    """Configuration and velocity at t = 0."""
+    start: StartOrAuto = InitialState()
+    """Configuration and velocity at t = 0; ``auto``: a good configuration is found."""
     scene: Scene = Scene()
     """The obstacles."""
     tasks: Annotated[dict[Name, Task], Field(max_length=100), BY_NAME, READ_ONLY] = (

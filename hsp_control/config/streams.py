@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
-from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,8 @@ from hsp_control.config.scenario import Scenario
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import with_parts_replaced
 from hsp_control.robot.description.access import Access
+from hsp_control.trajectories.streams.listeners import is_local
 from hsp_control.trajectories.streams.stream import Streamed
-from hsp_control.trajectories.streams.udp_listener import check_address
 
 
 def with_messages(scenario: Scenario, folder: Path, access: Access) -> Scenario:
@@ -47,20 +46,12 @@ def with_messages(scenario: Scenario, folder: Path, access: Access) -> Scenario:
 
 def _check_listening(stream: Streamed, access: Access) -> None:
     assert stream.source is not None
-    host, _ = check_address(stream.source)
-    if not access.strict or host == "localhost" or _is_loopback(host):
+    if not access.strict or is_local(stream.source):
         return
     raise AccessError(
         f"{stream.source} listens to other computers; strict reading allows only "
         "127.0.0.1"
     )
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def with_recordings(

@@ -39,8 +39,7 @@ from hsp_control.geometry.signed_distance import (
     nearest_rates,
 )
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.kinematics import joint_support
-from hsp_control.robot.robot import WorldKinematics
+from hsp_control.robot.kinematics import WorldKinematics, joint_support
 from hsp_control.trajectories.following import stay
 
 MOTION_SIZE = 18

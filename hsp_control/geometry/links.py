@@ -1,9 +1,11 @@
 """Shapes of the robot's links for distances: capsules or its collision geometry."""
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 from weakref import WeakKeyDictionary, WeakSet
+from xml.etree.ElementTree import Element
 
 import coal
 import numpy as np
@@ -11,11 +13,17 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
+from hsp_control.common.suggestions import listing
+from hsp_control.geometry.body_geometry import (
+    body_geometry,
+    enclosing_ellipsoid_capsule,
+)
 from hsp_control.geometry.capsule_fit import enclosing_capsule
 from hsp_control.geometry.hulls import convex_hull, hull_corners
 from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files
 from hsp_control.robot.description.combining import Part
+from hsp_control.robot.description.loading import parser_text
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf_checks import read_urdf
 
@@ -29,6 +37,7 @@ _MAX_SPHERES = 100
 
 _log = logging.getLogger(__name__)
 _warned: "WeakSet[Robot]" = WeakSet()
+_incomplete: "WeakKeyDictionary[Robot, set[str]]" = WeakKeyDictionary()
 _found: "WeakKeyDictionary[Robot, dict[Proxy, tuple[LinkShape, ...]]]" = (
     WeakKeyDictionary()
 )
@@ -64,8 +73,11 @@ def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
             smooth for all convex obstacles. ``hulls``, ``meshes``: the robot's own
             collision geometry, as convex hulls or as it is.
 
+    Meshes that do not exist are left out, with a warning.
+
     Raises:
-        ModelError: If a collision mesh cannot be read, or the proxy is unknown.
+        ModelError: If a collision mesh cannot be read, none exists and no other shape
+            is left, or the proxy is unknown.
     """
     if proxy not in get_args(Proxy):
         raise ModelError(f"proxy {proxy!r} is not one of {', '.join(get_args(Proxy))}")
@@ -104,25 +116,38 @@ def part_of(robot: Robot, name: str) -> Part:
 
 
 def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
+    """Return the collision geometry of a part, fixed to the joints of the robot."""
+    if part.source.shapes is None:
+        return _shapes_of_urdf(robot, part)
+    shapes = []
+    for shape in part.source.shapes:
+        if shape.collides:
+            name = part.prefix + shape.body
+            frame = robot.model.frames[robot.frame_id(name)]
+            place = frame.placement * pin.SE3(shape.pose)
+            geometry = body_geometry(shape)
+            shapes.append(LinkShape(name, frame.parentJoint, place, geometry))
+    return shapes
+
+
+def _shapes_of_urdf(robot: Robot, part: Part) -> list[LinkShape]:
     """Return the URDF's collision geometry, fixed to the joints of the robot.
 
     The robot may have fewer joints than the URDF, since joints can be locked. So the
     joint of a shape is found by the name of the shape's frame.
     """
     source = part.source
-    for name in _collision_meshes(source):
-        _check_mesh(source, name)
-    full = pin.buildModelFromUrdf(str(source.urdf), mimic=False)
+    xml = read_urdf(source)
+    missing = _locate_meshes(xml, source)
+    text = parser_text(xml, "visual")
+    full = pin.buildModelFromXML(text, mimic=False)
     try:
-        geometry = pin.buildGeomFromUrdf(
-            full,
-            str(source.urdf),
-            pin.GeometryType.COLLISION,
-            package_dirs=[str(folder) for folder in source.package_dirs],
-        )
+        geometry = pin.buildGeomFromUrdfString(full, text, pin.GeometryType.COLLISION)
     except (ValueError, RuntimeError) as error:
         reason = (str(error).strip() or type(error).__name__).splitlines()[0]
         raise ModelError(f"{source.urdf}: a collision mesh: {reason}") from error
+    if missing:
+        _report_missing(robot, part, missing, left=len(geometry.geometryObjects))
     shapes = []
     for item in geometry.geometryObjects:
         frame = full.frames[item.parentFrame]
@@ -144,18 +169,55 @@ def _collision_shapes(robot: Robot, part: Part) -> list[LinkShape]:
     return shapes
 
 
-def _collision_meshes(source: RobotSource) -> list[str]:
-    elements = read_urdf(source.urdf).iter("collision")
-    meshes = (mesh for element in elements for mesh in element.iter("mesh"))
-    return list(dict.fromkeys(mesh.get("filename", "") for mesh in meshes))
+def _locate_meshes(xml: Element, source: RobotSource) -> dict[str, str]:
+    """Put the path of each collision mesh into a URDF; delete those that do not exist.
+
+    Returns:
+        For each link without one of its meshes: the name of the first one.
+
+    Raises:
+        ModelError: If a mesh exists, but cannot be used.
+    """
+    missing: dict[str, str] = {}
+    for link in xml.iter("link"):
+        for element in link.findall("collision"):
+            for mesh in element.iter("mesh"):
+                name = mesh.get("filename", "")
+                file = mesh_files.find_file(source, name)
+                if file is None:
+                    missing.setdefault(link.get("name", ""), name)
+                    link.remove(element)
+                    break
+                if reason := mesh_files.find_problem(file):
+                    raise ModelError(
+                        f"{source.urdf}: a collision mesh: {file}: {reason}"
+                    )
+                mesh.set("filename", str(file.resolve()))
+    return missing
 
 
-def _check_mesh(source: RobotSource, name: str) -> None:
-    """Check a mesh before Assimp reads it; Pinocchio reports a missing one."""
-    found = (file for file in mesh_files.candidates(source, name) if file.is_file())
-    file = next(found, None)
-    if file is not None and (reason := mesh_files.find_problem(file)):
-        raise ModelError(f"{source.urdf}: a collision mesh: {file}: {reason}")
+def _report_missing(
+    robot: Robot, part: Part, missing: Mapping[str, str], left: int
+) -> None:
+    """Warn of meshes that do not exist, once for each robot.
+
+    Raises:
+        ModelError: If no other shape is left.
+    """
+    name = next(iter(missing.values()))
+    hint = mesh_files.where_to_put(name)
+    if not left:
+        raise ModelError(
+            f"{part.source.urdf}: a collision mesh: no file {name!r}, and no other "
+            f"shape of a link is left; {hint}, or give the links primitives"
+        )
+    if part.prefix not in _incomplete.setdefault(robot, set()):
+        _incomplete[robot].add(part.prefix)
+        _log.warning(
+            "%s: collision meshes of %d links are missing, which distances therefore "
+            "do not see: %s (%s); %s",
+            part.prefix + part.source.name, len(missing), listing(missing), name, hint,
+        )  # fmt: skip
 
 
 def _finite(geometry: Any) -> bool:
@@ -238,8 +300,11 @@ def _capsule(shape: LinkShape) -> LinkShape:
         return _replaced(
             shape, coal.Capsule(geometry.radius, 2.0 * geometry.halfLength)
         )
-    first, second, radius = enclosing_capsule(_points(shape))
-    placement, length = _placement_along(first, second)
+    if isinstance(geometry, coal.Ellipsoid):
+        placement, radius, length = enclosing_ellipsoid_capsule(geometry)
+    else:
+        first, second, radius = enclosing_capsule(_points(shape))
+        placement, length = _placement_along(first, second)
     return LinkShape(
         shape.link,
         shape.joint,

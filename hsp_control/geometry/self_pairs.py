@@ -1,7 +1,6 @@
 """Pairs of a robot's own links that are checked for self-collision."""
 
 from collections.abc import Sequence
-from xml.etree import ElementTree
 
 from hsp_control.common.exceptions import ModelError
 from hsp_control.geometry.links import LinkShape, part_of
@@ -13,7 +12,7 @@ def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]
     """Return the pairs of link shapes that can collide, as indices into ``links``.
 
     Pairs on one joint or on neighbouring joints are left out, since they always touch,
-    and so are pairs that the robot's SRDF disables.
+    and so are pairs that the robot's SRDF or MuJoCo model disables.
 
     Raises:
         ModelError: If the SRDF cannot be read.
@@ -50,15 +49,17 @@ def _neighbours(
 def _disabled(robot: Robot) -> set[frozenset[str]]:
     disabled = set()
     for part in robot.parts:
+        for pair in part.source.excluded:
+            disabled.add(frozenset(part.prefix + link for link in pair))
         if part.source.srdf is None:
             continue
         try:
             srdf = read_xml(part.source.srdf)
-        except (XmlError, ElementTree.ParseError, OSError) as error:
-            raise ModelError(
-                f"{part.source.srdf}: cannot read the SRDF: {error}"
-            ) from error
-        for pair in srdf.iter("disable_collisions"):
-            links = (pair.get("link1", ""), pair.get("link2", ""))
+        except XmlError as error:
+            raise ModelError(error.within(part.source.srdf)) from None
+        except OSError as error:
+            raise ModelError(f"{part.source.srdf}: {error.strerror}") from error
+        for element in srdf.iter("disable_collisions"):
+            links = (element.get("link1", ""), element.get("link2", ""))
             disabled.add(frozenset(part.prefix + link for link in links))
     return disabled

@@ -7,6 +7,13 @@ from hsp_control.constraints.limits import RobotLimits
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
+_TOLERANCE = 0.5
+"""By how much the effort that a robot says it has may exceed the limits, relative to
+them: the robot's own stop, or another load, may need more."""
+
+_SURE = 5
+"""Periods in a row without a measurement that a bad line may have."""
+
 
 class EffortLimiter:
     """Converts an effort into the value that is sent, within effort and rate limits.
@@ -39,10 +46,17 @@ class EffortLimiter:
         self._rest = np.zeros(robot.nv)
         self._compensates = settings.compensates_gravity
         self._upper = settings.effort_limits(robot, limits)
+        # The controller's limits may fall while it runs: efforts follow by their rate.
+        self._largest = np.maximum(self._upper, settings.effort_limits(robot))
         self._step = settings.rate_limits(robot) * period
         self.sent: Array = np.zeros(robot.nv)
         self.applied: Array = np.zeros(robot.nv)
         self.gravity: Array = np.zeros(robot.nv)
+        # What the robot may have, at least and at most; and before the last effort.
+        self._least: Array = np.zeros(robot.nv)
+        self._most: Array = np.zeros(robot.nv)
+        self._before = self._least, self._most
+        self._unheard, self._says = 0, False
 
     @property
     def effort_limits(self) -> Array:
@@ -54,6 +68,7 @@ class EffortLimiter:
         if limits is not self._limits:
             self._limits = limits
             self._upper[:] = self._settings.effort_limits(self._robot, limits)
+            self._largest = np.maximum(self._upper, self._largest)
 
     def reset(self, q: Array) -> None:
         """Start at rest at q, shape (nq,): brakes or motors provide g(q)."""
@@ -62,16 +77,61 @@ class EffortLimiter:
         if not self._compensates:
             self.sent = np.clip(self.gravity, -self._upper, self._upper)
         self.applied = self.sent + self._added_by_robot
+        self._least = self._most = self.sent.copy()
+        self._before = self._least, self._most
+        self._unheard, self._says = 0, False
 
     @property
     def _added_by_robot(self) -> Array | float:
         return self.gravity if self._compensates else 0.0
+
+    def believes(self, effort: Array) -> bool:
+        """Return whether the motors can have an effort, shape (nv,), as it is sent."""
+        tau = np.abs(effort + self._added_by_robot)
+        return bool((tau <= self._largest * (1.0 + _TOLERANCE)).all())
+
+    def robot_has(self, effort: Array | None) -> bool:
+        """Use the effort that the robot has, as it says; None: it does not say.
+
+        What was sent last may be lost, or still under way: the robot may have both,
+        unless they are too far apart for one step from both.
+
+        Args:
+            effort: In the terms of ``sent``, shape (nv,), finite.
+
+        Returns:
+            Whether it differs from what was sent last; ``applied`` then follows it.
+        """
+        self._unheard, self._says = 0, effort is not None
+        if effort is None or np.array_equal(effort, self.sent):
+            self._least = self._most = self.sent.copy()
+            return False
+        # Not even by rounding does an effort come from beyond the limits.
+        borne = self._added_by_robot
+        has = np.clip(effort, -self._largest - borne, self._largest - borne)
+        other = np.where(np.abs(has - self.sent) > 2.0 * self._step, has, self.sent)
+        self._least, self._most = np.minimum(has, other), np.maximum(has, other)
+        self.applied = has + borne
+        return True
+
+    def nothing_heard(self) -> None:
+        """Count a period without a measurement: what was sent may be lost.
+
+        After `_SURE` of them a line is dead, not bad: what was sent counts.
+        """
+        self._unheard += 1
+        if self._says and self._unheard <= _SURE:
+            least, most = self._before
+            self._least = np.minimum(least, self.sent)
+            self._most = np.maximum(most, self.sent)
 
     def apply(self, tau: Array, q: Array) -> bool:
         """Compute ``sent`` from an effort.
 
         The effort is clipped to its limits first, then the sent value to its rate. If
         some value satisfies both limits, the result does.
+
+        The rate counts from all efforts that the robot may have.
 
         Args:
             tau: Effort, shape (nv,).
@@ -85,6 +145,21 @@ class EffortLimiter:
         if self._compensates:
             self.gravity = self._robot.inverse_dynamics(q, self._rest, self._rest)
         wanted = np.clip(tau, -self._upper, self._upper) - self._added_by_robot
-        np.clip(wanted, self.sent - self._step, self.sent + self._step, out=self.sent)
+        lower, upper = self._most - self._step, self._least + self._step
+        np.clip(wanted, lower, upper, out=self.sent)
         self.applied = self.sent + self._added_by_robot
+        self._before = self._least, self._most
+        self._least = self._most = self.sent.copy()
         return True
+
+    def hold(self, q: Array) -> None:
+        """Keep ``sent``; ``applied`` follows g(q) if the robot compensates gravity."""
+        if self._compensates:
+            self.gravity = self._robot.inverse_dynamics(q, self._rest, self._rest)
+        self.applied = self.sent + self._added_by_robot
+
+    def replace_sent(self, sent: Array) -> None:
+        """Set ``sent``, shape (nv,): to another effort that the robot has."""
+        self.sent = sent
+        self._least = self._most = sent.copy()
+        self.applied = sent + self._added_by_robot

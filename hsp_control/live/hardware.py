@@ -16,8 +16,10 @@ class Measurement(NamedTuple):
         v: Velocity, shape (nv,).
         age: State age, as far as the hardware knows it [s].
         halted: Whether the robot has stopped by itself and ignores efforts.
-        applied: Effort the robot had when it measured, shape (nv,), where hardware
-            knows it; None: what was last sent counts.
+        applied: Effort the robot had when it measured, in the terms of
+            `Hardware.write` (libfranka's ``tau_J_d``), shape (nv,), where the hardware
+            knows it; None: what was sent last counts.
+        fault: Why the robot must be stopped safely, if hardware knows a reason.
     """
 
     sequence: int
@@ -27,6 +29,7 @@ class Measurement(NamedTuple):
     age: float = 0.0
     halted: bool = False
     applied: Array | None = None
+    fault: str = ""
 
 
 @runtime_checkable
@@ -36,6 +39,10 @@ class Hardware(Protocol):
     The loop calls `read` once, and then compiles kernels for some seconds. From the
     second `read` on, it calls `read` and `write` once a period, and `close` at the end.
     If it has no valid state any more, it calls `close` without further writes.
+
+    Once the first effort is out, whatever the methods raise ends in the report. What
+    `read` raises means that no state can arrive any more: the loop sends nothing more.
+    After what `write` raises it goes on trying, with the safe stop.
 
     Attributes:
         period: Time between two measurements [s].

@@ -34,7 +34,14 @@ class InProcessRobot:
         self._efforts = []
         self._sequence += 1
         q, v = self.robot.measure()
-        return Measurement(self._sequence, self.robot.t, q, v, halted=self.robot.halted)
+        return Measurement(
+            self._sequence,
+            self.robot.t,
+            q,
+            v,
+            halted=self.robot.halted,
+            applied=self.robot.in_force,
+        )
 
     def write(self, effort: Array) -> None:
         """Set the effort of the next period, shape (nv,)."""

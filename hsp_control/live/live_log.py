@@ -5,6 +5,8 @@ from math import floor, inf, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
@@ -22,6 +24,7 @@ from hsp_control.simulation.recorder import Recorder
 CHANNEL_INFO = {
     "phase": ("-", "0 waiting; 1 running; 2 safe stop, damping; 3 safe stop, hold"),
     "sent": ("N·m or N", "sent to the robot: tau, or tau - g(q)"),
+    "applied": ("N·m or N", "what the robot had of it before, if it says so"),
     "measured": ("-", "1 if the state was measured, 0 if the model predicted it"),
     "age": ("s", "state age"),
     "response": ("s", "response time: from the state's arrival to its effort"),
@@ -91,13 +94,13 @@ class LiveLog:
         """
         if not row.state.t > self._last_t:
             return
-        self._last_t = row.state.t
         try:
             self._recorder.record(*row)
             columns = self._recorder.rows(0)
             if not self._journal.describes(columns):
                 self._head()
             self._journal.write_row(columns)
+            self._last_t = row.state.t
         finally:
             self._recorder.clear()
 
@@ -115,8 +118,10 @@ class LiveLog:
         try:
             came = self._recorder.repeatable()
             self._journal.write_end(status, message, **came, **meta)
-        finally:
+        except Exception:  # after Ctrl-C it may be called again
             self._journal.close()
+            raise
+        self._journal.close()
 
     def _head(self) -> None:
         meta = self._recorder.meta("running", "", **self._meta)
@@ -154,6 +159,7 @@ class LoopLog:
         self._effort_source, self._period = effort_source, period
         self._log: LiveLog | None = None
         self._next, self._phase = -inf, Phase.WAITING
+        self._failed = False
         self.path = None if path is None else Path(path)
         self.controller_failed = False
         if self.path is not None:
@@ -181,15 +187,19 @@ class LoopLog:
             LogError: If it cannot be written; later calls then do nothing.
         """
         measurement, state = reader.measurement, reader.state
-        if self._log is None or (measurement is None and phase == Phase.RUNNING):
+        if self._log is None or self._failed:
+            return
+        if measurement is None and phase == Phase.RUNNING:
             return  # no measurement, so no effort was computed
         if state.t < self._next and phase == self._phase and not last:
             return
+        try:
+            self._log.add(self._row(phase, reader, limiter, response))
+        except Exception:  # after Ctrl-C the row is written again
+            self._failed = True
+            raise
         periods = floor(state.t / self._period + 1e-6) + 1
         self._next, self._phase = (periods - 1e-6) * self._period, phase
-        log, self._log = self._log, None  # if writing raises, no log is left
-        log.add(self._row(phase, reader, limiter, response))
-        self._log = log
 
     def warm_up(self, reader: StateReader, limiter: EffortLimiter) -> None:
         """Record a row without writing it, so that later rows compile nothing."""
@@ -200,9 +210,12 @@ class LoopLog:
         self, phase: Phase, reader: StateReader, limiter: EffortLimiter, response: float
     ) -> Row:
         measurement, state = reader.measurement, reader.state
+        applied = None if measurement is None else measurement.applied
+        unknown = np.full(limiter.sent.shape, nan)
         log_channels = live_channels(
             phase=float(phase),
             sent=limiter.sent,
+            applied=unknown if applied is None else applied,
             measured=float(measurement is not None),
             age=nan if measurement is None else measurement.age,
             response=response,

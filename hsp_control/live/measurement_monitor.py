@@ -1,4 +1,4 @@
-"""Check every measurement before the controller uses it."""
+"""Check every valid measurement before the controller uses it."""
 
 import numpy as np
 
@@ -17,7 +17,11 @@ class MeasurementMonitor:
     """
 
     def __init__(
-        self, robot: Robot, limits: RobotLimits | None, settings: LiveSettings
+        self,
+        robot: Robot,
+        limits: RobotLimits | None,
+        settings: LiveSettings,
+        period: float,
     ) -> None:
         """Read the limits.
 
@@ -26,8 +30,9 @@ class MeasurementMonitor:
             limits: The controller's limits; None: those of the robot's model.
             settings: Margins beyond the limits, greatest age and number of missing
                 states.
+            period: Time between two measurements [s].
         """
-        self._robot, self._settings = robot, settings
+        self._robot, self._settings, self._period = robot, settings, period
         self._own = own_limits(robot) if limits is None else None
         self.last: Measurement | None = None
         self._read(limits)
@@ -51,49 +56,37 @@ class MeasurementMonitor:
         self._upper = upper + settings.position_margin
         self._speed = speed * (1.0 + settings.velocity_margin)
 
-    def if_new(self, measurement: Measurement | None) -> Measurement | None:
-        """Return the measurement if it is later than the last one, else None."""
-        last = self.last
-        if measurement is None or last is None:
-            return measurement
-        old = measurement.sequence <= last.sequence or measurement.t < last.t
-        return None if old else measurement
+    def is_new(self, measurement: Measurement) -> bool:
+        """Return whether the measurement is later than the last one."""
+        return self.last is None or measurement.sequence > self.last.sequence
 
-    def invalid(self, measurement: Measurement) -> str | None:
-        """Return why a measurement is not a valid state of the robot, or None.
+    def jump(self, measurement: Measurement) -> str | None:
+        """Return why the robot cannot have come here from the last state, or None.
 
-        Checks shapes, finite numbers and unit quaternions.
+        A joint moves no further than its greatest speed allows. A state that jumps is
+        not the robot's: predict it instead.
         """
-        robot = self._robot
-        for name, value, size in (
-            ("q", measurement.q, robot.nq),
-            ("v", measurement.v, robot.nv),
-        ):
-            if value.shape != (size,):
-                return f"the state's {name} has shape {value.shape}; needs ({size},)"
-            if not np.isfinite(value).all():
-                where = int(np.flatnonzero(~np.isfinite(value))[0])
-                return f"the state is not finite: {name}[{where}] is {value[where]}"
-        if not np.isfinite(measurement.t):
-            return f"the state's time is {measurement.t}"
-        for start, size in robot.unit_blocks:
-            norm = float(np.linalg.norm(measurement.q[start : start + size]))
-            if abs(norm - 1.0) > 1e-6:
-                return (
-                    f"q[{start}:{start + size}] of the state has norm {norm:.6g}; "
-                    "needs norm 1"
-                )
-        return None
+        last = self.last
+        if last is None:
+            return None
+        passed = max(measurement.t - last.t, 0.0)
+        passed = max(passed, (measurement.sequence - last.sequence) * self._period)
+        moved = self._robot.difference(last.q, measurement.q)
+        furthest = self._speed * passed + self._settings.position_margin
+        return self._outside(moved, -furthest, furthest, "jumps by")
 
     def violation(self, measurement: Measurement) -> str | None:
         """Return why the loop must stop at a valid state, or None.
 
-        Checks the robot's own stop, state age, skipped states, positions and speeds.
+        Checks what the hardware found, the robot's own stop, state age, skipped states,
+        positions and speeds.
         """
         last, allowed = self.last, self._settings
+        if measurement.fault:
+            return measurement.fault
         if measurement.halted:
             return "the robot has stopped by itself"
-        if measurement.age > allowed.age:
+        if not abs(measurement.age) <= allowed.age:
             return (
                 f"the state is {measurement.age:.3g} s old; {allowed.age:g} s are "
                 "allowed"

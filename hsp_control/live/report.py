@@ -1,6 +1,6 @@
 """The result of a live run."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -15,14 +15,17 @@ class LoopReport:
     """How a loop ended, and its response times.
 
     Attributes:
-        ended: ``completed``: the duration is over; ``operator``: the operator stopped
-            it; ``fault``: a fault stopped it.
+        ended: ``completed``: the duration is over, and the robot is at rest;
+            ``operator``: the operator stopped it; ``fault``: a fault stopped it, or
+            came in the safe stop, or the robot still moved afterwards.
         reason: Why it ended, in a sentence.
-        phase: The last phase of the safe stop: `Phase.HOLDING` if the robot stood
-            still, `Phase.DAMPING` if the loop fell silent before.
+        phase: The last phase of the safe stop: `Phase.HOLDING` if the safe stop ended,
+            `Phase.DAMPING` if the loop fell silent before.
         silent: Whether the loop fell silent, that is stopped sending efforts, before
             the safe stop was complete: the robot's own watchdog must stop it.
         speed: Speed of the fastest joint at the end, measured or predicted.
+        at_rest: Whether this speed is at most `StopSettings.standstill`, and the safe
+            stop has ended.
         t: The run's time at the end [s].
         deadlines: Response times and deadline misses.
         error: What the controller, a change or the hardware raised, if it ended the
@@ -35,10 +38,11 @@ class LoopReport:
     phase: Phase
     silent: bool
     speed: float
+    at_rest: bool
     t: float
     deadlines: Deadlines
     error: Exception | None = None
-    log: Path | None = field(default=None)
+    log: Path | None = None
 
     @property
     def status(self) -> str:

@@ -36,6 +36,9 @@ class StopSettings(Part, error=LiveError):
     ``rest_speed``."""
     hold: NonNegative = 0.2
     """Duration of holding before the loop ends [s]."""
+    standstill: Positive = 0.1
+    """Largest joint speed at the end with which a run counts as completed [rad/s or
+    m/s]; above ``rest_speed``, because of noise."""
 
     def check_period(self, period: float) -> None:
         """Check that the sampled safe stop is stable at this period [s].

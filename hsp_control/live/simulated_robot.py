@@ -5,8 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import LiveError
+from hsp_control.common.exceptions import HspControlError, LiveError
 from hsp_control.constraints.limits import RobotLimits
+from hsp_control.live.effort_check import EffortCheck
+from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.safe_stop import Phase, SafeStop
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import RobotState
@@ -18,15 +20,20 @@ from hsp_control.simulation.plants import (
     SampledPlant,
 )
 
+_LARGEST_SPEED = 1e4
+"""Of a joint [rad/s or m/s]; what is faster is no motion of a robot."""
+
 
 class SimulatedRobot:
     """A plant that is advanced period by period, and checks the efforts it receives.
 
     Until the first effort its brakes hold it and its time stands still. Afterwards, in
-    a period without an effort it holds the last one. After too many of them, or after
-    an effort that is not finite, it stops by itself with a `SafeStop` from its true
-    state, and ignores all further efforts, as a real robot's safety controller and
-    brakes do.
+    a period without an effort it holds the last one. It stops by itself with a
+    `SafeStop` from its true state, within the same limits, and ignores all further
+    efforts, as a real robot's safety controller and brakes do: after too many periods
+    without an effort; after an effort that is not finite, beyond its limits, or faster
+    than its effort rate; if a joint is too fast. If its motion cannot be computed any
+    more, its brakes hold it where it was.
 
     Attributes:
         plant: The plant.
@@ -58,28 +65,27 @@ class SimulatedRobot:
             q: Start configuration, shape (nq,).
             v: Start velocity, shape (nv,).
             period: Length of a period [s].
-            settings: Its watchdog, its own safe stop, and whether it compensates
-                gravity, with its true mass; None: the defaults.
-            limits: Limits on the efforts of its safe stop, if the settings have none;
-                None: the URDF's.
+            settings: Its watchdog, its own safe stop, its limits, and whether it
+                compensates gravity, with its true mass; None: the defaults.
+            limits: Limits on its efforts, if the settings have none; None: the URDF's.
+                It accepts what either of them allows.
 
         Raises:
             LiveError: If the settings do not fit the robot or the period.
         """
         robot, settings = plant.robot, settings or LiveSettings()
-        settings.rate_limits(robot)  # raises if they do not fit
-        upper = settings.effort_limits(robot, limits)
+        self._limiter = EffortLimiter(robot, settings, period, limits)
+        upper = self._limiter.effort_limits
         self._stop = SafeStop(robot, settings.stop, upper, period)
-        self._compensates = settings.compensates_gravity
+        self._check = EffortCheck(robot, settings, period, upper)
         self._state = RobotState(robot)
-        self._rest = np.zeros(robot.nv)
         self.plant, self.period, self.watchdog = plant, period, settings.watchdog
         self.q, self.v = q.copy(), v.copy()
         self.t, self.periods = 0.0, 0
         self.phase, self.reason = Phase.WAITING, ""
         self._missing = 0
-        self._command: Array = np.zeros(robot.nv)
-        self.tau = self._gravity()
+        self._limiter.reset(self.q)
+        self.tau = self._limiter.applied
         plant.reset(0.0, self.q, self.v)
 
     @property
@@ -91,6 +97,14 @@ class SimulatedRobot:
     def done(self) -> bool:
         """Whether it has stopped, and was held for `StopSettings.hold`."""
         return self.phase == Phase.HOLDING and self._stop.done
+
+    @property
+    def in_force(self) -> Array | None:
+        """The effort that it holds, in the terms in which it receives efforts.
+
+        Shape (nv,); None while its brakes hold it before the start.
+        """
+        return None if self.phase == Phase.WAITING else self._limiter.sent.copy()
 
     def measure(self) -> tuple[Array, Array]:
         """Return the measured q, shape (nq,), and v, shape (nv,)."""
@@ -113,20 +127,36 @@ class SimulatedRobot:
         if self.phase == Phase.WAITING:
             return
         if self.phase == Phase.RUNNING:
-            self.tau = self._command
-            if self._compensates:
-                self.tau = self.tau + self._gravity()
-        else:
+            self._limiter.hold(self.q)
+            fault = self._check.too_fast(self.v)
+            if fault is not None:
+                self.halt(fault)
+        if self.phase > Phase.RUNNING:
             state = self._state.update(self.t, self.q, self.v)
-            self.tau = self._stop.effort(state)
+            self._limiter.apply(self._stop.effort(state), self.q)
             self.phase = self._stop.phase
+        self.tau = self._limiter.applied
         end = (self.periods + 1) * self.period
-        self.q, self.v = self.plant.advance(self.t, end, self.tau)
+        self._move(end)
         self.periods += 1
         self.t = end
 
-    def _gravity(self) -> Array:
-        return self.plant.robot.inverse_dynamics(self.q, self._rest, self._rest)
+    def _move(self, end: float) -> None:
+        """Advance the plant; if that gives no state, the brakes hold the last one."""
+        try:
+            q, v = self.plant.advance(self.t, end, self.tau)
+        except (HspControlError, ArithmeticError, ValueError) as error:
+            self._brake(f"its motion cannot be computed: {error}", end)
+            return
+        if np.isfinite(q).all() and np.abs(v).max() < _LARGEST_SPEED:  # NaN is not
+            self.q, self.v = q, v
+        else:
+            self._brake("its motion cannot be computed: it is too fast", end)
+
+    def _brake(self, reason: str, t: float) -> None:
+        self.halt(reason)
+        self.v = np.zeros_like(self.v)
+        self.plant.reset(t, self.q, self.v)
 
     def _receive(self, efforts: Sequence[Array]) -> None:
         if not efforts:
@@ -135,12 +165,14 @@ class SimulatedRobot:
                 self.halt(f"the watchdog: no valid effort for {self._missing} periods")
             return
         self._missing = 0
+        effort, before = efforts[-1], self.in_force
         if self.phase == Phase.WAITING:
             self.phase = Phase.RUNNING
-        if not np.isfinite(efforts[-1]).all():
-            self.halt(f"an effort is not finite: {efforts[-1].tolist()}")
+        fault = self._check.fault(effort, before, self._limiter.gravity)
+        if fault is not None:
+            self.halt(fault)
             return
-        self._command = np.array(efforts[-1], dtype=float)
+        self._limiter.replace_sent(np.array(effort, dtype=float))
 
 
 def sampled(plant: Plant, integrator: Integrator, period: float) -> SampledPlant:

@@ -7,9 +7,13 @@ from hsp_control.common.exceptions import HardwareError
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.live.dead_reckoning import DeadReckoning
 from hsp_control.live.deadlines import Deadlines
+from hsp_control.live.failures import described
+from hsp_control.live.frozen_state import FrozenState
 from hsp_control.live.hardware import Hardware, Measurement
 from hsp_control.live.measurement_monitor import MeasurementMonitor
+from hsp_control.live.robot_clock import RobotClock
 from hsp_control.live.settings import LiveSettings
+from hsp_control.live.valid_measurement import valid_measurement
 from hsp_control.robot import Robot, RobotState
 
 _READ_MARGIN = 0.5
@@ -35,6 +39,7 @@ class StateReader:
         hardware: Hardware,
         settings: LiveSettings,
         clock: Callable[[], float],
+        start_time: float = 0.0,
     ) -> None:
         """Allocate.
 
@@ -44,13 +49,20 @@ class StateReader:
             hardware: The robot.
             settings: Faults that are tolerated.
             clock: A monotonic clock [s].
+            start_time: The controller's time at the first state [s].
         """
         self._hardware, self._settings, self._clock = hardware, settings, clock
-        self._monitor = MeasurementMonitor(robot, limits, settings)
-        self._reckoning = DeadReckoning(robot, hardware.period)
-        self._period = hardware.period
+        self._robot, self._period = robot, hardware.period
+        self._monitor = MeasurementMonitor(robot, limits, settings, self._period)
+        self._reckoning = DeadReckoning(robot, self._period)
+        self._frozen = FrozenState(robot, self._period, settings.missing)
+        self._robot_clock = RobotClock(
+            start_time,
+            self._period,
+            settings.missing,
+            settings.start_timeout / self._period,
+        )
         self._missing = 0
-        self._time_offset = 0.0
         self.measurement: Measurement | None = None
         self.fault: str | None = None
         self.error: Exception | None = None
@@ -68,25 +80,25 @@ class StateReader:
         """Time since the last measurement [s]."""
         return self._reckoning.predicted_for
 
-    def wait_for_first(self, start_time: float) -> Measurement:
+    def wait_for_first(self) -> Measurement:
         """Wait for the first state, and return it.
-
-        Args:
-            start_time: The controller's time at this state [s].
 
         Raises:
             HardwareError: If none arrives in time, or the robot cannot be started.
         """
         end = self._clock() + self._settings.start_timeout
         while (left := end - self._clock()) > 0.0:
-            measurement = self._hardware.read(left)
-            if measurement is None:
+            raw = self._hardware.read(left)
+            if raw is None:
                 continue
-            monitor = self._monitor
-            fault = monitor.invalid(measurement) or monitor.violation(measurement)
+            try:
+                measurement = valid_measurement(raw, self._robot, self._period)
+                fault = self._monitor.violation(measurement)
+            except HardwareError as error:
+                fault = str(error)
             if fault is not None:
                 raise HardwareError(f"the robot cannot be started: {fault}")
-            self._time_offset = start_time - measurement.t
+            self._robot_clock.fault(measurement)
             self._accept(measurement)
             return measurement
         raise HardwareError(
@@ -96,6 +108,7 @@ class StateReader:
     def start(self) -> None:
         """Start real-time operation; states skipped before do not count."""
         self._monitor.last = None
+        self._robot_clock.restart()
         self._last_arrival = self._clock()
         self._due = self._last_arrival + (1.0 + _READ_MARGIN) * self._period
 
@@ -108,15 +121,10 @@ class StateReader:
         """
         self._monitor.follow(limits)
         self.fault = self.error = self.measurement = None
-        raw = self._read()
-        if raw is not None:
-            self.fault = self._monitor.invalid(raw)
-        new = self._monitor.if_new(raw) if self.fault is None else None
-        self.arrival = self._clock()
+        new = self._newest(applied)
         if new is None:
             self._predict(applied)
             return
-        self.fault = self._monitor.violation(new)
         if (last := self._monitor.last) is not None:
             self.deadlines.skipped_states += new.sequence - last.sequence - 1
         self._accept(new)
@@ -130,18 +138,35 @@ class StateReader:
             self._due = self.arrival + (1.0 + _READ_MARGIN) * self._period
         return response
 
-    def _read(self) -> Measurement | None:
+    def _newest(self, applied: Array) -> Measurement | None:
+        """Return the new measurement if it is the robot's state; set the fault."""
         try:
-            return self._hardware.read(max(self._due - self._clock(), 0.0))
-        except (HardwareError, OSError) as error:
-            self.fault, self.error = f"no state can be read: {error}", error
+            raw = self._hardware.read(max(self._due - self._clock(), 0.0))
+        except Exception as error:  # a driver may raise anything
+            self.fault, self.error = f"no state can be read: {described(error)}", error
             self.connection_lost = True
+            raw = None
+        self.arrival = self._clock()
+        if raw is None:
             return None
+        try:
+            new = valid_measurement(raw, self._robot, self._period)
+        except HardwareError as error:
+            self.fault, self.error = str(error), error
+            return None
+        if not self._monitor.is_new(new):
+            return None
+        self.fault = self._robot_clock.fault(new) or self._monitor.violation(new)
+        untrue = self._frozen.fault(new, applied) or self._monitor.jump(new)
+        if untrue is not None:
+            self.fault = self.fault or untrue
+            return None
+        return new
 
     def _accept(self, measurement: Measurement) -> None:
         self._monitor.last = self.measurement = measurement
         self._missing = 0
-        t = measurement.t + self._time_offset
+        t = self._robot_clock.time(measurement)
         self._reckoning.correct(t, measurement.q, measurement.v)
 
     def _predict(self, applied: Array) -> None:

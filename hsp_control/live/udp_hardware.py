@@ -72,9 +72,17 @@ class UdpHardware:
             age = self._age_estimator.age(monotonic(), 1e-9 * packet.stamp)
         if not states:
             return None
-        q, v = packet.payload[: self._nq], packet.payload[self._nq :]
-        halted = packet.phase > Phase.RUNNING
-        return Measurement(packet.sequence, packet.t, q, v, age, halted)
+        numbers, nq, nv = packet.payload, self._nq, self._nv
+        q, v, applied = numbers[:nq], numbers[nq : nq + nv], numbers[nq + nv :]
+        return Measurement(
+            packet.sequence,
+            packet.t,
+            q,
+            v,
+            age,
+            halted=packet.phase > Phase.RUNNING,
+            applied=applied if applied.size else None,
+        )
 
     def write(self, effort: Array) -> None:
         """Send an effort; see `Hardware.write`."""

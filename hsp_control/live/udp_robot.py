@@ -1,6 +1,7 @@
 """Run a simulated robot in real time, connected by UDP."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from time import monotonic, sleep
 
@@ -97,8 +98,10 @@ def serve(
                 robot.halt(reason)
             t, q, v = robot.t, robot.q, robot.v
             robot.advance(efforts)
-            state = np.concatenate(robot.measure())
-            link.send(Kind.STATE, state, t=robot.t, phase=int(robot.phase))
+            has = robot.in_force
+            state = np.concatenate([*robot.measure(), [] if has is None else has])
+            with suppress(OSError):  # a line that fails loses packets
+                link.send(Kind.STATE, state, t=robot.t, phase=int(robot.phase))
             state_sequence = link.counts["sent"]
             done = robot.done
             if on_row is not None and robot.t > t:

@@ -106,8 +106,10 @@ class Foot:
         return float(np.ptp(self._corners[:, 1]))
 
     def stand(self, state: RobotState) -> None:
-        """Take where the foot is for where it stands."""
+        """Take where the foot is for where it stands; its references rest there."""
         here = state.frame(self.frame)
+        self.position.write(state.t, here.position)
+        self.orientation.write(state.t, here.rotation)
         yaw = float(np.arctan2(here.rotation[1, 0], here.rotation[0, 0]))
         self._last_yaw = near(yaw, self._last_yaw)  # several turns may have been made
         x, y = map(float, here.position[:2])

@@ -14,11 +14,13 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, StreamError
 from hsp_control.control.controller import Controller
+from hsp_control.declaration.nested import parts_within
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.robot import RobotState
 from hsp_control.tasks import FrameOrientation, FramePose, FramePosition, Task
 from hsp_control.trajectories import Stream, StreamOrientation, StreamPose
 from hsp_control.trajectories.crossfade import AnyReference
+from hsp_control.trajectories.remembering import Written
 from hsp_control.trajectories.streams.stream import Streamed
 
 RAMP = 0.2
@@ -199,12 +201,17 @@ class ObstacleGrip(Grip):
 
 
 def targets_of(controller: Controller) -> dict[str, TargetGrip]:
-    """Return the grips of the tasks whose targets can be dragged, by name."""
+    """Return the grips of the tasks whose targets can be dragged, by name.
+
+    What a plan writes is the plan's: nobody takes it away.
+    """
     kinds = FramePose, FramePosition, FrameOrientation
     return {
         task.name: TargetGrip(task, controller)
         for task in controller.tasks
-        if isinstance(task, kinds) and task.followed is not None
+        if isinstance(task, kinds)
+        and task.followed is not None
+        and not any(parts_within(task.followed, Written))
     }
 
 

@@ -13,6 +13,7 @@ from hsp_control.config.document import Document
 from hsp_control.config.experiment import build, read_document
 from hsp_control.play.session import ROW
 from hsp_control.robot import Robot
+from hsp_control.robot.description.described import described_names
 from hsp_control.robot.description.sources import example_robots
 
 _PERIOD = 0.001
@@ -27,7 +28,7 @@ def playable(
     It gets a control period of a millisecond, if it has none, and rows of about 10 ms.
 
     Args:
-        source: As for `load_experiment`; or the name of a robot with a fixed base,
+        source: As for `load_experiment`; or a robot with a fixed base, by name or URDF,
             whose hand then holds its pose, with a ball beside its elbow.
         overrides: Values to change, each ``key.path=value``.
         strict: See `load_experiment`.
@@ -57,7 +58,8 @@ def playable(
 
 
 def _is_robot(name: str) -> bool:
-    return name in {*bundled_robots(), *example_robots()}
+    known = {*bundled_robots(), *example_robots(), *described_names()}
+    return name in known or name.endswith((".urdf", ".xacro"))
 
 
 def _for_robot(name: str) -> dict[str, Any]:
@@ -80,9 +82,11 @@ def _for_robot(name: str) -> dict[str, Any]:
         )
     center, radius = _beside_the_elbow(robot)
     pose = robot.nv >= 6
+    has_home = bool(np.any(robot.home() != robot.neutral()))
     return {
         "title": f"{name}: take its hand, move the ball, pull at a link",
         "robot": {"name": name},
+        **({} if has_home else {"start": "auto"}),
         "scene": {
             "obstacles": {
                 "ball": {

@@ -77,6 +77,8 @@ class SteeredLoop:
                     self._requests.stop("stopped from the page")
                 case _ if self._requests.reason is None:
                     self.handles.take(message)
+        if self.key is not None and self._channel.lost:  # nobody can hold it any more
+            self._requests.stop("the process of the page has ended")
 
     def tell(self) -> None:
         """Say where everything is, and what the knobs are set to."""

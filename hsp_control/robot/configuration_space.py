@@ -26,7 +26,7 @@ class ConfigurationSpace:
             the order of v.
         joint_names: Their names.
         dof_names: A name for each degree of freedom: that of its joint, or
-            ``root_joint.x`` if the joint has several.
+            ``root_joint.x`` if the joint has several, ``neck.roll`` if it is a ball.
         units: The unit of each degree of freedom, ``rad`` or ``m``.
         single_dof_joints: (index in v, start in q, size in q) of every joint with one
             degree of freedom, shape (k, 3); the size is 2 for continuous joints.
@@ -217,7 +217,8 @@ def _units(joints: Mapping[str, Any]) -> tuple[str, ...]:
             ("JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismatic")
         )
         single = ("m",) if prismatic else ("rad",)
-        units.extend(roots.get(joint.nv, single * joint.nv))
+        several = roots.get(joint.nv, single * joint.nv)
+        units.extend(("rad",) * 3 if _is_ball(joint) else several)
     return tuple(units)
 
 
@@ -226,10 +227,14 @@ def _unit_blocks(joints: Mapping[str, Any]) -> tuple[tuple[int, int], ...]:
     for joint in joints.values():
         if joint.nq == joint.nv + 1:
             size = 2 if joint.nv in {1, 3} else 4
-            if joint.shortname() == "JointModelSpherical":
+            if _is_ball(joint):
                 size = 4
             blocks.append((joint.idx_q + joint.nq - size, size))
     return tuple(blocks)
+
+
+def _is_ball(joint: Any) -> bool:
+    return bool(joint.shortname() == "JointModelSpherical")
 
 
 def _dof_names(joints: Mapping[str, Any]) -> tuple[str, ...]:
@@ -241,6 +246,8 @@ def _dof_names(joints: Mapping[str, Any]) -> tuple[str, ...]:
     for name, joint in joints.items():
         if joint.nv == 1:
             names.append(name)
+        elif _is_ball(joint):
+            names.extend(f"{name}.{label}" for label in ("roll", "pitch", "yaw"))
         else:
             labels = suffixes.get(joint.nv, tuple(str(k) for k in range(joint.nv)))
             names.extend(f"{name}.{label}" for label in labels)

@@ -41,6 +41,24 @@ class FrameMotion(NamedTuple):
         return cls(*matrices, np.zeros(3), np.zeros(6))
 
 
+class WorldKinematics(NamedTuple):
+    """Placements and Jacobians of all joints, from which distances are computed.
+
+    Attributes:
+        placements: Placements of the joints, shape (njoints, 12): see
+            `joint_placements`.
+        jacobian: Pinocchio's J, in world axes at the world's origin, shape
+            (6, nvExtended): see `joint_support`.
+        jacobian_dot: Its time derivative, shape (6, nvExtended).
+        v: The velocity, shape (nv,).
+    """
+
+    placements: Array
+    jacobian: Array
+    jacobian_dot: Array
+    v: Array
+
+
 class _Carrier(NamedTuple):
     """The joint that carries a frame.
 

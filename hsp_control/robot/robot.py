@@ -1,32 +1,23 @@
-"""The robot and its state: kinematic and dynamic terms, each computed once per state.
-
-The controller gets its kinematics and dynamics from `RobotState`, which calls Pinocchio
-here, in `kinematics` and in `centroidal`. Other modules call Pinocchio directly only
-for what a state does not offer: loading and checks of models, integration, collision
-geometry, derivatives of gravity, plants with models of their own, and the viewer.
-"""
+"""The robot: a model that was loaded, taken from a scene, or combined."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, Self, TypeVar, cast
+from typing import Any, Self
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     FrameNotFoundError,
     JointNotFoundError,
     ModelError,
-    NonFiniteError,
 )
-from hsp_control.common.kernels import is_compiled, kernel
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import within
-from hsp_control.robot.centroidal import CentroidalMotion
-from hsp_control.robot.configuration_space import ConfigurationSpace, as_numbers
+from hsp_control.robot.configuration_space import ConfigurationSpace
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.combining import Part, combine, placement
 from hsp_control.robot.description.loading import (
@@ -34,25 +25,14 @@ from hsp_control.robot.description.loading import (
     load_model,
     reference_posture,
 )
+from hsp_control.robot.description.mujoco.selection import select
+from hsp_control.robot.description.mujoco.source import load_mjcf, load_selection
 from hsp_control.robot.description.robot_description import RobotDescription, ToolFrame
-from hsp_control.robot.description.sources import RobotSource, Root, find_robot
-from hsp_control.robot.kinematics import (
-    FrameKinematics,
-    joint_placements,
-    mass_matrix_difference,
-)
-from hsp_control.robot.matrix_view import matrix_view
-
-Made = TypeVar("Made")
+from hsp_control.robot.description.sources import RobotSource, Root
+from hsp_control.robot.state import RobotState
 
 _LIMB = 4
 """Fewest joints of an arm or a leg; heads and fingers have fewer."""
-_DOUBLE = np.dtype(np.float64)
-_PACKED = (8,)
-"""Strides of a vector of doubles one after another."""
-
-_MADE_LIMIT = 1000
-"""Number of parts whose memory a state keeps; then it starts anew."""
 
 
 class Robot(ConfigurationSpace):
@@ -103,13 +83,15 @@ class Robot(ConfigurationSpace):
         tool_frames: Mapping[str, ToolFrame] | None = None,
         gravity: ArrayLike | None = None,
         mimic: bool = True,
+        project_inertias: bool = False,
+        xacro_args: Mapping[str, str | bool | float] | None = None,
         access: Access = ANYWHERE,
     ) -> Self:
-        """Load a bundled robot, one of example-robot-data, or a URDF file.
+        """Load a bundled robot, one of an installed package, or a URDF or xacro file.
 
         Args:
-            name: For example ``"panda"``, ``"talos_arm"`` or ``"my_arm/arm.urdf"``; or
-                a whole description, and then nothing else.
+            name: For example ``"panda"``, ``"talos_arm"``, ``"gen3_description"`` or
+                ``"my_arm/arm.urdf"``; or a whole description, and then nothing else.
             root: How its base is attached to the world: ``fixed``, ``planar``
                 (x, y, yaw) or ``free_flyer``. None: as its source says; ``fixed`` for a
                 file.
@@ -120,6 +102,9 @@ class Robot(ConfigurationSpace):
                 -9.81 along z.
             mimic: Whether ``<mimic>`` joints follow their leader. False: they are
                 independent joints.
+            project_inertias: Whether inertias that no body can have are replaced by the
+                nearest that one can have; mass and centre of mass stay.
+            xacro_args: Arguments of a xacro file, by name.
             access: Which files may be read: a URDF given by path, and the meshes that
                 it names. Use `access.only_within` for untrusted files.
 
@@ -139,29 +124,79 @@ class Robot(ConfigurationSpace):
                 tool_frames=tool_frames or {},
                 gravity=gravity,
                 mimic=mimic,
+                project_inertias=project_inertias,
+                xacro_args=xacro_args or {},
             )
-        elif not mimic or any(
-            option is not None for option in (root, locked, tool_frames, gravity)
+        elif (
+            not mimic
+            or project_inertias
+            or any(
+                option is not None
+                for option in (root, locked, tool_frames, gravity, xacro_args)
+            )
         ):
             raise ModelError(
                 "a RobotDescription says all about the robot: give root, locked, "
-                "tool_frames, gravity and mimic in it"
+                "tool_frames, gravity, mimic, project_inertias and xacro_args in it"
             )
         return cls._described(name, access)
+
+    @classmethod
+    def from_mujoco(
+        cls,
+        model: Any,
+        root: str | None = None,
+        joints: Sequence[str] | None = None,
+        *,
+        qpos: ArrayLike | None = None,
+        keyframe: str | None = None,
+        locked: Mapping[str, float] | None = None,
+        tool_frames: Mapping[str, ToolFrame] | None = None,
+    ) -> Self:
+        """Return a robot in a compiled MuJoCo model: with the numbers MuJoCo uses.
+
+        Bodies and sites are its frames, under their names. Bodies that are not below
+        the root are no part of it; those above the root stand still. What MuJoCo has
+        and the robot lacks, such as a closed loop, is in `source.omitted`, and logged
+        once as a warning. `MujocoCoordinates` converts states.
+
+        Args:
+            model: The scene, a ``mujoco.MjModel``.
+            root: Name of the body whose subtree is the robot, with the body's own
+                joints; None: the whole scene.
+            joints: Names of its joints that move; None: all. The others are locked.
+                q and v have MuJoCo's order, whatever the order here.
+            qpos: The scene's configuration, shape (model.nq,), in which the other
+                joints are locked and the robot is at home; None: ``model.qpos0``, but
+                then the home of a joint that is not within its limits there is in
+                their middle.
+            keyframe: The name of that configuration in the model, instead.
+            locked: Hinges and slides to lock elsewhere, name to value [rad or m].
+            tool_frames: Frames to add, by name.
+
+        Raises:
+            ModelError: If MuJoCo is not installed, the configuration is not one of the
+                scene, no joint moves, or the mass matrix is singular.
+            FrameNotFoundError: If the root or a tool frame's parent does not exist.
+            JointNotFoundError: If a joint does not exist or is not below the root.
+        """
+        selection = select(model, root, joints, qpos, keyframe, locked)
+        return cls(*load_selection(selection, tool_frames or {}))
 
     @classmethod
     def _described(cls, description: RobotDescription, access: Access) -> Self:
         """Return the robot of a description."""
         gravity = description.gravity
+        if description.mjcf is not None:
+            return cls(*load_mjcf(description, access), description=description)
         if description.parts is None:
-            assert description.name is not None
-            source = find_robot(description.name, access)
+            source = description.find(access)
             model = load_model(source, description, gravity)
             return cls(model, source, description=description)
         robots = {}
         for name, part in description.parts.items():
-            with within("parts", name, "name"):
-                source = find_robot(part.name, access)
+            with within("parts", name, "name" if part.name else "description"):
+                source = part.find(access)
                 robot = cls(load_model(source, part, gravity), source)
             robots[name] = robot, placement(part.position, part.rotation)
         with within("parts"):
@@ -285,7 +320,7 @@ class Robot(ConfigurationSpace):
 
     # -- dynamics ---------------------------------------------------------------------
 
-    def state(self, t: float, q: Any, v: Any) -> "RobotState":
+    def state(self, t: float, q: Any, v: Any) -> RobotState:
         """Return a new `RobotState` at time t [s], q (nq,) and v (nv,).
 
         Raises:
@@ -334,300 +369,3 @@ class Robot(ConfigurationSpace):
             raise ModelError(
                 f"{self.name}: the mass matrix is singular at this configuration"
             ) from None
-
-
-class RobotState:
-    """The robot at one time, with all its kinematic and dynamic terms.
-
-    A term is computed at its first use and kept until the next `update`. The returned
-    arrays belong to the state and change with it: copy an array to keep its values. Use
-    a state in one thread only.
-
-    Attributes:
-        robot: The robot.
-        t: Time [s].
-        q: Configuration, shape (nq,).
-        v: Velocity, shape (nv,).
-        stamp_array: `stamp` as an array of shape (1,), for kernels.
-        data: Pinocchio's data at (q, v), for terms that this class does not offer.
-    """
-
-    def __init__(self, robot: Robot) -> None:
-        """Allocate the memory; call `update` before using any term."""
-        self.robot = robot
-        self.t = 0.0
-        self.q: Array = robot.neutral()
-        self.v: Array = np.zeros(robot.nv)
-        self.data: pin.Data = robot.model.createData()
-        self._compute_jacobians = partial(
-            pin.computeJointJacobiansTimeVariation,
-            robot.model,
-            self.data,
-            self.q,
-            self.v,
-        )
-        self._inverse_dynamics = partial(
-            pin.rnea, robot.model, self.data, self.q, self.v
-        )
-        self._compute_mass_matrix = partial(pin.crba, robot.model, self.data, self.q)
-        self._mass_matrix = matrix_view(self.data.M)
-        self._world: WorldKinematics | None = None
-        self._unit_blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
-        self._frames: dict[str, FrameKinematics] = {}
-        self.stamp_array: Indices = np.zeros(1, dtype=np.int64)
-        self._mass_matrix_stamp = self._mass_matrix_rate_stamp = -1
-        self._coriolis_stamp = self._effects_stamp = self._centroidal_stamp = -1
-        self._centroidal: CentroidalMotion | None = None
-        self._mass_matrix_rate: Array = np.zeros((robot.nv, robot.nv))
-        self._displaced: RobotState | None = None
-        self._made: dict[tuple[int, str], tuple[object, Any]] = {}
-        _compile_once()
-
-    def update(self, t: float, q: ArrayLike, v: ArrayLike) -> Self:
-        """Move to time t [s], configuration q (nq,) and velocity v (nv,), in place.
-
-        Raises:
-            ShapeError: If q or v has the wrong shape.
-            NonFiniteError: If t, q or v contains NaN or inf.
-            ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
-        """
-        q_in: Any = q
-        v_in: Any = v
-        try:
-            packed = (
-                q_in.dtype is v_in.dtype is _DOUBLE
-                and q_in.strides == v_in.strides == _PACKED
-            )
-        except AttributeError:  # a list, for example
-            packed = False
-        if not packed:  # a kernel would be compiled anew for each kind of array
-            q_in = as_numbers(q, self.robot.nq, "configuration q", self.robot)
-            v_in = as_numbers(v, self.robot.nv, "velocity v", self.robot)
-        try:
-            accepted = _copy_valid(
-                t, q_in, v_in, self.q, self.v, self._unit_blocks, self.stamp_array
-            )
-        except TypeError:  # t is no number
-            accepted = False
-        if not accepted:
-            self._refuse(t, q, v)
-        self.t = t
-        self._compute_jacobians()
-        return self
-
-    def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
-        """Raise the error that says what is wrong with t, q and v."""
-        if not isinstance(t, float | int | np.number) or not np.isfinite(t):
-            raise NonFiniteError(f"time t is {t!r}; needs a finite number of seconds")
-        self.robot.check_configuration(q)
-        self.robot.check_tangent(v, "velocity v")
-        raise NonFiniteError(f"t = {t!r}, q = {q!r}, v = {v!r}: their sum overflows")
-
-    def frame(self, name: str) -> FrameKinematics:
-        """Return the placement, the Jacobian and the motion of a frame.
-
-        Raises:
-            FrameNotFoundError: If the robot has no such frame.
-        """
-        frame = self._frames.get(name)
-        if frame is None:
-            index = self.robot.frame_id(name)
-            frame = FrameKinematics(
-                self.robot.model, self.data, self.v, self.stamp_array, index
-            )
-            self._frames[name] = frame
-        frame.compute()
-        return frame
-
-    def position(self, frame: str) -> Array:
-        """Return the origin of a frame in the world [m], shape (3,)."""
-        return self.frame(frame).position
-
-    @property
-    def centroidal(self) -> CentroidalMotion:
-        """The centre of mass, the angular momentum about it, and their Jacobians."""
-        if self._centroidal is None:
-            self._centroidal = CentroidalMotion(
-                self.robot.model, self.data, self.q, self.v
-            )
-        if self._centroidal_stamp != self.stamp:
-            self._centroidal.update()
-            self._centroidal_stamp = self.stamp
-        return self._centroidal
-
-    @property
-    def mass_matrix(self) -> Array:
-        """M(q), shape (nv, nv) (CRBA)."""
-        stamp = self.stamp
-        if self._mass_matrix_stamp != stamp:
-            self._compute_mass_matrix()
-            self._mass_matrix_stamp = stamp
-        return self._mass_matrix
-
-    @property
-    def coriolis_matrix(self) -> Array:
-        """C(q, v), where C v are Coriolis and centrifugal efforts, shape (nv, nv)."""
-        if self._coriolis_stamp != self.stamp:
-            pin.computeCoriolisMatrix(self.robot.model, self.data, self.q, self.v)
-            self._coriolis_stamp = self.stamp
-        return matrix_view(self.data.C)
-
-    @property
-    def mass_matrix_rate(self) -> Array:
-        """M' = C + Cᵀ along v, shape (nv, nv)."""
-        if self._mass_matrix_rate_stamp != self.stamp:
-            model = self.robot.model
-            if self.robot.mimics:
-                self._mass_matrix_rate[:] = mass_matrix_difference(
-                    model, self.q, self.v
-                )
-            else:
-                C = self.coriolis_matrix
-                np.add(C, C.T, out=self._mass_matrix_rate)
-            self._mass_matrix_rate_stamp = self.stamp
-        return self._mass_matrix_rate
-
-    @property
-    def nonlinear_effects(self) -> Array:
-        """N(q, v): Coriolis, centrifugal and gravity efforts, shape (nv,) (RNEA)."""
-        if self._effects_stamp != self.stamp:
-            pin.nonLinearEffects(self.robot.model, self.data, self.q, self.v)
-            self._effects_stamp = self.stamp
-        return self.data.nle  # type: ignore[no-any-return]
-
-    def inverse_dynamics(self, acceleration: Array) -> Array:
-        """Return the effort M a + N, shape (nv,), for an acceleration (nv,) (RNEA)."""
-        return self._inverse_dynamics(acceleration)  # type: ignore[no-any-return]
-
-    @property
-    def stamp(self) -> int:
-        """A number that changes with every `update`: use it to invalidate caches."""
-        return int(self.stamp_array[0])
-
-    @property
-    def world(self) -> "WorldKinematics":
-        """Placements and Jacobians of all joints at the world's origin, as views."""
-        if self._world is None:
-            self._world = WorldKinematics(
-                joint_placements(self.data),
-                matrix_view(self.data.J),
-                matrix_view(self.data.dJ),
-                self.v,
-            )
-        return self._world
-
-    def made(self, part: object, what: str, make: Callable[[], Made]) -> Made:
-        """Return what ``make`` returned for a part and this state; it is called once.
-
-        ``what`` tells apart what a class and its subclasses keep.
-
-        Parts are values and have no memory. What they compute with at a state, such as
-        buffers and compiled calls, is kept here, so that one part may serve many
-        states, in many threads.
-        """
-        key = id(part), what
-        found = self._made.get(key)
-        if found is None:
-            if len(self._made) >= _MADE_LIMIT:
-                self._made.clear()
-            self._made[key] = found = part, make()  # keeps the part, and its id
-        made: Made = found[1]
-        return made
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"robot": self.robot, "t": self.t, "q": self.q, "v": self.v}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(state["robot"])  # type: ignore[misc]
-        self.update(state["t"], state["q"], state["v"])
-
-    def displaced(self, dt: float, displacement: Array) -> "RobotState":
-        """Return the state at (t + dt, q ⊕ displacement) with the same velocity.
-
-        For finite differences. Each call overwrites and returns the same object, the
-        companion of this state.
-
-        Args:
-            dt: Time difference [s].
-            displacement: Shape (nv,) [rad or m].
-        """
-        if self._displaced is None:
-            self._displaced = RobotState(self.robot)
-        q = pin.integrate(self.robot.model, self.q, displacement)
-        return self._displaced.update(self.t + dt, q, self.v)
-
-    def ahead(self, dt: float) -> "RobotState":
-        """Return the companion state at (t + dt, q ⊕ v dt), see `displaced`; dt [s]."""
-        return self.displaced(dt, self.v * dt)
-
-
-class WorldKinematics(NamedTuple):
-    """Placements and Jacobians of all joints, from which distances are computed.
-
-    Attributes:
-        placements: Placements of the joints, shape (njoints, 12): see
-            `joint_placements`.
-        jacobian: Pinocchio's J, in world axes at the world's origin, shape
-            (6, nvExtended): see `joint_support`.
-        jacobian_dot: Its time derivative, shape (6, nvExtended).
-        v: The velocity, shape (nv,).
-    """
-
-    placements: Array
-    jacobian: Array
-    jacobian_dot: Array
-    v: Array
-
-
-@cache
-def _compile_once() -> None:
-    """Compile `_copy_valid` for packed doubles, and for nothing else, ever.
-
-    Numba takes an array that may be written for one that may not, but looks it up for
-    longer; so there is a version for both.
-    """
-    if is_compiled(_copy_valid):
-        from numba import types
-
-        own, kernel = types.float64[::1], cast("Any", _copy_valid)
-        given = own, types.Array(types.float64, 1, "C", readonly=True)
-        rest = own, own, types.int64[:, ::1], types.int64[::1]
-        for each in given:
-            kernel.compile((types.float64, each, each, *rest))
-        kernel.disable_compile()
-
-
-@kernel
-def _copy_valid(
-    t: float,
-    q_in: Array,
-    v_in: Array,
-    q: Array,
-    v: Array,
-    unit_blocks: Indices,
-    stamp: Indices,
-) -> bool:
-    """Copy q and v if they are valid; return whether they are.
-
-    Valid means of the right size, finite, and of norm 1 in the unit blocks.
-    """
-    if q_in.shape[0] != q.shape[0] or v_in.shape[0] != v.shape[0]:
-        return False
-    total = t
-    for i in range(q.shape[0]):
-        total += q_in[i]
-    for i in range(v.shape[0]):
-        total += v_in[i]
-    ok = np.isfinite(total)
-    for k in range(unit_blocks.shape[0]):
-        square = 0.0
-        for i in range(unit_blocks[k, 0], unit_blocks[k, 0] + unit_blocks[k, 1]):
-            square += q_in[i] * q_in[i]
-        ok = ok and abs(square - 1.0) < 2e-6
-    if ok:
-        for i in range(q.shape[0]):
-            q[i] = q_in[i]
-        for i in range(v.shape[0]):
-            v[i] = v_in[i]
-        stamp[0] += 1
-    return bool(ok)

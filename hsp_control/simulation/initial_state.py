@@ -10,20 +10,32 @@ from hsp_control.common.exceptions import ConfigurationError, ContactError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.quantities import READ_ONLY, Number, Vector
+from hsp_control.declaration.quantities import READ_ONLY, ArrayField, Number, Vector
+from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot
+from hsp_control.simulation.start_search import StartPose, posture_search
+from hsp_control.tasks import Task
 
 
 class InitialState(Part, error=ConfigurationError):
-    """The start: one of joints, coordinates and configuration; home by default."""
+    """The start: one of joints, coordinates, configuration and pose; home by default.
 
-    joints: Vector | Annotated[Mapping[str, Number], READ_ONLY] | None = None
-    """Joint positions [rad or m]: nv numbers, or some by name with the others at
-    home."""
+    ``joints: auto``, in YAML also ``start: auto``, and ``pose`` are found: regular for
+    the tasks, within limits, clear of collisions and near the middle of the limits. The
+    same is found every time, and the log holds what was found.
+    """
+
+    joints: (
+        Literal["auto"] | Vector | Annotated[Mapping[str, Number], READ_ONLY] | None
+    ) = None
+    """Joint positions [rad or m]: nv numbers, some by name with the others at home, or
+    ``auto``."""
     coordinates: Vector | None = None
     """Joint coordinates theta = A q [rad or m], where the robot's source defines A."""
     configuration: Vector | None = None
     """The configuration, nq numbers [rad, m, or unit quaternions]."""
+    pose: StartPose | None = None
+    """Where a frame is, for a robot with a fixed base."""
     ground: Number | None = None
     """Height of the lowest contact [m]; a free-flyer root is moved up or down to it."""
     velocity: Literal["rest", "flow"] | Vector = "rest"
@@ -44,25 +56,48 @@ class InitialState(Part, error=ConfigurationError):
 
     def _given(self) -> list[str]:
         """Return the names of the fields that give the configuration."""
-        names = "joints", "coordinates", "configuration"
+        names = "joints", "coordinates", "configuration", "pose"
         return [name for name in names if getattr(self, name) is not None]
 
-    def configuration_of(self, robot: Robot, contacts: Iterable[Contact] = ()) -> Array:
+    @property
+    def is_found(self) -> bool:
+        """Whether the configuration is not given, but found."""
+        return self.pose is not None or isinstance(self.joints, str)
+
+    def configuration_of(
+        self,
+        robot: Robot,
+        contacts: Iterable[Contact] = (),
+        tasks: Iterable[Task] = (),
+        scene: Scene | None = None,
+        least: float = 0.03,
+    ) -> Array:
         """Return the start configuration, shape (nq,).
 
         Args:
             robot: The robot.
             contacts: Its contacts, for `ground`.
+            tasks: The tasks for which a start that is found must be regular.
+            scene: The obstacles of which it must be clear.
+            least: Singular value below which it is not regular.
 
         Raises:
-            ConfigurationError: If the numbers are no configuration of the robot.
+            ConfigurationError: If the numbers are no configuration of the robot, or
+                none is found.
             ShapeError: If there is another number of them.
             JointNotFoundError: If a joint does not exist.
             ContactError: If the robot has no free-flyer root, or no contact, to put on
                 the ground.
         """
         with within(*self._given()):
-            q = self._configuration(robot)
+            if self.is_found:
+                search = posture_search(robot, tasks, scene)
+                if self.pose is None:
+                    q = search.find(least).q
+                else:
+                    q = search.find_with(self.pose.target(robot), least).q
+            else:
+                q = self._configuration(robot)
         if self.ground is None:
             return q
         return _put_on_ground(self.ground, list(contacts), robot, q)
@@ -101,6 +136,16 @@ class InitialState(Part, error=ConfigurationError):
             joints = robot.check_tangent(self.joints, "joints")
             return robot.integrate(robot.neutral(), joints)
         return robot.home()
+
+
+def _or_auto(start: InitialState | str) -> InitialState:
+    return InitialState(joints="auto") if isinstance(start, str) else start
+
+
+StartOrAuto = Annotated[
+    InitialState, ArrayField(Literal["auto"] | InitialState, _or_auto)
+]
+"""A start; ``auto`` is short for ``joints: auto``."""
 
 
 def _moved_joints(robot: Robot, joints: Mapping[str, float]) -> Array:

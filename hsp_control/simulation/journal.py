@@ -16,10 +16,12 @@ loses nothing that it wrote. Reading stops at the first incomplete frame.
 """
 
 import json
+import math
 import os
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +29,13 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
+from hsp_control.simulation.log_file import MAX_COLUMNS, MAX_SIZE, shortened
 
 MAGIC = b"hsp_control journal 1\n"
 KILLED = "the journal has no end: its writer was killed"
+
+_PADDED = 16
+"""Columns that come later are padded: how many times as large as the file all are."""
 
 FRAME = struct.Struct("<cII")
 HEADING, ROW, END = b"H", b"R", b"E"
@@ -55,6 +61,7 @@ class JournalWriter:
             flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND
             self._file = os.open(path, flags, 0o644)
             self._put(MAGIC)
+            self._size = len(MAGIC)
         except OSError as error:
             raise self._failure(error) from error
 
@@ -70,8 +77,9 @@ class JournalWriter:
         Raises:
             LogError: If it cannot be written.
         """
-        self._shapes = {name: a.shape[1:] for name, a in columns.items()}
-        self._frame(HEADING, _json({"columns": self._shapes, "meta": meta}))
+        shapes = {name: a.shape[1:] for name, a in columns.items()}
+        self._frame(HEADING, _json({"columns": shapes, "meta": meta}))
+        self._shapes = shapes  # only now: Ctrl-C may cut the heading short
 
     def write_row(self, columns: Mapping[str, Array]) -> None:
         """Write the first row of columns that fit the last heading.
@@ -97,11 +105,18 @@ class JournalWriter:
             self._file = -1
 
     def _frame(self, kind: bytes, payload: bytes) -> None:
+        """Write a frame, whole or not at all: what cuts it short takes it back."""
         check = zlib.crc32(payload, zlib.crc32(kind))
+        data = FRAME.pack(kind, len(payload), check) + payload
         try:
-            self._put(FRAME.pack(kind, len(payload), check) + payload)
-        except OSError as error:
-            raise self._failure(error) from error
+            self._put(data)
+            self._size += len(data)
+        except BaseException as error:
+            with suppress(OSError):
+                os.ftruncate(self._file, self._size)
+            if isinstance(error, OSError):
+                raise self._failure(error) from error
+            raise
 
     def _put(self, data: bytes) -> None:
         while data:  # a nearly full disk may take only a part
@@ -125,28 +140,55 @@ def is_journal(path: Path) -> bool:
 def read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
     """Return the columns and the meta data of a journal, up to an incomplete frame.
 
-    Where a column was added later or was narrower, earlier rows hold NaN.
+    Where a column was added later or was narrower, earlier rows hold NaN. The file may
+    be untrusted: its size bounds the memory that is used.
 
     Raises:
-        LogError: If the first heading is incomplete.
+        LogError: If the first heading is incomplete, a heading or a row is malformed,
+            or the columns would be too large.
     """
+    size = path.stat().st_size
+    if size > MAX_SIZE:
+        raise LogError(f"{path}: the journal is larger than {MAX_SIZE / 1e9:g} GB")
     meta: dict[str, Any] = {}
-    shapes: dict[str, tuple[int, ...]] = {}
-    parts: list[tuple[dict[str, tuple[int, ...]], list[Array]]] = []
+    parts: list[_Part] = []
     end: dict[str, Any] = {"status": "interrupted", "message": KILLED}
     for kind, payload in _frames(path.read_bytes()):
         if kind == HEADING:
             heading = json.loads(payload)
             meta = heading["meta"]
-            shapes = {name: tuple(s) for name, s in heading["columns"].items()}
-            parts.append((shapes, []))
+            parts.append((_shapes(path, heading["columns"]), []))
         elif kind == ROW and parts:
-            parts[-1][1].append(np.frombuffer(payload, "<f8"))
+            shapes, rows = parts[-1]
+            if len(payload) != 8 * sum(map(math.prod, shapes.values())):
+                raise LogError(f"{path}: a row of the journal does not fit its heading")
+            rows.append(np.frombuffer(payload, "<f8"))
         elif kind == END:
             end = json.loads(payload)
     if not parts:
         raise LogError(f"{path}: the journal ends before its first heading")
-    return _joined(parts), {**meta, **end}
+    return _joined(path, parts, min(_PADDED * size, MAX_SIZE)), {**meta, **end}
+
+
+_Part = tuple[dict[str, tuple[int, ...]], list[Array]]
+"""The shapes of a heading's columns, and its rows."""
+
+
+def _shapes(path: Path, columns: Any) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of an untrusted heading.
+
+    Raises:
+        LogError: If they are not shapes, or too many.
+    """
+    if not isinstance(columns, dict) or len(columns) > MAX_COLUMNS:
+        raise LogError(f"{path}: a heading has no columns, or too many")
+    for name, shape in columns.items():
+        sizes = shape if isinstance(shape, list) else [None]
+        if not all(type(n) is int and 0 <= n <= MAX_SIZE for n in sizes):
+            raise LogError(
+                f"{path}: the column {shortened(name)} has the shape {shortened(shape)}"
+            )
+    return {name: tuple(shape) for name, shape in columns.items()}
 
 
 def _frames(data: bytes) -> Iterator[tuple[bytes, bytes]]:
@@ -168,15 +210,26 @@ def frame_at(data: bytes, at: int) -> tuple[bytes, bytes] | None:
     return kind, payload
 
 
-def _joined(
-    parts: list[tuple[dict[str, tuple[int, ...]], list[Array]]],
-) -> dict[str, Array]:
-    """Return the columns of all parts, each of a heading's shapes and its rows."""
-    final: dict[str, tuple[int, ...]] = {}
-    for shapes, _ in parts:
-        for name, shape in shapes.items():
-            final[name] = max(final.get(name, shape), shape)
+def _joined(path: Path, parts: list[_Part], largest: int) -> dict[str, Array]:
+    """Return the columns of all parts.
+
+    Raises:
+        LogError: If a column changes its number of dimensions, or the columns would
+            have more bytes than ``largest``.
+    """
     count = sum(len(rows) for _, rows in parts)
+    final: dict[str, tuple[int, ...]] = {}
+    for shapes, _ in [part for part in parts if part[1]] or parts[:1]:
+        for name, shape in shapes.items():
+            before = final.get(name, shape)
+            if len(before) != len(shape):
+                raise LogError(f"{path}: the column {shortened(name)} changes its form")
+            final[name] = tuple(map(max, before, shape))
+    if 8 * count * sum(map(math.prod, final.values())) > largest:
+        raise LogError(
+            f"{path}: the columns of the journal would need more than "
+            f"{largest / 1e6:.3g} MB"
+        )
     columns = {name: np.full((count, *shape), np.nan) for name, shape in final.items()}
     begin = 0
     for shapes, rows in parts:
@@ -186,7 +239,7 @@ def _joined(
         stacked = np.array(rows)
         at = 0
         for name, shape in shapes.items():
-            size = int(np.prod(shape))
+            size = math.prod(shape)
             where = (slice(begin, end), *(slice(length) for length in shape))
             block = stacked[:, at : at + size].reshape(len(rows), *shape)
             columns[name][where] = block

@@ -37,6 +37,7 @@ class JournalTail:
         self.count = 0
         self._read = len(MAGIC)
         self._shapes: dict[str, tuple[int, ...]] = {}
+        self._next_shapes: dict[str, tuple[int, ...]] | None = None
         self._rows: list[Array] = []
 
     @property
@@ -62,9 +63,12 @@ class JournalTail:
             if kind == HEADING:
                 heading = json.loads(payload)
                 self.meta = heading["meta"]
-                self._shapes = {n: tuple(s) for n, s in heading["columns"].items()}
-                self._rows.clear()
+                columns = heading["columns"]
+                self._next_shapes = {n: tuple(s) for n, s in columns.items()}
             elif kind == ROW:
+                if self._next_shapes is not None:  # only now: the last row stays there
+                    self._shapes, self._next_shapes = self._next_shapes, None
+                    self._rows.clear()
                 self._rows.append(np.frombuffer(payload, "<f8"))
                 self.count += 1
             elif kind == END:
@@ -76,7 +80,7 @@ class JournalTail:
     def rows(self, first: int) -> dict[str, Array]:
         """Return the columns from a row on, as far as they are kept.
 
-        Rows before the last heading are not: their columns were others.
+        Rows before the heading of the last one are not: their columns were others.
         """
         wanted = max(self.count - first, 0)
         kept = self._rows[max(len(self._rows) - wanted, 0) :] if wanted else []

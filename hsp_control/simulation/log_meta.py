@@ -186,17 +186,39 @@ def find_fault(meta: dict[str, Any], columns: dict[str, Array]) -> str:
     )
 
 
+def drawable_rows(columns: dict[str, Array]) -> Array:
+    """Return which rows have numbers that a log may have, shape (N,), booleans.
+
+    A row that a loop wrote of an absurd state must not make its journal unreadable.
+
+    Args:
+        columns: The columns by name, N rows each.
+    """
+    drawable = np.ones(len(columns["t"]), dtype=bool)
+    for name, column in columns.items():
+        size = np.abs(column.reshape(len(column), math.prod(column.shape[1:])))
+        if _is_drawn(name):
+            drawable &= (size <= _MAX_DRAWN).all(axis=1)  # neither is NaN
+        else:
+            drawable &= ~((size > _MAX_VALUE) & np.isfinite(size)).any(axis=1)
+    return drawable
+
+
+def _is_drawn(name: str) -> bool:
+    return (
+        name in _DRAWN
+        or name.startswith("obstacle.")
+        or (name.startswith("task.") and name.endswith((".reference", ".actual")))
+    )
+
+
 def _fault_of_columns(columns: dict[str, Array]) -> str:
     for name, column in columns.items():
         if column.dtype.kind not in "fiub":
             return f"its column {name!r} does not hold numbers"
         if 0 in column.shape[1:]:
             return f"its column {name!r} has rows without numbers"
-        drawn = (
-            name in _DRAWN
-            or name.startswith("obstacle.")
-            or (name.startswith("task.") and name.endswith((".reference", ".actual")))
-        )
+        drawn = _is_drawn(name)
         if drawn and not np.isfinite(column).all():
             return f"its column {name!r} contains NaN or inf"
         largest = np.abs(column[np.isfinite(column)], dtype=float).max(initial=0.0)

@@ -21,7 +21,11 @@ from hsp_control.simulation.log_file import (
     shortened,
     write_arrays,
 )
-from hsp_control.simulation.log_meta import find_fault, renamed_entries
+from hsp_control.simulation.log_meta import (
+    drawable_rows,
+    find_fault,
+    renamed_entries,
+)
 from hsp_control.simulation.salvage import read_complete_entries
 
 FORMAT = "hsp_control rollout 1"
@@ -161,6 +165,8 @@ class Rollout:
         try:
             if is_journal(path):
                 columns, meta = read_journal(path)
+                complete_columns(columns, [])  # one absurd turn would spoil all later
+                columns, meta = without_absurd_rows(columns, meta)
                 complete_columns(columns, meta["robot"]["continuous"])
                 columns["meta"] = np.array(json.dumps(meta, ensure_ascii=False))
             else:
@@ -265,6 +271,25 @@ def complete_columns(columns: Mapping[str, Array], continuous: Sequence[int]) ->
             finite = np.flatnonzero(np.isfinite(column).all(axis=1))
             if finite.size:
                 column[: finite[0]] = column[finite[0]]
+
+
+def without_absurd_rows(
+    columns: dict[str, Array], meta: dict[str, Any]
+) -> tuple[dict[str, Array], dict[str, Any]]:
+    """Return the columns without rows that cannot be drawn; the message counts them.
+
+    Args:
+        columns: The columns by name, N rows each.
+        meta: The meta data.
+    """
+    kept = drawable_rows(columns)
+    if kept.all():
+        return columns, meta
+    count, first = int((kept == 0).sum()), columns["t"][int(kept.argmin())]
+    told = f"{count} of {len(kept)} rows are left out, from t = {first:g} s on: their "
+    told += "numbers are too large, or not finite"
+    meta = {**meta, "message": "; ".join(filter(None, (meta.get("message"), told)))}
+    return {name: column[kept] for name, column in columns.items()}, meta
 
 
 def _checked(

@@ -17,6 +17,7 @@ from hsp_control.geometry import shapes
 from hsp_control.geometry.shapes import Shape
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.log_series import task_names
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.export.meshes import read_mesh
 from hsp_control.visualization.viewer.mesh_files import collada_object, mesh_geometry
@@ -70,6 +71,7 @@ def log_to_rerun(
     if recording is None:
         title = rollout.meta.get("title") or rollout.meta.get("name") or robot.name
         recording = rerun.RecordingStream(str(title))
+        recording.send_blueprint(_layout(rollout))
     if path is not None:
         try:
             Path(path).touch()
@@ -88,6 +90,38 @@ def log_to_rerun(
     if path is not None:
         recording.disconnect()  # completes the file
     return recording
+
+
+def _layout(rollout: Rollout) -> Any:
+    """Return what Rerun's viewer opens with: the scene, and beside it a few plots."""
+    from rerun import blueprint
+
+    shown = {
+        "Task errors": [f"task.{name}.error" for name in task_names(rollout)],
+        "Null-space error ‖e_N‖": ["null_space_norm"],
+        "Distances": [n for n in rollout.columns if n.startswith("distance.")],
+        "Efforts": ["tau"],
+    }
+    plots = [
+        blueprint.TimeSeriesView(
+            origin="/log",
+            name=title,
+            contents=[f"+ /log/{name}/**" for name in names],
+        )
+        for title, names in shown.items()
+        if any(name in rollout.columns for name in names)
+    ]
+    scene = blueprint.Spatial3DView(
+        origin="/", name="Scene", contents=["+ /**", "- /log/**"]
+    )
+    return blueprint.Blueprint(
+        blueprint.Horizontal(
+            scene, blueprint.Vertical(*plots), column_shares=[3.0, 2.0]
+        ),
+        blueprint.SelectionPanel(state="collapsed"),
+        blueprint.BlueprintPanel(state="collapsed"),
+        blueprint.TimePanel(timeline=TIMELINE, state="collapsed"),
+    )
 
 
 def _log_robot(rerun: Any, recording: Any, motion: Motion) -> None:
@@ -189,6 +223,10 @@ def _archetypes(rerun: Any, visual: Visual, owner: str) -> Iterator[Any]:
             yield rerun.Capsules3D(
                 radii=[size[0]], lengths=[size[1]], translations=down, **solid
             )
+        case "ellipsoid":
+            yield rerun.Ellipsoids3D(radii=[size], **solid)
+        case _ if visual.mesh is not None:
+            yield _mesh(rerun, *visual.mesh, color)
         case _ if visual.file is not None:
             collada = visual.file.suffix.lower() == ".dae"
             thing = (
@@ -203,8 +241,25 @@ def _archetypes(rerun: Any, visual: Visual, owner: str) -> Iterator[Any]:
 
 def _mesh(rerun: Any, vertices: Array, triangles: Any, color: Any) -> Any:
     return rerun.Mesh3D(
-        vertex_positions=vertices, triangle_indices=triangles, albedo_factor=color
+        vertex_positions=vertices,
+        vertex_normals=_normals(vertices, triangles),
+        triangle_indices=triangles,
+        albedo_factor=color,
     )
+
+
+def _normals(vertices: Array, triangles: Any) -> Array:
+    """Return the normals of vertices, shape (N, 3): without them nothing is shaded.
+
+    Each is the mean of its triangles' normals, weighted by their areas.
+    """
+    first, second, third = np.moveaxis(vertices[triangles], 1, 0)
+    of_triangles = np.cross(second - first, third - first)
+    normals = np.zeros_like(vertices, dtype=float)
+    for corner in np.asarray(triangles).T:
+        np.add.at(normals, corner, of_triangles)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals / np.where(lengths > 0.0, lengths, 1.0)
 
 
 def _rgb(color: str) -> list[float]:

@@ -2,21 +2,20 @@
 
 import re
 import shlex
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
-from live_rigs import law, watched
 from places import ROOT
 
 import hsp_control
 from hsp_control import load_experiment
-from hsp_control.cli.main import _parser
-from hsp_control.live import LiveSettings, run_loop
+from hsp_control.cli.options.command_line import command_line
+from hsp_control.live import LiveSettings
 from hsp_control.null_space.fields.weight import sample_weight
+from hsp_control.robot import RobotDescription
+from hsp_control.simulation import InitialState, StartPose
 from hsp_control.visualization.viewer import ShownItems
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -79,7 +78,7 @@ def test_the_pages_python_runs_and_their_commands_exist(page: str) -> None:
     used = [shlex.split(line)[1:] for line in commands if line.startswith("hsp ")]
     assert used
     for command in used:
-        _parser().parse_args(command)
+        command_line().parse_args(command)
 
 
 def test_the_readme_s_yaml_is_a_configuration() -> None:
@@ -100,7 +99,7 @@ def test_the_readme_s_commands_exist() -> None:
         "live", "play",
     }  # fmt: skip
     for command in commands:
-        _parser().parse_args(command)
+        command_line().parse_args(command)
 
 
 def test_the_compensators_of_the_document_are_a_configuration() -> None:
@@ -118,7 +117,7 @@ def test_the_view_s_document_is_true(monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / "docs" / "view.md").read_text(encoding="utf-8")
     (commands,) = blocks(text, "sh")
     for command in commands.splitlines():
-        _parser().parse_args(command.split("#")[0].split()[1:])
+        command_line().parse_args(command.split("#")[0].split()[1:])
     (view,) = blocks(text, "yaml")
     configuration = {**yaml.safe_load(view), **yaml.safe_load(SMALL)}
     assert load_experiment(configuration).scenario.view.show.ellipsoid
@@ -136,8 +135,8 @@ def test_the_export_s_document_is_true(
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
     for command in "".join(blocks(text, "sh")).splitlines():
-        _parser().parse_args(command.split("#")[0].split()[1:])
-    known = _parser().parse_args(["export", "log.npz"])
+        command_line().parse_args(command.split("#")[0].split()[1:])
+    known = command_line().parse_args(["export", "log.npz"])
     for option in re.findall(r"`--(?:no-)?(\w+)`", text):
         assert {"from": "first", "to": "last"}.get(option, option) in vars(known)
     *pages, _ = blocks(text, "python")  # the film is taken in test_browser.py
@@ -196,42 +195,13 @@ def test_pictures_that_documents_show_exist() -> None:
                 assert (document.parent / target).exists(), f"{document.name}: {target}"
 
 
-PANDA = LiveSettings(compensates_gravity=True, effort_rate=1000.0)
-
-
-class _FakeFranka:
-    """pylibfranka as far as the page uses it, around a simulated Panda."""
-
-    def __init__(self, address: str) -> None:
-        self.watched = watched(PANDA)
-        self.efforts: list[np.ndarray] = []
-        self.stopped = False
-
-    def read_once(self) -> SimpleNamespace:
-        return SimpleNamespace(q=self.watched.q.tolist(), dq=self.watched.v.tolist())
-
-    def start_torque_control(self) -> "_FakeFranka":
-        return self
-
-    def readOnce(self) -> tuple[SimpleNamespace, SimpleNamespace]:
-        self.watched.advance(self.efforts)
-        self.efforts = []
-        return self.read_once(), SimpleNamespace(to_sec=lambda: 0.001)
-
-    def writeOnce(self, torques: list[float]) -> None:
-        self.efforts.append(np.array(torques))
-
-    def stop(self) -> None:
-        self.stopped = True
-
-
 def test_the_live_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
     (shell,) = blocks(text, "sh")
     for line in shell.splitlines():
-        _parser().parse_args(shlex.split(line.split("#")[0])[1:])
-    example, panda = blocks(text, "python")
+        command_line().parse_args(shlex.split(line.split("#")[0])[1:])
+    (example,) = blocks(text, "python")
     space: dict = {}
     exec(compile(example, "live.md", "exec"), space)
     assert space["report"].ended == "completed"
@@ -239,17 +209,6 @@ def test_the_live_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     weights = {each.name: sample_weight(each.weight, state)[0] for each in fields}
     assert weights == {"obstacle_clearance": 0.0, "target_posture": 0.0, "calm": 1.0}
     assert space["run"].status == "completed"
-
-    module = SimpleNamespace(
-        Robot=_FakeFranka, Torques=list, FrankaException=type("F", (Exception,), {})
-    )
-    monkeypatch.setitem(sys.modules, "pylibfranka", module)
-    exec(compile(panda, "live.md", "exec"), space)
-    robot = space["Panda"]("fake")
-    report = run_loop(law(), robot, duration=0.2, settings=PANDA)
-    assert report.ended == "completed", report.reason
-    assert robot._robot.stopped
-    assert robot._robot.watched.t > 0.2
 
 
 def test_the_live_page_s_defaults_are_the_code_s() -> None:
@@ -261,3 +220,17 @@ def test_the_live_page_s_defaults_are_the_code_s() -> None:
     for name, value in settings.items():
         shown = "none" if value is None else str(value).lower().removesuffix(".0")
         assert re.split("[ ,:]", told[name])[0] == shown, name
+
+
+def test_the_page_of_one_s_own_robot_is_true() -> None:
+    text = (ROOT / "docs" / "own_robot.md").read_text(encoding="utf-8")
+    for line in "".join(blocks(text, "sh")).splitlines():
+        command_line().parse_args(shlex.split(line.split("#")[0])[1:])
+    (configuration,) = blocks(text, "yaml")
+    lines = [yaml.safe_load(line) for line in configuration.splitlines()]
+    for line in lines:
+        if "robot" in line:
+            RobotDescription(**line["robot"])
+        else:
+            start = line["start"]
+            assert start == "auto" or InitialState(pose=StartPose(**start["pose"]))

@@ -414,3 +414,15 @@ def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
     assert compared["null_space_norm"][late].max() > 0.3
     assert "operational" in compared.meta["changes_lost"]
     assert "changes_lost" not in exact.meta
+
+
+def test_a_robot_that_walks_can_be_pulled_but_not_led(tmp_path: Path) -> None:
+    """The feet and the trunk are the plan's; its run is that of `simulate`."""
+    session = Session(playable("whole_body/talos_walk"))
+    assert [*session.handles.targets] == ["posture"]
+    go(session, 0.5)
+    log = session.rollout()
+    assert log["plan.phase"][-1] >= 1.0
+    log.save(tmp_path / "walked.npz")
+    again = hsp.load_experiment(tmp_path / "walked.npz").run()
+    np.testing.assert_array_equal(again.q, log.q)

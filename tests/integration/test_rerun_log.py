@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 import rerun
+import trimesh
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 import hsp_control as hsp
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError
+from hsp_control.visualization import rerun_log
 from hsp_control.visualization.rerun_log import log_to_rerun
 
 Array = NDArray[np.float64]
@@ -157,3 +159,12 @@ def test_what_is_missing_is_said(
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(ExportError, match=r"pip install 'hsp_control\[rerun\]'"):
         log_to_rerun(log)
+
+
+def test_meshes_are_shaded_by_the_normals_of_their_surface() -> None:
+    """Of a ball, the normals are the directions from its centre."""
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    normals = rerun_log._normals(np.array(ball.vertices), np.array(ball.faces))
+    np.testing.assert_allclose(normals, ball.vertices, atol=0.01)  # triangles of 0.07
+    alone = rerun_log._normals(np.eye(3), np.zeros((0, 3), dtype=int))
+    assert not alone.any()

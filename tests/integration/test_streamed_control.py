@@ -399,6 +399,7 @@ def test_strict_reading_listens_to_this_computer_and_reads_beside_the_file(
     folder.mkdir()
     for source, message in (
         ("udp://0.0.0.0:5005", "listens to other computers; strict reading allows"),
+        ("ros2://goal?domain=1", "listens to other computers; strict reading allows"),
         (str(outside), "outside the folders that strict reading allows"),
     ):
         file = write(folder, {"type": "stream", "source": source})

@@ -8,7 +8,7 @@ import pytest
 
 from hsp_control import Experiment, Rollout, Stream, TargetPosture, load_experiment
 from hsp_control.cli.bench import bench
-from hsp_control.cli.main import _parser
+from hsp_control.cli.options.command_line import command_line
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.plans import Trot
 from hsp_control.play import Session
@@ -98,4 +98,6 @@ def test_it_trots_where_it_can_be_touched():
 
 def test_a_plan_is_no_part_of_what_bench_measures():
     with pytest.raises(ConfigError, match=r"^whole_body/solo12_trot: plan: bench"):
-        bench(_parser().parse_args(["bench", "--latency", "whole_body/solo12_trot"]))
+        bench(
+            command_line().parse_args(["bench", "--latency", "whole_body/solo12_trot"])
+        )

@@ -121,6 +121,8 @@ def test_a_robot_elsewhere_is_refused_and_allowed(
     told = capsys.readouterr().err
     assert told.startswith(f"hsp: {config}:1: robot.name: robot '{outside}/arm.urdf'")
     assert told.count("\n") == 1
+    assert main(["live", str(config), "--strict"]) == 2
+    assert capsys.readouterr().err == told
     assert main(["check", str(config), "--allow", str(outside)]) == 0
     assert main(["check", str(config)]) == 0
 

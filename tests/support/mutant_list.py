@@ -36,6 +36,9 @@ PLANTS = SIMULATION + "plants/"
 DECLARATION = PACKAGE + "declaration/"
 CONFIG, CLI = PACKAGE + "config/", PACKAGE + "cli/"
 
+MODELS = ROBOT + "description/mujoco/"
+IN_MUJOCO = PLANTS + "mujoco/"
+
 UNIT = "tests/unit/"
 EVERY_FIELD = UNIT + "null_space/test_every_field.py -k "
 EVERY_SHAPE = UNIT + "null_space/test_clearance_rates.py -k "
@@ -646,8 +649,8 @@ MUTANTS = (
     Mutant(
         "rate check: drives without delay",
         COMPENSATION + "linear_loop.py",
-        "self.share * drives[0]",
-        "self.share * drives[-1]",
+        "self._performed(drives[0])",
+        "self._performed(drives[-1])",
         UNIT + "control/test_rate_check.py -k limits_of_theory",
     ),
     Mutant(
@@ -744,6 +747,55 @@ MUTANTS = (
         "braking = settings.damping * (state.mass_matrix @ v)",
         UNIT + "live/test_safe_stop.py -k takes_energy",
     ),
+    Mutant(
+        "live: an age that is NaN passes",
+        LIVE + "valid_measurement.py",
+        "    if not isfinite(value):",
+        "    if abs(value) > 1e308:",
+        UNIT + "live/test_live_faults.py -k each_fault",
+    ),
+    Mutant(
+        "live: a frozen state is believed",
+        LIVE + "state_reader.py",
+        "untrue = self._frozen.fault(new, applied) or self._monitor.jump(new)",
+        "untrue = self._monitor.jump(new)",
+        UNIT + "live/test_live_faults.py -k each_fault",
+    ),
+    Mutant(
+        "live: completed while it moves",
+        LIVE + "one_run.py",
+        "standing = speed <= self.settings.stop.standstill",
+        "standing = True",
+        UNIT + "live/test_live_faults.py -k completed_means",
+    ),
+    Mutant(
+        "live: the rate counts from what was sent",
+        LIVE + "effort_limiter.py",
+        "if effort is None or np.array_equal(effort, self.sent):",
+        "if effort is None or effort is not None:",
+        UNIT + "live/test_live_robot.py -k add_up",
+    ),
+    Mutant(
+        "live: the robot accepts any rate",
+        LIVE + "effort_check.py",
+        "if step[i] > allowed[i]:",
+        "if step[i] > np.inf:",
+        UNIT + "live/test_live_robot.py -k beyond_its_limits",
+    ),
+    Mutant(
+        "journal: a frame that Ctrl-C cuts stays",
+        SIMULATION + "journal.py",
+        "os.ftruncate(self._file, self._size)",
+        "os.fsync(self._file)",
+        UNIT + "live/test_live_journal.py -k ctrl_c",
+    ),
+    Mutant(
+        "rate check: the load couples nothing",
+        COMPENSATION + "loaded_loop.py",
+        "np.linalg.inv(one + s * self.difference)",
+        "np.diag(np.diag(np.linalg.inv(one + s * self.difference)))",
+        UNIT + "control/test_loaded_loop.py -k grows_and_decays",
+    ),
     # -------------------------------------------------------------- config and cli
     Mutant(
         "parts: unknown keys accepted",
@@ -765,6 +817,48 @@ MUTANTS = (
         "    strict = options.strict or bool(options.allow)",
         "    strict = bool(options.allow)",
         "tests/integration/test_trust.py -k refused",
+    ),
+    Mutant(
+        "MuJoCo models: reference of joints ignored",
+        MODELS + "dynamics.py",
+        "place = place * self._moved(joint, 0.0)",
+        "place = place * self._moved(joint, scene.qpos0[scene.jnt_qposadr[joint]])",
+        UNIT + "robot/test_mujoco_models.py -k random_scene",
+    ),
+    Mutant(
+        "MuJoCo models: gear of armatures not squared",
+        MODELS + "motors.py",
+        "return gear**2 *",
+        "return gear *",
+        UNIT + "robot/test_mujoco_models.py -k armature",
+    ),
+    Mutant(
+        "MuJoCo models: locked elsewhere than told",
+        MODELS + "selection.py",
+        "configuration[model.jnt_qposadr[inside[name]]] = value",
+        "pass",
+        UNIT + "robot/test_mujoco_models.py -k home",
+    ),
+    Mutant(
+        "MuJoCo models: strict reading ignored",
+        MODELS + "compiling.py",
+        "    if access.strict:",
+        "    if False:",
+        UNIT + "config/test_mjcf_config.py -k strict",
+    ),
+    Mutant(
+        "MuJoCo scene: pushes ignored",
+        IN_MUJOCO + "scene_plant.py",
+        "        applied += self.pushes.effort(t, q)\n",
+        "",
+        UNIT + "simulation/test_mujoco_scene.py -k pushes",
+    ),
+    Mutant(
+        "MuJoCo contacts: action without reaction",
+        IN_MUJOCO + "engine.py",
+        "touched = [(-1.0, contact.geom1)",
+        "touched = [(1.0, contact.geom1)",
+        UNIT + "simulation/test_mujoco_scene.py -k push_each_other",
     ),
 )
 """All of them, from the lowest room to the highest."""

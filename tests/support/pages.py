@@ -48,7 +48,11 @@ class Page(threading.Thread):
         except WebSocketClosedError:
             pass
         finally:
+            protocol = page.protocol
             page.close()
+            # The event loop ends here, before the other side could confirm.
+            if protocol is not None and protocol.stream is not None:
+                protocol.stream.close()
 
     def last(self, kind: str, path: str) -> dict[str, Any]:
         return next(

@@ -26,7 +26,7 @@ from hsp_control.live import Faults, LiveSettings, Phase, run_loop
 
 pytestmark = pytest.mark.process
 
-PATIENT = {"missing": 1000, "age": 5.0, "watchdog": 1000}
+PATIENT = {"missing": 1000, "age": 5.0, "watchdog": 1000, "velocity_margin": 2.0}
 """For a machine on which other tests run: what is shown here is not punctuality."""
 CONFIG: dict[str, Any] = {
     "robot": {"name": "panda"},
@@ -258,6 +258,8 @@ def test_a_robot_that_cannot_start_says_so(
         (["--faults", "lots=1"], "no fault 'lots'"),
         (["--duration", "-1"], "--duration -1; must be positive"),
         (["--kill", "me=1"], "--kill 'me=1'; needs robot=SECONDS or controller="),
+        (["--robot", "a://b", "--faults", "lost=0.1"], "are for the simulated robot"),
+        (["--robot", "a://b", "--kill", "robot=1"], "are for the simulated robot"),
         (["--set", "live.missing=-1"], "live.missing"),
     ],
 )

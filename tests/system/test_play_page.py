@@ -593,3 +593,11 @@ def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:
     assert (move["do"], release["do"]) == ("move", "release")
     page.close()
     assert wrong == []
+
+
+def test_a_browser_that_cannot_draw_is_told_so(chromium: Any, viewer: Viewer) -> None:
+    page = chromium.new_page()
+    page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    page.goto(str(viewer.url))
+    page.get_by_text("WebGL is off").wait_for()
+    page.close()

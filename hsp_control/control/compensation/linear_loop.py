@@ -6,6 +6,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation.compensation import Compensation
+from hsp_control.control.compensation.elastic_joint import ElasticJoint
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,8 @@ class LinearLoop:
         compensation: The compensators. Those that act on a linear loop are the velocity
             filter, the predictor and the momentum observer; integral action is ``ki``.
         share: The part of u that the robot performs: below 1 where it is heavier than
-            its model.
+            its model; a matrix, shape (m, m), where that differs with the direction.
+        joint: The elastic joint that performs u; None: a rigid one.
     """
 
     kp: Array
@@ -36,15 +38,18 @@ class LinearLoop:
     effort_delay: int = 0
     sensor_delay: int = 0
     compensation: Compensation = field(default_factory=Compensation)
-    share: float = 1.0
+    share: float | Array = 1.0
+    joint: ElasticJoint | None = None
 
     def transition(self) -> Array:
         """Return the transition matrix over one period, of the robot and all memory."""
         m, own = len(self.kp), self.compensation
         ahead = 0 if own.predictor is None else own.predictor.periods
-        # x, v; ∫x, r, the last momentum; the filter's memory; the efforts sent, for the
-        # observer and the predictor; the efforts and measurements under way.
-        counts = [2, 3, 4, 1 + ahead, self.effort_delay, 2 * self.sensor_delay]
+        moving = 2 if self.joint is None else 4
+        # x, v, and those of an elastic joint's motor; ∫x, r, the last momentum; the
+        # filter's memory; the efforts sent, for the observer and the predictor; the
+        # efforts and measurements under way.
+        counts = [moving, 3, 4, 1 + ahead, self.effort_delay, 2 * self.sensor_delay]
         size = m * sum(counts)
         basis = np.eye(size).reshape(-1, m, size)
         parts = np.split(basis, np.cumsum(counts)[:-1])
@@ -65,8 +70,9 @@ class LinearLoop:
         sensors: list[Array],
     ) -> list[Array]:
         """Return all states one period later, in the order of the arguments."""
-        (x, v), (z, r, momentum), h, own = plant, memory, self.period, self.compensation
-        sensors = [*sensors, x, v]
+        (z, r, momentum), h, own = memory, self.period, self.compensation
+        on_motor = self.joint is not None and self.joint.measured == "motor"
+        sensors = [*sensors, *(plant[2:] if on_motor else plant[:2])]
         x_seen, v_seen, sensors = sensors[0], sensors[1], sensors[2:]
         if own.velocity_filter is not None:
             v_seen, kept = own.velocity_filter.step(v_seen, tuple(past), h)
@@ -85,11 +91,25 @@ class LinearLoop:
         u = -self.kp @ x_seen - self.kv @ v_seen - self.ki @ z
         if own.momentum_observer is not None and own.momentum_observer.cancel:
             u = u - r
-        z = z + h * x_seen if self.ki.any() else 0.0 * z
+        integrated = np.any(self.ki != 0.0, axis=0, keepdims=True).T
+        z = np.where(integrated, z + h * x_seen, 0.0)
         drives = [*drives, u]
-        x, v = _moved(x, v, self.share * drives[0], h)
+        plant = self._after(plant, self._performed(drives[0]))
         rest = [*past, *sent[1:], u, *drives[1:], *sensors]
-        return [each[None] for each in (x, v, z, r, momentum, *rest)]
+        return [each[None] for each in (*plant, z, r, momentum, *rest)]
+
+    def _after(self, plant: list[Array], u: Array) -> list[Array]:
+        """Return the plant's state one period later, under the acceleration u."""
+        if self.joint is None:
+            return [*_moved(plant[0], plant[1], u, self.period)]
+        transition, effect = self.joint.transition(self.period)
+        moved = np.tensordot(transition, np.array(plant), axes=1)
+        return [*(moved + effect[:, None, None] * u)]
+
+    def _performed(self, u: Array) -> Array:
+        """Return the acceleration that the robot performs where u is asked for."""
+        share = np.asarray(self.share)
+        return share @ u if share.ndim else share * u
 
 
 def _moved(x: Array, v: Array, u: Array, h: float) -> tuple[Array, Array]:

@@ -15,11 +15,11 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, UnstableRateError
 from hsp_control.control.compensation.compensation import Compensation
 from hsp_control.control.compensation.linear_loop import LinearLoop
+from hsp_control.control.compensation.loaded_loop import LoadedLoop, loaded_loop
+from hsp_control.control.compensation.null_space_rates import null_space_rates
 from hsp_control.control.controller import Controller
 from hsp_control.control.held_gains import rounded_down
 from hsp_control.declaration import within
-from hsp_control.null_space.fields import FieldSample
-from hsp_control.null_space.metrics import MetricSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
@@ -29,13 +29,14 @@ RULE = 0.2
 to the law."""
 RULE_DELAYED = 0.1
 """Recommended maximum of ω0 h with a delay and no predictor."""
+RULE_LOADED = 1.5
+"""A known plant must stay stable if it differs from the model this many times as much,
+as it may elsewhere on its way."""
 RULE_HEAVY = 5.0
 """Integral action must stay stable for a robot up to this many times as heavy, at a
 task, as its model. Without other compensators this is a rate of Kv/5."""
 _ROUNDING = 1e-7
 """Tolerance of the radius: self-motion without a field has eigenvalues of 1."""
-_STEP = 1e-5
-"""Step of the differences of the field [rad or m]."""
 
 
 class RateFinding(NamedTuple):
@@ -63,6 +64,7 @@ def check_rate(
     *,
     effort_delay: int | None = None,
     sensor_delay: int | None = None,
+    plant: Robot | None = None,
 ) -> list[RateFinding]:
     """Check that the loop is stable at its rate.
 
@@ -83,6 +85,7 @@ def check_rate(
         compensation,
         effort_delay=effort_delay,
         sensor_delay=sensor_delay,
+        plant=plant,
     )
     for finding in found:
         if finding.unstable:
@@ -99,6 +102,7 @@ def rate_findings(
     *,
     effort_delay: int | None = None,
     sensor_delay: int | None = None,
+    plant: Robot | None = None,
 ) -> list[RateFinding]:
     """Return the problems of each task and of the null space at a control rate.
 
@@ -110,6 +114,8 @@ def rate_findings(
         compensation: The compensators; None: none.
         effort_delay: Delay of efforts, in periods; None: the predictor's setting.
         sensor_delay: Delay of measurements, in periods; None: the predictor's setting.
+        plant: The robot that moves, if it is known to differ from the model: with a
+            payload, for example; None: the model.
 
     Raises:
         CompensationError: If the velocity filter's cut-off is too high for the rate.
@@ -129,6 +135,9 @@ def rate_findings(
         *_task_findings(controller, state, period, delays),
         *_null_space_findings(controller, state, period, delays),
     ]
+    if plant is not None and not any(each and each.unstable for each in found):
+        loaded = loaded_loop(controller, state, plant, period, *delays)
+        found.append(None if loaded is None else _loaded_finding(loaded))
     return [finding for finding in found if finding is not None]
 
 
@@ -242,6 +251,40 @@ def _integral_finding(name: str, loop: LinearLoop) -> RateFinding | None:
     )
 
 
+def _loaded_finding(loaded: LoadedLoop) -> RateFinding | None:
+    """Return the problem of a robot whose bodies differ from the model's."""
+    part = loaded.largest_part(RULE_LOADED)
+    wanted = loaded.with_part(part)
+    if wanted.radius() <= 1.0 + _ROUNDING:
+        return None
+    times = _largest(lambda s: loaded.with_part(s * part))
+    if times is None:  # unstable with the exact model, too
+        return None
+    radius = loaded.with_part(1.0).radius()
+    grows = (
+        f"grows by a factor of up to {radius:.6g} per period"
+        if radius > 1.0 + _ROUNDING
+        else f"grows if they differ {times * part:.3g} times as much"
+    )
+    choices, path = [], ("simulation", "control_period")
+    if loaded.loop.ki.any():
+        path = ("compensation", "integral_action")
+        if (s := _largest(lambda s: replace(wanted, ki=s * wanted.ki))) is not None:
+            choices.append(f"Ki of at most {rounded_down(s)} times this")
+        running = loaded.loop.compensation.momentum_observer is not None
+        choices.append(f"a {'faster ' if running else ''}momentum observer")
+    if not choices:
+        choices.append("smaller gains or a shorter control_period")
+    return RateFinding(
+        path,
+        f"the plant's bodies differ from the model's: it is {loaded.heavier:.3g} times "
+        f"as heavy at the tasks, and motion {grows}; design for {part:.3g} times "
+        f"the difference: use {' or '.join(choices)}",
+        radius,
+        False,
+    )
+
+
 def _null_space_findings(
     controller: Controller, state: RobotState, period: float, delays: _Delays
 ) -> list["RateFinding | None"]:
@@ -269,48 +312,6 @@ def _null_space_findings(
             )
         ]
     return found
-
-
-def null_space_rates(controller: Controller, state: RobotState) -> tuple[Array, Array]:
-    """Return K_N and the field's slope A ≥ 0 in the null space, shape (k, k) each.
-
-    Both are in coordinates that are orthonormal in the metric. A is the symmetric part
-    of -∂g/∂q, by central differences. Negative eigenvalues of A are set to 0: there the
-    field drives the robot away from a point (a saddle of its cost), which is intended,
-    and no control rate changes it.
-    """
-    nothing = np.zeros((0, 0))
-    if not controller.field.controls:
-        return nothing, nothing
-    J = controller.stack(state).jacobian
-    L = controller.active_stack.resolution.problem.metric.L
-    across = np.linalg.solve(L, J.T).T  # J L⁻ᵀ
-    _, values, Vt = np.linalg.svd(across)
-    rank = int((values > controller.active_stack.resolution.threshold).sum())
-    Z = Vt[rank:].T
-    if not Z.size:
-        return nothing, nothing
-    into, out_of = L.T, np.linalg.inv(L.T)
-    A = -Z.T @ into @ field_slope(controller, state) @ out_of @ Z
-    values, U = np.linalg.eigh(0.5 * (A + A.T))
-    A = (U * np.maximum(values, 0.0)) @ U.T
-    return Z.T @ into @ controller.null_space_gain @ out_of @ Z, A
-
-
-def field_slope(controller: Controller, state: RobotState) -> Array:
-    """Return ∂g/∂q at a state, shape (nv, nv), by central differences."""
-    robot: Robot = state.robot
-    nv, metric = robot.nv, MetricSample.allocate(robot.nv)
-    out, slope = FieldSample.allocate(nv), np.zeros((nv, nv))
-    for i in range(nv):
-        for sign in (1.0, -1.0):
-            moved = np.zeros(nv)
-            moved[i] = sign * _STEP
-            near = state.displaced(0.0, moved)
-            controller.metric.evaluate(near, metric)
-            controller.field.evaluate(near, metric, controller.metric.form, out)
-            slope[:, i] += sign * out.g / (2.0 * _STEP)
-    return slope
 
 
 def _finding(

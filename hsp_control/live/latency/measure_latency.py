@@ -1,7 +1,6 @@
 """Measure the latency of a control loop and of an empty loop in real time."""
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from time import perf_counter_ns
 
 import numpy as np
@@ -49,7 +48,7 @@ def measure(
             cannot be set.
     """
     count = _periods(loop, seconds)
-    with _priority(priority):
+    with real_time_priority(priority):
         pass  # raise at once if it cannot be set
     turn = max(1, round(TURN / loop.period))
     period = round(loop.period * 1e9)
@@ -60,7 +59,7 @@ def measure(
     back_to_back = dry_run(loop, seconds)
     with (
         no_garbage_collection(),
-        _priority(priority),
+        real_time_priority(priority),
         event.install_recorder("numba:compile") as compiled,
     ):
         try:
@@ -100,10 +99,6 @@ def dry_run(loop: ControlLoop, seconds: float) -> Array:
         loop.move()
     loop.restart()
     return step_times
-
-
-def _priority(level: int | None) -> AbstractContextManager[None]:
-    return nullcontext() if level is None else real_time_priority(level)
 
 
 def _periods(loop: ControlLoop, seconds: float) -> int:

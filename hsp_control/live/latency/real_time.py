@@ -29,16 +29,20 @@ def no_garbage_collection() -> Iterator[None]:
 
 
 @contextmanager
-def real_time_priority(level: int) -> Iterator[None]:
+def real_time_priority(level: int | None) -> Iterator[None]:
     """Run the process with real-time priority (SCHED_FIFO) in this context.
 
     Args:
-        level: Priority, 1 to 99; on a real-time kernel drivers' threads have 50.
+        level: Priority, 1 to 99; on a real-time kernel drivers' threads have 50. None:
+            the scheduling stays as it is.
 
     Raises:
         SimulationError: If the level is out of range, or the user lacks the permission:
             root, the capability CAP_SYS_NICE, or a line ``rtprio`` in limits.conf.
     """
+    if level is None:
+        yield
+        return
     if not 1 <= level <= 99:
         raise SimulationError(f"real-time priority {level}; must be from 1 to 99")
     policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)

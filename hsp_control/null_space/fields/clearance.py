@@ -68,7 +68,7 @@ class Clearance(Cost):
         if start.known and distance <= 0.0:
             raise SceneError(
                 f"the robot starts in contact: {pair}, {-distance:.3g} m deep; "
-                "change the start or move the obstacle"
+                "change the start, for example to start: auto, or move the obstacle"
             )
         return fitted
 

@@ -6,8 +6,9 @@ import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any
+from typing import Any, cast
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
@@ -20,6 +21,10 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.combining import placement
+from hsp_control.robot.description.inertias import (
+    impossible_inertias,
+    project_inertias,
+)
 from hsp_control.robot.description.mesh_files import check_mesh_name
 from hsp_control.robot.description.robot_description import (
     PlacedRobot,
@@ -33,6 +38,15 @@ _ROOT_JOINTS = {
     "planar": pin.JointModelPlanar,
     "free_flyer": pin.JointModelFreeFlyer,
 }
+_NO_HAND = re.compile(
+    "finger|thumb|camera|imu|sensor|range|accelerometer|laser|optical|force|(^|_)ft_frame"
+)
+"""Names of links on a last joint that are less likely the hand than others."""
+NEGATIVE_MOMENT = 1e-6
+"""A principal moment of inertia may be negative by this much [kg·m²].
+
+Many files contain rounded or guessed inertias; the mass matrix is checked later.
+"""
 
 
 def load_model(
@@ -61,11 +75,27 @@ def load_model(
     """
     if settings is None:
         settings = RobotDescription(source.name)
-    model = _parse(source, settings.root or source.root, mimic=settings.mimic)
+    model = _parse(source, settings)
     locks = source.locked if settings.locked is None else settings.locked
     if locks:
         model = _lock(model, locks)
-    for name, tool in settings.tool_frames.items():
+    return completed(model, source, settings.tool_frames, gravity)
+
+
+def completed(
+    model: pin.Model,
+    source: RobotSource,
+    tool_frames: Mapping[str, ToolFrame],
+    gravity: ArrayLike | None,
+) -> pin.Model:
+    """Return a checked model, with frames and gravity of one's own.
+
+    Raises:
+        ModelError: If a tool frame's name exists already, a joint's limits are
+            reversed, or the mass matrix is singular.
+        FrameNotFoundError: If a tool frame's parent does not exist.
+    """
+    for name, tool in tool_frames.items():
         _add_frame(model, name, tool)
     if gravity is not None:
         model.gravity.linear = np.asarray(gravity)
@@ -104,9 +134,13 @@ def end_effector_frame(model: pin.Model) -> str:
     """Return the frame that is most likely the hand, found from the kinematic tree.
 
     It is the last link on the last joint of the longest chain of joints (of the last
-    such chain if several are equally long). If this chain branches in its second half,
-    the branches are taken for fingers, and the chain ends at the joint where it
-    branches first.
+    such chain if several are equally long). Links named after fingers or sensors come
+    after all others.
+
+    Where this chain branches in its second half into three or more chains, or into two
+    of similar lengths, these are taken for fingers, and it ends at the joint where it
+    branches so first. One much shorter branch is none: it is a part of the arm's own
+    mechanism, and the hand is not at the elbow where it begins.
     """
     chains: list[list[int]] = [[]]
     for joint in range(1, model.njoints):
@@ -115,7 +149,7 @@ def end_effector_frame(model: pin.Model) -> str:
     branching = [
         joint
         for depth, joint in enumerate(longest, start=1)
-        if 2 * depth >= len(longest) and len(model.children[joint]) > 1
+        if 2 * depth >= len(longest) and _carries_fingers(chains, joint)
     ]
     end = branching[0] if branching else longest[-1]
     links = [
@@ -123,30 +157,83 @@ def end_effector_frame(model: pin.Model) -> str:
         for frame in model.frames
         if frame.parentJoint == end and frame.type == pin.FrameType.BODY
     ]
-    hands = [link for link in links if not re.search("finger|thumb", link.lower())]
+    hands = [link for link in links if not _NO_HAND.search(link.lower())]
     return str((hands or links)[-1])
 
 
-def _parse(source: RobotSource, root: Root, *, mimic: bool) -> pin.Model:
-    urdf = source.urdf
-    xml = read_urdf(urdf)
+def _carries_fingers(chains: list[list[int]], joint: int) -> bool:
+    """Return whether the chains beyond a joint are three, or two of similar lengths."""
+    beyond: dict[int, int] = {}  # the longest chain, by its first joint
+    for chain in chains:
+        if joint in chain[:-1]:
+            after = chain[chain.index(joint) + 1 :]
+            beyond[after[0]] = max(beyond.get(after[0], 0), len(after))
+    lengths = sorted(beyond.values())
+    return len(lengths) > 2 or (len(lengths) == 2 and 2 * lengths[0] > lengths[1])
+
+
+def _parse(source: RobotSource, settings: RobotDescription | PlacedRobot) -> pin.Model:
+    urdf, mimic = source.urdf, settings.mimic
+    xml = read_urdf(source)
     if source.access.strict:
         for name, where in named_files(xml):
             check_mesh_name(source, name, f"{urdf}: {where}", source.access)
+    if settings.project_inertias:
+        project_inertias(xml)
+    else:
+        _check_inertias(xml, source)
+    text = parser_text(xml, "visual", "collision")
     parser_errors: list[str] = []
+    root = cast("Root", settings.root or source.root)  # text is for MJCF only
     try:
         with _collect_parser_errors(parser_errors):
             if root == "fixed":
-                return pin.buildModelFromUrdf(str(urdf), mimic=mimic)
-            joint = _ROOT_JOINTS[root]()
-            return pin.buildModelFromUrdf(str(urdf), joint, "root_joint", mimic=mimic)
+                model = pin.buildModelFromXML(text, mimic=mimic)
+            else:
+                joint = _ROOT_JOINTS[root]()
+                model = pin.buildModelFromXML(text, joint, "root_joint", mimic=mimic)
     except (ValueError, RuntimeError) as error:
         reason = str(error).strip().splitlines()[-1].removeprefix("hint: ")
         reason = parser_errors[0] if parser_errors else reason
         if mimic and "mimic" in reason:
-            reason = _explain_mimic(urdf) or reason
+            reason = _explain_mimic(xml, text) or reason
             reason += "; load its mimic joints as independent joints with mimic=False"
         raise ModelError(f"{urdf}: Pinocchio cannot build a model: {reason}") from error
+    if parser_errors:
+        left_out = "; ".join(parser_errors)
+        raise ModelError(
+            f"{urdf}: Pinocchio leaves out a part of the model: {left_out}"
+        )
+    return model
+
+
+def parser_text(xml: Element, *unused: str) -> str:
+    """Return the text of a URDF for the parser, without what it does not need.
+
+    The tree is changed, too.
+
+    Args:
+        xml: The URDF.
+        unused: Elements of links that are deleted, such as ``visual``: their faults are
+            no business of who reads the rest.
+    """
+    for link in xml.iter("link"):
+        for element in [each for each in link if each.tag in unused]:
+            link.remove(element)
+    return ElementTree.tostring(xml, encoding="unicode")
+
+
+def _check_inertias(xml: Element, source: RobotSource) -> None:
+    """Check that no principal moment is negative, but for rounding.
+
+    Greater ones than a body can have are accepted, as by other programs.
+    """
+    for found in impossible_inertias(xml):
+        if found.moments[0] < -NEGATIVE_MOMENT:
+            raise ModelError(
+                f"{source.urdf}: link {found.link!r}: <inertia>: {found.reason}; "
+                "project_inertias: true takes the nearest that a body can have"
+            )
 
 
 @contextmanager
@@ -171,10 +258,10 @@ def _collect_parser_errors(errors: list[str]) -> Iterator[None]:
             )
 
 
-def _explain_mimic(urdf: Path) -> str:
+def _explain_mimic(xml: Element, text: str) -> str:
     """Return which mimic joint Pinocchio cannot handle, and why; empty if unknown."""
-    order = list(pin.buildModelFromUrdf(str(urdf), mimic=False).names)
-    for joint in read_urdf(urdf).iter("joint"):
+    order = list(pin.buildModelFromXML(text, mimic=False).names)
+    for joint in xml.iter("joint"):
         mimic, follower = joint.find("mimic"), joint.get("name")
         if mimic is None or follower not in order:
             continue
@@ -299,6 +386,11 @@ def _check_mass_matrix(model: pin.Model, source: RobotSource) -> None:
     idle = np.diag(mass_matrix) <= 1e-12 * values[-1]
     if not idle.any():  # a combination of joints: name the one that moves most
         idle[np.argmax(np.abs(vectors[:, 0]))] = True
+    if not mass_matrix.any():
+        raise ModelError(
+            f"{source.urdf}: no link that moves has a mass: this URDF describes shapes "
+            "and joints only; efforts need <inertial> elements"
+        )
     massless = {
         name: joint.nv
         for name, joint in moving_joints(model).items()

@@ -4,7 +4,6 @@ The files are passed to Assimp (distances) and to the browser (views), which do 
 limit their size.
 """
 
-import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +11,7 @@ from urllib.parse import unquote
 
 from hsp_control.common.exceptions import AccessError
 from hsp_control.robot.description.access import Access
+from hsp_control.robot.description.packages import package_folders
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.xml_files import XmlError, check_no_document_type
 
@@ -30,7 +30,7 @@ _LIBRARY = re.compile(rb"^[ \t]*mtllib[ \t]+(.+)$", re.M)
 def find_problem(file: Path) -> str:
     """Return why a mesh file cannot be used, or an empty string."""
     if not file.is_file():  # reading a pipe would block
-        return "no such file"
+        return "not a file" if _is_there(file) else "no such file"
     try:
         size = file.stat().st_size
         if size > MAX_SIZE:
@@ -45,25 +45,36 @@ def find_problem(file: Path) -> str:
 
 
 def candidates(source: RobotSource, name: str) -> list[Path]:
-    """Return the paths that a file name in a URDF may mean; the first existing wins.
-
-    These include all paths that Pinocchio and the viewer try.
-    """
+    """Return the paths that a file name in a URDF may mean; the first existing wins."""
     scheme, _, rest = name.rpartition("://")
     if scheme in ("package", "model"):
         package, _, inside = rest.partition("/")
-        ros = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
-        ament = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
-        folders = [
-            *source.package_dirs,
-            *(Path(folder) for folder in ros if folder),
-            *(Path(folder) / "share" for folder in ament if folder),
-        ]
-        return [
-            *(folder / rest for folder in folders),
-            *(folder / inside for folder in folders if folder.name == package),
-        ]
+        folders = package_folders(package, source.package_dirs)
+        return [folder / inside for folder in folders]
     return [source.urdf.parent / rest, *([Path(rest)] if scheme != "file" else [])]
+
+
+def find_file(source: RobotSource, name: str) -> Path | None:
+    """Return what a file name in a URDF means; None if there is nothing.
+
+    It is no file only if there is something else at its place, such as a pipe.
+    """
+    places = candidates(source, name)
+    file = next(filter(_is_file, places), None)
+    return file or next(filter(_is_there, places), None)
+
+
+def where_to_put(name: str) -> str:
+    """Return where a missing file is looked for, and how that is changed."""
+    scheme, _, rest = name.rpartition("://")
+    if scheme not in ("package", "model"):
+        return "the path is relative to the URDF"
+    package = rest.partition("/")[0]
+    return (
+        f"the package {package!r} is looked for beside the URDF, above it, and along "
+        "ROS_PACKAGE_PATH: "
+        f"export ROS_PACKAGE_PATH=<the folder that contains {package}>"
+    )
 
 
 def check_mesh_name(source: RobotSource, name: str, what: str, access: Access) -> None:
@@ -82,7 +93,7 @@ def check_mesh_name(source: RobotSource, name: str, what: str, access: Access) -
     if not access.strict:
         return
     places = candidates(source, name)
-    found = [place for place in places if _exists(place)]
+    found = [place for place in places if _is_file(place)]
     named_outside = name.rpartition("://")[0] not in ("package", "model")
     # A missing file is reported later. But a path outside the allowed folders is an
     # error in any case, so that the message does not reveal which files exist there.
@@ -120,8 +131,15 @@ def _references(file: Path) -> Iterator[str]:
             yield unquote(text)
 
 
-def _exists(path: Path) -> bool:
+def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
+    except (OSError, ValueError):  # too long for a path, or with a null character
+        return False
+
+
+def _is_there(path: Path) -> bool:
+    try:
+        return path.exists()
     except (OSError, ValueError):
         return False

@@ -10,12 +10,21 @@ from typing import Any, Literal
 
 import yaml
 
-from hsp_control.common.exceptions import RobotNotFoundError
+from hsp_control.common.exceptions import (
+    AccessError,
+    ModelError,
+    RobotNotFoundError,
+)
 from hsp_control.common.resources import bundled_robots
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.access import ANYWHERE, Access
+from hsp_control.robot.description.body_shape import BodyShape
+from hsp_control.robot.description.described import described_names, find_described
+from hsp_control.robot.description.xacro_files import expand, is_xacro
 
 Root = Literal["fixed", "planar", "free_flyer"]
+FILE_ENDINGS = (".urdf", ".xml", ".xacro")
+"""A robot's name that ends so is a path."""
 
 # Robots of example-robot-data for which `end_effector_frame` would be wrong: a single
 # gripper jaw looks like one more joint of the arm, a sensor looks like a tool.
@@ -36,11 +45,13 @@ class RobotSource:
 
     Attributes:
         name: Name of a known robot, or the URDF file's name without ``.urdf``.
-        urdf: The URDF file.
+        urdf: The URDF file. Of a robot in a MuJoCo model, whose `shapes` are given:
+            the MJCF file, or the model's name if it was compiled in Python.
         srdf: The SRDF file (reference postures, disabled collision pairs), if any.
         root: The default root: ``fixed``, ``planar`` or ``free_flyer``.
         package_dirs: Folders in which ``package://`` is looked up.
-        origin: ``bundled``, ``example-robot-data``, ``file`` or ``combined``.
+        origin: ``bundled``, ``example-robot-data``, ``robot_descriptions``, ``file``,
+            ``mujoco`` or ``combined``.
         locked: Joints that are locked by default, name to value [rad or m].
         end_effector: The frame that tasks use by default, if known.
         home: Joint values of a good start posture, shape (nv,) [rad or m], if known.
@@ -48,6 +59,10 @@ class RobotSource:
         joint_coordinates: Which coordinates theta = A q the literature uses for this
             robot (``absolute`` for the planar arm), if not q.
         access: Which files its URDF may name.
+        shapes: The shapes of its bodies, if they are not in a URDF.
+        excluded: Pairs of bodies that never collide, besides those of the SRDF.
+        omitted: What the model that it comes from has and the robot lacks, in words.
+        expanded: The URDF that xacro makes of the file; None if the file is the URDF.
     """
 
     name: str
@@ -62,23 +77,40 @@ class RobotSource:
     posture: str | None = None
     joint_coordinates: str | None = None
     access: Access = ANYWHERE
+    shapes: tuple[BodyShape, ...] | None = field(default=None, repr=False)
+    excluded: frozenset[frozenset[str]] = frozenset()
+    omitted: tuple[str, ...] = ()
+    expanded: str | None = None
 
 
-def find_robot(name: str | Path, access: Access = ANYWHERE) -> RobotSource:
-    """Find a bundled robot, one of example-robot-data, or a URDF file.
+def find_robot(
+    name: str | Path,
+    access: Access = ANYWHERE,
+    xacro_args: Mapping[str, str] | None = None,
+) -> RobotSource:
+    """Find a bundled robot, one of an installed package, or a URDF or xacro file.
 
     Args:
-        name: For example ``"panda"``, ``"talos_arm"`` or ``"my_arm/arm.urdf"``. A name
-            with a path separator, or ending in ``.urdf`` or ``.xml``, is a path.
+        name: For example ``"panda"``, ``"talos_arm"``, ``"gen3_description"`` or
+            ``"my_arm/arm.urdf"``. A name with a path separator, or with the ending of a
+            URDF or xacro file, is a path.
         access: Which files may be read: a URDF given by path, and its meshes.
+        xacro_args: Arguments of a xacro file, by name.
 
     Raises:
         RobotNotFoundError: If there is no such robot; the message suggests the nearest.
-        AccessError: If the path is not allowed.
+        AccessError: If the path is not allowed, or reading is strict and the robot is a
+            xacro file or one of robot_descriptions.
+        ModelError: If a xacro file cannot be expanded, or arguments are given for a
+            robot that is none.
     """
     text = os.fspath(name)
-    if text.endswith((".urdf", ".xml")) or os.sep in text:
-        return _from_path(Path(text), access)
+    if is_path(text):
+        return _from_path(Path(text), access, xacro_args)
+    if text.endswith("_description"):
+        return find_description(text, access, xacro_args)
+    if xacro_args:
+        raise ModelError(f"xacro_args: {text} is no xacro file")
     bundled = bundled_robots()
     if text in bundled:
         return _from_bundle(text, bundled[text])
@@ -90,7 +122,7 @@ def find_robot(name: str | Path, access: Access = ANYWHERE) -> RobotSource:
             f"robot {text!r} of example-robot-data has no URDF; robots can only be "
             "loaded from a URDF"
         )
-    known = [*bundled, *sorted(set(others) - set(bundled))]
+    known = [*bundled, *sorted(set(others) - set(bundled)), *described_names()]
     hint = (
         "list all with: hsp robots"
         if others
@@ -100,6 +132,42 @@ def find_robot(name: str | Path, access: Access = ANYWHERE) -> RobotSource:
         f"no robot {text!r}{did_you_mean(text, known)} "
         f"(give a path to a .urdf file, or one of: {listing(known)}); {hint}"
     )
+
+
+def find_description(
+    name: str,
+    access: Access = ANYWHERE,
+    xacro_args: Mapping[str, str] | None = None,
+) -> RobotSource:
+    """Find a robot of the package robot_descriptions, such as ``gen3_description``.
+
+    Raises:
+        RobotNotFoundError: If there is none.
+        AccessError: If reading is strict: the package clones repositories.
+        ModelError: If it cannot be expanded; see `find_robot`.
+    """
+    if access.strict:
+        raise AccessError(
+            f"robot {name!r}: strict reading allows no robot of robot_descriptions, "
+            "because it may be fetched from a network"
+        )
+    found = find_described(name)
+    folders = found.package_dirs
+    return RobotSource(
+        name=name,
+        urdf=found.file,
+        srdf=found.srdf,
+        package_dirs=folders,
+        origin="robot_descriptions",
+        expanded=_expanded(
+            found.file, access, folders, {**found.xacro_args, **(xacro_args or {})}
+        ),
+    )
+
+
+def is_path(name: str) -> bool:
+    """Return whether the name of a robot is a path."""
+    return name.endswith(FILE_ENDINGS) or os.sep in name
 
 
 def example_robots() -> dict[str, RobotSource]:
@@ -142,7 +210,28 @@ def packaged_folders() -> list[Path]:
     return []
 
 
-def _from_path(path: Path, access: Access) -> RobotSource:
+def _expanded(
+    file: Path,
+    access: Access,
+    folders: tuple[Path, ...],
+    arguments: Mapping[str, str] | None,
+) -> str | None:
+    """Return the URDF that xacro makes of a file; None if it is no xacro file."""
+    if is_xacro(file):
+        if access.strict:
+            raise AccessError(
+                f"robot {str(file)!r}: strict reading allows no xacro file, because it "
+                "is a program; expand it first"
+            )
+        return expand(file, arguments or {}, folders)
+    if arguments:
+        raise ModelError(f"xacro_args: {file} is no xacro file")
+    return None
+
+
+def _from_path(
+    path: Path, access: Access, xacro_args: Mapping[str, str] | None
+) -> RobotSource:
     if "\0" in str(path):
         raise RobotNotFoundError(
             f"{str(path)!r}: a path cannot contain a null character"
@@ -151,7 +240,9 @@ def _from_path(path: Path, access: Access) -> RobotSource:
         path = path.expanduser()
     access.check(path, "robot")
     if path.is_dir():
-        inside = listing(sorted(file.name for file in path.glob("*.urdf")))
+        inside = listing(
+            sorted(file.name for file in path.glob("*") if is_path(file.name))
+        )
         raise RobotNotFoundError(
             f"{path} is a folder; give a .urdf file in it"
             + (f" (it contains {inside})" if inside else " (it contains none)")
@@ -161,13 +252,13 @@ def _from_path(path: Path, access: Access) -> RobotSource:
         raise RobotNotFoundError(f"{path}: no such file{did_you_mean(path.name, near)}")
     # The folder of `package://<folder>/...` is usually one above the URDF.
     above = tuple(path.resolve().parents)[:5]
-    ros = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
-    packages = (*above, *(Path(folder) for folder in ros if folder))
+    allowed = tuple(folder for folder in above if access.allows(folder))
     return RobotSource(
-        name=path.stem,
+        name=Path(path.name.removesuffix(".xacro")).stem,
         urdf=path,
-        package_dirs=tuple(folder for folder in packages if access.allows(folder)),
+        package_dirs=allowed,
         access=access,
+        expanded=_expanded(path, access, allowed, xacro_args),
     )
 
 

@@ -5,15 +5,15 @@ the size. Faults that they detect and report themselves are left to them.
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-import numpy as np
-
 from hsp_control.common.exceptions import ModelError, RobotNotFoundError
-from hsp_control.robot.description.xml_files import XmlError, read_xml
+from hsp_control.common.suggestions import listing
+from hsp_control.robot.description.inertias import ENTRIES
+from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.xml_files import XmlError, parse_xml, read_xml
 
 MAX_LINKS = 1000
 """Maximum number of links: the depth of recursions grows with it."""
@@ -28,7 +28,7 @@ MAX_NUMBER = 1e9
 _NUMBERS = {
     "origin": {"xyz": 3, "rpy": 3},
     "mass": {"value": 1},
-    "inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
+    "inertia": dict.fromkeys(ENTRIES, 1),
     "axis": {"xyz": 3},
     "mimic": {"multiplier": 1, "offset": 1},
     "box": {"size": 3},
@@ -42,39 +42,58 @@ _NUMBERS = {
 _LIMITS = {"limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1)}
 """Attributes that may be arbitrarily large: very large limits mean no limit."""
 _LENGTHS = {"box", "cylinder", "capsule", "sphere"}
+_SINGLE = {
+    "link": {"inertial"},
+    "inertial": {"origin", "mass", "inertia"},
+    "visual": {"origin", "geometry"},
+    "collision": {"origin", "geometry"},
+    "geometry": {"box", "cylinder", "capsule", "sphere", "mesh"},
+    "joint": {"origin", "parent", "child", "axis", "limit", "mimic", "dynamics"},
+}
+"""Elements of which others may contain one; parsers use one of several, silently."""
 _WITH_AXIS = {"revolute", "continuous", "prismatic"}
-_INERTIA_TOLERANCE = 1e-6
-"""A principal moment of inertia may be negative by this much [kg·m²].
-
-Many files contain rounded or guessed inertias; the mass matrix is checked later.
-"""
 
 
-def read_urdf(urdf: Path) -> Element:
+def read_urdf(source: RobotSource) -> Element:
     """Return the top element of a URDF that is safe to pass to any parser.
+
+    Its numbers are written so that all parsers read them.
+
+    Raises:
+        RobotNotFoundError, ModelError: See `parse_urdf`.
+        ModelError: If an element is wrong; the message says where.
+    """
+    robot = parse_urdf(source)
+    for where, problem in problems(robot):
+        raise ModelError(f"{source.urdf}: {where}: {problem}")
+    for element in robot.iter():
+        for name in (*_NUMBERS.get(element.tag, ()), *_LIMITS.get(element.tag, ())):
+            if (text := element.get(name)) is not None:
+                element.set(name, _plain(text))
+    return robot
+
+
+def parse_urdf(source: RobotSource) -> Element:
+    """Return the top element of a URDF whose elements are not yet checked.
 
     Raises:
         RobotNotFoundError: If the file cannot be read.
-        ModelError: If the file is not XML, not a URDF, too large, or contains an
-            invalid number; the message says where.
+        ModelError: If the file is not XML, not a URDF, or too large.
     """
+    urdf = source.urdf
     try:
-        robot = read_xml(urdf)
-    except ElementTree.ParseError as error:
-        line, column = error.position
-        raise ModelError(
-            f"{urdf}:{line}:{column + 1}: malformed XML: {error}"
-        ) from error
+        if source.expanded is None:
+            robot = read_xml(urdf)
+        else:
+            robot = parse_xml(source.expanded.encode())
     except XmlError as error:
-        where = f"{urdf}:{error.line}" if error.line else f"{urdf}"
-        raise ModelError(f"{where}: {error.message}") from None
+        raise ModelError(error.within(urdf)) from None
     except OSError as error:
         raise RobotNotFoundError(f"{urdf}: {error.strerror}") from error
-    except (LookupError, ValueError) as error:  # an unknown encoding
-        raise ModelError(f"{urdf}: malformed XML: {error}") from error
     if robot.tag != "robot":
+        hint = "; give an MJCF as mjcf, not as name" if robot.tag == "mujoco" else ""
         raise ModelError(
-            f"{urdf}: the top element is <{robot.tag}>; in a URDF it is <robot>"
+            f"{urdf}: the top element is <{robot.tag}>; in a URDF it is <robot>{hint}"
         )
     count = sum(1 for _ in robot.iter("link"))
     if count > MAX_LINKS:
@@ -82,11 +101,27 @@ def read_urdf(urdf: Path) -> Element:
     count = sum(joint.get("type") != "fixed" for joint in robot.iter("joint"))
     if count > MAX_DOFS:
         raise ModelError(f"{urdf}: {count} moving joints; at most {MAX_DOFS}")
-    for owner, element in _elements(robot):
-        problem = _find_problem(element)
-        if problem:
-            raise ModelError(f"{urdf}: {owner}<{element.tag}>: {problem}")
     return robot
+
+
+def problems(robot: Element) -> Iterator[tuple[str, str]]:
+    """Yield everything that is wrong with a URDF's elements, with the place.
+
+    For example ``("link 'hand': <mass>", 'value="heavy" must be a number')``.
+    """
+    for owner, element in _elements(robot):
+        if problem := _find_problem(element):
+            yield f"{owner}<{element.tag}>", problem
+    for kind in ("link", "joint"):
+        names = Counter(element.get("name") for element in robot.findall(kind))
+        for name, count in names.items():
+            if name is not None and count > 1:
+                yield f"{kind} {name!r}", f"{count} {kind}s have this name"
+        for part in robot.findall(kind):
+            for element in part.iter():
+                if problem := _repeated(element):
+                    name = part.get("name", "")
+                    yield f"{kind} {name!r}: <{element.tag}>", problem
 
 
 def named_files(robot: Element) -> Iterator[tuple[str, str]]:
@@ -122,10 +157,6 @@ def _find_problem(element: Element) -> str:
             return f'{name}="{_short(text)}" {wrong}'
     if tag == "mass" and float(element.get("value", 0.0)) < 0.0:
         return f'value="{element.get("value")}": a mass must not be negative'
-    if tag == "inertia":
-        smallest = float(np.linalg.eigvalsh(_tensor(element))[0])
-        if smallest < -_INERTIA_TOLERANCE:
-            return f"a principal moment is {smallest:.3g} kg·m²; must not be negative"
     if tag == "joint" and element.get("type") in _WITH_AXIS:
         axis = element.find("axis")
         direction = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
@@ -140,9 +171,23 @@ def _find_problem(element: Element) -> str:
     return ""
 
 
+def _repeated(element: Element) -> str:
+    """Return what an element contains more than once, or an empty string."""
+    single = _SINGLE.get(element.tag, set())
+    found = Counter(child.tag for child in element if child.tag in single)
+    if element.tag == "geometry" and found.total() > 1:
+        return f"contains {listing(found.elements())}; must be one shape"
+    for tag, count in found.items():
+        if count > 1:
+            return f"contains {count} elements <{tag}>; must be one"
+    return ""
+
+
 def _check_numbers(text: str, count: int, largest: float) -> str:
     """Return what is wrong with an attribute of some numbers, or an empty string."""
     needed = f"must be {count} numbers" if count > 1 else "must be a number"
+    if not text.isascii():  # Python reads the digits of all scripts, parsers do not
+        return f"{needed} in the digits 0 to 9"
     try:
         numbers = _parsed(text)
     except ValueError:
@@ -162,11 +207,13 @@ def _parsed(text: str) -> list[float]:
     return [float(word) for word in text.split()]
 
 
-def _tensor(element: Element) -> np.ndarray:
-    xx, xy, xz, yy, yz, zz = (
-        float(element.get(name, 0.0)) for name in _NUMBERS["inertia"]
-    )
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+def _plain(text: str) -> str:
+    """Return numbers with one space between them, and none that are subnormal.
+
+    At a space behind a number, or at 1e-320, one parser drops the whole inertia.
+    """
+    words = text.split()
+    return " ".join("0" if 0.0 < abs(float(word)) < 1e-300 else word for word in words)
 
 
 def _short(text: str) -> str:

@@ -20,28 +20,32 @@ MAX_DEPTH = 100
 
 
 class XmlError(Exception):
-    """XML that is not allowed.
+    """XML that is malformed or not allowed.
 
     Attributes:
         line: Line number, from 1; 0 if the whole file is meant.
         message: What is wrong.
+        column: Column number, from 1; 0 if the whole line is meant.
     """
 
-    def __init__(self, line: int, message: str) -> None:
-        """Store both; the caller adds the name of the file."""
-        super().__init__(line, message)
-        self.line = line
-        self.message = message
+    def __init__(self, line: int, message: str, column: int = 0) -> None:
+        """Store all; the caller adds the name of the file."""
+        super().__init__(line, message, column)
+        self.line, self.message, self.column = line, message, column
+
+    def within(self, file: Path | str) -> str:
+        """Return the whole message: ``arm.urdf:3:7: malformed XML: ...``."""
+        place = [str(number) for number in (self.line, self.column) if number]
+        return f"{':'.join([str(file), *place])}: {self.message}"
 
 
 def read_xml(path: Path) -> Element:
     """Return the top element of an XML file.
 
     Raises:
-        XmlError: If the file is too large or too deeply nested, or has a document type.
-        ElementTree.ParseError: If it is malformed.
+        XmlError: If the file is malformed, too large or too deeply nested, or has a
+            document type.
         OSError: If it cannot be read.
-        LookupError, ValueError: If its encoding is unknown.
     """
     with path.open("rb") as file:
         data = file.read(MAX_SIZE + 1)
@@ -51,9 +55,19 @@ def read_xml(path: Path) -> Element:
 
 
 def parse_xml(data: bytes) -> Element:
-    """Return the top element of an XML text; raises what `read_xml` raises."""
+    """Return the top element of an XML text.
+
+    Raises:
+        XmlError: See `read_xml`.
+    """
     _Limits(MAX_ELEMENTS, MAX_DEPTH).check(data)
-    return ElementTree.fromstring(data)
+    try:
+        return ElementTree.fromstring(data)
+    except ElementTree.ParseError as error:
+        line, column = error.position
+        raise XmlError(line, f"malformed XML: {error}", column + 1) from error
+    except (LookupError, ValueError) as error:  # an unknown encoding
+        raise XmlError(0, f"malformed XML: {error}") from error
 
 
 def check_no_document_type(data: bytes) -> None:

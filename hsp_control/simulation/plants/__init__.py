@@ -19,6 +19,8 @@ from .model_changes import Payload as Payload
 from .mujoco import ContactShape as ContactShape
 from .mujoco import Ground as Ground
 from .mujoco import Mujoco as Mujoco
+from .mujoco import MujocoScene as MujocoScene
+from .mujoco import MujocoScenePlant as MujocoScenePlant
 from .plant import ContinuousPlant as ContinuousPlant
 from .plant import Plant as Plant
 from .plant import SampledPlant as SampledPlant

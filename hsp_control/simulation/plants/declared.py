@@ -152,8 +152,10 @@ def _completed(own: RobotDescription, robot: Robot) -> RobotDescription:
     """Return the plant's robot, with the controller's settings where it has none."""
     given = own.changed_fields()
     like = {"gravity": robot.model.gravity.linear}
-    if own.parts is None and robot.description is not None:
-        others = robot.description.changed_fields()
+    theirs = robot.description
+    alike = theirs is not None and (own.mjcf is None) == (theirs.mjcf is None)
+    if own.parts is None and theirs is not None and alike:
+        others = theirs.changed_fields()
         like = {**others, **like}
         like.pop("parts", None)
     return RobotDescription(**{**like, **given})

@@ -4,10 +4,10 @@ from typing import Any
 
 from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.inbox import Inbox, InboxReader
+from hsp_control.trajectories.streams.listeners import is_address, listening_inbox
 from hsp_control.trajectories.streams.message import Message, Space
 from hsp_control.trajectories.streams.record import Record
 from hsp_control.trajectories.streams.recording import Recording
-from hsp_control.trajectories.streams.udp_listener import SCHEME, listening_inbox
 
 
 class Mailbox:
@@ -53,7 +53,7 @@ class Mailbox:
         Raises:
             StreamError: If the source cannot be opened, or carries other values.
         """
-        if self._hears.startswith(SCHEME):
+        if is_address(self._hears):
             self.inbox = listening_inbox(self._hears, space)
         elif self.inbox.space.linear not in (None, space.linear):
             raise StreamError(

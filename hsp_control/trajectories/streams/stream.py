@@ -33,14 +33,11 @@ from hsp_control.trajectories.streams.bounds import (
     linear_bounds,
 )
 from hsp_control.trajectories.streams.chart import Chart, State
+from hsp_control.trajectories.streams.listeners import check_address, is_address
 from hsp_control.trajectories.streams.mailbox import Mailbox
 from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
 from hsp_control.trajectories.streams.recording import read_recording, recorded
 from hsp_control.trajectories.streams.running import Policy, RunningStream, Source
-from hsp_control.trajectories.streams.udp_listener import (
-    SCHEME,
-    check_address,
-)
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
@@ -71,8 +68,9 @@ class Streamed(Remembering, error=TrajectoryError):
 
     _: KW_ONLY
     source: str | None = None
-    """Where messages come from: ``udp://HOST:PORT`` for JSON datagrams, or the path of
-    a recording, of JSON lines with a time ``at`` [-]; by default `send`."""
+    """Where messages come from: ``udp://HOST:PORT`` for JSON datagrams, ``ros2://TOPIC``
+    for poses of ROS 2, or the path of a recording, of JSON lines with a time ``at``
+    [-]; by default `send`."""
     messages: Annotated[Sequence[Mapping[str, Any]], AfterValidator(tuple)] | None = (
         None
     )
@@ -102,7 +100,7 @@ class Streamed(Remembering, error=TrajectoryError):
         """Check the source."""
         if self.source is not None and self.messages is not None:
             raise StreamError("give either source or messages")
-        if self.source is not None and self.source.startswith(SCHEME):
+        if self.source is not None and is_address(self.source):
             check_address(self.source)
         if self.messages is not None:  # what they carry is checked where it is known
             recorded(self.messages, Space(None, False))
@@ -205,7 +203,7 @@ class Streamed(Remembering, error=TrajectoryError):
     @property
     def live(self) -> bool:
         """Whether another process feeds it, in real time."""
-        return self.source is not None and self.source.startswith(SCHEME)
+        return self.source is not None and is_address(self.source)
 
     @property
     def _hears(self) -> str:
@@ -278,7 +276,7 @@ class Streamed(Remembering, error=TrajectoryError):
     def _opened(self, space: Space) -> Source:
         kept = not vars(self).get("_previews", False)
         messages: Sequence[Mapping[str, Any]] | None = self.messages
-        if self.source is not None and not self.source.startswith(SCHEME):
+        if self.source is not None and not is_address(self.source):
             messages = read_recording(Path(self.source))
         if messages is not None:
             return self._mailbox.recording(recorded(messages, space), kept=kept)

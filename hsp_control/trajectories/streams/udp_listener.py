@@ -1,9 +1,11 @@
-"""Messages from other processes: JSON datagrams, received by a thread."""
+"""Messages from other processes: JSON datagrams."""
 
 import socket
-from threading import Thread
+from collections.abc import Callable
+from functools import partial
+from ipaddress import ip_address
 from urllib.parse import urlsplit
-from weakref import WeakValueDictionary, ref
+from weakref import ref
 
 from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.inbox import Inbox
@@ -35,40 +37,21 @@ def check_address(source: str) -> tuple[str, int]:
     return host, port
 
 
-def listening_inbox(source: str, space: Space) -> Inbox:
-    """Return the inbox of an address; all streams of one process share it.
+def is_local(source: str) -> bool:
+    """Return whether only this computer can send to an address."""
+    host, _ = check_address(source)
+    try:
+        return host == "localhost" or ip_address(host).is_loopback
+    except ValueError:
+        return False
 
-    The thread ends, and the port is free again, when nobody uses the inbox any more.
+
+def opened(source: str, space: Space) -> Callable[["ref[Inbox]"], None]:
+    """Open the port of an address; return what listens there.
 
     Raises:
-        StreamError: If the address is wrong or in use, or another stream of this
-            process receives other values there.
+        StreamError: If the address is wrong or in use.
     """
-    known = _inboxes.get(source)
-    if known is not None:
-        if known.space != space:
-            raise StreamError(
-                f"{source} already carries {known.space.width} numbers; this stream "
-                f"needs {space.width}"
-            )
-        return known
-    if source in _threads:  # of an inbox that nobody uses: the port is soon free
-        _threads[source].join()
-    opened = _open(source)
-    inbox = Inbox(space)
-    _inboxes[source] = inbox
-    _threads[source] = Thread(
-        target=_listen, args=(opened, ref(inbox)), name=f"stream {source}", daemon=True
-    )
-    _threads[source].start()
-    return inbox
-
-
-_inboxes: WeakValueDictionary[str, Inbox] = WeakValueDictionary()
-_threads: dict[str, Thread] = {}
-
-
-def _open(source: str) -> socket.socket:
     host, port = check_address(source)
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
@@ -79,7 +62,7 @@ def _open(source: str) -> socket.socket:
             f"{source}: cannot listen there: {error.strerror or error}"
         ) from None
     opened.settimeout(_POLL)
-    return opened
+    return partial(_listen, opened)
 
 
 def _listen(opened: socket.socket, inbox: "ref[Inbox]") -> None:

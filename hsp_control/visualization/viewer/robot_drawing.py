@@ -21,6 +21,7 @@ from hsp_control.visualization.viewer.legend import LegendEntry
 from hsp_control.visualization.viewer.materials import material
 from hsp_control.visualization.viewer.mesh_files import collada_object, mesh_geometry
 from hsp_control.visualization.viewer.motion import Motion
+from hsp_control.visualization.viewer.obstacle_shapes import facets
 from hsp_control.visualization.viewer.placeholders import placeholder
 from hsp_control.visualization.viewer.poses import pose_at
 from hsp_control.visualization.viewer.scene_path import path_element
@@ -54,7 +55,7 @@ class RobotDrawing:
         self.robot = robot
         self._visuals = read_visuals(robot)
         self._nodes = [f"{root}/{path_element(name)}" for name in robot.model.names]
-        missing = [v for v in self._visuals if v.kind == "mesh" and v.file is None]
+        missing = [visual for visual in self._visuals if visual.missing]
         self._placeholders = {visual.joint for visual in missing}
         if not self._visuals:
             self._placeholders = set(range(robot.model.njoints))
@@ -149,6 +150,11 @@ def _thing(visual: Visual) -> Json | None:
             half = pose_at([0.0, 0.0, -size[1] / 2.0])
             body = threejs.capsule(size[1], size[0], size[0])
             return threejs.mesh(body, surface, pose @ half)
+        case "ellipsoid":
+            ball = threejs.sphere(1.0)
+            return threejs.mesh(ball, surface, pose @ np.diag([*size, 1.0]))
+    if visual.mesh is not None:
+        return threejs.mesh(facets(*visual.mesh), surface, pose)
     if visual.file is None:
         return None
     pose = pose @ np.diag([*visual.size, 1.0])
@@ -164,7 +170,11 @@ def _thing(visual: Visual) -> Json | None:
 
 
 def _hint(robot: Robot) -> str:
-    texts = [part.source.urdf.read_text(errors="replace") for part in robot.parts]
+    texts = [
+        part.source.urdf.read_text(errors="replace")
+        for part in robot.parts
+        if part.source.shapes is None
+    ]
     if any("package://example-robot-data" in text for text in texts):
         return "; they come with: pip install example-robot-data-loaders"
     return ""

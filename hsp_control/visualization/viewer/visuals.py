@@ -1,6 +1,6 @@
-"""The visual elements of a robot's URDF, read without loading meshes."""
+"""The visual elements of a robot, read without loading meshes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
@@ -8,11 +8,12 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ModelError, RobotNotFoundError
 from hsp_control.robot import Robot
+from hsp_control.robot.description.body_shape import BodyShape
 from hsp_control.robot.description.combining import Part
-from hsp_control.robot.description.mesh_files import find_problem
+from hsp_control.robot.description.mesh_files import candidates, find_problem
 from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.description.urdf_checks import read_urdf
 
@@ -35,10 +36,13 @@ class Visual(NamedTuple):
         joint: The index of its link's parent joint; 0: it does not move.
         link: Its link's name.
         pose: Its pose in the joint's frame, shape (4, 4).
-        kind: ``box``, ``cylinder``, ``sphere``, ``capsule`` or ``mesh``.
-        size: Its lengths [m] in the URDF's order; of a mesh: its scale.
+        kind: ``box``, ``cylinder``, ``sphere``, ``capsule``, ``ellipsoid`` or ``mesh``.
+        size: Its lengths [m] in the URDF's order, or an ellipsoid's semi-axes; of a
+            mesh: its scale.
         color: Red, green, blue and opacity, from 0 to 1.
         file: Of a mesh: its file, or None if it is not found or not readable.
+        mesh: Of a mesh without a file: vertices [m], shape (k, 3), and triangles
+            of their indices, shape (n, 3).
     """
 
     joint: int
@@ -48,6 +52,12 @@ class Visual(NamedTuple):
     size: tuple[float, ...]
     color: tuple[float, ...]
     file: Path | None
+    mesh: tuple[Array, Indices] | None = None
+
+    @property
+    def missing(self) -> bool:
+        """Whether it is a mesh that cannot be drawn."""
+        return self.kind == "mesh" and self.file is None and self.mesh is None
 
 
 def read_visuals(robot: Robot) -> list[Visual]:
@@ -56,8 +66,11 @@ def read_visuals(robot: Robot) -> list[Visual]:
 
 
 def _of_part(robot: Robot, part: Part) -> Iterator[Visual]:
+    if part.source.shapes is not None:
+        yield from _given(robot, part, part.source.shapes)
+        return
     try:
-        tree = read_urdf(part.source.urdf)
+        tree = read_urdf(part.source)
     except (ModelError, RobotNotFoundError):
         return
     materials = dict(_materials(tree))
@@ -70,6 +83,22 @@ def _of_part(robot: Robot, part: Part) -> Iterator[Visual]:
             visual = _visual(part.source, frame, element, materials)
             if visual is not None:
                 yield visual
+
+
+def _given(robot: Robot, part: Part, shapes: Iterable[BodyShape]) -> Iterator[Visual]:
+    for shape in shapes:
+        if shape.seen:
+            frame = robot.model.frames[robot.frame_id(part.prefix + shape.body)]
+            yield Visual(
+                joint=frame.parentJoint,
+                link=frame.name,
+                pose=frame.placement.homogeneous @ shape.pose,
+                kind=shape.kind,
+                size=shape.size or (1.0, 1.0, 1.0),
+                color=shape.color,
+                file=None,
+                mesh=shape.mesh,
+            )
 
 
 def _visual(
@@ -125,19 +154,10 @@ def _pose(origin: Element | None) -> Array:
 
 def _mesh_file(source: RobotSource, name: str) -> Path | None:
     """Return the file that a mesh's name refers to, if it exists and can be shown."""
-    scheme, _, rest = name.rpartition("://")
-    if scheme == "package":
-        package, _, inside = rest.partition("/")
-        candidates = [folder / rest for folder in source.package_dirs]
-        candidates += [
-            folder / inside for folder in source.package_dirs if folder.name == package
-        ]
-    else:
-        candidates = [source.urdf.parent / rest]  # an absolute path stays as it is
     return next(
         (
             file
-            for file in candidates
+            for file in candidates(source, name)
             if file.suffix.lower() in _MESHES
             and not find_problem(file)
             and source.access.allows(file)

@@ -47,7 +47,7 @@ from hsp_control.null_space.metrics import (
     Metric,
 )
 from hsp_control.null_space.metrics.metric import CONSTANT, IDENTITY, raise_covector
-from hsp_control.robot import kinematics, robot
+from hsp_control.robot import kinematics, state
 from hsp_control.tasks import TaskSample
 from hsp_control.trajectories import HoldOrientation
 
@@ -383,7 +383,7 @@ KERNELS: dict[str, Callable[..., Any]] = {
     },
     "acceleration": law.acceleration,
     "frame_kinematics": kinematics.frame_kinematics,
-    "_copy_valid": robot._copy_valid,
+    "_copy_valid": state._copy_valid,
 }
 
 

@@ -246,7 +246,7 @@ MISTAKES = [
      "robot.name: no robot 'pandda'; did you mean 'panda'?"),
     ("robot.name", "missing/arm.urdf", "RobotNotFoundError",
      "robot.name: missing/arm.urdf: no such file"),
-    ("robot.root", "flying", "ConfigError", "robot.root: unknown value 'flying'"),
+    ("robot.root", "flying", "ModelError", "robot.root: unknown value 'flying'"),
     ("robot.locked", {"panda_join1": 0.0}, "JointNotFoundError",
      "did you mean 'panda_joint1'?"),
     ("robot.gravity", [0, 0], "ConfigError", "robot.gravity: "),

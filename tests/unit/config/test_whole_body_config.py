@@ -81,6 +81,8 @@ MISTAKES: list[tuple[dict[str, Any], str, Any, str, str]] = [
      "ContactError", "contacts: panda has no free-flyer root"),
     (PANDA, "start", {"ground": 0}, "ContactError",
      "start.ground: panda has no free-flyer root to put on the ground"),
+    (PANDA, "start", {"joints": "auto", "ground": 0}, "ContactError",
+     "start.ground: panda has no free-flyer root to put on the ground"),
     (PANDA, "limits.efort", 1, "ConfigError",
      "limits.efort: unknown key 'efort'; did you mean 'effort'?"),
     (PANDA, "limits.effort", -1, "ConfigError",

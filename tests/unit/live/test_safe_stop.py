@@ -247,7 +247,7 @@ def test_it_waits_under_its_brakes_until_the_first_effort() -> None:
 
 def test_its_watchdog_counts_and_forgives() -> None:
     robot = watched(LiveSettings(watchdog=5))
-    tau = gravity(start()) + 3.0
+    tau = gravity(start()) + 0.3
     for _ in range(3):
         robot.advance([tau])
         for _ in range(5):

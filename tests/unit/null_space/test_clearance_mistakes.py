@@ -175,7 +175,7 @@ def test_a_start_in_contact_is_refused_where_the_configuration_says_so() -> None
     assert d < 0.0
     assert str(caught.value).endswith(
         f"null_space.fields.0: the robot starts in contact: {pair}, {-d:.3g} m deep; "
-        "change the start or move the obstacle"
+        "change the start, for example to start: auto, or move the obstacle"
     )
     assert "to ball" in pair
     apart = json.loads(

@@ -1,5 +1,7 @@
 """Check which pairs of links a robot keeps apart, its own and other robots'."""
 
+from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 from oracles import gradient
 
 from hsp_control import Robot
+from hsp_control.common.exceptions import ModelError
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.null_space.fields import (
     SelfClearance,
@@ -33,6 +36,24 @@ def disabled(robot: Robot) -> set[frozenset[str]]:
         frozenset((pair.attrib["link1"], pair.attrib["link2"]))
         for pair in ElementTree.parse(robot.source.srdf).iter("disable_collisions")
     }
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [("<robot>", r"arm\.srdf:1:8: malformed XML"),
+     ("<?xml version='1.0' encoding='ebcdic-9'?><robot/>", "unknown encoding"),
+     (None, r"arm\.srdf: No such file")],
+)  # fmt: skip
+def test_an_srdf_that_cannot_be_read(
+    text: str | None, reason: str, tmp_path: Path
+) -> None:
+    robot = load("panda")
+    srdf = tmp_path / "arm.srdf"
+    if text is not None:
+        srdf.write_text(text)
+    source = replace(robot.source, srdf=srdf)
+    with pytest.raises(ModelError, match=reason):
+        self_pairs(Robot(robot.model, source), link_shapes(robot))
 
 
 def test_pairs_of_links_that_are_watched() -> None:

@@ -20,6 +20,7 @@ from hsp_control.common.exceptions import (
 from hsp_control.common.resources import bundled_robots
 from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.loading import load_model
+from hsp_control.robot.description.mesh_files import candidates
 from hsp_control.robot.description.sources import example_robots, find_robot
 
 # Of example-robot-data: name, root by default, nq, nv.
@@ -219,12 +220,14 @@ def test_package_folders_of_a_file(
     """`package://` is looked up above the file, then along ROS_PACKAGE_PATH."""
     path = write(ARM)
     monkeypatch.setenv("ROS_PACKAGE_PATH", "/opt/one:/opt/two")
-    folders = find_robot(path).package_dirs
-    assert folders[0] == path.resolve().parent
-    assert path.resolve().parents[2] in folders
-    assert folders[-2:] == (Path("/opt/one"), Path("/opt/two"))
+    found = candidates(find_robot(path), "package://arm/a.stl")
+    places = [each.parent.parent for each in found]
+    assert places[0] == path.resolve().parent
+    assert path.resolve().parents[2] in places
+    assert places[-2:] == [Path("/opt/one"), Path("/opt/two")]
     monkeypatch.delenv("ROS_PACKAGE_PATH")
-    assert Path("/opt/one") not in find_robot(path).package_dirs
+    found = candidates(find_robot(path), "package://arm/a.stl")
+    assert Path("/opt/one/arm/a.stl") not in found
 
 
 # --- roots ---------------------------------------------------------------------------

@@ -18,6 +18,7 @@ from hsp_control.common.exceptions import (
     ModelError,
     RobotNotFoundError,
 )
+from hsp_control.geometry import link_shapes
 from hsp_control.robot import ToolFrame
 
 
@@ -99,7 +100,40 @@ def test_file_that_may_not_be_read(
         (robot_xml(link("a"), joint("j", "a", "b")), "Pinocchio cannot build a model"),
         (robot_xml(link("b"), joint("j", "a", "b")), "Pinocchio cannot build a model"),
         (robot_xml(link("a"), link("b")), "Pinocchio cannot build a model"),
-        (robot_xml(link("a"), link("a")), "Pinocchio cannot build a model"),
+        (robot_xml(link("a"), link("a")), "link 'a': 2 links have this name"),
+        (
+            ARM.replace("</robot>", joint("elbow", "base", "lower") + "</robot>"),
+            "joint 'elbow': 2 joints have this name",
+        ),
+        (
+            ARM.replace('<mass value="2"/>', '<mass value="2"/><mass value="3"/>', 1),
+            "link 'upper': <inertial>: contains 2 elements <mass>; must be one",
+        ),
+        (
+            ARM.replace(INERTIA, 2 * INERTIA, 1),
+            "link 'upper': <link>: contains 2 elements <inertial>; must be one",
+        ),
+        (
+            ARM.replace("<axis", '<axis xyz="1 0 0"/><axis', 1),
+            "joint 'shoulder': <joint>: contains 2 elements <axis>; must be one",
+        ),
+        (
+            ARM.replace(
+                INERTIA,
+                '<collision><geometry><sphere radius="1"/><box size="1 1 1"/>'
+                "</geometry></collision>",
+                1,
+            ),
+            "link 'upper': <geometry>: contains sphere, box; must be one shape",
+        ),
+        (
+            ARM.replace('<mass value="2"/>', '<mass value="٢"/>', 1),
+            "link 'upper': <mass>: value=\"٢\" must be a number in the digits 0 to 9",
+        ),
+        (
+            ARM.replace('xyz="0.2 0.1 0.3"', 'xyz="0.2 0.1 ３"', 1),
+            'xyz="0.2 0.1 ３" must be 3 numbers in the digits 0 to 9',
+        ),
         (
             ARM.replace('type="revolute"', 'type="bent"'),
             "Pinocchio cannot build a model",
@@ -179,6 +213,37 @@ def test_joint_that_moves_no_mass_is_named(
     with pytest.raises(ModelError, match=message):
         Robot.load(path)
     assert Robot.load(path, locked={last: 0.0}).joint_names == ("shoulder",)
+
+
+def test_a_robot_without_any_mass(write: Callable[..., Path]) -> None:
+    with pytest.raises(ModelError, match=r"no link that moves has a mass: .*inertial"):
+        Robot.load(write(ARM.replace(INERTIA, "")))
+
+
+@pytest.mark.parametrize("number", ["0 ", "\n0", "1e-320"])
+def test_no_inertia_is_lost_to_how_a_number_is_written(
+    number: str, write: Callable[..., Path]
+) -> None:
+    """The parser drops the whole element at each of these."""
+    written = Robot.load(write(ARM.replace('ixy="0"', f'ixy="{number}"', 1)))
+    plain = Robot.load(write(ARM, "plain.urdf"))
+    assert written.model.inertias[1] == plain.model.inertias[1]
+
+
+def test_what_the_parser_leaves_out_is_an_error(write: Callable[..., Path]) -> None:
+    text = ARM.replace('ixy="0"', "", 1)
+    with pytest.raises(ModelError, match=r"leaves out a part of the model: .*upper\]"):
+        Robot.load(write(text))
+
+
+def test_visuals_are_no_business_of_the_model(
+    write: Callable[..., Path], capfd: pytest.CaptureFixture[str]
+) -> None:
+    nameless = '<visual><geometry><box size="1 1 1"/></geometry><material/></visual>'
+    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    robot = Robot.load(write(ARM.replace(INERTIA, INERTIA + nameless + ball, 1)))
+    assert len(link_shapes(robot)) == 1
+    assert capfd.readouterr().err == ""
 
 
 def test_massless_link_between_heavy_ones_is_no_error(

@@ -261,7 +261,13 @@ def chain(*names: str) -> str:
         # A fork in the second half is a hand with fingers; one in the first is not.
         ([chain("base", "a", "b", "c", "d", "e"), chain("d", "f")], "d"),
         ([chain("base", "a", "b", "c", "d", "e"), chain("a", "f")], "e"),
-        # A finger that is welded on is none to track.
+        # But one short branch is a link of the arm's mechanism, and no elbow the hand.
+        ([chain("base", "a", "b", "c", "d", "e", "f"), chain("c", "rod")], "f"),
+        ([chain("base", "a", "b", "c", "d", "e", "f"), chain("c", "rod"),
+          chain("c", "bar")], "c"),
+        # A finger that is welded on is none to track, and neither is a sensor.
+        ([chain("base", "a", "b"), link("hand_camera"),
+          joint("weld", "b", "hand_camera", "fixed")], "b"),
         ([chain("base", "a", "b"), link("left_finger"),
           joint("weld", "b", "left_finger", "fixed")], "b"),
     ],

@@ -32,6 +32,7 @@ from hsp_control.visualization.viewer.export.clip_reduction import (
     ANGLE_BOUND,
     POSITION_BOUND,
 )
+from hsp_control.visualization.viewer.export.html import write_page
 from hsp_control.visualization.viewer.export.keyframes import (
     angle_error,
     distance_error,
@@ -579,7 +580,9 @@ def test_a_run_of_one_row_is_exported(planar: Rollout, tmp_path: Path) -> None:
     assert frame_times((0.0, 0.0), 30.0, 1.0).tolist() == [0.0]
 
 
-def test_what_cannot_be_exported_is_said(planar: Rollout, tmp_path: Path) -> None:
+def test_what_cannot_be_exported_is_said(
+    planar: Rollout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     anonymous = Rollout(
         planar.columns, {k: v for k, v in planar.meta.items() if k != "config"}
     )
@@ -591,6 +594,9 @@ def test_what_cannot_be_exported_is_said(planar: Rollout, tmp_path: Path) -> Non
     blocked.write_text("")
     with pytest.raises(ExportError, match=r"file/page\.html: cannot write the page"):
         export_html(planar, blocked / "page.html")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ExportError, match=r"^\.: cannot write the page"):
+        write_page(Path(), "")
 
 
 # -- films ----------------------------------------------------------------------------

@@ -3,5 +3,7 @@
 from .contact_shapes import ContactShape as ContactShape
 from .ground import Ground as Ground
 from .mujoco import Mujoco as Mujoco
+from .mujoco_scene import MujocoScene as MujocoScene
 from .plant import MujocoIntegrator as MujocoIntegrator
 from .plant import MujocoPlant as MujocoPlant
+from .scene_plant import MujocoScenePlant as MujocoScenePlant

@@ -14,8 +14,7 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
-from hsp_control.simulation.plants.mujoco.contact_shapes import Geom
-from hsp_control.simulation.plants.mujoco.conventions import (
+from hsp_control.robot.mujoco_coordinates import (
     CONTINUOUS,
     FREE,
     HINGE,
@@ -24,6 +23,7 @@ from hsp_control.simulation.plants.mujoco.conventions import (
     SPHERICAL,
     Joint,
 )
+from hsp_control.simulation.plants.mujoco.contact_shapes import Geom
 from hsp_control.simulation.plants.mujoco.ground import Ground
 
 MIN_INERTIA = 1e-12

@@ -1,7 +1,6 @@
 """MuJoCo as a plant: a physics engine with its own contacts, friction, integrator."""
 
 import importlib
-import logging
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, get_args
 
@@ -15,19 +14,22 @@ from hsp_control.declaration import within
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import number_of_steps
+from hsp_control.robot.mujoco_coordinates import MujocoCoordinates, joints_of
 from hsp_control.simulation.plants.contact_channels import contact_channels
 from hsp_control.simulation.plants.floating_roots import FloatingRoots
 from hsp_control.simulation.plants.json_data import to_json_data
 from hsp_control.simulation.plants.mujoco.contact_shapes import ContactShape, geoms_of
-from hsp_control.simulation.plants.mujoco.conventions import Conventions, joints_of
+from hsp_control.simulation.plants.mujoco.engine import (
+    check_motion,
+    contact_wrenches,
+    import_mujoco,
+)
 from hsp_control.simulation.plants.mujoco.ground import Ground
 from hsp_control.simulation.plants.mujoco.mjcf import write_mjcf
 from hsp_control.simulation.plants.plant import SampledPlant
 from hsp_control.simulation.plants.push import Push, Pushes
 
 MujocoIntegrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
-
-_log = logging.getLogger(__name__)
 
 
 class MujocoPlant(SampledPlant):
@@ -39,7 +41,7 @@ class MujocoPlant(SampledPlant):
         mjcf: The model as MJCF text, for MuJoCo's own tools.
         model: MuJoCo's model.
         data: MuJoCo's data.
-        conventions: Converts between Pinocchio's coordinates and MuJoCo's.
+        coordinates: Converts between Pinocchio's coordinates and MuJoCo's.
     """
 
     def __init__(
@@ -73,7 +75,7 @@ class MujocoPlant(SampledPlant):
             FrameNotFoundError: If a contact's frame does not exist.
         """
         super().__init__(robot)
-        mujoco = _import_mujoco()
+        mujoco = import_mujoco()
         if not 0.0 < timestep < np.inf:
             raise SimulationError(f"mujoco: timestep is {timestep}; must be positive")
         if integrator not in get_args(MujocoIntegrator):
@@ -114,7 +116,7 @@ class MujocoPlant(SampledPlant):
         self.data: Any = mujoco.MjData(self.model)
         names = [name for joint in joints for name in joint.mujoco_names]
         made = [self.model.joint(name) for name in names]
-        self.conventions = Conventions(
+        self.coordinates = MujocoCoordinates(
             robot,
             joints,
             {name: int(j.qposadr[0]) for name, j in zip(names, made, strict=True)},
@@ -131,7 +133,7 @@ class MujocoPlant(SampledPlant):
         """Set the state; see `SampledPlant.reset`."""
         self._mujoco.mj_resetData(self.model, self.data)
         self.data.time = t
-        self.conventions.to_mujoco(q, v, self.data.qpos, self.data.qvel)
+        self.coordinates.to_mujoco(q, v, self.data.qpos, self.data.qvel)
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
         """Step MuJoCo from t to ``end``; see `SampledPlant.advance`.
@@ -144,16 +146,16 @@ class MujocoPlant(SampledPlant):
         motors = self._roots.remove_effort(t, tau)
         steps = number_of_steps(end - t, self.timestep)
         h = self.model.opt.timestep = (end - t) / steps
-        q, v = self.conventions.from_mujoco(data.qpos, data.qvel)
+        q, v = self.coordinates.from_mujoco(data.qpos, data.qvel)
         pushed = self.pushes.any_active(t, end)
-        constant = self.conventions.constant_effort and not pushed
+        constant = self.coordinates.constant_effort and not pushed
         steps_at_once = steps if constant else 1
         for k in range(0, steps, steps_at_once):
             effort = motors + self.pushes.effort(t + (k + 0.5) * h, q)
-            self.conventions.effort_to_mujoco(q, effort, data.qfrc_applied)
+            self.coordinates.effort_to_mujoco(q, effort, data.qfrc_applied)
             self._mujoco.mj_step(self.model, data, steps_at_once)
-            self._check_warnings(end)
-            q, v = self.conventions.from_mujoco(data.qpos, data.qvel)
+            check_motion(data, end)
+            q, v = self.coordinates.from_mujoco(data.qpos, data.qvel)
         return q, v
 
     def log_channels(
@@ -163,7 +165,7 @@ class MujocoPlant(SampledPlant):
         if not self.contacts:
             return {}
         effort = self._roots.remove_effort(t, tau) + self.pushes.effort(t, q)
-        self.conventions.effort_to_mujoco(q, effort, self.data.qfrc_applied)
+        self.coordinates.effort_to_mujoco(q, effort, self.data.qfrc_applied)
         self._mujoco.mj_forward(self.model, self.data)
         return contact_channels(self._wrenches(q))
 
@@ -188,7 +190,7 @@ class MujocoPlant(SampledPlant):
             raise SimulationError(f"{self.robot.name} has no contacts with the ground")
         probe = self._mujoco.MjData(self.model)
         rest = np.zeros(self.robot.nv)
-        self.conventions.to_mujoco(q, rest, probe.qpos, probe.qvel)
+        self.coordinates.to_mujoco(q, rest, probe.qpos, probe.qvel)
         self._mujoco.mj_kinematics(self.model, probe)
         ground = self.model.geom("ground").id
         distance = self._mujoco.mj_geomDistance
@@ -218,50 +220,10 @@ class MujocoPlant(SampledPlant):
 
     def _wrenches(self, q: Array) -> dict[str, Array]:
         """Return each contact's wrench about its frame's origin, in world axes."""
-        model, data = self.model, self.data
-        pin.forwardKinematics(self.robot.model, self._data, q)
-        wrenches = {contact.frame: np.zeros(6) for contact in self.contacts}
+        model, data = self.robot.model, self._data
+        pin.forwardKinematics(model, data, q)
         origins = {
-            name: pin.updateFramePlacement(self.robot.model, self._data, frame)
+            name: pin.updateFramePlacement(model, data, frame).translation
             for name, frame in self._origins.items()
         }
-        local = np.zeros(6)
-        for k, contact in enumerate(data.contact[: data.ncon]):
-            self._mujoco.mj_contactForce(model, data, k, local)
-            # From the first geom on the second, along the rows of contact.frame.
-            sign = 1.0 if contact.geom2 in self._geoms else -1.0
-            name = self._geoms[contact.geom2 if sign > 0.0 else contact.geom1]
-            rows = contact.frame.reshape(3, 3)
-            force, moment = sign * rows.T @ local[:3], sign * rows.T @ local[3:]
-            # Ten times faster than np.cross.
-            (x, y, z), (a, b, c) = contact.pos - origins[name].translation, force
-            wrenches[name][:3] += force
-            wrenches[name][3:] += moment
-            wrenches[name][3:] += y * c - z * b, z * a - x * c, x * b - y * a
-        return wrenches
-
-    def _check_warnings(self, end: float) -> None:
-        warnings = self._mujoco.mjtWarning
-        for kind in (
-            warnings.mjWARN_BADQPOS,
-            warnings.mjWARN_BADQVEL,
-            warnings.mjWARN_BADQACC,
-        ):
-            if self.data.warning[kind].number:
-                raise SimulationError(
-                    f"the motion diverged before t = {end:.6g} s: MuJoCo's state or "
-                    "acceleration is not finite, or beyond 1e10"
-                )
-
-
-def _import_mujoco() -> Any:
-    try:
-        mujoco = importlib.import_module("mujoco")
-    except ImportError as error:
-        raise SimulationError(
-            "the plant mujoco needs MuJoCo, which is not installed; install it with: "
-            "pip install 'hsp_control[mujoco]'"
-        ) from error
-    if mujoco.get_mju_user_warning() is None:  # otherwise MuJoCo writes a log file
-        mujoco.set_mju_user_warning(_log.info)
-    return mujoco
+        return contact_wrenches(self.model, self.data, self._geoms, origins)

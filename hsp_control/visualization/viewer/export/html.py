@@ -60,9 +60,16 @@ def export_html(
             is given for several, a mesh cannot be read, the library for it is not
             installed, or the file cannot be written.
     """
-    path = Path(path)
-    text = page_of(_runs(rollout, robot, controller), view)
-    part = path.with_name(f".{path.name}.part")
+    return write_page(Path(path), page_of(_runs(rollout, robot, controller), view))
+
+
+def write_page(path: Path, text: str) -> Path:
+    """Write a page, as a whole or not at all.
+
+    Raises:
+        ExportError: If it cannot be written.
+    """
+    part = path.parent / f".{path.name}.part"  # also of "."
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part.write_text(text, encoding="utf-8")

@@ -1,7 +1,7 @@
 // Extends Meshcat's viewer by additional commands: see viewer/commands.py.
 "use strict";
 
-const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+const viewer = newViewer(document.getElementById("meshcat-pane"));
 const meshcat = viewer.handle_command.bind(viewer);
 
 // The scene brings its own lights, floor and grid, which fit the robot.
@@ -32,6 +32,18 @@ viewer.handle_command = (command) => {
   layers.apply();  // nodes that were drawn again
   viewer.set_dirty();
 };
+
+// Without WebGL nothing can be drawn: the page says so instead of staying empty.
+function newViewer(pane) {
+  try {
+    return new MeshCat.Viewer(pane);
+  } catch (error) {
+    pane.className = "without-webgl";
+    pane.textContent = "This browser cannot draw in three dimensions: WebGL is off or not "
+      + "supported. Turn on hardware acceleration, or open the page in another browser.";
+    throw error;
+  }
+}
 
 function node(path) {
   return viewer.scene_tree.find(path.split("/").filter((name) => name.length > 0)).object;

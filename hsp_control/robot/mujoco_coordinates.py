@@ -19,14 +19,16 @@ MuJoCo may also number joints and degrees of freedom in another order.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError
-from hsp_control.robot import Robot
+from hsp_control.common.exceptions import JointNotFoundError, ModelError
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.robot.description.mujoco.names import Names
+from hsp_control.robot.robot import Robot
 
 FREE, PLANAR, SPHERICAL, CONTINUOUS, HINGE, SLIDE = (
     "free",
@@ -133,7 +135,7 @@ def _axis(data: Any) -> Array:
     return np.asarray(axis / np.linalg.norm(axis))  # a mimic joint's S is scaled
 
 
-class Conventions:
+class MujocoCoordinates:
     """Converts states and efforts between Pinocchio's coordinates and MuJoCo's.
 
     Velocities are related by qvel = T(q) v. T is a permutation, with a rotation block
@@ -187,6 +189,37 @@ class Conventions:
         self._placements = {
             j.index: robot.model.jointPlacements[j.index] for j in joints
         }
+
+    @classmethod
+    def of(cls, robot: Robot, model: Any) -> Self:
+        """Return the coordinates of a robot in a compiled MuJoCo model.
+
+        Its joints are found by their names; the model may contain more.
+
+        Args:
+            robot: The robot, for example from `Robot.from_mujoco`.
+            model: The compiled model, a ``mujoco.MjModel``.
+
+        Raises:
+            JointNotFoundError: If the model lacks a joint of the robot.
+            ModelError: If MuJoCo has no joint of that kind.
+        """
+        joints = joints_of(robot)
+        known = {name: i for i, name in enumerate(Names(model).joints)}
+        found = {}
+        for name in (name for joint in joints for name in joint.mujoco_names):
+            if name not in known:
+                raise JointNotFoundError(
+                    f"the MuJoCo model has no joint {name!r}"
+                    f"{did_you_mean(name, list(known))} (it has {listing(list(known))})"
+                )
+            found[name] = known[name]
+        return cls(
+            robot,
+            joints,
+            {name: int(model.jnt_qposadr[joint]) for name, joint in found.items()},
+            {name: int(model.jnt_dofadr[joint]) for name, joint in found.items()},
+        )
 
     def to_mujoco(self, q: Array, v: Array, qpos: Array, qvel: Array) -> None:
         """Write the qpos and qvel of a state (q, v)."""

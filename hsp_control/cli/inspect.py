@@ -1,0 +1,129 @@
+"""``hsp inspect``: what is odd about a robot's description."""
+
+import argparse
+import json
+import logging
+import textwrap
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from hsp_control.cli.consoles import out
+from hsp_control.common.exceptions import ExportError, ModelError
+from hsp_control.inspection import Inspection
+from hsp_control.inspection import inspect as inspect_robot
+from hsp_control.robot import RobotDescription
+from hsp_control.robot.description.access import ANYWHERE, only_within
+from hsp_control.robot.description.repaired import write_repaired
+
+_WIDTH = 80
+_SHOWN = 12
+"""Elements that are written out where one finding is about many."""
+
+
+def inspect(options: argparse.Namespace) -> int:
+    """Print what is odd about a robot; return 2 if it does not load."""
+    description = RobotDescription(options.robot, xacro_args=_arguments(options.args))
+    strict = options.strict or bool(options.allow)
+    access = only_within(_folders(options)) if strict else ANYWHERE
+    source = description.find(access)
+    with _no_warnings():
+        inspection = inspect_robot(source, description)
+    if options.json:
+        print(json.dumps(inspection.to_dict(), indent=2, ensure_ascii=False))
+    else:
+        for line in report(inspection):
+            out.print(line, markup=False)
+    if options.fix is not None:
+        file = write_repaired(source, options.fix)
+        if not options.json:
+            out.print(f"Written with projected inertias: {file}", markup=False)
+    if options.html is not None:
+        file = _write_page(inspection, options.html)
+        if not options.json:
+            out.print(f"Page: {file}", markup=False)
+    return 0 if inspection.loads else 2
+
+
+def report(inspection: Inspection) -> Iterator[str]:
+    """Yield the lines that are printed, of at most 80 characters."""
+    for name, text in inspection.facts():
+        line = f"{name:12}  {text}"
+        yield from [line] if name == "file" else _wrapped(line, "", " " * 14)
+    for (severity, check, cure), findings in inspection.groups().items():
+        yield ""
+        yield f"{severity}: {check}"
+        for finding in findings[:_SHOWN]:
+            yield from _wrapped(f"{finding.element}: {finding.message}", "  ", "    ")
+        if len(findings) > _SHOWN:
+            yield f"  ... {len(findings)} in all; --json lists them"
+        if cure:
+            yield from _wrapped(cure, "  -> ", "     ")
+    yield ""
+    counts = {
+        severity: sum(f.severity == severity for f in inspection.findings)
+        for severity in ("error", "warning", "note")
+    }
+    yield ", ".join(f"{n} {s}{'s' * (n != 1)}" for s, n in counts.items())
+
+
+def _write_page(inspection: Inspection, path: Path) -> Path:
+    """Write a page with the robot at home, and beside it what is odd.
+
+    Raises:
+        ExportError: If the robot does not load, or the page cannot be written.
+    """
+    from hsp_control.visualization.viewer.export.still import Note, export_still
+
+    if inspection.robot is None:
+        raise ExportError(f"{path}: there is no picture of a robot that does not load")
+    facts = [f"{name}: {text}" for name, text in inspection.facts() if name != "file"]
+    notes = [
+        Note(f"{severity}: {check}", [f"{f.element}: {f.message}" for f in found], cure)
+        for (severity, check, cure), found in inspection.groups().items()
+    ]
+    notes = notes or [Note("nothing is odd", [], "")]
+    with _no_warnings():
+        return export_still(inspection.robot, path, [*notes, Note("robot", facts, "")])
+
+
+@contextmanager
+def _no_warnings() -> Iterator[None]:
+    """Keep the package's warnings from being printed: they are findings here."""
+    logger = logging.getLogger("hsp_control")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+
+
+def _wrapped(text: str, first: str, rest: str) -> list[str]:
+    return textwrap.wrap(
+        text,
+        _WIDTH,
+        initial_indent=first,
+        subsequent_indent=rest,
+        break_on_hyphens=False,
+        break_long_words=False,
+    )
+
+
+def _arguments(texts: list[str]) -> dict[str, str]:
+    """Return the arguments of a xacro file.
+
+    Raises:
+        ModelError: If one has not the form ``name:=value``.
+    """
+    arguments = {}
+    for text in texts:
+        name, separator, value = text.partition(":=")
+        if not (name and separator):
+            raise ModelError(f"{text!r}: an argument of a xacro file is name:=value")
+        arguments[name] = value
+    return arguments
+
+
+def _folders(options: argparse.Namespace) -> list[Path]:
+    return [Path(options.robot).parent, *options.allow]

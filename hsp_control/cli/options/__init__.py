@@ -1,0 +1,1 @@
+"""What stands behind ``hsp``: commands and their options."""

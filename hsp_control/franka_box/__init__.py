@@ -1,0 +1,9 @@
+"""A Franka's control box without a robot: for unmodified clients of libfranka."""
+
+from .arm import Arm as Arm
+from .box import Box as Box
+from .server import DEADLINE as DEADLINE
+from .server import Server as Server
+from .wire import PERIOD as PERIOD
+from .wire import PORT as PORT
+from .wire import VERSION as VERSION

@@ -1,0 +1,319 @@
+"""Find a posture from which a robot can work: regular, within limits and clear.
+
+Of the postures that qualify, the nearest to the middle of the joints' limits is taken.
+The candidates come from a Halton sequence, so that the result depends on nothing but
+the robot and what is asked.
+"""
+
+import logging
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ConfigurationError, ModelError
+from hsp_control.geometry.links import link_shapes
+from hsp_control.geometry.proximity import Proximity
+from hsp_control.geometry.scene import Obstacle
+from hsp_control.geometry.self_pairs import self_pairs
+from hsp_control.robot import Robot
+from hsp_control.robot.inverse_kinematics import Reached, Target, reach
+
+_SAMPLES = 48
+_ALWAYS = 0.9
+"""Pairs of links that overlap in this share of all samples touch by construction."""
+_MARGIN = 0.05
+"""Distance from a limit, as a share of the joint's range."""
+_WIDE = 8.0 * np.pi
+"""A joint with a greater range has no middle: files write 1e5 for no limit."""
+_GAP = 0.02
+"""Least distance from an obstacle [m]; links only must not overlap."""
+_SHARE = 0.5
+"""Least singular value, as a share of the best that was seen."""
+_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71)
+
+_log = logging.getLogger(__name__)
+
+Rows = tuple[str, tuple[int, ...]]
+"""A frame, and the rows of its Jacobian in world axes that a task tracks."""
+
+
+class Judgement(NamedTuple):
+    """What counts for a posture.
+
+    Attributes:
+        q: The configuration, shape (nq,).
+        regularity: The smallest singular value of the tasks' stacked Jacobian.
+        distance: The smallest distance of links and obstacles [m]; inf: there are none.
+        pair: The two that are at this distance.
+        clear: Whether no links overlap, and no obstacle is near.
+        eccentricity: Distance from the middle: root mean square over the joints, 1 at
+            the limits.
+    """
+
+    q: Array
+    regularity: float
+    distance: float
+    pair: str
+    clear: bool
+    eccentricity: float
+
+
+class PostureSearch:
+    """Judges postures of one robot, and finds a good one.
+
+    Attributes:
+        robot: The robot, with a fixed base.
+        middle: Displacement from neutral of the middle of the limits, shape (nv,); of a
+            joint without limits: of home.
+    """
+
+    def __init__(
+        self, robot: Robot, rows: Sequence[Rows], obstacles: Sequence[Obstacle] = ()
+    ) -> None:
+        """Set up the search.
+
+        If the shapes of the links cannot be read, a warning is logged, and collisions
+        do not count.
+
+        Args:
+            robot: The robot.
+            rows: What the tasks track; it decides which postures are regular.
+            obstacles: What the robot must not touch, where it is at the time 0.
+        """
+        self.robot = robot
+        self._rows = tuple(rows)
+        lower, upper = robot.position_limits()
+        bounded = upper - lower < _WIDE  # also not where there is no limit
+        home = robot.joint_positions(robot.home())
+        half = np.full(robot.nv, np.pi)
+        half[bounded] = 0.5 * (upper[bounded] - lower[bounded])
+        self.middle: Array = home.copy()
+        self.middle[bounded] = 0.5 * (lower[bounded] + upper[bounded])
+        self._half = half
+        self._root = np.array(["root_joint" in name for name in robot.dof_names])
+        inner = (1.0 - 2.0 * _MARGIN) * half
+        self._lower = np.maximum(self.middle - inner, lower)
+        self._upper = np.minimum(self.middle + inner, upper)
+        self._lower[self._root] = self._upper[self._root] = home[self._root]
+        self._proximity = self._pairs_that_can_be_apart(obstacles)
+        pairs = self._proximity.pairs if self._proximity else ()
+        links = len(self._proximity.links) if self._proximity else 0
+        self._gaps = np.array([_GAP if j >= links else 0.0 for _, j in pairs])
+
+    def judge(self, q: Array) -> Judgement:
+        """Return what counts for a configuration, shape (nq,)."""
+        robot = self.robot
+        state = robot.state(0.0, q, np.zeros(robot.nv))
+        regularity = np.inf
+        if self._rows:
+            blocks = [state.frame(f).jacobian[list(rows)] for f, rows in self._rows]
+            values = np.linalg.svd(np.vstack(blocks), compute_uv=False)
+            regularity = float(values[-1])
+        distance, spare, pair = np.inf, np.inf, ""
+        if self._proximity is not None:
+            distance, pair = self._proximity.nearest(state)
+            spare = float((self._proximity.measure(state) - self._gaps).min())
+        offset = ((robot.joint_positions(q) - self.middle) / self._half)[~self._root]
+        eccentricity = float(np.sqrt(np.mean(offset**2))) if offset.size else 0.0
+        return Judgement(q, regularity, distance, pair, spare > 0.0, eccentricity)
+
+    def overlap(self, q: Array) -> tuple[float, str]:
+        """Return how deep links and obstacles overlap at a configuration, and which.
+
+        Capsules are larger than the links; so what overlaps as capsules is measured
+        again with the convex hulls of the links.
+
+        Returns:
+            The depth [m], 0 if nothing overlaps, and the pair, ``a to b``.
+        """
+        rough = self._proximity
+        if rough is None:
+            return 0.0, ""
+        robot = self.robot
+        state = robot.state(0.0, q, np.zeros(robot.nv))
+        names = [each.link for each in rough.links] + [o.name for o in rough.obstacles]
+        suspected = {
+            (names[i], names[j])
+            for (i, j), d in zip(rough.pairs, rough.measure(state), strict=True)
+            if d <= 0.0
+        }
+        hulls = link_shapes(robot, "hulls")
+        names = [each.link for each in hulls] + [o.name for o in rough.obstacles]
+        pairs = [
+            (i, j)
+            for j in range(len(names))
+            for i in range(min(j, len(hulls)))
+            if {(names[i], names[j]), (names[j], names[i])} & suspected
+        ]
+        if not pairs:
+            return 0.0, ""
+        distance, pair = Proximity(robot, hulls, rough.obstacles, pairs).nearest(state)
+        return max(-distance, 0.0), pair
+
+    def find(self, least: float) -> Judgement:
+        """Return a good posture near the middle, with as few joints away as possible.
+
+        Args:
+            least: Smallest singular value that counts as regular.
+
+        Raises:
+            ConfigurationError: If none is found; the message says how near it came.
+        """
+        seen = [self.judge(self._at(x)) for x in self._displacements()]
+        good, needed = self._qualified(seen, least)
+        if not good:
+            raise ConfigurationError(
+                f"no good posture is found: {_nearest(seen, least)}"
+            )
+        best = min(good, key=_eccentricity)
+        return min(
+            (self._nearer_to_the_middle(each, needed) for each in (best, good[0])),
+            key=_eccentricity,
+        )
+
+    def rounded(self, found: Judgement) -> Judgement:
+        """Return a posture with the numbers that `start_line` writes."""
+        return self.judge(self._at(np.round(self.robot.joint_positions(found.q), 3)))
+
+    def start_line(self, found: Judgement) -> str:
+        """Return what a configuration says under ``start`` to begin at a posture."""
+        positions = self.robot.joint_positions(found.q) + 0.0  # no -0.000
+        return f"{{joints: [{', '.join(f'{x:.3f}' for x in positions)}]}}"
+
+    def find_with(self, target: Target, least: float) -> Judgement:
+        """Return a good posture at which a frame is at a target.
+
+        Args:
+            target: Where the frame shall be.
+            least: Smallest singular value that counts as regular.
+
+        Raises:
+            ConfigurationError: If none is found; the message says how near it came.
+            FrameNotFoundError: If there is no such frame.
+        """
+        self.robot.frame_id(target.frame)
+        bounds = self._lower, self._upper
+        found = [
+            reach(self.robot, target, self._at(x), self.middle, *bounds)
+            for x in self._displacements()
+        ]
+        reached = [self.judge(each.q) for each in found if each.converged]
+        if not reached:
+            raise ConfigurationError(_too_far(found, target))
+        good, _ = self._qualified(reached, least)
+        if not good:
+            raise ConfigurationError(
+                f"frame {target.frame!r} reaches its place, but in no good posture: "
+                + _nearest(reached, least)
+            )
+        return min(good, key=_eccentricity)
+
+    def _qualified(
+        self, seen: Sequence[Judgement], least: float
+    ) -> tuple[list[Judgement], float]:
+        """Return those that are clear and regular, and how regular they must be."""
+        clear = [each for each in seen if each.clear]
+        best = max((each.regularity for each in clear), default=0.0)
+        needed = max(least, _SHARE * best) if np.isfinite(best) else least
+        return [each for each in clear if each.regularity > needed], needed
+
+    def _nearer_to_the_middle(self, found: Judgement, needed: float) -> Judgement:
+        """Return a good posture with fewer joints away from the middle, and less so."""
+        for share in (0.0, 0.5, 0.7, 0.9):
+            for k in np.flatnonzero(~self._root):
+                x = self.robot.joint_positions(found.q)
+                x[k] = self.middle[k] + share * (x[k] - self.middle[k])
+                each = self.judge(self._at(x))
+                if each.clear and each.regularity > needed:
+                    found = each
+        return found
+
+    def _displacements(self) -> Iterator[Array]:
+        """Yield home, the middle, and postures all over the limits, shape (nv,)."""
+        yield np.clip(
+            self.robot.joint_positions(self.robot.home()), self._lower, self._upper
+        )
+        yield self.middle.copy()
+        for number in range(1, _SAMPLES + 1):
+            share = np.array([_halton(number, k) for k in range(self.robot.nv)])
+            yield self._lower + share * (self._upper - self._lower)
+
+    def _at(self, x: Array) -> Array:
+        return self.robot.integrate(self.robot.neutral(), x)
+
+    def _pairs_that_can_be_apart(
+        self, obstacles: Sequence[Obstacle]
+    ) -> Proximity | None:
+        """Return the pairs to keep apart; None if there are none."""
+        robot = self.robot
+        try:
+            links = link_shapes(robot)
+        except ModelError as error:
+            _log.warning("%s; postures are not checked for collisions", error)
+            return None
+        pairs = self_pairs(robot, links)
+        if pairs:
+            everywhere = Proximity(robot, links, (), pairs)
+            rest = np.zeros(robot.nv)
+            overlaps = [
+                everywhere.measure(robot.state(0.0, self._at(x), rest)) <= 0.0
+                for x in self._displacements()
+            ]
+            apart = np.mean(overlaps, axis=0) < _ALWAYS
+            pairs = [
+                pair for pair, can in zip(everywhere.pairs, apart, strict=True) if can
+            ]
+        pairs += [
+            (i, len(links) + k)
+            for i, link in enumerate(links)
+            for k in range(len(obstacles))
+            if link.joint > 0
+        ]
+        return Proximity(robot, links, tuple(obstacles), pairs) if pairs else None
+
+
+def _halton(number: int, dimension: int) -> float:
+    """Return an entry of the Halton sequence, in (0, 1) (Halton 1960).
+
+    Dimensions beyond the primes at hand use the first ones again, shifted.
+    """
+    base = _PRIMES[dimension % len(_PRIMES)]
+    number += 409 * (dimension // len(_PRIMES))
+    share, value = 1.0, 0.0
+    while number:
+        share /= base
+        value += share * (number % base)
+        number //= base
+    return value
+
+
+def _eccentricity(judged: Judgement) -> float:
+    return judged.eccentricity
+
+
+def _nearest(seen: Sequence[Judgement], least: float) -> str:
+    """Return how near postures that do not qualify came to doing so."""
+    clear = [each for each in seen if each.clear]
+    if not clear:
+        best = max(seen, key=lambda each: each.distance)
+        return (
+            f"of {len(seen)} postures none is clear; at best {best.pair} are "
+            f"{best.distance:.3g} m apart (links must not overlap, and be {_GAP:g} m "
+            "from obstacles)"
+        )
+    best = max(clear, key=lambda each: each.regularity)
+    return (
+        f"of {len(clear)} clear postures none is regular; the smallest singular value "
+        f"of the tasks is at best {best.regularity:.3g}, needs more than {least:g}"
+    )
+
+
+def _too_far(found: Sequence[Reached], target: Target) -> str:
+    nearest = min(each.error for each in found)
+    unit = "m" if target.rows == 3 else "m and rad"
+    return (
+        f"frame {target.frame!r} cannot reach its place within the joints' limits: "
+        f"from {len(found)} postures it came to {nearest:.3g} ({unit})"
+    )

@@ -1,0 +1,128 @@
+"""Look at a robot's description with all checks."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import pinocchio as pin
+
+from hsp_control.common.exceptions import ModelError
+from hsp_control.inspection.elements import check_elements
+from hsp_control.inspection.finding import Finding
+from hsp_control.inspection.home import check_home
+from hsp_control.inspection.inertias import check_inertias
+from hsp_control.inspection.limits import check_limits
+from hsp_control.inspection.mass_matrix import check_mass_matrix, worst_condition
+from hsp_control.inspection.meshes import check_meshes
+from hsp_control.inspection.self_collisions import check_self_collisions
+from hsp_control.robot import Robot, RobotDescription
+from hsp_control.robot.description.loading import load_model
+from hsp_control.robot.description.sources import RobotSource
+from hsp_control.robot.description.urdf_checks import parse_urdf
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What was found about a robot.
+
+    Attributes:
+        source: Where the robot comes from.
+        findings: What is odd, errors first.
+        robot: The robot; None if it does not load.
+    """
+
+    source: RobotSource
+    findings: tuple[Finding, ...]
+    robot: Robot | None
+
+    @property
+    def loads(self) -> bool:
+        """Whether the robot loads as it was described."""
+        return all(finding.severity != "error" for finding in self.findings)
+
+    def facts(self) -> Iterator[tuple[str, str]]:
+        """Yield what can be said about the robot in general: names and texts."""
+        yield "file", str(self.source.urdf)
+        robot = self.robot
+        if robot is None:
+            return
+        root = "floating base" if robot.unactuated else "fixed base"
+        yield "robot", f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}, {root}"
+        yield "end effector", f"{robot.end_effector} (by default)"
+        yield "mass", f"{pin.computeTotalMass(robot.model):.4g} kg move"
+        condition, dof = worst_condition(robot)
+        yield "mass matrix", f"condition number up to {condition:.2g}, by {dof}"
+        home = ", ".join(f"{x:.3g}" for x in robot.joint_positions(robot.home()) + 0.0)
+        yield "home", f"[{home}]"
+
+    def groups(self) -> dict[tuple[str, str, str], list[Finding]]:
+        """Return the findings by severity, check and cure."""
+        groups: dict[tuple[str, str, str], list[Finding]] = {}
+        for finding in self.findings:
+            key = finding.severity, finding.check, finding.cure
+            groups.setdefault(key, []).append(finding)
+        return groups
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {
+            "facts": dict(self.facts()),
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+
+def inspect(source: RobotSource, description: RobotDescription) -> Inspection:
+    """Return what is odd about a robot.
+
+    Checks of the file come first. If it has no errors, or only inertias that projection
+    repairs, the robot is loaded and looked at.
+
+    Args:
+        source: Where it comes from, see `RobotDescription.find`.
+        description: How it is loaded.
+
+    Raises:
+        RobotNotFoundError: If its file cannot be read.
+        ModelError: If its file is not XML, not a URDF, or too large.
+    """
+    xml = parse_urdf(source)
+    findings = list(check_elements(xml))
+    if not findings:
+        findings = list(_of_file(xml, source))
+    robot, errors = None, [f for f in findings if f.severity == "error"]
+    if all(error.check == "inertia" for error in errors):
+        if errors:
+            description = replace(description, project_inertias=True)
+        try:
+            model = load_model(source, description, description.gravity)
+            robot = Robot(model, source, description=description)
+            findings += _of_robot(robot)
+        except ModelError as error:
+            findings.append(
+                Finding("error", "robot", source.name, _reason(error, source))
+            )
+    order = ("error", "warning", "note")
+    findings.sort(key=lambda finding: order.index(finding.severity))
+    return Inspection(source, tuple(findings), robot)
+
+
+def _of_file(xml: Element, source: RobotSource) -> Iterator[Finding]:
+    yield from check_inertias(xml)
+    yield from check_limits(xml)
+    yield from check_meshes(xml, source)
+
+
+def _of_robot(robot: Robot) -> Iterator[Finding]:
+    yield from check_mass_matrix(robot)
+    try:
+        yield from check_self_collisions(robot)
+    except ModelError as error:
+        reason = _reason(error, robot.source).partition(";")[0]
+        message = f"not checked: {reason}"
+        yield Finding("warning", "self-collision", "all links", message)
+    yield from check_home(robot)
+
+
+def _reason(error: ModelError, source: RobotSource) -> str:
+    return str(error).removeprefix(f"{source.urdf}: ")

@@ -1,0 +1,134 @@
+"""The process that holds the connection to a Franka arm; started by `ClientProcess`.
+
+libfranka waits without end for an answer when the control box closes the connection
+inside a command, and pylibfranka keeps the interpreter's lock while it waits, so that
+no thread of the same process could help. Its destructors may end the process. So it
+runs here, where the loop can kill it.
+
+It does one request at a time, and needs nothing of hsp_control: it starts at once.
+"""
+
+import gc
+import json
+import os
+import socket
+import struct
+import sys
+from typing import Any
+
+REQUEST = struct.Struct("=c7d")
+"""A letter, and seven efforts [N·m] for ``E`` and ``F``."""
+STATE = struct.Struct("=cd7d7d7d")
+"""``S``; time [s]; q [rad]; dq [rad/s]; tau_J_d [N·m]."""
+
+CONNECT, READ, START, EFFORT, FINISH = b"C", b"R", b"S", b"E", b"F"
+ANSWER, ERROR = b"A", b"X"
+LONGEST = 1 << 16
+"""Longest message [bytes]."""
+
+
+class Client:
+    """Answers requests with pylibfranka."""
+
+    def __init__(self) -> None:
+        """Wait for the first request."""
+        self.library: Any = None
+        self.robot: Any = None
+        self.control: Any = None
+
+    def answer(self, message: bytes) -> bytes:
+        """Return the answer to a request, a state or a text; errors are answers too."""
+        kind = message[:1]
+        try:
+            if kind == EFFORT:
+                self.write(message)
+                return packed(self.control.readOnce()[0])
+            if kind == READ:
+                return packed(self.robot.read_once())
+            if kind == START:
+                self.control = self.robot.start_torque_control()
+                return packed(self.control.readOnce()[0])
+            if kind == FINISH:
+                self.write(message, finished=True)
+                return ANSWER + b"{}"
+            return ANSWER + json.dumps(self.connect(json.loads(message[1:]))).encode()
+        except Exception as error:
+            told = {"kind": type(error).__name__, "text": str(error)}
+            return ERROR + json.dumps(told).encode()
+
+    def connect(self, wanted: dict[str, Any]) -> dict[str, Any]:
+        """Connect, set what is wanted, and return the robot's state and model."""
+        import pylibfranka
+
+        self.library = pylibfranka
+        config = pylibfranka.RealtimeConfig
+        realtime = config.kEnforce if wanted["enforce"] else config.kIgnore
+        self.robot = pylibfranka.Robot(wanted["address"], realtime)
+        state = self.robot.read_once()
+        if state.robot_mode == pylibfranka.RobotMode.Reflex and wanted["recover"]:
+            self.robot.automatic_error_recovery()
+            state = self.robot.read_once()
+        if state.robot_mode != pylibfranka.RobotMode.Idle:
+            return described(state)
+        torque, force = wanted["collision_torque"], wanted["collision_force"]
+        self.robot.set_collision_behavior(torque, torque, force, force)
+        if (load := wanted["load"]) is not None:
+            self.robot.set_load(load["mass"], load["center"], load["inertia"])
+            state = self.robot.read_once()
+        model = self.robot.load_model()
+        masses, gravities = [], []
+        measured = list(state.q)
+        for q in [measured, *wanted["postures"]]:
+            state.q = q
+            masses.append(list(model.mass(state)))
+            gravities.append(list(model.gravity(state)))
+        state.q = measured
+        return {**described(state), "masses": masses, "gravities": gravities}
+
+    def write(self, message: bytes, finished: bool = False) -> None:
+        """Send a request's effort, perhaps as the last one."""
+        torques = self.library.Torques(list(REQUEST.unpack(message)[1:]))
+        torques.motion_finished = finished
+        self.control.writeOnce(torques)
+
+
+def packed(state: Any) -> bytes:
+    """Return a state as a message."""
+    return STATE.pack(b"S", state.time.to_sec(), *state.q, *state.dq, *state.tau_J_d)
+
+
+def described(state: Any) -> dict[str, Any]:
+    """Return what a state tells once: mode, errors, and what hangs on the flange."""
+    errors = state.current_errors
+    names = [name for name in dir(errors) if not name.startswith("_")]
+    return {
+        "mode": state.robot_mode.name,
+        "errors": [name for name in names if getattr(errors, name)],
+        "q": list(state.q),
+        "end_effector": state.m_ee,
+        "load": {
+            "mass": state.m_load,
+            "center": list(state.F_x_Cload),
+            "inertia": list(state.I_load),
+        },
+        "total": {
+            "mass": state.m_total,
+            "center": list(state.F_x_Ctotal),
+            "inertia": list(state.I_total),
+        },
+        "flange_to_end_effector": list(state.F_T_EE),
+    }
+
+
+def main(descriptor: int) -> None:
+    """Answer requests from a socket until its other end is closed."""
+    gc.disable()  # nothing here makes cycles
+    link = socket.socket(fileno=descriptor)
+    client = Client()
+    while message := link.recv(LONGEST):
+        link.send(client.answer(message))
+    os._exit(0)  # without libfranka's destructors, which may wait without end
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

@@ -1,0 +1,68 @@
+"""Detect a sensor that repeats one state while the robot moves on."""
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.live.dead_reckoning import DeadReckoning
+from hsp_control.live.hardware import Measurement
+from hsp_control.robot import Robot
+
+_MOVED = 1e-3
+"""Motion by the model from which a state that stays the same is frozen [rad or m]."""
+
+
+class FrozenState:
+    """Compares a state that does not change with the motion that the model predicts.
+
+    New measurements with the same q and v to the last bit are right for a robot that
+    stands. If they have a velocity that is not 0, or come from a sensor with noise, the
+    model says how far the robot went meanwhile under the efforts applied.
+
+    Such a state must not be used: damping a velocity that is long gone drives the robot
+    backwards. A state with v = 0 in all joints is not judged: a robot that its brakes
+    or its friction hold looks the same.
+    """
+
+    def __init__(self, robot: Robot, period: float, tolerated: int) -> None:
+        """Allocate.
+
+        Args:
+            robot: The model.
+            period: Length of a period [s].
+            tolerated: Number of periods that a state may stay the same.
+        """
+        self._robot, self._tolerated = robot, tolerated
+        self._reckoning = DeadReckoning(robot, period)
+        self._last: Measurement | None = None
+        self._same = 0
+
+    def fault(self, measurement: Measurement, applied: Array) -> str | None:
+        """Return why a new measurement cannot be the robot's state, or None.
+
+        Args:
+            measurement: The measurement.
+            applied: The effort of the motors since the last one, shape (nv,).
+        """
+        last, self._last = self._last, measurement
+        if last is None or not (
+            np.array_equal(measurement.q, last.q)
+            and np.array_equal(measurement.v, last.v)
+            and measurement.v.any()
+        ):
+            self._same = 0
+            return None
+        if self._same == 0:
+            self._reckoning.correct(last.t, last.q, last.v)
+        self._same += 1
+        self._reckoning.predict(applied)
+        if self._same <= self._tolerated:
+            return None
+        reached = self._reckoning.state.q
+        moved = np.abs(self._robot.difference(measurement.q, reached))
+        i = int(moved.argmax())
+        if moved[i] <= _MOVED:
+            return None
+        return (
+            f"the state is frozen: it was the same {self._same + 1} times, while "
+            f"{self._robot.dof_names[i]} moved by {moved[i]:.2g} by the model"
+        )

@@ -1,0 +1,269 @@
+"""The live loop itself: read states, send efforts, and always end with a safe stop."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.live.effort_limiter import EffortLimiter
+from hsp_control.live.effort_source import EffortSource
+from hsp_control.live.failures import described
+from hsp_control.live.hardware import Hardware
+from hsp_control.live.live_log import LoopLog
+from hsp_control.live.operator_requests import OperatorRequests
+from hsp_control.live.report import Ended, LoopReport
+from hsp_control.live.safe_stop import Phase, SafeStop
+from hsp_control.live.settings import LiveSettings
+from hsp_control.live.state_reader import StateReader
+
+
+class OneRun:
+    """One run of a loop, whose parts are ready; `run`, then `finish`. Neither raises.
+
+    Attributes:
+        phase: Running, damping or holding.
+        silent: Whether it stopped sending efforts.
+        abandoned: Whether the operator did not wait for the safe stop.
+        later: The first fault in the safe stop, "" without one.
+    """
+
+    def __init__(
+        self,
+        effort_source: EffortSource,
+        hardware: Hardware,
+        reader: StateReader,
+        limiter: EffortLimiter,
+        safe_stop: SafeStop,
+        log: LoopLog,
+        requests: OperatorRequests,
+        settings: LiveSettings,
+        end: float,
+    ) -> None:
+        """Connect the parts.
+
+        Args:
+            effort_source: Computes the efforts.
+            hardware: The robot.
+            reader: Reads its states; it has the first one.
+            limiter: Limits the efforts.
+            safe_stop: Ends the run.
+            log: The log.
+            requests: The operator's requests.
+            settings: What is tolerated.
+            end: The controller's time at which the run is complete [s].
+        """
+        self.effort_source, self.hardware, self.reader = effort_source, hardware, reader
+        self.limiter, self.safe_stop, self.log = limiter, safe_stop, log
+        self.requests, self.settings, self.end = requests, settings, end
+        self.period = hardware.period
+        self.phase = Phase.RUNNING
+        self.ended: Ended = "completed"
+        self.reason = ""
+        self.error: Exception | None = None
+        self.silent = self.done = self.abandoned = False
+        self.later = ""
+
+    def run(self, on_period: Callable[[float], object] | None) -> None:
+        """Run period after period until the safe stop is complete.
+
+        Args:
+            on_period: Called with the controller's time [s] in the rest of a period.
+        """
+        self.reader.start()
+        self.limiter.reset(self.reader.state.q)
+        while not self.done:
+            try:
+                self.one_period(on_period)
+            except (KeyboardInterrupt, SystemExit) as request:
+                if self.phase != Phase.RUNNING:  # the second: the robot must stop
+                    self.silent = self.done = self.abandoned = True
+                name = "Ctrl-C" if isinstance(request, KeyboardInterrupt) else "exit"
+                self.stop("operator", f"stopped by the operator ({name})")
+            except Exception as error:  # nobody knows what to send now
+                self.silent = self.done = True
+                self.fail(error)
+
+    def one_period(self, on_period: Callable[[float], object] | None) -> None:
+        """Read a state, send an effort, then log and make the requested changes."""
+        reader, limiter = self.reader, self.limiter
+        reader.read(limiter.applied, self.effort_source.controller.limits)
+        if reader.fault is not None:
+            self.stop("fault", reader.fault, reader.error)
+        elif self.requests.reason is not None:
+            self.stop("operator", self.requests.reason)
+        elif reader.state.t >= self.end:
+            self.stop("completed", "the duration is over")
+        self.hear_applied()
+        tau = self.controller_effort() if self.phase == Phase.RUNNING else None
+        if self.phase != Phase.RUNNING:
+            tau = self.stop_effort()
+        limiter.follow(self.effort_source.controller.limits)
+        before = limiter.sent.copy()
+        if tau is not None and not limiter.apply(tau, reader.state.q):
+            self.stop("fault", f"the effort is not finite: {tau.tolist()}")
+        self.send(before)
+        response = reader.effort_sent()
+        self.tell_applied()
+        self.log_row(response)
+        if self.phase == Phase.RUNNING:
+            self.rest_of_period(on_period)
+
+    def controller_effort(self) -> Array | None:
+        """Return the controller's effort; None without a measurement: hold the last."""
+        measurement, t = self.reader.measurement, self.reader.state.t
+        if measurement is None:
+            return None
+        try:
+            tau = self.effort_source.effort(
+                t, measurement.q, measurement.v, self.period
+            )
+            tau = np.asarray(tau, dtype=float)
+            if tau.shape != measurement.v.shape:
+                raise ValueError(
+                    f"the effort has shape {tau.shape}; needs {measurement.v.shape}"
+                )
+        except Exception as error:  # a user's task or field may raise anything
+            self.log.controller_failed = True
+            self.fail(error)
+            return None
+        return tau
+
+    def stop_effort(self) -> Array:
+        """Return the safe stop's effort at the measured or predicted state."""
+        tau = self.safe_stop.effort(self.reader.state)
+        self.phase = self.safe_stop.phase
+        too_long = self.reader.predicted_for > self.settings.prediction_time
+        unknown = self.reader.connection_lost or too_long
+        self.silent = unknown or not np.isfinite(tau).all()
+        self.done = self.silent or self.safe_stop.done
+        return tau
+
+    def stop(self, ended: Ended, reason: str, error: Exception | None = None) -> None:
+        """Start the safe stop; later calls change neither it nor the reason."""
+        if self.phase != Phase.RUNNING:
+            if ended == "fault":
+                self.later = self.later or reason
+            return
+        self.phase = Phase.DAMPING
+        self.ended, self.reason, self.error = ended, reason, error
+        self.safe_stop.begin()
+
+    def fail(self, error: Exception) -> None:
+        """Stop because of what a user's code or the law raised."""
+        name = type(error).__name__
+        text = described(error)
+        told = text if text.startswith(name) else f"{name}: {text}"
+        self.stop("fault", told, error)
+
+    def hear_applied(self) -> None:
+        """Learn which effort the robot has, and tell the controller if it is another.
+
+        Efforts may be lost: then neither the rate nor the controller's memory may count
+        from what was sent.
+        """
+        if (measurement := self.reader.measurement) is None:
+            self.limiter.nothing_heard()
+            return
+        has = measurement.applied
+        if has is not None and not self.limiter.believes(has):
+            self.stop("fault", f"the robot says it has an effort of {has.tolist()}")
+            has = None
+        if self.limiter.robot_has(has):
+            self.tell_applied()
+
+    def tell_applied(self) -> None:
+        """Tell the controller which effort the motors apply."""
+        if self.log.controller_failed:
+            return
+        try:
+            self.effort_source.applied(self.limiter.applied, self.period)
+        except Exception as error:
+            self.fail(error)
+
+    def send(self, before: Array) -> None:
+        """Send the limited effort, unless the state is unknown (fail-silent).
+
+        Args:
+            before: What was sent before, shape (nv,).
+        """
+        if self.silent:
+            return
+        try:
+            self.hardware.write(self.limiter.sent.copy())
+        except Exception as error:  # a driver may raise anything
+            self.limiter.replace_sent(before)
+            reason = f"the effort cannot be sent: {described(error)}"
+            self.stop("fault", reason, error)
+
+    def log_row(self, response: float) -> None:
+        """Write a row if one is due; if Ctrl-C cuts it short, once more."""
+
+        def write() -> None:
+            self.log.row(
+                self.phase, self.reader, self.limiter, response, last=self.done
+            )
+
+        try:
+            try:
+                write()
+            except KeyboardInterrupt:
+                write()
+                raise
+        except Exception as error:  # the disk is full, or a user's task raises
+            self.fail(error)
+
+    def rest_of_period(self, on_period: Callable[[float], object] | None) -> None:
+        """Make the operator's changes, and call the user's function."""
+        try:
+            self.requests.run_pending()
+            if on_period is not None:
+                on_period(self.reader.state.t)
+        except Exception as error:
+            self.fail(error)
+
+    def finish(self) -> LoopReport:
+        """Close the hardware, end the log, and return the report."""
+        self._close("the robot cannot be closed", self.hardware.close)
+        self._close("the log cannot be ended", lambda: self.log.end(self.report()))
+        return self.report()
+
+    def report(self) -> LoopReport:
+        """Return how the run ended."""
+        state = self.reader.state
+        speed = float(np.abs(state.v).max())
+        standing = speed <= self.settings.stop.standstill
+        at_rest = standing and self.safe_stop.done and not self.silent
+        ended, reason = self.ended, self.reason
+        if ended != "fault" and not self.abandoned and (self.later or not at_rest):
+            ended = "fault"
+            reason += f"; then {self.later or f'the robot still moved at {speed:.3g}'}"
+        return LoopReport(
+            ended=ended,
+            reason=reason,
+            phase=self.phase,
+            silent=self.silent,
+            speed=speed,
+            at_rest=at_rest,
+            t=state.t,
+            deadlines=self.reader.deadlines,
+            error=self.error,
+            log=self.log.path,
+        )
+
+    def _close(self, what: str, close: Callable[[], object]) -> None:
+        """Close something; if Ctrl-C cuts it short, once more."""
+        for last in (False, True):
+            try:
+                close()
+            except KeyboardInterrupt as interrupt:
+                if last:
+                    self._add(f"{what}: {described(interrupt)}")
+                continue
+            except Exception as error:
+                self._add(f"{what}: {described(error)}")
+                self.error = self.error or error
+            return
+
+    def _add(self, fault: str) -> None:
+        """Report a fault after the end."""
+        self.ended, self.reason = "fault", f"{self.reason}; {fault}"

@@ -1,0 +1,103 @@
+"""Expand xacro, the macro language of URDFs, where the package ``xacro`` is installed.
+
+A xacro file is a program: it includes other files and evaluates Python expressions.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from hsp_control.common.exceptions import ModelError
+from hsp_control.robot.description.packages import package_folders
+from hsp_control.robot.description.xml_files import MAX_SIZE
+
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)  # xacro leaves its own as comments
+_MACRO = re.compile(rb"<xacro:\w")
+
+
+def is_xacro(file: Path) -> bool:
+    """Return whether a file must be expanded: by its name, or by what it contains."""
+    if file.suffix.lower() == ".xacro":
+        return True
+    try:
+        with file.open("rb") as opened:
+            text = _COMMENT.sub(b"", opened.read(MAX_SIZE))
+    except OSError:  # reported by who reads the URDF
+        return False
+    return _MACRO.search(text) is not None
+
+
+def xacro_text(value: str | bool | float) -> str:
+    """Return an argument as xacro writes it: ``true``, ``7``, ``0.5``, ``left_``."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)  # `7` is read as 7.0, but a macro may count with it
+    return str(value)
+
+
+def expand(
+    file: Path, arguments: Mapping[str, str], package_dirs: Sequence[Path]
+) -> str:
+    """Return the URDF that a xacro file makes.
+
+    Args:
+        file: The xacro file.
+        arguments: Its arguments, by name; others have their defaults.
+        package_dirs: Where ``$(find package)`` looks, see `package_folders`.
+
+    Raises:
+        ModelError: If the package xacro is not installed, or cannot expand the file.
+    """
+    try:
+        import xacro  # type: ignore[import-not-found,import-untyped,unused-ignore]
+        from xacro import (  # type: ignore[import-not-found,import-untyped,unused-ignore]
+            substitution_args,
+        )
+    except ImportError:
+        raise ModelError(
+            f"{file}: a xacro file must be expanded: pip install xacro, or expand it "
+            f"first: xacro {file.name} > {_expanded_name(file)}"
+        ) from None
+    try:
+        with _packages_found(substitution_args, package_dirs):
+            document = xacro.process_file(str(file), mappings=dict(arguments))
+    except Exception as error:  # whatever its expressions raise
+        reason = " ".join(str(error).split()) or type(error).__name__
+        if type(error).__name__ == "UndefinedArgumentsException" or reason.startswith(
+            "Undefined substitution argument"
+        ):
+            reason += "; give it by xacro_args, or on the command line as name:=value"
+        raise ModelError(f"{file}: xacro cannot expand it: {reason}") from error
+    return str(document.toprettyxml(indent="  "))
+
+
+@contextmanager
+def _packages_found(
+    substitution_args: Any, package_dirs: Sequence[Path]
+) -> Iterator[None]:
+    """Let ``$(find package)`` look in folders; xacro itself asks an installed ROS 2."""
+
+    def find(package: str) -> str:
+        for folder in package_folders(package, package_dirs):
+            if folder.is_dir():
+                return str(folder)
+        raise LookupError(
+            f"no package {package!r} beside the file or above it, nor along "
+            "ROS_PACKAGE_PATH"
+        )
+
+    original = substitution_args._eval_find
+    evaluated = substitution_args._eval_dict
+    substitution_args._eval_find = evaluated["find"] = find
+    try:
+        yield
+    finally:
+        substitution_args._eval_find = evaluated["find"] = original
+
+
+def _expanded_name(file: Path) -> str:
+    stem = Path(file.name.removesuffix(".xacro")).stem
+    return f"{stem}.urdf" if f"{stem}.urdf" != file.name else f"{stem}_expanded.urdf"

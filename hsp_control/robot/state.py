@@ -1,0 +1,319 @@
+"""The robot's state: kinematic and dynamic terms, each computed once per state.
+
+The controller gets its kinematics and dynamics from `RobotState`, which calls Pinocchio
+here, in `kinematics` and in `centroidal`. Other modules call Pinocchio directly only
+for what a state does not offer: loading and checks of models, integration, collision
+geometry, derivatives of gravity, plants with models of their own, and the viewer.
+"""
+
+from collections.abc import Callable
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import NonFiniteError
+from hsp_control.common.kernels import is_compiled, kernel
+from hsp_control.robot.centroidal import CentroidalMotion
+from hsp_control.robot.configuration_space import as_numbers
+from hsp_control.robot.kinematics import (
+    FrameKinematics,
+    WorldKinematics,
+    joint_placements,
+    mass_matrix_difference,
+)
+from hsp_control.robot.matrix_view import matrix_view
+
+if TYPE_CHECKING:  # `Robot.state` makes a state, and a state names its robot
+    from hsp_control.robot.robot import Robot
+
+Made = TypeVar("Made")
+
+_DOUBLE = np.dtype(np.float64)
+_PACKED = (8,)
+"""Strides of a vector of doubles one after another."""
+
+_MADE_LIMIT = 1000
+"""Number of parts whose memory a state keeps; then it starts anew."""
+
+
+class RobotState:
+    """The robot at one time, with all its kinematic and dynamic terms.
+
+    A term is computed at its first use and kept until the next `update`. The returned
+    arrays belong to the state and change with it: copy an array to keep its values. Use
+    a state in one thread only.
+
+    Attributes:
+        robot: The robot.
+        t: Time [s].
+        q: Configuration, shape (nq,).
+        v: Velocity, shape (nv,).
+        stamp_array: `stamp` as an array of shape (1,), for kernels.
+        data: Pinocchio's data at (q, v), for terms that this class does not offer.
+    """
+
+    def __init__(self, robot: "Robot") -> None:
+        """Allocate the memory; call `update` before using any term."""
+        self.robot = robot
+        self.t = 0.0
+        self.q: Array = robot.neutral()
+        self.v: Array = np.zeros(robot.nv)
+        self.data: pin.Data = robot.model.createData()
+        self._compute_jacobians = partial(
+            pin.computeJointJacobiansTimeVariation,
+            robot.model,
+            self.data,
+            self.q,
+            self.v,
+        )
+        self._inverse_dynamics = partial(
+            pin.rnea, robot.model, self.data, self.q, self.v
+        )
+        self._compute_mass_matrix = partial(pin.crba, robot.model, self.data, self.q)
+        self._mass_matrix = matrix_view(self.data.M)
+        self._world: WorldKinematics | None = None
+        self._unit_blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
+        self._frames: dict[str, FrameKinematics] = {}
+        self.stamp_array: Indices = np.zeros(1, dtype=np.int64)
+        self._mass_matrix_stamp = self._mass_matrix_rate_stamp = -1
+        self._coriolis_stamp = self._effects_stamp = self._centroidal_stamp = -1
+        self._centroidal: CentroidalMotion | None = None
+        self._mass_matrix_rate: Array = np.zeros((robot.nv, robot.nv))
+        self._displaced: RobotState | None = None
+        self._made: dict[tuple[int, str], tuple[object, Any]] = {}
+        _compile_once()
+
+    def update(self, t: float, q: ArrayLike, v: ArrayLike) -> Self:
+        """Move to time t [s], configuration q (nq,) and velocity v (nv,), in place.
+
+        Raises:
+            ShapeError: If q or v has the wrong shape.
+            NonFiniteError: If t, q or v contains NaN or inf.
+            ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1.
+        """
+        q_in: Any = q
+        v_in: Any = v
+        try:
+            packed = (
+                q_in.dtype is v_in.dtype is _DOUBLE
+                and q_in.strides == v_in.strides == _PACKED
+            )
+        except AttributeError:  # a list, for example
+            packed = False
+        if not packed:  # a kernel would be compiled anew for each kind of array
+            q_in = as_numbers(q, self.robot.nq, "configuration q", self.robot)
+            v_in = as_numbers(v, self.robot.nv, "velocity v", self.robot)
+        try:
+            accepted = _copy_valid(
+                t, q_in, v_in, self.q, self.v, self._unit_blocks, self.stamp_array
+            )
+        except TypeError:  # t is no number
+            accepted = False
+        if not accepted:
+            self._refuse(t, q, v)
+        self.t = t
+        self._compute_jacobians()
+        return self
+
+    def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
+        """Raise the error that says what is wrong with t, q and v."""
+        if not isinstance(t, float | int | np.number) or not np.isfinite(t):
+            raise NonFiniteError(f"time t is {t!r}; needs a finite number of seconds")
+        self.robot.check_configuration(q)
+        self.robot.check_tangent(v, "velocity v")
+        raise NonFiniteError(f"t = {t!r}, q = {q!r}, v = {v!r}: their sum overflows")
+
+    def frame(self, name: str) -> FrameKinematics:
+        """Return the placement, the Jacobian and the motion of a frame.
+
+        Raises:
+            FrameNotFoundError: If the robot has no such frame.
+        """
+        frame = self._frames.get(name)
+        if frame is None:
+            index = self.robot.frame_id(name)
+            frame = FrameKinematics(
+                self.robot.model, self.data, self.v, self.stamp_array, index
+            )
+            self._frames[name] = frame
+        frame.compute()
+        return frame
+
+    def position(self, frame: str) -> Array:
+        """Return the origin of a frame in the world [m], shape (3,)."""
+        return self.frame(frame).position
+
+    @property
+    def centroidal(self) -> CentroidalMotion:
+        """The centre of mass, the angular momentum about it, and their Jacobians."""
+        if self._centroidal is None:
+            self._centroidal = CentroidalMotion(
+                self.robot.model, self.data, self.q, self.v
+            )
+        if self._centroidal_stamp != self.stamp:
+            self._centroidal.update()
+            self._centroidal_stamp = self.stamp
+        return self._centroidal
+
+    @property
+    def mass_matrix(self) -> Array:
+        """M(q), shape (nv, nv) (CRBA)."""
+        stamp = self.stamp
+        if self._mass_matrix_stamp != stamp:
+            self._compute_mass_matrix()
+            self._mass_matrix_stamp = stamp
+        return self._mass_matrix
+
+    @property
+    def coriolis_matrix(self) -> Array:
+        """C(q, v), where C v are Coriolis and centrifugal efforts, shape (nv, nv)."""
+        if self._coriolis_stamp != self.stamp:
+            pin.computeCoriolisMatrix(self.robot.model, self.data, self.q, self.v)
+            self._coriolis_stamp = self.stamp
+        return matrix_view(self.data.C)
+
+    @property
+    def mass_matrix_rate(self) -> Array:
+        """M' = C + Cᵀ along v, shape (nv, nv)."""
+        if self._mass_matrix_rate_stamp != self.stamp:
+            model = self.robot.model
+            if self.robot.mimics:
+                self._mass_matrix_rate[:] = mass_matrix_difference(
+                    model, self.q, self.v
+                )
+            else:
+                C = self.coriolis_matrix
+                np.add(C, C.T, out=self._mass_matrix_rate)
+            self._mass_matrix_rate_stamp = self.stamp
+        return self._mass_matrix_rate
+
+    @property
+    def nonlinear_effects(self) -> Array:
+        """N(q, v): Coriolis, centrifugal and gravity efforts, shape (nv,) (RNEA)."""
+        if self._effects_stamp != self.stamp:
+            pin.nonLinearEffects(self.robot.model, self.data, self.q, self.v)
+            self._effects_stamp = self.stamp
+        return self.data.nle  # type: ignore[no-any-return]
+
+    def inverse_dynamics(self, acceleration: Array) -> Array:
+        """Return the effort M a + N, shape (nv,), for an acceleration (nv,) (RNEA)."""
+        return self._inverse_dynamics(acceleration)  # type: ignore[no-any-return]
+
+    @property
+    def stamp(self) -> int:
+        """A number that changes with every `update`: use it to invalidate caches."""
+        return int(self.stamp_array[0])
+
+    @property
+    def world(self) -> WorldKinematics:
+        """Placements and Jacobians of all joints at the world's origin, as views."""
+        if self._world is None:
+            self._world = WorldKinematics(
+                joint_placements(self.data),
+                matrix_view(self.data.J),
+                matrix_view(self.data.dJ),
+                self.v,
+            )
+        return self._world
+
+    def made(self, part: object, what: str, make: Callable[[], Made]) -> Made:
+        """Return what ``make`` returned for a part and this state; it is called once.
+
+        ``what`` tells apart what a class and its subclasses keep.
+
+        Parts are values and have no memory. What they compute with at a state, such as
+        buffers and compiled calls, is kept here, so that one part may serve many
+        states, in many threads.
+        """
+        key = id(part), what
+        found = self._made.get(key)
+        if found is None:
+            if len(self._made) >= _MADE_LIMIT:
+                self._made.clear()
+            self._made[key] = found = part, make()  # keeps the part, and its id
+        made: Made = found[1]
+        return made
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"robot": self.robot, "t": self.t, "q": self.q, "v": self.v}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["robot"])  # type: ignore[misc]
+        self.update(state["t"], state["q"], state["v"])
+
+    def displaced(self, dt: float, displacement: Array) -> "RobotState":
+        """Return the state at (t + dt, q ⊕ displacement) with the same velocity.
+
+        For finite differences. Each call overwrites and returns the same object, the
+        companion of this state.
+
+        Args:
+            dt: Time difference [s].
+            displacement: Shape (nv,) [rad or m].
+        """
+        if self._displaced is None:
+            self._displaced = RobotState(self.robot)
+        q = pin.integrate(self.robot.model, self.q, displacement)
+        return self._displaced.update(self.t + dt, q, self.v)
+
+    def ahead(self, dt: float) -> "RobotState":
+        """Return the companion state at (t + dt, q ⊕ v dt), see `displaced`; dt [s]."""
+        return self.displaced(dt, self.v * dt)
+
+
+@cache
+def _compile_once() -> None:
+    """Compile `_copy_valid` for packed doubles, and for nothing else, ever.
+
+    Numba takes an array that may be written for one that may not, but looks it up for
+    longer; so there is a version for both.
+    """
+    if is_compiled(_copy_valid):
+        from numba import types
+
+        own, kernel = types.float64[::1], cast("Any", _copy_valid)
+        given = own, types.Array(types.float64, 1, "C", readonly=True)
+        rest = own, own, types.int64[:, ::1], types.int64[::1]
+        for each in given:
+            kernel.compile((types.float64, each, each, *rest))
+        kernel.disable_compile()
+
+
+@kernel
+def _copy_valid(
+    t: float,
+    q_in: Array,
+    v_in: Array,
+    q: Array,
+    v: Array,
+    unit_blocks: Indices,
+    stamp: Indices,
+) -> bool:
+    """Copy q and v if they are valid; return whether they are.
+
+    Valid means of the right size, finite, and of norm 1 in the unit blocks.
+    """
+    if q_in.shape[0] != q.shape[0] or v_in.shape[0] != v.shape[0]:
+        return False
+    total = t
+    for i in range(q.shape[0]):
+        total += q_in[i]
+    for i in range(v.shape[0]):
+        total += v_in[i]
+    ok = np.isfinite(total)
+    for k in range(unit_blocks.shape[0]):
+        square = 0.0
+        for i in range(unit_blocks[k, 0], unit_blocks[k, 0] + unit_blocks[k, 1]):
+            square += q_in[i] * q_in[i]
+        ok = ok and abs(square - 1.0) < 2e-6
+    if ok:
+        for i in range(q.shape[0]):
+            q[i] = q_in[i]
+        for i in range(v.shape[0]):
+            v[i] = v_in[i]
+        stamp[0] += 1
+    return bool(ok)

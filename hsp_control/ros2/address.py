@@ -1,0 +1,78 @@
+"""Addresses ``ros2://name?domain=0``: a name of ROS 2, and options."""
+
+import os
+import re
+from collections.abc import Collection
+from typing import NamedTuple
+from urllib.parse import parse_qsl
+
+from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.suggestions import did_you_mean, listing
+
+SCHEME = "ros2://"
+_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+_LARGEST_DOMAIN = 232  # beyond, RTPS has no ports for it
+
+
+class Address(NamedTuple):
+    """What an address says.
+
+    Attributes:
+        name: A name of ROS 2, beginning with a slash.
+        domain: The DDS domain.
+        options: The other options.
+    """
+
+    name: str
+    domain: int
+    options: dict[str, str]
+
+
+def parse(address: str, options: Collection[str] = ()) -> Address:
+    """Return what an address says; the domain is ``ROS_DOMAIN_ID``'s, or else 0.
+
+    Args:
+        address: The address, with or without ``ros2://``.
+        options: Which options it may have besides the domain.
+
+    Raises:
+        HardwareError: If a name, an option or the domain is not valid.
+    """
+    name, _, query = address.removeprefix(SCHEME).partition("?")
+    where = f"{SCHEME}{name}" + (f"?{query}" if query else "")
+    try:
+        given = parse_qsl(query, strict_parsing=True) if query else []
+    except ValueError:
+        raise HardwareError(f"{where}: needs options KEY=VALUE&...") from None
+    found = dict(given)
+    for key, _ in given:
+        if key not in {"domain", *options}:
+            known = listing(["domain", *options])
+            raise HardwareError(
+                f"{where}: there is no option {key!r}"
+                f"{did_you_mean(key, ['domain', *options])} (known: {known})"
+            )
+    if len(found) < len(given):
+        raise HardwareError(f"{where}: an option is given twice")
+    domain = found.pop("domain", None)
+    if domain is None:
+        domain, where = os.environ.get("ROS_DOMAIN_ID") or "0", "ROS_DOMAIN_ID"
+    if not (domain.isascii() and domain.isdigit() and int(domain) <= _LARGEST_DOMAIN):
+        raise HardwareError(
+            f"{where}: the domain is {domain!r}; needs 0 to {_LARGEST_DOMAIN}"
+        )
+    return Address(checked_name(name), int(domain), found)
+
+
+def checked_name(name: str) -> str:
+    """Return a name of ROS 2 with its leading slash.
+
+    Raises:
+        HardwareError: If it is none.
+    """
+    if not _NAME.fullmatch(name):
+        raise HardwareError(
+            f"{name!r} is no name of ROS 2; needs letters, digits and '_' between "
+            "slashes, such as /joint_states"
+        )
+    return name if name.startswith("/") else f"/{name}"

@@ -1,0 +1,19 @@
+"""Whether Cyclone DDS is there."""
+
+from hsp_control.common.exceptions import HardwareError
+
+INSTALL = "pip install 'hsp_control[ros2]'"
+
+
+def check_installed() -> None:
+    """Raise if Cyclone DDS cannot be imported.
+
+    Raises:
+        HardwareError: Then; says how to install it.
+    """
+    try:
+        import cyclonedds.domain  # noqa: F401
+    except ImportError as error:
+        raise HardwareError(
+            f"ros2:// needs Cyclone DDS; install it with: {INSTALL}"
+        ) from error

@@ -1,0 +1,247 @@
+"""A MuJoCo scene of one's own as a plant: robot, objects and contacts in it."""
+
+import importlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.exceptions import FrameNotFoundError, SimulationError
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.control.log_channel import LogChannel
+from hsp_control.declaration import within
+from hsp_control.robot import MujocoCoordinates, Robot
+from hsp_control.robot.description.mujoco.motors import Motor, joint_actuators, motor
+from hsp_control.robot.description.mujoco.names import Names
+from hsp_control.robot.integrators import number_of_steps
+from hsp_control.simulation.plants.contact_channels import contact_channels
+from hsp_control.simulation.plants.floating_roots import FloatingRoots
+from hsp_control.simulation.plants.json_data import to_json_data
+from hsp_control.simulation.plants.mujoco.engine import (
+    check_motion,
+    contact_wrenches,
+    import_mujoco,
+)
+from hsp_control.simulation.plants.plant import SampledPlant
+from hsp_control.simulation.plants.push import Push, Pushes
+
+_GROUPS = 31
+"""Number of groups of actuators that MuJoCo can disable."""
+
+
+class MujocoScenePlant(SampledPlant):
+    """A robot in a MuJoCo scene: the user's own ``MjModel`` and ``MjData``.
+
+    An effort goes through the robot's torque motors, as a control that MuJoCo limits,
+    and for joints without exactly one such motor through ``qfrc_applied``. All else in
+    ``data`` is the user's: controls of other actuators, forces on objects, mocap
+    bodies. It may be read and written between periods.
+
+    A run begins at the state that ``data`` had when the plant was made, with the
+    robot's joints at the start of the run.
+
+    Attributes:
+        model: The ``mujoco.MjModel``.
+        data: The ``mujoco.MjData``.
+        coordinates: Converts between the robot's coordinates and MuJoCo's.
+        motors: The motor of each degree of freedom that has one, by its index in v.
+        contacts: The bodies whose contact forces are logged.
+        pushes: External wrenches.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        model: Any,
+        data: Any,
+        *,
+        contacts: Sequence[str] = (),
+        disable_servos: bool = False,
+        pushes: Sequence[Push] = (),
+    ) -> None:
+        """Find the robot in the scene.
+
+        Args:
+            robot: The robot, usually from `Robot.from_mujoco` with this model.
+            model: The scene.
+            data: Its state, where a run begins.
+            contacts: Names of the bodies whose contact forces are logged.
+            disable_servos: Whether servos on the robot's joints are switched off: they
+                get a group of their own in ``model``, which is disabled. Without it
+                they are an error, since they would work against the controller.
+            pushes: External wrenches on the robot.
+
+        Raises:
+            SimulationError: If MuJoCo is not installed, or a servo acts on a joint.
+            JointNotFoundError: If the scene lacks a joint of the robot.
+            FrameNotFoundError: If the scene lacks a body, or the robot a frame.
+        """
+        super().__init__(robot)
+        mujoco = import_mujoco()
+        self.model, self.data = model, data
+        self.coordinates = MujocoCoordinates.of(robot, model)
+        self.pushes = Pushes(robot, pushes)
+        self.contacts = tuple(contacts)
+        self._roots = FloatingRoots(robot)
+        names = Names(model)
+        self._bodies = _bodies(names, self.contacts)
+        self._geoms = {
+            geom: name
+            for name, body in self._bodies.items()
+            for geom in range(model.ngeom)
+            if model.geom_bodyid[geom] == body
+        }
+        on_joints = _actuators_on(robot, model, names)
+        _switch_off_servos(model, names, on_joints, allowed=disable_servos)
+        self.motors: dict[int, Motor] = _motors(model, on_joints)
+        dofs = sorted(self.motors)
+        self._driven: Indices = np.array(dofs, dtype=np.int64)
+        self._controls = np.array([self.motors[i].control for i in dofs], dtype=int)
+        self._factors = np.array([self.motors[i].factor for i in dofs])
+        self._kind = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+        self._begin = np.zeros(mujoco.mj_stateSize(model, self._kind))
+        mujoco.mj_getState(model, data, self._begin, self._kind)
+        self._probe: Any = mujoco.MjData(model) if self.contacts else None
+
+    def reset(self, t: float, q: Array, v: Array) -> None:
+        """Set the robot's state, and all else as it was; see `SampledPlant.reset`."""
+        mujoco, data = self._mujoco, self.data
+        mujoco.mj_resetData(self.model, data)  # also its warnings
+        mujoco.mj_setState(self.model, data, self._begin, self._kind)
+        data.time = t
+        self.coordinates.to_mujoco(q, v, data.qpos, data.qvel)
+        mujoco.mj_forward(self.model, data)
+
+    def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
+        """Step MuJoCo from t to ``end``; see `SampledPlant.advance`.
+
+        The interval is divided into equal steps, at most as long as the scene's own.
+
+        Raises:
+            SimulationError: If the effort pushes a root, which has no motor, or the
+                motion diverges.
+        """
+        data, own = self.data, self.model.opt.timestep
+        effort = self._roots.remove_effort(t, tau)
+        steps = number_of_steps(end - t, own)
+        h = (end - t) / steps
+        constant = self.coordinates.constant_effort and not self.pushes.any_active(
+            t, end
+        )
+        steps_at_once = steps if constant else 1
+        q, v = self.coordinates.from_mujoco(data.qpos, data.qvel)
+        try:
+            self.model.opt.timestep = h
+            for k in range(0, steps, steps_at_once):
+                self._drive(data, t + (k + 0.5) * h, q, effort)
+                self._mujoco.mj_step(self.model, data, steps_at_once)
+                check_motion(data, end)
+                q, v = self.coordinates.from_mujoco(data.qpos, data.qvel)
+        finally:
+            self.model.opt.timestep = own
+        return q, v
+
+    def log_channels(
+        self, t: float, q: Array, v: Array, tau: Array
+    ) -> Mapping[str, LogChannel]:
+        """Return the contacts' force and moment on each body that was asked for."""
+        if not self.contacts:
+            return {}
+        mujoco, probe = self._mujoco, self._probe  # the data itself is not touched
+        state = np.zeros_like(self._begin)
+        mujoco.mj_getState(self.model, self.data, state, self._kind)
+        mujoco.mj_setState(self.model, probe, state, self._kind)
+        self._drive(probe, t, q, self._roots.remove_effort(t, tau))
+        mujoco.mj_forward(self.model, probe)
+        origins = {name: probe.xpos[body] for name, body in self._bodies.items()}
+        return contact_channels(
+            contact_wrenches(self.model, probe, self._geoms, origins)
+        )
+
+    def describe(self) -> dict[str, Any]:
+        """Return its settings, and which joints are driven through their motors."""
+        names = self.robot.dof_names
+        return {
+            "type": "MujocoScenePlant",
+            "mujoco": self._mujoco.__version__,
+            "timestep": float(self.model.opt.timestep),
+            "motors": [names[i] for i in self.motors],
+            "contacts": list(self.contacts),
+            "pushes": to_json_data(self.pushes.pushes),
+        }
+
+    @property
+    def _mujoco(self) -> Any:
+        """The module mujoco; not an attribute, because a module cannot be pickled."""
+        return importlib.import_module("mujoco")
+
+    def _drive(self, data: Any, t: float, q: Array, effort: Array) -> None:
+        """Write an effort as controls and as applied forces."""
+        applied = effort.copy()
+        applied[self._driven] = 0.0
+        applied += self.pushes.effort(t, q)
+        self.coordinates.effort_to_mujoco(q, applied, data.qfrc_applied)
+        data.ctrl[self._controls] = effort[self._driven] / self._factors
+
+
+def _bodies(names: Names, contacts: Sequence[str]) -> dict[str, int]:
+    found = {}
+    for name in contacts:
+        if name not in names.bodies:
+            with within("contacts"):
+                raise FrameNotFoundError(
+                    f"no body {name!r}{did_you_mean(name, names.bodies)} "
+                    f"(the scene has {listing(names.bodies)})"
+                )
+        found[name] = names.bodies.index(name)
+    return found
+
+
+def _actuators_on(robot: Robot, model: Any, names: Names) -> dict[int, list[int]]:
+    """Return the actuators on the robot's joints, by the joint's first index in v."""
+    by_joint = joint_actuators(model)
+    return {
+        joint.idx_v: by_joint.get(names.joints.index(name), [])
+        for name, joint in robot.joints.items()
+    }
+
+
+def _motors(model: Any, on_joints: Mapping[int, list[int]]) -> dict[int, Motor]:
+    """Return the motor of each joint that has exactly one, and no other actuator."""
+    found = {}
+    for dof, actuators in on_joints.items():
+        own = motor(model, actuators[0]) if len(actuators) == 1 else None
+        if own is not None and own.factor and _works(model, own.actuator):
+            found[dof] = own
+    return found
+
+
+def _works(model: Any, actuator: int) -> bool:
+    """Return whether an actuator is not disabled, with its group or all of them."""
+    flags = importlib.import_module("mujoco").mjtDisableBit
+    group = int(model.actuator_group[actuator])
+    of_group = 0 <= group < _GROUPS and int(model.opt.disableactuator) >> group & 1
+    return not (of_group or int(model.opt.disableflags) & int(flags.mjDSBL_ACTUATION))
+
+
+def _switch_off_servos(
+    model: Any, names: Names, on_joints: Mapping[int, list[int]], *, allowed: bool
+) -> None:
+    servos = [
+        actuator
+        for actuators in on_joints.values()
+        for actuator in actuators
+        if motor(model, actuator) is None and _works(model, actuator)
+    ]
+    if servos and not allowed:
+        raise SimulationError(
+            f"actuators {listing([names.actuators[a] for a in servos])} of the scene "
+            "are no torque motors and act on the robot's joints, where they would work "
+            "against the controller: remove them from the MJCF, or give "
+            "disable_servos=True"
+        )
+    if servos:
+        unused = max({*range(_GROUPS)} - {*map(int, model.actuator_group)})
+        model.actuator_group[servos] = unused
+        model.opt.disableactuator |= 1 << unused

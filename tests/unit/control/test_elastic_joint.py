@@ -1,0 +1,159 @@
+"""The sampled loop of an elastic joint, against a simulated one."""
+
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from hsp_control import Controller, Gains, JointPosture, Robot, simulate
+from hsp_control.control.compensation import (
+    Compensation,
+    IntegralAction,
+    MomentumObserver,
+    Predictor,
+    VelocityFilter,
+)
+from hsp_control.control.compensation.elastic_joint import ElasticJoint
+from hsp_control.control.compensation.linear_loop import LinearLoop
+from hsp_control.simulation.plants import EffortDelay, ImperfectPlant, SampledPlant
+from hsp_control.simulation.plants.sensors import SensorDelay
+
+Array = NDArray[np.float64]
+H, OMEGA = 0.001, 20.0
+MASS = 2.0
+CARRIAGE = f"""<robot name="carriage"><link name="rail"/><link name="carriage">
+<inertial><mass value="{MASS}"/>
+<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+<joint name="slide" type="prismatic"><parent link="rail"/>
+<child link="carriage"/><axis xyz="1 0 0"/>
+<limit lower="-10" upper="10" effort="1000" velocity="100"/></joint></robot>"""
+
+
+class Sprung(SampledPlant):
+    """A carriage that a motor pulls by a spring; it measures where the joint says."""
+
+    def __init__(self, robot: Robot, joint: ElasticJoint) -> None:
+        super().__init__(robot)
+        self.joint, self.state = joint, np.zeros(4)
+
+    def reset(self, t: float, q: Array, v: Array) -> None:
+        self.state = np.array([q[0], v[0], q[0], v[0]])
+
+    def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
+        transition, effect = self.joint.transition(end - t)
+        self.state = transition @ self.state + effect * tau[0] / MASS
+        return self.state[:1].copy(), self.state[1:2].copy()
+
+    def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+        begin = 2 if self.joint.measured == "motor" else 0
+        return self.state[begin : begin + 1].copy(), self.state[begin + 1 :][:1].copy()
+
+
+def elastic(measured: Literal["motor", "link"], stiffness: float = 5e3) -> ElasticJoint:
+    """Return a joint like a Panda's first ones: damped by 2 % of the critical."""
+    link, motor = 2.0 / 3.0, 1.0 / 3.0
+    damping = 2.0 * 0.02 * np.sqrt(stiffness * link * motor)
+    return ElasticJoint(link, motor, stiffness, damping, measured)
+
+
+def test_the_transition_is_the_solution_of_the_equations() -> None:
+    joint = ElasticJoint(1.7, 0.4, 300.0, 2.0)
+    transition, effect = joint.transition(0.05)
+
+    def rates(_: float, s: Array) -> Array:
+        pull = 300.0 * (s[2] - s[0]) + 2.0 * (s[3] - s[1])
+        return np.array([s[1], pull / 1.7, s[3], (3.0 - pull) / 0.4])
+
+    begin = np.array([0.1, -0.2, 0.3, 0.4])
+    found = solve_ivp(rates, (0.0, 0.05), begin, rtol=1e-10, atol=1e-12).y[:, -1]
+    np.testing.assert_allclose(transition @ begin + effect * 3.0, found, atol=1e-8)
+
+
+@pytest.mark.parametrize("measured", ["motor", "link"])
+@pytest.mark.parametrize(
+    ("delays", "compensation"),
+    [
+        ((0, 0), {}),
+        ((1, 2), {"integral_action": IntegralAction(5.0)}),
+        ((1, 0), {"predictor": Predictor(1, 0)}),
+        ((0, 1), {"velocity_filter": VelocityFilter(40.0, 2)}),
+        ((0, 2), {"momentum_observer": MomentumObserver(2.0)}),
+    ],
+)
+def test_a_simulated_joint_obeys_the_loop_s_polynomial(
+    delays: tuple[int, int],
+    compensation: dict[str, Any],
+    measured: Literal["motor", "link"],
+    tmp_path: Path,
+) -> None:
+    """By Cayley and Hamilton; see `test_the_linear_loop_is_the_chain_link_by_link`."""
+    file = tmp_path / "carriage.urdf"
+    file.write_text(CARRIAGE)
+    robot = Robot.load(str(file))
+    h, joint = 0.01, elastic(measured, 400.0)
+    task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=8.0))
+    made, parts = Controller(robot, [task], limits=None), Compensation(**compensation)
+    plant = ImperfectPlant(
+        Sprung(robot, joint), [SensorDelay(delays[1])], [EffortDelay(delays[0])]
+    )
+    x = simulate(
+        made, [1.0], duration=0.6, control_period=h, log_period=h, plant=plant,
+        compensation=parts,
+    ).q[:, 0]  # fmt: skip
+    Kp, Kv, _ = made.feedback("posture")
+    action = parts.integral_action
+    Ki = np.zeros((1, 1)) if action is None else action.gains(made.tasks)["posture"]
+    loop = LinearLoop(Kp, Kv, Ki, h, *delays, parts, joint=joint)
+    coefficients = np.poly(loop.transition())
+    n, begun = len(coefficients), 8
+    residuals = [coefficients[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
+    assert np.abs(residuals).max() < 1e-11 * max(1.0, np.abs(x).max())
+    other = LinearLoop(1.1 * Kp, Kv, Ki, h, *delays, parts, joint=joint)
+    wrong = np.poly(other.transition())
+    missed = [wrong[::-1] @ x[k : k + n] for k in range(begun, len(x) - n)]
+    assert np.abs(missed).max() > 1e3 * np.abs(residuals).max()
+
+
+def growth(joint: ElasticJoint, delay: int, rate: float = 5.0) -> float:
+    """Return the rate [1/s] of the slowest motion of the loop of the documents."""
+    one = np.eye(1)
+    loop = LinearLoop(
+        OMEGA**2 * one, 2.0 * OMEGA * one, rate * OMEGA**2 * one, H, 0, delay,
+        joint=joint,
+    )  # fmt: skip
+    return float(np.log(loop.radius()) / H)
+
+
+def test_a_very_stiff_joint_is_rigid() -> None:
+    one = np.eye(1)
+    rigid = LinearLoop(OMEGA**2 * one, 2.0 * OMEGA * one, 2e3 * one, H, 0, 2)
+    expected = np.log(rigid.radius()) / H
+    assert growth(elastic("motor", 1e9), 2) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("delay", [0, 2])
+def test_where_it_is_measured_decides(delay: int) -> None:
+    """Without damping in the joint, small gains brake or drive the joint's own mode.
+
+    To first order in Kv, its rate is -Kv φ_m φ/2: φ is the mode's shape, of the motor
+    and of what is measured, with λ φ_l² + μ φ_m² = 1. Motor and link move against each
+    other, so that a measured link drives the mode.
+    """
+    stiffness = 5e3
+    link, motor = 2.0 / 3.0, 1.0 / 3.0
+    shape = np.array([motor, -link]) / np.sqrt(link * motor)  # of link and motor
+    for measured, own in (("link", shape[0]), ("motor", shape[1])):
+        joint = ElasticJoint(link, motor, stiffness, 0.0, measured)  # type: ignore[arg-type]
+        gentle = np.eye(1)
+        loop = LinearLoop(0.01 * gentle, 0.2 * gentle, 0.0 * gentle, H, 0, delay,
+                          joint=joint)  # fmt: skip
+        modes = np.linalg.eigvals(loop.transition())
+        frequency = np.sqrt(stiffness / (link * motor))
+        found = modes[np.abs(np.abs(np.angle(modes)) - frequency * H).argmin()]
+        # The held effort is half a period late besides.
+        late = np.cos(frequency * H * (delay + 0.5))
+        expected = -0.5 * 0.2 * own * shape[1] * late
+        assert np.log(np.abs(found)) / H == pytest.approx(expected, rel=0.02)

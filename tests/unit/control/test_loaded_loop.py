@@ -1,0 +1,224 @@
+"""The loop of a robot that carries what its controller does not know of."""
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hsp_control import (
+    Controller,
+    FramePosition,
+    Gains,
+    Hold,
+    NullSpaceField,
+    Robot,
+    TargetPosture,
+    load_experiment,
+    simulate,
+)
+from hsp_control.control.compensation import (
+    Compensation,
+    IntegralAction,
+    MomentumObserver,
+    VelocityFilter,
+    check_rate,
+)
+from hsp_control.control.compensation.loaded_loop import LoadedLoop, loaded_loop
+from hsp_control.control.compensation.null_space_rates import field_slope
+from hsp_control.null_space.fields import FunctionField
+from hsp_control.robot.integrators import Rk4
+from hsp_control.simulation.plants import (
+    ImperfectPlant,
+    IntegratedPlant,
+    RigidBodyPlant,
+)
+from hsp_control.simulation.plants.model_changes import Inertias, Payload, changed
+from hsp_control.simulation.plants.sensors import SensorDelay
+
+ARM = Robot.load("panda", gravity=[0.0, 0.0, 0.0])
+Q0 = np.array([0.0, -0.5, 0.1, -2.0, 0.2, 1.6, 0.7])
+H, MASS = 1e-3, 3.0
+
+
+def holding(field: NullSpaceField | None = None, frequency: float = 20.0) -> Controller:
+    position = ARM.state(0.0, Q0, np.zeros(7)).position("panda_tcp")
+    gains = Gains(natural_frequency=frequency)
+    hand = FramePosition("panda_tcp", Hold(position), gains=gains, name="hand")
+    field = TargetPosture(Q0) if field is None else field
+    return Controller(ARM, [hand], field, null_space_gain=10.0, limits=None)
+
+
+def loaded(times: float = 1.0) -> Robot:
+    return changed(ARM, [Payload(frame="panda_hand", mass=times * MASS)])
+
+
+def whole(made: Controller, parts: Compensation, delay: int) -> LoadedLoop:
+    state = ARM.state(0.0, Q0, np.zeros(7))
+    found = loaded_loop(made, state, loaded(), H, 0, delay, parts)
+    assert found is not None
+    return found
+
+
+def boundary(loop: LoadedLoop) -> float:
+    """Return the part of the load at which the loop begins to grow."""
+    low, high = 0.01, 20.0
+    assert loop.with_part(low).radius() < 1.0 < loop.with_part(high).radius()
+    for _ in range(30):
+        middle = np.sqrt(low * high)
+        grows = loop.with_part(middle).radius() > 1.0 + 1e-9
+        low, high = (low, middle) if grows else (middle, high)
+    return float(low)
+
+
+CASES: dict[str, tuple[dict[str, Any], int]] = {
+    "integral action": ({"integral_action": IntegralAction(7.0)}, 0),
+    "measured two periods late": ({"integral_action": IntegralAction(7.0)}, 2),
+    "a slow observer": (
+        {
+            "integral_action": IntegralAction(10.0),
+            "momentum_observer": MomentumObserver(2.0),
+        },
+        1,
+    ),
+    "a filter": (
+        {
+            "integral_action": IntegralAction(5.0),
+            "velocity_filter": VelocityFilter(30.0),
+        },
+        0,
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
+def test_the_robot_grows_and_decays_at_the_rate_of_the_linear_loop(case: str) -> None:
+    """On both sides of the boundary, with the load that the linear loop tells.
+
+    A point mass: the difference of the mass matrices is linear in it.
+    """
+    parts, delay = Compensation(**CASES[case][0]), CASES[case][1]
+    made = holding()
+    loop = whole(made, parts, delay)
+    edge = boundary(loop)
+    start = ARM.integrate(Q0, 1e-6 * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 0.0]))
+    for times, grows in ((0.8 * edge, False), (1.25 * edge, True)):
+        plant = ImperfectPlant(
+            IntegratedPlant(RigidBodyPlant(loaded(times)), Rk4(H)), [SensorDelay(delay)]
+        )
+        log = simulate(
+            made, start, duration=6.0, control_period=H, log_period=0.01, plant=plant,
+            compensation=parts,
+        )  # fmt: skip
+        error = np.linalg.norm(log["task.hand.error"], axis=1)
+        windows = [error[k : k + 100].max() for k in (200, 300, 400, 500)]
+        assert bool(windows[-1] > windows[0]) is grows
+        if grows:  # the growing mode leaves all others behind
+            rate = np.log(loop.with_part(times).radius()) / H
+            found = np.polyfit([0.0, 1.0, 2.0, 3.0], np.log(windows), 1)[0]
+            assert found == pytest.approx(rate, rel=0.1, abs=0.05)
+
+
+def test_what_is_told_is_the_boundary_and_the_advice_works() -> None:
+    made, strong = holding(), Compensation(integral_action=IntegralAction(7.0))
+    edge = boundary(whole(made, strong, 0))
+    (found,) = check_rate(made, Q0, H, strong, plant=loaded())
+    assert found.path == ("compensation", "integral_action")
+    assert not found.unstable
+    told = re.fullmatch(
+        r"the plant's bodies differ from the model's: it is (.*) times as heavy at the "
+        r"tasks, and motion grows if they differ (.*) times as much; design for 1.5 "
+        r"times the difference: use Ki of at most (.*) times this or a momentum "
+        r"observer",
+        found.message,
+    )
+    assert told is not None, found.message
+    state, true = ARM.state(0.0, Q0, np.zeros(7)), loaded()
+    J = state.frame("panda_tcp").jacobian[:3]
+    # For the identity metric J# = Jᵀ (J Jᵀ)⁻¹: β from the two mass matrices.
+    M, heavy = state.mass_matrix, true.state(0.0, Q0, np.zeros(7)).mass_matrix
+    performed = J @ np.linalg.solve(heavy, M @ np.linalg.pinv(J))
+    beta = np.linalg.eigvals(performed).real.min()
+    assert float(told[1]) == pytest.approx(1.0 / beta, rel=5e-3)
+    assert float(told[2]) == pytest.approx(edge, rel=5e-3)
+    weaker = IntegralAction(7.0 * float(told[3]))
+    assert not check_rate(
+        made, Q0, H, Compensation(integral_action=weaker), plant=loaded()
+    )
+    observed = Compensation(
+        integral_action=IntegralAction(7.0), momentum_observer=MomentumObserver(50.0)
+    )
+    assert not check_rate(made, Q0, H, observed, plant=loaded())
+    assert not check_rate(made, Q0, H, strong, plant=ARM)
+    assert not check_rate(made, Q0, H, strong)
+    (worse,) = check_rate(made, Q0, H, strong, plant=loaded(1.2 * edge))
+    assert "motion grows by a factor of up to 1.000" in worse.message
+    assert worse.radius > 1.0
+
+
+def test_with_the_model_s_bodies_it_is_the_loops_of_its_parts() -> None:
+    """The spectrum of the whole is that of the task, and that of the null space."""
+    made = holding(3.0 * TargetPosture(Q0))
+    parts = Compensation(integral_action=IntegralAction(5.0))
+    loop = whole(made, parts, 2).with_part(0.0)
+    state = ARM.state(0.0, Q0, np.zeros(7))
+    one, rest = np.eye(3), np.eye(4)
+    task = type(loop)(400.0 * one, 40.0 * one, 2000.0 * one, H, 0, 2, parts)
+    free = type(loop)(30.0 * rest, 13.0 * rest, 0.0 * rest, H, 0, 2, parts)
+    assert loop.radius() == pytest.approx(max(task.radius(), free.radius()), abs=1e-9)
+    assert made.stack(state).jacobian.shape == (3, 7)
+
+
+def test_configurations_with_a_payload_are_warned_of_it() -> None:
+    """2 kg are borne at a rate of 5 1/s; 3 kg, which the arm carries, are not at 7."""
+    document: dict[str, Any] = {
+        "robot": {"name": "panda"},
+        "tasks": {
+            "hand": {
+                "type": "frame_position",
+                "frame": "panda_tcp",
+                "trajectory": {"type": "hold"},
+                "gains": {"natural_frequency": 20},
+            }
+        },
+        "null_space": {"gain": 10},
+        "compensation": {"integral_action": {"rate": 5}},
+        "plant": {"type": "rigid_body", "payload": {"frame": "panda_hand", "mass": 2}},
+        "simulation": {"duration": 0.02, "control_period": H},
+    }
+    assert not load_experiment(document).rate_findings
+    heavier = "plant.payload.mass=3", "compensation.integral_action.rate=7"
+    (found,) = load_experiment(document, *heavier).rate_findings
+    assert "it is 5.26 times as heavy at the tasks" in found.message
+    driven = document | {"compensation": {}, "simulation": {"duration": 0.02}}
+    assert not load_experiment(driven, "plant.payload.mass=3").rate_findings
+
+
+def test_a_plant_that_is_much_lighter_is_no_less_than_nothing() -> None:
+    """1.5 times a difference of -80 % would be a robot of negative mass."""
+    light = changed(ARM, [Inertias(0.2)])
+    strong = Compensation(integral_action=IntegralAction(7.0))
+    made = holding(frequency=80.0)
+    assert not check_rate(made, Q0, H, strong, plant=light)
+    assert not check_rate(made, Q0, H, strong, sensor_delay=2)
+    # The same loop with five times the gains.
+    (found,) = check_rate(made, Q0, H, strong, sensor_delay=2, plant=light)
+    assert re.search(r"it is 0\.2 times as heavy .* grows", found.message)
+
+
+def test_saddles_of_the_field_are_no_instability() -> None:
+    """The field leaves a point in the null space, as it shall; the load is borne."""
+    away = holding(
+        FunctionField(
+            lambda state: 0.5 * (state.q - Q0), rate_function=lambda s: 0.5 * s.v
+        )
+    )
+    state = ARM.state(0.0, Q0, np.zeros(7))
+    A = -field_slope(away, state)
+    np.testing.assert_allclose(A, -0.5 * np.eye(7), atol=1e-6)
+    mild = Compensation(integral_action=IntegralAction(3.0))
+    assert not check_rate(away, Q0, H, mild, plant=loaded())
+    strong = Compensation(integral_action=IntegralAction(7.0))
+    (found,) = check_rate(away, Q0, H, strong, plant=loaded())
+    assert found.path == ("compensation", "integral_action")

@@ -1,0 +1,130 @@
+"""Good postures: regular, within limits, clear, and near the middle."""
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from odd_robots import collision, odd_robot
+
+from hsp_control import Robot
+from hsp_control.common.exceptions import ConfigurationError, FrameNotFoundError
+from hsp_control.geometry import Obstacle, Sphere
+from hsp_control.geometry.good_postures import PostureSearch
+from hsp_control.null_space.fields import SelfClearance
+from hsp_control.robot.inverse_kinematics import Target
+from hsp_control.trajectories import Hold
+
+POSE = tuple(range(6))
+LEAST = 0.03
+
+
+def hand(robot: Robot) -> list[tuple[str, tuple[int, ...]]]:
+    return [(robot.end_effector, POSE)]
+
+
+def sigma(robot: Robot, q: np.ndarray) -> float:
+    """The smallest singular value of the end effector's Jacobian, by Pinocchio."""
+    data = robot.model.createData()
+    frame = robot.model.getFrameId(robot.end_effector)
+    J = pin.computeFrameJacobian(robot.model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
+    return float(np.linalg.svd(J, compute_uv=False)[-1])
+
+
+def test_an_arm_that_is_straight_in_the_middle_bends_few_joints() -> None:
+    robot = Robot.load("iiwa14")
+    search = PostureSearch(robot, hand(robot))
+    straight = search.judge(robot.neutral())
+    assert straight.regularity < 1e-12
+    assert straight.eccentricity == 0.0
+    found = search.find(LEAST)
+    assert found.regularity == pytest.approx(sigma(robot, found.q), rel=1e-9)
+    assert found.regularity > LEAST
+    assert np.count_nonzero(np.abs(found.q) > 1e-6) <= 3
+    state = robot.state(0.0, found.q, np.zeros(7))
+    assert SelfClearance().minimum_distance(state) > 0.0
+    lower, upper = robot.position_limits()
+    assert (np.abs(found.q - 0.5 * (lower + upper)) < 0.46 * (upper - lower)).all()
+
+
+def test_a_middle_that_is_good_is_taken() -> None:
+    robot = Robot.load("panda")
+    found = PostureSearch(robot, hand(robot)).find(LEAST)
+    np.testing.assert_allclose(
+        found.q, np.mean(robot.position_limits(), axis=0), atol=1e-12
+    )
+    assert found.eccentricity < 1e-12
+
+
+def test_it_keeps_clear_of_obstacles() -> None:
+    """A ball where the hand would be, by the choice without it."""
+    robot = Robot.load("iiwa14")
+    free = PostureSearch(robot, hand(robot)).find(LEAST)
+    there = robot.state(0.0, free.q, np.zeros(7)).position(robot.end_effector)
+    ball = Obstacle("ball", Sphere(0.15), Hold(there))
+    search = PostureSearch(robot, hand(robot), [ball])
+    touched = search.judge(free.q)
+    assert touched.distance < 0.0
+    assert touched.pair.endswith("to ball")
+    assert not touched.clear
+    assert search.find(LEAST).clear
+
+
+def test_what_overlaps_as_capsules_only_is_no_collision(tmp_path: Path) -> None:
+    """A ball above a plate, which is inside the plate's capsule; then in the plate."""
+    box = '<box size="0.4 0.4 0.02"/>'
+    robot = odd_robot(tmp_path, arm=collision(box, xyz="0 0 0", rpy="0 0 0"))
+    q = robot.neutral()
+    for height, depth in ((0.1, 0.0), (0.02, 0.01)):
+        ball = Obstacle("ball", Sphere(0.02), Hold([0.0, 0.0, 0.3 + height]))
+        search = PostureSearch(robot, [("hand", (0, 1))], [ball])
+        assert search.judge(q).distance < -0.02
+        found, pair = search.overlap(q)
+        assert found == pytest.approx(depth, abs=1e-6)
+        assert pair == "arm to ball"
+    assert PostureSearch(robot, [("hand", (0, 1))]).overlap(q) == (0.0, "")
+
+
+def test_a_pose_is_reached_in_a_good_posture() -> None:
+    robot = Robot.load("iiwa14")
+    search = PostureSearch(robot, hand(robot))
+    target = Target(
+        robot.end_effector, pin.SE3(np.eye(3), np.array([0.5, 0.1, 0.6])), 3
+    )
+    found, again = (search.find_with(target, LEAST) for _ in range(2))
+    np.testing.assert_array_equal(found.q, again.q)
+    there = robot.state(0.0, found.q, np.zeros(7)).position(robot.end_effector)
+    np.testing.assert_allclose(there, [0.5, 0.1, 0.6], atol=1e-8)
+    assert sigma(robot, found.q) > LEAST
+
+
+def test_what_cannot_be_found_is_said_with_numbers() -> None:
+    robot = Robot.load("planar3r")
+    search = PostureSearch(robot, [("tip", (0, 1))])
+    far = Target("tip", pin.SE3(np.eye(3), np.array([9.0, 0.0, 0.0])), 3)
+    with pytest.raises(ConfigurationError, match=r"'tip' cannot reach .* came to \d"):
+        search.find_with(far, LEAST)
+    upward = PostureSearch(robot, [("tip", (0, 1, 2))])
+    with pytest.raises(
+        ConfigurationError, match=r"none is regular; .* at best \S+, ne"
+    ):
+        upward.find(LEAST)
+    ball = Obstacle("ball", Sphere(0.5), Hold([0.0, 0.0, 0.0]))
+    blocked = PostureSearch(robot, [("tip", (0, 1))], [ball])
+    with pytest.raises(
+        ConfigurationError, match=r"none is clear; at best .* to ball are"
+    ):
+        blocked.find(LEAST)
+    with pytest.raises(FrameNotFoundError, match="did you mean 'tip'"):
+        search.find_with(far._replace(frame="tpi"), LEAST)
+
+
+def test_shapes_that_cannot_be_read_are_warned_about(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    robot = odd_robot(tmp_path, arm=collision('<mesh filename="nowhere.stl"/>'))
+    with caplog.at_level(logging.WARNING):
+        search = PostureSearch(robot, [("hand", (0, 1))])
+    assert "are not checked for collisions" in caplog.text
+    assert search.judge(robot.home()).distance == np.inf

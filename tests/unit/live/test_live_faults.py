@@ -1,0 +1,433 @@
+"""Whatever a robot's driver does, the loop raises nothing, stops safely and reports."""
+
+import os
+import signal
+from collections import namedtuple
+from collections.abc import Callable
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+from live_rigs import (
+    PERIOD,
+    Array,
+    Rig,
+    Trick,
+    always,
+    law,
+    missing,
+    panda,
+    start,
+    watched,
+)
+
+from hsp_control import Rollout
+from hsp_control.common.exceptions import HardwareError, HspControlError
+from hsp_control.control.compensation import Command
+from hsp_control.live import (
+    LiveSettings,
+    LoopReport,
+    Measurement,
+    OperatorRequests,
+    Phase,
+    StopSettings,
+    run_loop,
+)
+
+RATE, EFFORT = 1000.0, 80.0
+QUICK = StopSettings(hold=0.02)
+SETTINGS = LiveSettings(effort_rate=RATE, effort=EFFORT, stop=QUICK)
+BEGIN = 60
+"""The read at which something goes wrong: the arm moves by then."""
+
+
+def rig(tricks: dict[int, Trick] | None = None, **settings: Any) -> Rig:
+    return Rig(watched(SETTINGS.with_(**settings) if settings else SETTINGS), tricks)
+
+
+def run(robot: Rig, **options: Any) -> LoopReport:
+    return run_loop(law(), robot, **{"duration": 0.15, "settings": SETTINGS} | options)
+
+
+def assert_safe(robot: Rig, report: LoopReport) -> None:
+    """What was sent keeps its limits, and the robot is at rest."""
+    sent = np.array(robot.sent)
+    assert np.isfinite(sent).all()
+    assert np.abs(sent).max() <= EFFORT + 1e-9
+    held = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
+    steps = np.abs(np.diff(np.vstack([held, sent]), axis=0))
+    assert steps.max() <= RATE * PERIOD + 1e-9
+    assert report.reason
+    assert robot.closed
+    assert robot.robot.phase is Phase.HOLDING
+    assert np.abs(robot.robot.v).max() < 0.02
+    if report.ended != "fault":
+        assert report.at_rest
+        assert robot.robot.reason == "the loop has ended"
+
+
+# --- what `read` returns -------------------------------------------------------------
+
+
+class Hostile:
+    """An object whose every use raises."""
+
+    def __array__(self, *_: object, **__: object) -> Array:
+        raise RuntimeError("no array")
+
+    def __float__(self) -> float:
+        raise RuntimeError("no number")
+
+    def __bool__(self) -> bool:
+        raise RuntimeError("no truth")
+
+    def __str__(self) -> str:
+        raise RuntimeError("no text")
+
+
+Other = namedtuple("Other", "sequence t q v")
+HUGE = 10**400
+ODD_NUMBERS = st.sampled_from(
+    [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e18, HUGE, None, "1", 1j, [], Hostile(),
+     Decimal(1), np.array([0.1]), np.datetime64("2020-01-01")]
+)  # fmt: skip
+ODD_ARRAYS = st.one_of(
+    st.sampled_from(
+        [None, 3.0, "q", [], [[]], [None] * 7, ["a"] * 7, [1j] * 7, [True] * 7,
+         Hostile(), [Hostile()] * 7, [HUGE] * 7, [[1.0], [1.0, 2.0]], {"q": 1},
+         np.full(7, 1e300), np.full(7, np.nan), np.full(7, np.inf),
+         np.full(7, 1e5), np.zeros((7, 1)),
+         np.zeros(7, dtype="datetime64[s]"), np.zeros(7, dtype="f4,i4")]
+    ),
+    npst.arrays(
+        st.one_of(npst.floating_dtypes(), npst.complex_number_dtypes(),
+                  npst.unicode_string_dtypes()),
+        npst.array_shapes(min_dims=0, max_dims=2, max_side=8),
+    ),
+)  # fmt: skip
+ODD_RESULTS = st.one_of(
+    st.sampled_from(
+        [(), 3, "state", {}, object(), Hostile(), Measurement, np.zeros(14),
+         Other(1, 0.0, np.zeros(7), np.zeros(7))]
+    ).map(lambda what: lambda m: what),
+    st.tuples(st.sampled_from(["q", "v", "applied"]), ODD_ARRAYS).map(
+        lambda pair: lambda m: m._replace(**{pair[0]: pair[1]})
+    ),
+    st.tuples(
+        st.sampled_from(["sequence", "t", "age", "halted", "fault"]), ODD_NUMBERS
+    ).map(lambda pair: lambda m: m._replace(**{pair[0]: pair[1]})),
+)  # fmt: skip
+
+
+@pytest.mark.slow
+@settings(max_examples=30)
+@given(odd=ODD_RESULTS, count=st.sampled_from([1, 30, 20_000]))
+def test_whatever_read_returns(odd: Trick, count: int) -> None:
+    robot = rig(always(odd, BEGIN, count))
+    report = run(robot)
+    assert_safe(robot, report)
+    # An object that is a valid value in this place, such as halted=1.0, is no fault.
+    assert report.ended in {"fault", "completed"}
+    if count == 20_000 and report.ended == "fault":
+        assert report.t < 0.15 + 0.3
+
+
+def replaced(**values: Any) -> Trick:
+    return lambda m: m._replace(**values)
+
+
+def shifted(**shifts: float) -> Trick:
+    return lambda m: m._replace(**{k: getattr(m, k) + s for k, s in shifts.items()})
+
+
+class Frozen:
+    """Repeats the first state that it sees, as if it were new."""
+
+    def __init__(self) -> None:
+        self.seen: Measurement | None = None
+
+    def __call__(self, found: Measurement) -> Measurement:
+        self.seen = self.seen or found
+        return found._replace(q=self.seen.q, v=self.seen.v)
+
+
+FAULTS: dict[str, tuple[Any, int, str]] = {
+    "an age that is NaN": (replaced(age=np.nan), 1, "age is nan"),
+    "an age of the future": (replaced(age=-0.5), 1, "-0.5 s old"),
+    "a sequence that is no number": (replaced(sequence=1.5), 1, "sequence is of type"),
+    "a time without resolution": (replaced(t=1e15), 1, "too large for periods"),
+    "a clock that jumps": (shifted(t=1.0), 20_000, "clock jumps by 1.001 s"),
+    "a clock that goes back": (shifted(t=-0.01), 20_000, "clock jumps by -0.009 s"),
+    "a clock that stands": (replaced(t=0.058), 20_000, "clock stands still for 21"),
+    "a joint that jumps": (shifted(q=0.1), 20_000, "panda_joint1 jumps by 0.1"),
+    "a huge position": (replaced(q=np.full(7, 1e300)), 1, r"absurd: q\[0\] is 1e\+300"),
+    "a huge speed": (replaced(v=np.full(7, -1e200)), 1, r"absurd: v\[0\] is -1e\+200"),
+    "an applied effort": (replaced(applied=np.full(7, np.nan)), 1, "not finite"),
+    "what the hardware says": (replaced(fault="two of them send"), 1, "two of them"),
+    "a reason that is none": (replaced(fault=None), 1, "fault is of type NoneType"),
+    "another type": (lambda m: tuple(m), 1, "type tuple; needs a Measurement"),
+    "complex numbers": (replaced(q=np.zeros(7, complex)), 1, "holds complex128"),
+    "a frozen state": (Frozen, 20_000, "the state is frozen: it was the same 22 times"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_each_fault_of_a_measurement_is_named(kind: str, tmp_path: Path) -> None:
+    trick, count, reason = FAULTS[kind]
+    robot, log = rig(always(trick() if trick is Frozen else trick, BEGIN, count)), None
+    log = tmp_path / "run.journal"
+    report = run(robot, log=log)
+    assert report.ended == "fault"
+    with pytest.raises(AssertionError, match=reason):
+        raise AssertionError(report.reason)
+    assert_safe(robot, report)
+    logged = Rollout.load(log)
+    assert (logged.status, logged.meta["message"]) == ("stopped", report.reason)
+    assert (np.diff(logged.t) < 0.02).all()  # also where the robot's clock jumps
+
+
+def test_a_robot_at_rest_is_not_frozen() -> None:
+    """Its brakes hold it: the same state to the last bit, and a velocity of 0."""
+    still = always(replaced(q=start(), v=np.zeros(7)), 1)
+    patient = LiveSettings(stop=QUICK, velocity_margin=99.0)  # it is not held here
+    report = run(Rig(watched(patient), still), duration=0.1, settings=patient)
+    assert report.ended == "completed", report.reason
+
+
+def test_a_clock_that_runs_while_kernels_compile_is_no_jump() -> None:
+    robot = rig(always(shifted(t=5.0), 2))  # the first read comes before compiling
+    report = run(robot)
+    assert report.ended == "completed", report.reason
+    assert report.t < 1.0  # and the safe stop
+
+
+def test_buffers_that_the_driver_reuses_are_copied() -> None:
+    """A driver that hands out the same arrays, and overwrites them at once."""
+    buffers = np.zeros(7), np.zeros(7)
+
+    class Reusing(Rig):
+        def read(self, timeout: float) -> Measurement | None:
+            found = super().read(timeout)
+            assert found is not None
+            buffers[0][:], buffers[1][:] = found.q, found.v
+            return found._replace(q=buffers[0], v=buffers[1])
+
+    plain, reusing = rig(), Reusing(watched(SETTINGS))
+    assert run(plain).ended == run(reusing).ended == "completed"
+    np.testing.assert_array_equal(plain.sent, reusing.sent)
+
+
+# --- what is raised ------------------------------------------------------------------
+
+
+class Odd(Exception):
+    def __str__(self) -> str:
+        raise ValueError("not even a message")
+
+
+ERRORS = st.sampled_from(
+    [ValueError("bad"), RuntimeError("reflex"), HardwareError("gone"), OSError(5, "io"),
+     KeyError("q"), MemoryError(), RecursionError(), StopIteration(), AssertionError(),
+     np.linalg.LinAlgError("singular"), FloatingPointError("overflow"), TimeoutError(),
+     UnicodeDecodeError("utf-8", b"", 0, 1, "odd"), HspControlError("odd"), Odd(),
+     ExceptionGroup("two", [ValueError(), OSError()])]
+)  # fmt: skip
+
+
+class Failing(Rig):
+    """A robot whose methods raise: from their nth call on, some times or always."""
+
+    def __init__(
+        self, method: str, error: BaseException, first: int, times: int
+    ) -> None:
+        super().__init__(watched(SETTINGS))
+        self.method, self.error = method, error
+        self.calls, self.first, self.times = 0, first, times
+
+    def fail(self, method: str) -> None:
+        if method == self.method:
+            self.calls += 1
+            if 0 <= self.calls - self.first < self.times:
+                raise self.error
+
+    def read(self, timeout: float) -> Measurement | None:
+        self.fail("read")
+        return super().read(timeout)
+
+    def write(self, effort: Array) -> None:
+        self.fail("write")
+        super().write(effort)
+
+    def close(self) -> None:
+        super().close()
+        self.fail("close")
+
+
+@pytest.mark.slow
+@settings(max_examples=16)
+@given(
+    method=st.sampled_from(["read", "write", "close", "on_period", "change"]),
+    error=ERRORS,
+    times=st.sampled_from([1, 3, 20_000]),
+)
+def test_whatever_is_raised(method: str, error: Exception, times: int) -> None:
+    first = 1 if method in {"close", "on_period", "change"} else BEGIN
+    robot, requests = Failing(method, error, first, times), OperatorRequests()
+
+    def fail(*_: object) -> None:
+        raise error
+
+    if method == "change":
+        requests.call(fail)
+    on_period = fail if method == "on_period" else None
+    report = run(robot, requests=requests, on_period=on_period)
+    assert report.ended == "fault"
+    assert report.error is error
+    assert report.silent is (method == "read")
+    assert_safe(robot, report)
+
+
+@pytest.mark.parametrize("what", ["applied", "effort", "log_channels"])
+@pytest.mark.parametrize("given_", [RuntimeError("mine"), None, np.zeros(3), "tau"])
+def test_whatever_an_effort_source_does(what: str, given_: Any, tmp_path: Path) -> None:
+    class Mine(Command):
+        calls = 0
+
+        def _odd(self, usual: Callable[[], Any]) -> Any:
+            self.calls += 1
+            if self.calls < 40:
+                return usual()
+            if isinstance(given_, Exception):
+                raise given_
+            return given_
+
+        def effort(self, *args: Any) -> Any:
+            usual = super().effort
+            return self._odd(lambda: usual(*args)) if what == "effort" else usual(*args)
+
+        def applied(self, tau: Array, period: float) -> None:
+            super().applied(tau, period)
+            if what == "applied":
+                self._odd(lambda: None)
+
+        def log_channels(self) -> Any:
+            usual = super().log_channels
+            return self._odd(usual) if what == "log_channels" else usual()
+
+    robot = rig()
+    report = run_loop(
+        Mine(law()), robot, duration=0.1, settings=SETTINGS, log=tmp_path / "a.journal",
+        log_period=PERIOD,
+    )  # fmt: skip
+    raised = isinstance(given_, Exception)
+    assert report.ended == (
+        "completed" if what == "applied" and not raised else "fault"
+    )
+    assert_safe(robot, report)
+    logged = Rollout.load(tmp_path / "a.journal")
+    assert logged.meta["message"] == report.reason  # also where a row failed
+
+
+@pytest.mark.parametrize("says", [True, False])
+def test_an_effort_that_could_not_be_written_does_not_count(says: bool) -> None:
+    """The rate counts from what the robot has, also after writes that failed."""
+    robot = Failing("write", RuntimeError("busy"), BEGIN, 15)
+    if not says:
+        robot.tricks = always(replaced(applied=None), 1)
+    report = run(robot)
+    assert report.reason == "the effort cannot be sent: RuntimeError: busy"
+    assert_safe(robot, report)
+    assert report.at_rest
+    assert robot.robot.reason == "the loop has ended"  # which saw no jump
+
+
+# --- the operator --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_is_the_operator_s_stop(kind: signal.Signals) -> None:
+    before, robot = signal.getsignal(kind), rig()
+
+    def send(t: float) -> None:
+        if t > 0.05 and not sent:
+            sent.append(t)
+            os.kill(os.getpid(), kind)
+
+    sent: list[float] = []
+    report = run(robot, duration=None, on_period=send)
+    assert report.ended == "operator"
+    assert report.reason == f"stopped by the operator ({kind.name})"
+    assert_safe(robot, report)
+    assert signal.getsignal(kind) is before
+
+
+def test_a_second_signal_leaves_it_to_the_robot() -> None:
+    robot = rig()
+
+    class Impatient(Command):
+        def applied(self, tau: Array, period: float) -> None:
+            if self.state.t > 0.05:
+                os.kill(os.getpid(), signal.SIGTERM)
+            super().applied(tau, period)
+
+    report = run_loop(Impatient(law()), robot, settings=SETTINGS)
+    assert report.ended == "operator"
+    assert report.silent
+    assert robot.robot.phase is Phase.HOLDING
+
+
+def test_the_programs_own_handlers_stay() -> None:
+    seen: list[int] = []
+    before = signal.signal(signal.SIGTERM, lambda number, _: seen.append(number))
+    try:
+        run(rig(), on_period=lambda t: os.kill(os.getpid(), signal.SIGTERM))
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert len(seen) > 100
+
+
+# --- the report ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("standstill", [0.1, 1.0])
+def test_completed_means_at_rest(standstill: float) -> None:
+    """The safe stop ends after its longest damping, whether or not the robot rests."""
+
+    def moving(found: Measurement) -> Measurement:
+        return found._replace(v=np.full(7, 0.3 + 1e-6 * found.sequence))
+
+    stop = StopSettings(longest_damping=0.02, hold=0.01, standstill=standstill)
+    chosen = LiveSettings(stop=stop)
+    robot = Rig(watched(chosen), always(moving, 150))
+    report = run_loop(law(), robot, duration=0.15, settings=chosen)
+    assert report.phase is Phase.HOLDING
+    assert report.speed == pytest.approx(0.3, rel=1e-3)
+    assert report.at_rest is (standstill > 0.3)
+    told = (report.ended, report.reason)
+    if report.at_rest:
+        assert told == ("completed", "the duration is over")
+    else:
+        moved = "the duration is over; then the robot still moved at 0.3"
+        assert told == ("fault", moved)
+
+
+def test_a_line_that_fails_in_the_safe_stop_is_no_completion() -> None:
+    def lost(found: Measurement) -> Measurement:
+        raise RuntimeError("the cable")
+
+    for trick, reason in (
+        (lost, "RuntimeError: the cable"),
+        (missing, "for 21 periods"),
+    ):
+        robot = rig(always(trick, 160))  # the safe stop begins at the 152nd read
+        report = run(robot)
+        assert report.ended == "fault"
+        assert report.reason.startswith("the duration is over; then no ")
+        assert reason in report.reason
+        assert report.silent
+        assert not report.at_rest

@@ -1,0 +1,367 @@
+"""The robot's side: what it accepts, how it stops, and which effort it says it has."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from live_rigs import PERIOD, Array, Rig, law, panda, start, watched
+
+from hsp_control import Gains, Limits, Robot, Rollout
+from hsp_control.control.compensation import Command, Compensation, MomentumObserver
+from hsp_control.live import (
+    Link,
+    LiveSettings,
+    Measurement,
+    Phase,
+    SimulatedRobot,
+    UdpHardware,
+    run_loop,
+)
+from hsp_control.live.effort_limiter import EffortLimiter
+from hsp_control.live.packets import Kind
+from hsp_control.robot.integrators import Rk4, SemiImplicitEuler
+from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
+from hsp_control.simulation.plants.model_changes import Payload, changed
+
+RATE = 500.0
+RATED = LiveSettings(effort_rate=RATE)
+
+
+def gravity(q: Array) -> Array:
+    return panda().inverse_dynamics(q, np.zeros(7), np.zeros(7))
+
+
+def fed(robot: SimulatedRobot, efforts: Iterable[Array]) -> Array:
+    """Return the motors' efforts of all periods, to the end of the robot's own stop."""
+    taus = []
+    for effort in efforts:
+        robot.advance([effort])
+        taus.append(robot.tau.copy())
+    while not robot.done:
+        robot.advance([])
+        taus.append(robot.tau.copy())
+        assert len(taus) < 5000
+    return np.array(taus)
+
+
+# --- what it checks ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("joint", "effort", "reason"),
+    [
+        (1, 87.1, "panda_joint2 was sent 87.1; its effort is limited to 87.0001"),
+        (6, -1e300, r"panda_joint7 was sent -1e\+300; its effort is limited to 12"),
+        (3, np.nan, "an effort is not finite"),
+        (0, 0.6, "effort of panda_joint1 jumped by 0.6 in a period; 0.5 are allowed"),
+    ],
+)
+def test_efforts_beyond_its_limits_stop_it(
+    joint: int, effort: float, reason: str
+) -> None:
+    robot = watched(RATED)
+    held = gravity(start())
+    wrong = held.copy()
+    wrong[joint] = effort
+    taus = fed(robot, [held, held, wrong, held])
+    with pytest.raises(AssertionError, match=reason):
+        raise AssertionError(robot.reason)
+    assert robot.phase is Phase.HOLDING
+    assert np.isfinite(taus).all()
+    assert np.abs(robot.v).max() < 0.01
+
+
+@pytest.mark.parametrize("compensates", [False, True])
+def test_it_stops_within_its_own_rate_and_effort(compensates: bool) -> None:
+    """From full motion, where an unlimited stop would jump by more than 10 N·m."""
+    settings = LiveSettings(effort_rate=RATE, compensates_gravity=compensates)
+    robot, free = watched(settings), watched()
+    for each in (robot, free):
+        each.v = np.array([1.0, -0.8, 0.5, 0.9, 1.0, -1.0, 1.0])
+        each.plant.reset(0.0, each.q, each.v)
+    held = np.zeros(7) if compensates else gravity(start())
+    taus = fed(robot, [held])
+    jumps = np.abs(np.diff(fed(free, [gravity(start())]), axis=0))
+    assert robot.reason.startswith("the watchdog")
+    steps = np.abs(np.diff(taus, axis=0))
+    # Gravity, which the motors add, changes by less than 0.1 N·m in a period.
+    assert steps.max() <= RATE * PERIOD + 0.1 * compensates + 1e-9
+    assert jumps.max() > 10.0
+    assert np.abs(robot.v).max() < 0.01
+
+
+def test_a_joint_that_is_too_fast_stops_it() -> None:
+    robot = watched()
+    tau = gravity(start())
+    tau[6] += 2.0  # the last link is light
+    taus = fed(robot, [tau] * 100)
+    assert robot.reason.startswith("panda_joint7 moves at 3.0")  # 0.2 in a period
+    assert "its speed is limited to 2.871" in robot.reason  # 10 % above 2.61
+    assert len(taus) < 2000
+
+
+@settings(max_examples=60)
+@given(
+    efforts=st.lists(
+        st.one_of(
+            st.lists(st.floats(width=64), min_size=7, max_size=7),
+            st.lists(st.sampled_from([1e300, -1e308, np.nan, 0.0]), max_size=8),
+        ),
+        min_size=1,
+        max_size=5,
+    )
+)
+def test_no_number_ends_it(efforts: list[list[float]]) -> None:
+    robot = watched()
+    robot.advance([gravity(start())])
+    for effort in efforts:
+        robot.advance([np.array(effort)])
+        for number in (robot.q, robot.v, robot.tau):
+            assert np.isfinite(number).all()
+    assert np.abs(robot.tau).max() <= 87.0 * (1.0 + 1e-6)
+
+
+def test_a_motion_that_cannot_be_computed_ends_under_its_brakes() -> None:
+    """Without limits in the URDF a huge effort is accepted, and moves to infinity."""
+    endless = Robot.load("planar3r")
+    assert np.isinf(LiveSettings().effort_limits(endless)).all()
+    plant = IntegratedPlant(RigidBodyPlant(endless), SemiImplicitEuler(PERIOD))
+    robot = SimulatedRobot(plant, endless.home(), np.zeros(3), PERIOD)
+    for _ in range(50):
+        robot.advance([np.array([1e6, -1e6, 1e6])])
+    while not robot.done:
+        robot.advance([])
+    assert "motion cannot be computed" in robot.reason
+    assert np.isfinite(robot.q).all()
+    assert np.abs(robot.v).max() < 0.1
+
+
+# --- which effort it has -------------------------------------------------------------
+
+
+class Lossy(Rig):
+    """A robot that does not get all efforts, and its efforts in force.
+
+    Attributes:
+        in_force: The effort that it had in each period.
+    """
+
+    def __init__(self, settings: LiveSettings, says: bool, every: int) -> None:
+        super().__init__(watched(settings))
+        self.says, self.every = says, every
+        self.in_force: list[Array] = []
+
+    def read(self, timeout: float) -> Measurement | None:
+        found = super().read(timeout)
+        assert found is not None
+        if found.applied is not None and not found.halted:
+            self.in_force.append(found.applied)
+        return found if self.says else found._replace(applied=None)
+
+    def write(self, effort: Array) -> None:
+        if len(self.sent) % self.every < self.every - 5:
+            super().write(effort)
+        else:  # five in a row are lost
+            self.sent.append(np.array(effort))
+
+
+@pytest.mark.parametrize("compensates", [False, True])
+@pytest.mark.parametrize("says", [True, False])
+def test_lost_efforts_do_not_add_up_where_the_robot_says_what_it_has(
+    says: bool, compensates: bool
+) -> None:
+    """An effort that always wants to go on as fast as it may, over a bad line.
+
+    Where only what was sent is known, six steps in one are sent after five are lost.
+    """
+    settings = LiveSettings(
+        effort_rate=RATE, compensates_gravity=compensates, velocity_margin=9.0
+    )
+
+    class Sawtooth(Command):
+        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
+            super().effort(t, q, v, period)
+            side = 1.0 if int(t / 0.02) % 2 else -1.0
+            return gravity(q) + side * np.array([8.0, 8.0, 8.0, 8.0, 0.1, 0.1, 0.1])
+
+    robot = Lossy(settings, says, every=11)
+    report = run_loop(Sawtooth(law()), robot, duration=0.2, settings=settings)
+    steps = np.abs(np.diff(robot.in_force, axis=0))
+    assert steps.max() <= RATE * PERIOD * (1.0 + 1e-6)  # it accepts no others
+    if says:
+        assert report.ended == "completed", report.reason
+        assert steps.max() == pytest.approx(RATE * PERIOD)
+        assert robot.robot.reason == "the loop has ended"
+    else:
+        assert report.ended == "fault"
+        assert "in a period; 0.5 are allowed, a rate of 500" in robot.robot.reason
+
+
+@pytest.mark.slow
+@settings(max_examples=15)
+@given(seed=st.integers(0, 2**32 - 1), loss=st.sampled_from([0.1, 0.3]))
+def test_a_robot_never_rejects_an_effort_over_a_bad_line(
+    seed: int, loss: float
+) -> None:
+    """States and efforts are lost at random, while it runs and while it stops."""
+    rng = np.random.default_rng(seed)
+    chosen = LiveSettings(effort_rate=100.0, velocity_margin=9.0)
+
+    class Bad(Lossy):
+        lost = 0  # states in a row
+
+        def read(self, timeout: float) -> Measurement | None:
+            found = super().read(timeout)
+            lost = self.reads > 2 and self.lost < 5 and rng.random() < loss
+            self.lost = self.lost + 1 if lost else 0
+            return None if lost else found
+
+        def write(self, effort: Array) -> None:
+            if rng.random() < loss:
+                self.sent.append(np.array(effort))
+            else:
+                Rig.write(self, effort)
+
+    robot = Bad(chosen, says=True, every=1)
+    quick = law(gains=Gains(natural_frequency=20.0))
+    report = run_loop(quick, robot, duration=0.1, settings=chosen)
+    assert report.ended == "completed", report.reason
+    assert robot.robot.reason == "the loop has ended"
+    assert np.abs(np.diff(robot.in_force, axis=0)).max() <= 0.1 * (1.0 + 1e-6)
+
+
+def test_the_controller_is_told_what_the_robot_has() -> None:
+    told: list[Array] = []  # last, before each effort
+
+    class Recording(Command):
+        last = np.zeros(7)
+
+        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
+            told.append(self.last)
+            return super().effort(t, q, v, period)
+
+        def applied(self, tau: Array, period: float) -> None:
+            self.last = tau.copy()
+            super().applied(tau, period)
+
+    settings = LiveSettings(effort_rate=200.0, velocity_margin=9.0)
+    robot = Lossy(settings, says=True, every=11)
+    quick = law(gains=Gains(natural_frequency=20.0))
+    report = run_loop(Recording(quick), robot, duration=0.1, settings=settings)
+    assert report.ended == "completed", report.reason
+    running = told[-100:]  # after the steps that compile
+    has = np.array(robot.in_force[: len(running) - 1])
+    np.testing.assert_array_equal(running[1:], has)
+    assert not np.array_equal(has, robot.sent[: len(has)])
+
+
+@given(seed=st.integers(0, 2**32 - 1), compensates=st.booleans())
+def test_the_limiter_keeps_the_rate_from_both(seed: int, compensates: bool) -> None:
+    rng = np.random.default_rng(seed)
+    most, step = 40.0, RATE * PERIOD
+    chosen = LiveSettings(
+        effort_rate=RATE, effort=most, compensates_gravity=compensates
+    )
+    limiter = EffortLimiter(panda(), chosen, PERIOD)
+    limiter.reset(start())
+    borne = gravity(start()) if compensates else np.zeros(7)
+    for _ in range(20):
+        before = limiter.sent.copy()
+        known = before + rng.choice([0.0, 0.7, 1.5, 30.0, 1e300]) * rng.choice(
+            [-step, step], 7
+        )
+        changed = limiter.robot_has(known)
+        assert changed is (not np.array_equal(known, before))
+        assert limiter.apply(100.0 * rng.standard_normal(7), start())
+        assert (np.abs(limiter.sent + borne) <= most + 1e-9).all()
+        true = np.clip(known, -most - borne, most - borne)
+        assert (np.abs(limiter.sent - true) <= step + 1e-9).all()
+        near = np.abs(true - before) <= 2.0 * step
+        assert (np.abs(limiter.sent - before)[near] <= step + 1e-9).all()
+
+
+def test_the_log_has_what_the_robot_says(tmp_path: Path) -> None:
+    robot, log = Lossy(RATED, says=True, every=11), tmp_path / "run.journal"
+    run_loop(law(), robot, duration=0.1, settings=RATED, log=log, log_period=PERIOD)
+    logged = Rollout.load(log)
+    has = logged["live.applied"]
+    assert np.isnan(has[0]).all()  # its brakes held it
+    np.testing.assert_array_equal(has[1:100], robot.in_force[:99])
+
+
+def test_a_state_packet_carries_it() -> None:
+    hardware = UdpHardware(panda(), PERIOD)
+    link = Link(hardware.session, peer=hardware.address)
+    numbers = np.arange(21.0)
+    try:
+        for sent in (14, 21, 17):
+            link.send(Kind.STATE, numbers[:sent])
+            found = hardware.read(5.0)
+            assert found is not None
+            np.testing.assert_array_equal(found.v, numbers[7:14])
+            if sent == 14:
+                assert found.applied is None
+            else:  # one of a wrong size is the loop's to refuse
+                assert found.applied is not None
+                np.testing.assert_array_equal(found.applied, numbers[14:sent])
+    finally:
+        hardware.close()
+        hardware.drain()
+        link.close()
+
+
+def test_a_lost_effort_corrects_the_momentum_observer() -> None:
+    """What is compensated counts from the applied effort, not from the sent one."""
+    observer = Compensation(momentum_observer=MomentumObserver(200.0, cancel=False))
+
+    class Watching(Command):
+        largest = 0.0
+
+        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
+            tau = super().effort(t, q, v, period)
+            assert self._observer is not None
+            estimated = float(np.abs(self._observer.disturbance).max())
+            self.largest = max(self.largest, estimated if t > 0.02 else 0.0)
+            tau[:4] += 6.0 if int(t / 0.02) % 2 else -6.0
+            return tau
+
+    known, unknown = Watching(law(), observer), Watching(law(), observer)
+    for command, says in ((known, True), (unknown, False)):
+        run_loop(command, Lossy(LiveSettings(), says, every=11), duration=0.1)
+    # The plant is the model: nothing disturbs it but sampling.
+    assert known.largest < 0.1 * unknown.largest
+
+
+def test_the_start_is_the_loop_s_whatever_the_robot_weighs() -> None:
+    """The brakes held it, so the first effort is not compared with any other."""
+    heavy = changed(panda(), [Payload(frame="panda_tcp", mass=3.0)])
+    plant = IntegratedPlant(RigidBodyPlant(heavy), Rk4(PERIOD))
+    robot = SimulatedRobot(plant, start(), np.zeros(7), PERIOD, settings=RATED)
+    assert robot.in_force is None
+    robot.advance([gravity(start())])
+    assert robot.phase is Phase.RUNNING
+    assert robot.in_force is not None
+    np.testing.assert_array_equal(robot.in_force, gravity(start()))
+
+
+def test_limits_that_fall_are_followed_by_the_rate() -> None:
+    """The effort in force may be beyond the controller's new limit, by far."""
+    pushing = np.array([0.0, 0.0, 0.0, 20.0, 0.0, 0.0, 0.0])
+
+    class Pushing(Command):
+        def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
+            super().effort(t, q, v, period)
+            return gravity(q) + pushing * (t < 0.05)
+
+    chosen = LiveSettings(effort_rate=1000.0, velocity_margin=9.0)
+    source = Pushing(law(limits=Limits(effort=60.0)))
+    source.controller.at(0.04).ramp(0.0).limits(Limits(effort=25.0))
+    robot = Lossy(chosen, says=True, every=11)
+    report = run_loop(source, robot, duration=0.1, settings=chosen)
+    assert report.ended == "completed", report.reason
+    largest = np.abs(robot.in_force)[:, 3]
+    assert largest[:40].max() > 1.5 * 25.0
+    assert largest[80:].max() <= 25.0

@@ -1,0 +1,150 @@
+"""Inertias that no body can have, and their projection to those that one can have."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from robot_texts import ARM, INERTIA
+from scipy.optimize import minimize
+
+from hsp_control import Robot
+from hsp_control.common.exceptions import ModelError
+from hsp_control.robot.description.inertias import (
+    FLOOR,
+    impossible_inertias,
+    is_possible,
+    nearest_possible,
+    project_inertias,
+)
+
+SEEDS = range(30)
+
+
+def second_moments(tensor: np.ndarray) -> np.ndarray:
+    """Return Σ = ½ tr(I) 1 - I, shape (3, 3)."""
+    return 0.5 * np.trace(tensor) * np.eye(3) - tensor
+
+
+def of_points(seed: int) -> np.ndarray:
+    """Return the inertia of some point masses about their centre, shape (3, 3)."""
+    rng = np.random.default_rng(seed)
+    points, masses = rng.standard_normal((5, 3)), rng.uniform(0.1, 1.0, 5)
+    points -= masses @ points / masses.sum()
+    return sum(
+        m * (x @ x * np.eye(3) - np.outer(x, x))
+        for m, x in zip(masses, points, strict=True)
+    )
+
+
+def of_no_body(seed: int) -> np.ndarray:
+    """Return a symmetric matrix that violates the triangle inequality."""
+    rng = np.random.default_rng(seed)
+    axes = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    low, middle = rng.uniform(-0.1, 1.0, 2)
+    high = low + middle + rng.uniform(0.05, 2.0)
+    return axes @ np.diag([low, middle, high]) @ axes.T
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_a_body_can_have_stays_to_the_last_bit(seed: int) -> None:
+    tensor = of_points(seed)
+    assert is_possible(tensor)
+    assert nearest_possible(tensor) is tensor
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_projection_is_of_a_body_symmetric_and_idempotent(seed: int) -> None:
+    tensor = of_no_body(seed)
+    assert not is_possible(tensor)
+    projected = nearest_possible(tensor)
+    np.testing.assert_array_equal(projected, projected.T)
+    moments = np.linalg.eigvalsh(second_moments(projected))
+    assert moments[0] >= FLOOR * moments.sum() * (1.0 - 1e-9)
+    assert nearest_possible(projected) is projected
+    np.testing.assert_allclose(  # the axes stay
+        projected @ tensor, tensor @ projected, atol=1e-14 * np.abs(tensor).max()
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_projection_is_nearest_in_the_pseudo_inertia(seed: int) -> None:
+    """No other mass, centre of mass and second moments are: by a general search."""
+    tensor, mass = of_no_body(seed), 0.7
+    wrong = np.zeros((4, 4))
+    wrong[:3, :3], wrong[3, 3] = second_moments(tensor), mass
+    right = wrong.copy()
+    right[:3, :3] = second_moments(nearest_possible(tensor))
+
+    def distance(lower: np.ndarray) -> float:
+        """To L Lᵀ + FLOOR/(1 - 3 FLOOR) tr(S) 1 in the block S of the moments."""
+        root = np.zeros((4, 4))
+        root[np.tril_indices(4)] = lower
+        body = root @ root.T
+        share = FLOOR / (1.0 - 3.0 * FLOOR)
+        body[:3, :3] += share * np.trace(body[:3, :3]) * np.eye(3)
+        return float(np.linalg.norm(body - wrong))
+
+    start = np.eye(4)[np.tril_indices(4)]
+    found = minimize(distance, start, method="BFGS", options={"gtol": 1e-9})
+    assert np.linalg.norm(right - wrong) <= found.fun + 1e-9
+    assert found.fun < np.linalg.norm(right - wrong) + 1e-3  # the search came near
+
+
+def test_projection_of_a_known_case() -> None:
+    """I = diag(1, 1, 4): Σ = diag(2, 2, -1), whose last entry becomes the floor.
+
+    Σ* = diag(x, x, k x) with k x = FLOOR (2 + k) x; x minimises 2(x - 2)² + (k x + 1)².
+    """
+    k = 2.0 * FLOOR / (1.0 - FLOOR)
+    x = (4.0 - k) / (2.0 + k**2)
+    expected = np.diag([x + k * x, x + k * x, 2.0 * x])
+    projected = nearest_possible(np.diag([1.0, 1.0, 4.0]))
+    np.testing.assert_allclose(projected, expected, rtol=1e-14, atol=1e-15)
+
+
+def test_nothing_is_left_of_moments_that_are_all_negative() -> None:
+    np.testing.assert_allclose(nearest_possible(-np.eye(3)), 0.0, atol=1e-15)
+
+
+HEAVY = INERTIA.replace('izz="0.1"', 'izz="0.5"')
+
+
+def write(folder: Path, inertia: str) -> Path:
+    path = folder / "arm.urdf"
+    path.write_text(ARM.replace(INERTIA, inertia, 1))
+    return path
+
+
+def test_links_are_named_with_the_reason() -> None:
+    robot = ElementTree.fromstring(ARM.replace(INERTIA, HEAVY, 1))
+    (found,) = impossible_inertias(robot)
+    assert found.link == "upper"
+    assert found.reason == (
+        "the principal moment 0.5 exceeds the sum of the other two, 0.1 + 0.1 = 0.2 "
+        "kg·m²"
+    )
+    project_inertias(robot)
+    assert not list(impossible_inertias(robot))
+
+
+def test_a_robot_is_loaded_with_projected_inertias(tmp_path: Path) -> None:
+    path = write(tmp_path, HEAVY)
+    asked, not_asked = Robot.load(path, project_inertias=True), Robot.load(path)
+    changed, given = asked.model.inertias[1], not_asked.model.inertias[1]
+    assert changed.mass == given.mass == 2.0
+    np.testing.assert_array_equal(changed.lever, given.lever)
+    np.testing.assert_allclose(given.inertia, np.diag([0.1, 0.1, 0.5]))
+    np.testing.assert_allclose(
+        changed.inertia, nearest_possible(np.diag([0.1, 0.1, 0.5])), rtol=1e-14
+    )
+    assert asked.model.inertias[2] == not_asked.model.inertias[2]
+
+
+def test_negative_moments_load_only_if_projected(tmp_path: Path) -> None:
+    path = write(tmp_path, INERTIA.replace('ixx="0.1"', 'ixx="-0.1"'))
+    message = "link 'upper': .* a principal moment is -0.1 .*; project_inertias: true"
+    with pytest.raises(ModelError, match=message):
+        Robot.load(path)
+    robot = Robot.load(path, project_inertias=True)
+    assert is_possible(robot.model.inertias[1].inertia)

@@ -1,0 +1,306 @@
+"""A MuJoCo scene of one's own as a plant: the robot, its motors, and objects."""
+
+import copy
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from mjcf_texts import ARM, CELL
+
+from hsp_control import Controller, FramePosition, Gains, Robot, simulate
+from hsp_control.common.exceptions import (
+    FrameNotFoundError,
+    JointNotFoundError,
+    SimulationError,
+)
+from hsp_control.robot.friction import JointFriction
+from hsp_control.simulation.plants import (
+    Encoder,
+    ImperfectPlant,
+    MujocoScenePlant,
+    Push,
+)
+from hsp_control.simulation.plants.mujoco import MujocoPlant
+from hsp_control.trajectories import Circle
+
+mujoco = pytest.importorskip("mujoco")
+
+BALL = 5  # the first degree of freedom of the ball in qvel
+EFFORT = np.array([3.0, 40.0, -2.0, 5.0])
+
+
+def cell(text: str = CELL) -> tuple[Robot, Any, Any]:
+    """Return the arm of the cell, the scene, and its state at its keyframe."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    joints = [name for name in ARM if f'joint name="{name}"' in text]
+    keyframe = "home" if model.nkey else None
+    return Robot.from_mujoco(model, "base", joints, keyframe=keyframe), model, data
+
+
+def at_home(robot: Robot, plant: MujocoScenePlant) -> None:
+    plant.reset(0.0, robot.home(), np.zeros(robot.nv))
+
+
+def without_gripper() -> str:
+    """Return the cell whose robot has no joint but those that move."""
+    text = re.sub(r'<joint name="f".*?/>', "", CELL)
+    text = re.sub(r"<position.*?/>", "", text)
+    return re.sub(r"<keyframe>.*</keyframe>", "", text, flags=re.DOTALL)
+
+
+def test_it_moves_like_the_plant_that_is_made_of_the_robot() -> None:
+    """The same engine with two models: one from the scene, one from the robot."""
+    robot, model, data = cell(without_gripper())
+    ours = MujocoScenePlant(robot, model, data)
+    theirs = MujocoPlant(robot, timestep=0.001, friction=JointFriction.of_model(robot))
+    q, v = np.array([0.1, 0.5, -0.2, 1.0]), np.array([0.3, -0.2, 0.5, 0.1])
+    ends = []
+    for plant in (ours, theirs):
+        plant.reset(0.0, q, v)
+        x = q, v
+        for k in range(100):
+            x = plant.advance(0.001 * k, 0.001 * (k + 1), EFFORT)
+        ends.append(np.concatenate(x))
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-9)
+
+
+def test_efforts_go_through_the_motors_and_their_limits() -> None:
+    robot, model, data = cell()
+    plant = MujocoScenePlant(robot, model, data)
+    at_home(robot, plant)
+    plant.advance(0.0, 0.001, EFFORT)
+    np.testing.assert_allclose(data.qfrc_actuator[:4], EFFORT, rtol=1e-12)
+    np.testing.assert_allclose(data.ctrl[:4], EFFORT / [50.0, 100.0, -20.0, 10.0])
+    np.testing.assert_array_equal(data.qfrc_applied, 0.0)
+    plant.advance(0.001, 0.002, np.array([60.0, 0.0, 30.0, -11.0]))
+    np.testing.assert_allclose(data.qfrc_actuator[:4], [50.0, 0.0, 20.0, -10.0])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ('<motor name="m4".*?/>', ""),  # no motor
+        ('<motor name="m4".*?/>', '<motor joint="j4"/><motor joint="j4"/>'),
+        ('(name="m4")', r'\1 group="3"'),  # disabled below
+        ('gear="10"', 'gear="0"'),
+    ],
+)
+def test_efforts_are_applied_where_there_is_not_one_motor(
+    change: tuple[str, str],
+) -> None:
+    text = re.sub(*change, CELL)
+    robot, model, data = cell(text.replace('ctrl="0 0 0 0 .02"', ""))
+    model.opt.disableactuator = 1 << 3
+    plant = MujocoScenePlant(robot, model, data)
+    assert list(plant.motors) == [0, 1, 2]
+    assert plant.describe()["motors"] == ["j1", "j2", "j3"]
+    at_home(robot, plant)
+    plant.advance(0.0, 0.001, EFFORT)
+    np.testing.assert_array_equal(data.qfrc_applied[:4], [0.0, 0.0, 0.0, EFFORT[3]])
+    assert data.qfrc_actuator[3] == 0.0
+
+
+def test_the_rest_of_the_scene_lives_on() -> None:
+    """The ball falls freely; the gripper's servo follows its own control."""
+    robot, model, data = cell()
+    data.qpos[7] = 1.0  # the ball's height
+    data.ctrl[4] = 0.035
+    plant = MujocoScenePlant(robot, model, data)
+    at_home(robot, plant)
+    end = 0.2
+    plant.advance(
+        0.0, end, robot.state(0.0, robot.home(), np.zeros(4)).nonlinear_effects
+    )
+    # Semi-implicit Euler: v = g t, and half a step more than ½ g t².
+    assert data.qvel[BALL + 2] == pytest.approx(-9.81 * end, rel=1e-9)
+    fallen = 0.5 * 9.81 * end * (end + 0.001)
+    assert data.qpos[7] == pytest.approx(1.0 - fallen, rel=1e-9)
+    assert data.qpos[4] > 0.02
+    assert data.time == pytest.approx(end)
+
+
+def test_a_run_begins_where_the_data_was() -> None:
+    robot, model, data = cell()
+    data.qvel[BALL] = 0.5
+    plant = MujocoScenePlant(robot, model, data)
+    ends = []
+    for _ in range(2):
+        at_home(robot, plant)
+        for k in range(20):
+            plant.advance(0.001 * k, 0.001 * (k + 1), EFFORT)
+        ends.append(np.concatenate([data.qpos, data.qvel]))
+        data.ctrl[4], data.qpos[5] = 1.0, 2.0  # somebody plays with it
+    np.testing.assert_array_equal(*ends)
+
+
+def test_the_scene_keeps_its_timestep() -> None:
+    robot, model, data = cell()
+    plant = MujocoScenePlant(robot, model, data)
+    at_home(robot, plant)
+    plant.advance(0.0, 0.0025, EFFORT)  # three steps of 0.83 ms
+    assert data.time == pytest.approx(0.0025, rel=1e-12)
+    assert model.opt.timestep == 0.001
+
+
+def test_contact_forces_on_a_body_are_logged() -> None:
+    """The ball lies on the floor: once at rest, its weight, in the middle of it."""
+    robot, model, data = cell()
+    plant = MujocoScenePlant(robot, model, data, contacts=["ball", "hand"])
+    at_home(robot, plant)
+    hold = robot.state(0.0, robot.home(), np.zeros(4)).nonlinear_effects
+    q, v = plant.advance(0.0, 1.0, hold)
+    before = data.qacc_warmstart.copy()
+    channels = plant.log_channels(1.0, q, v, hold)
+    np.testing.assert_array_equal(data.qacc_warmstart, before)  # a look moves nothing
+    force = channels["plant.contact.ball.force"].value
+    np.testing.assert_allclose(force, [0.0, 0.0, 0.981], atol=1e-3)
+    moment = channels["plant.contact.ball.moment"].value
+    np.testing.assert_allclose(moment, 0.0, atol=1e-6)
+    np.testing.assert_array_equal(channels["plant.contact.hand.force"].value, 0.0)
+
+
+def test_two_bodies_of_the_scene_push_each_other_equally() -> None:
+    """The hand, pushed down on the ball: what one gets, the other gives."""
+    robot, model, data = cell()
+    state = robot.state(0.0, robot.home(), np.zeros(4))
+    finger = state.position("finger")
+    data.qpos[5:8] = finger
+    data.qpos[5] += 0.03
+    model.opt.gravity[:] = 0.0
+    model.geom_contype[0] = model.geom_conaffinity[0] = 0  # no floor
+    plant = MujocoScenePlant(robot, model, data, contacts=["ball", "finger", "hand"])
+    at_home(robot, plant)
+    channels = plant.log_channels(0.0, robot.home(), np.zeros(4), np.zeros(4))
+    names = ("ball", "finger", "hand")
+    forces = [channels[f"plant.contact.{name}.force"].value for name in names]
+    assert np.linalg.norm(forces[0]) > 0.1
+    np.testing.assert_allclose(np.sum(forces, axis=0), 0.0, atol=1e-12)
+
+
+def test_pushes_are_applied_besides_the_motors() -> None:
+    robot, model, data = cell()
+    push = Push("tip", force=(0.0, 10.0, 0.0), start=0.0, duration=1.0)
+    plant = MujocoScenePlant(robot, model, data, pushes=[push])
+    at_home(robot, plant)
+    plant.advance(0.0, 0.001, EFFORT)
+    state = robot.state(0.0, robot.home(), np.zeros(4))
+    expected = state.frame("tip").jacobian[:3].T @ [0.0, 10.0, 0.0]
+    np.testing.assert_allclose(data.qfrc_applied[:4], expected, atol=1e-12)
+    np.testing.assert_allclose(data.qfrc_actuator[:4], EFFORT, rtol=1e-12)
+
+
+def test_a_controller_tracks_in_the_scene() -> None:
+    """The model is the scene's: half a millimetre, most of it the effort's being held.
+
+    Without compensation of the joint's damping, which the controller's model lacks.
+    """
+    robot, model, data = cell(CELL.replace('damping=".5"', ""))
+    plant = MujocoScenePlant(robot, model, data)
+    circle = Circle(0.05, 2.0)
+    task = FramePosition("tip", circle, gains=Gains(natural_frequency=20.0))
+    q = robot.home()
+    rollout = simulate(
+        Controller(robot, [task], start=q),
+        q,
+        np.zeros(4),
+        duration=1.5,
+        control_period=0.001,
+        plant=plant,
+    )
+    late = rollout.t > 1.0
+    assert np.abs(rollout["task.tip.error"][late]).max() < 5e-4
+    assert rollout.meta["plant"]["type"] == "MujocoScenePlant"
+
+
+def test_it_takes_sensors_and_can_be_copied() -> None:
+    robot, model, data = cell()
+    plant = MujocoScenePlant(robot, model, data)
+    ends = []
+    for each in (plant, copy.deepcopy(plant)):
+        imperfect = ImperfectPlant(each, [Encoder(1e-3)])
+        imperfect.reset(0.0, robot.home(), np.zeros(4))
+        x = imperfect.advance(0.0, 0.01, EFFORT)
+        measured = imperfect.measure(0.01, *x)
+        ends.append(np.concatenate([*x, *measured]))
+    np.testing.assert_array_equal(*ends)
+
+
+def test_a_motion_that_diverges_is_an_error() -> None:
+    robot, model, data = cell(re.sub(r'ctrllimited.*ctrlrange="-1 1"', "", CELL))
+    plant = MujocoScenePlant(robot, model, data)
+    at_home(robot, plant)
+    with pytest.raises(SimulationError, match=r"diverged before t = 0\.1 s"):
+        plant.advance(0.0, 0.1, np.full(4, 1e12))
+    at_home(robot, plant)  # a new run forgets it
+    plant.advance(0.0, 0.001, EFFORT)
+
+
+# --- servos and mistakes -------------------------------------------------------------
+
+SERVO = CELL.replace('<motor name="m4"', '<position name="p4" kp="50"')
+
+
+def test_servos_on_the_robots_joints_are_refused_or_switched_off() -> None:
+    robot, model, data = cell(SERVO)
+    data.ctrl[4] = 0.04
+    message = r"^actuators p4 of the scene are no torque motors .* disable_servos=True$"
+    with pytest.raises(SimulationError, match=message):
+        MujocoScenePlant(robot, model, data)
+    plant = MujocoScenePlant(robot, model, data, disable_servos=True)
+    at_home(robot, plant)
+    plant.advance(0.0, 0.001, EFFORT)
+    assert data.qfrc_actuator[3] == 0.0
+    assert data.qfrc_applied[3] == EFFORT[3]
+    assert data.actuator_force[4] != 0.0  # the gripper's is the user's
+    MujocoScenePlant(robot, model, data)  # it is off now
+
+
+@pytest.mark.parametrize(
+    "servo",
+    [
+        "<position joint='j4' kp='9'/>",
+        "<velocity joint='j4' kv='3'/>",
+        "<damper joint='j4' kv='2' ctrlrange='0 1'/>",
+        "<muscle joint='j4' lengthrange='.1 2'/>",
+        "<general joint='j4' dyntype='filter' dynprm='.1' gainprm='4'/>",
+        "<general joint='j4' gaintype='affine' gainprm='1 2 3'/>",
+    ],
+)
+def test_every_kind_of_servo_can_be_switched_off(servo: str) -> None:
+    text = without_gripper().replace("</actuator>", f"{servo}</actuator>")
+    robot, model, data = cell(re.sub(r'<motor name="m4".*?/>', "", text))
+    data.ctrl[3], data.qvel[:4] = 0.5, 1.0
+    data.act[:] = 0.5
+    mujoco.mj_forward(model, data)
+    assert abs(data.qfrc_actuator[3]) > 0.1
+    with pytest.raises(SimulationError, match="are no torque motors"):
+        MujocoScenePlant(robot, model, data)
+    MujocoScenePlant(robot, model, data, disable_servos=True)
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_actuator[3] == 0.0
+
+
+def test_a_floating_root_has_no_motor() -> None:
+    text = CELL.replace(
+        '<body name="base" pos="0 0 .1">', '<body name="base"><freejoint/>'
+    )
+    text = re.sub(r"<keyframe>.*</keyframe>", "", text, flags=re.DOTALL)
+    model = mujoco.MjModel.from_xml_string(text)
+    robot = Robot.from_mujoco(model, "base", locked={"f": 0.0})
+    plant = MujocoScenePlant(robot, model, mujoco.MjData(model))
+    at_home(robot, plant)
+    with pytest.raises(SimulationError, match=r"pushes the floating root"):
+        plant.advance(0.0, 0.001, np.ones(robot.nv))
+
+
+def test_mistakes() -> None:
+    robot, model, data = cell()
+    with pytest.raises(FrameNotFoundError, match=r"^contacts: no body 'bal'; did you"):
+        MujocoScenePlant(robot, model, data, contacts=["bal"])
+    other = mujoco.MjModel.from_xml_string(CELL.replace('"j1"', '"k1"'))
+    with pytest.raises(JointNotFoundError, match=r"no joint 'j1'"):
+        MujocoScenePlant(robot, other, mujoco.MjData(other))
