@@ -95,3 +95,14 @@ def test_the_velocity_may_change_and_ends():
         replace(trot, speed=0.2)
     with pytest.raises(PlanError, match=r"velocity has dimension 1; needs 3"):
         Trot(velocity=Hold([0.1]))
+
+
+def test_a_recorded_velocity_is_read_with_the_configuration(tmp_path):
+    record = tmp_path / "driven.jsonl"
+    record.write_text('{"at": 0.1, "value": [0.2, 0, 0]}\n', encoding="utf-8")
+    given = f"plan.velocity={{type: stream, source: {record}}}"
+    plan = load_experiment(TROT, "plan.speed=0", given).scenario.plan
+    (message,) = plan.velocity.messages
+    assert message["value"] == [0.2, 0.0, 0.0]
+    with pytest.raises(HspControlError, match=r"plan.velocity.source: .*absent.jsonl"):
+        load_experiment(TROT, "plan.speed=0", given.replace("driven", "absent"))
