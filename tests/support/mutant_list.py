@@ -806,16 +806,16 @@ MUTANTS = (
     ),
     Mutant(
         "command line: --set ignored",
-        CLI + "commands.py",
-        "options.config, *options.overrides, strict=strict",
-        "options.config, strict=strict",
+        CLI + "loading.py",
+        "        *options.overrides,\n",
+        "",
         UNIT + "cli/test_cli.py -k a_log_that_numpy_alone",
     ),
     Mutant(
         "command line: --strict ignored",
-        CLI + "commands.py",
-        "    strict = options.strict or bool(options.allow)",
-        "    strict = bool(options.allow)",
+        CLI + "loading.py",
+        "        strict=options.strict or bool(options.allow),",
+        "        strict=bool(options.allow),",
         "tests/integration/test_trust.py -k refused",
     ),
     Mutant(
