@@ -96,7 +96,7 @@ def test_the_readme_s_commands_exist() -> None:
     ]
     assert {command[0] for command in commands} == {
         "run", "view", "plot", "export", "check", "robots", "schema", "sweep", "bench",
-        "live", "play",
+        "live", "play", "inspect",
     }  # fmt: skip
     for command in commands:
         command_line().parse_args(command)
