@@ -96,6 +96,13 @@ wheel-test: wheel ## build the wheel, install it elsewhere, use it from there
 	if [ -n "$$compiled" ]; then echo "Compiled, though the wheel has code: $$compiled"; exit 1; fi; \
 	echo "The wheel works."
 
+##@ Documents
+docs: $(STAMP) ## build the site into docs/_build/html, with its replays; warnings are errors
+	@echo "Running what the site's frames play (a minute, once) ..."
+	@$(BIN)/python tools/replays.py
+	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
+	@echo "The site is docs/_build/html/index.html"
+
 ##@ Keep
 figures: $(STAMP) ## draw the documents' figures anew, into docs/figures
 	@$(BIN)/python docs/make_figures.py
@@ -124,10 +131,10 @@ constraints: ## refresh constraints.txt with the newest version of everything
 	cp "$$dir/new" constraints.txt; echo "Wrote constraints.txt; now: make lint test"
 
 clean: ## remove caches, builds and the demo's output; .venv stays
-	@rm -rf build dist machine_code out/demo .coverage .*_cache .hypothesis
+	@rm -rf build dist machine_code docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help figures screenshots animations demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test format constraints clean
+.PHONY: help docs figures screenshots animations demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

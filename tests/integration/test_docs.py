@@ -81,6 +81,47 @@ def test_the_pages_python_runs_and_their_commands_exist(page: str) -> None:
         command_line().parse_args(command)
 
 
+GUIDES = sorted(
+    page.relative_to(ROOT / "docs").with_suffix("").as_posix()
+    for folder in ("tutorial", "how_to")
+    for page in (ROOT / "docs" / folder).glob("*.md")
+)
+
+
+@pytest.mark.parametrize("page", GUIDES)
+def test_the_guides_can_be_followed(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    space: dict = {}
+    for snippet in blocks(text, "python"):
+        exec(compile(snippet, f"{page}.md", "exec"), space)
+    for configuration in blocks(text, "yaml"):
+        experiment = load_experiment(
+            yaml.safe_load(configuration), "simulation.duration=0.02"
+        )
+        assert experiment.run().status == "completed"
+    for line in "".join(blocks(text, "sh")).splitlines():
+        if line.startswith("hsp "):
+            command_line().parse_args(shlex.split(line.split("#")[0])[1:])
+
+
+def test_the_tutorial_s_field_does_what_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "tutorial" / "ten_minutes.md").read_text(encoding="utf-8")
+    space: dict = {}
+    for snippet in blocks(text, "python"):
+        exec(compile(snippet, "ten_minutes.md", "exec"), space)
+    # ω0 = 10, critically damped, from 0.1 m at rest relative to the circle's 0.2 m/s.
+    t = space["moved"].t
+    promised = np.linalg.norm([0.1 * (1 + 10 * t), 0.2 * t], axis=0) * np.exp(-10 * t)
+    np.testing.assert_allclose(space["error"], promised, rtol=1e-4, atol=1e-8)
+    assert space["difference"] < 1e-8
+
+
 def test_the_readme_s_yaml_is_a_configuration() -> None:
     (text,) = blocks(README, "yaml")
     experiment = load_experiment(yaml.safe_load(text), "simulation.duration=0.05")
