@@ -27,11 +27,20 @@ help: ## list the targets
 # The bytecode of what the demo imports is written, whatever the shell says: without it
 # each later start would take seconds more.
 demo: export PYTHONDONTWRITEBYTECODE :=
-demo: $(USE) ## run the paper's moving obstacle, plot it, say where it is
+demo: $(USE) ## the paper's run, and a Panda under a ball, with and without its field
 	@echo "Running paper/4_moving_obstacle; the first run compiles its kernels, once ..."
 	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo --no-view
 	@$(BIN)/hsp plot out/demo/4_moving_obstacle.npz --out out/demo
-	@echo "The log and the figures are in out/demo:" && ls out/demo
+	@echo "Running panda_obstacle, with its field and without ..."
+	@$(BIN)/hsp run panda_obstacle --out out/demo/with --no-view
+	@$(BIN)/hsp run panda_obstacle --out out/demo/without --no-view \
+	  --set 'null_space.fields=[{type: rest}]'
+	@$(BIN)/hsp export out/demo/with/panda_obstacle.npz out/demo/without/panda_obstacle.npz \
+	  --html out/demo/panda.html
+	@echo
+	@echo "Open out/demo/panda.html in a browser; the switch (or w) shows it with and without."
+	@echo "Touch it: $(BIN)/hsp play panda"
+	@echo "The paper's log and figures are in out/demo, too."
 
 ##@ Check
 quick: $(STAMP) ## what to run after every edit: a minute of CPU
@@ -143,7 +152,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 # constraints.txt is newer than the stamp.
 $(USE): pyproject.toml constraints.txt
 	@echo "Installing hsp_control into .venv (0.9 GB, once) ..."
-	@$(find-python); "$$python" tools/install.py .venv --editable .
+	@$(find-python); "$$python" tools/install.py .venv --editable ".[export]"
 	@touch $@
 
 $(STAMP): pyproject.toml constraints.txt

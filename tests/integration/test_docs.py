@@ -36,7 +36,7 @@ def test_the_readme_s_python_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    snippet, streamed = blocks(README, "python")
+    (snippet,) = blocks(README, "python")
     assert len([line for line in snippet.splitlines() if line.strip()]) <= 16
     space: dict = {}
     exec(compile(snippet, "README.md", "exec"), space)
@@ -47,11 +47,6 @@ def test_the_readme_s_python_runs(
     # It does what the README claims: the law's exponential on the user's own cost.
     decay = np.exp(-8.0 * rollout.t) * rollout["null_space_norm"][0]
     np.testing.assert_allclose(rollout["null_space_norm"], decay, rtol=1e-4, atol=1e-8)
-    exec(compile(streamed, "README.md", "exec"), space)
-    controller = space["hsp"].Controller(space["robot"], [space["hand"]])
-    assert np.isfinite(
-        controller.compute(0.0, space["robot"].home(), [0.0] * 7).tau
-    ).all()
 
 
 def test_the_page_of_compliance_is_true() -> None:
@@ -136,8 +131,7 @@ def test_the_readme_s_commands_exist() -> None:
         if line.startswith("hsp ")
     ]
     assert {command[0] for command in commands} == {
-        "run", "view", "plot", "export", "check", "robots", "schema", "sweep", "bench",
-        "live", "play", "inspect",
+        "run", "play", "view", "live", "inspect",
     }  # fmt: skip
     for command in commands:
         command_line().parse_args(command)
@@ -229,7 +223,7 @@ def test_every_public_name_is_documented_and_importable() -> None:
 
 
 def test_pictures_that_documents_show_exist() -> None:
-    for document in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
+    for document in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")):
         text = document.read_text(encoding="utf-8")
         for target in re.findall(r"\]\(([^)#]+)\)", text):
             if "://" not in target:
