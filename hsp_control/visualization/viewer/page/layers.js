@@ -53,6 +53,10 @@ class Layers {
   setOpen(open) {
     this.open = open;
     this.list.hidden = !open;
+    // It ends where the picture does: below it may be a bar, a sheet or plots.
+    const bottom = this.viewer.dom_element.getBoundingClientRect().bottom;
+    const room = bottom - this.list.getBoundingClientRect().top - 8;
+    this.list.style.setProperty("--room", open ? `${Math.max(room, 120)}px` : "");
     this.toggle.setAttribute("aria-expanded", open);
   }
 
