@@ -111,6 +111,7 @@ class Play {
     const sheet = panel.open ? panel.box.offsetHeight - 18 : 0;  // behind its round corners
     const height = Math.max(120, innerHeight - bar.row.offsetHeight - sheet);
     this.viewer.dom_element.style.height = panel.narrow.matches ? `${height}px` : "";
+    layers.measure();
   }
 
   // After a reset the plots are the same: they keep what is shown alone.

@@ -7,11 +7,12 @@
 
 class PlayPanel {
   static OBSTACLE = "#D55E00";  // appearance.OBSTACLE
+  static NARROW = "(max-width: 620px), (max-width: 860px) and (max-aspect-ratio: 6/5)";
 
   constructor(play, parent) {
     this.play = play;
     this.open = false;
-    this.narrow = matchMedia("(max-width: 560px)");
+    this.narrow = matchMedia(PlayPanel.NARROW);
     this.box = document.createElement("aside");
     this.box.className = "play-panel";
     this.box.setAttribute("aria-label", "Controls and plots");
