@@ -37,7 +37,6 @@ _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 _LOOPBACK_NAMES = {"127.0.0.1", "localhost"}
 _PARENT_CHECK_PERIOD = 1.0  # s
 _FLUSH_PERIOD = 0.005  # s
-_REST = 0.002  # s, after each message of a page
 
 
 class Door(NamedTuple):
@@ -165,11 +164,10 @@ class Page(WebSocketHandler):
             self.hub.steering.enter(self)
             self.hub.tell_who_steers()
 
-    async def on_message(self, message: str | bytes) -> None:
+    def on_message(self, message: str | bytes) -> None:
         """Process an answer, the number of a request, or what a page that steers says.
 
-        A page that says anything else is not ours: its connection is closed. The next
-        message is read after a rest, so that a flood of them waits with its sender.
+        A page that says anything else is not ours: its connection is closed.
         """
         steering = self.hub.steering
         try:
@@ -183,7 +181,6 @@ class Page(WebSocketHandler):
                 self.answered = max(self.answered, int(message))
         except ValueError as error:
             self.close(1008, str(error))
-        await asyncio.sleep(_REST)
 
     def on_close(self) -> None:
         """Remove the page."""
