@@ -98,7 +98,7 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
     if not field.controls:
         return
     switch = _FieldSwitch(field)
-    if switch.weights:
+    if switch.whole:
         yield Knob("field", group, "field", "", True, 0.0, 1.0, switch.turn)
     K = controller.null_space_gain
     gain = float(np.diag(K).mean())
@@ -119,22 +119,23 @@ class _FieldSwitch:
     that is led, move in them, too.
 
     Attributes:
-        weights: What each term weighs while the field is on, by its name; empty if two
-            have one name, or a weight is a function: such a field is not switched.
+        weights: What each term weighs while the field is on, by its name; without those
+            that share a name, or whose weight is a function.
+        whole: Whether these are all terms; else the field cannot be switched.
     """
 
     def __init__(self, field: NullSpaceField) -> None:
         """Begin with the field as it is."""
         terms = [term for term in terms_of(field) if not isinstance(term, Rest)]
+        names = [term.name for term in terms]
         self.weights: dict[str, float] = {}
         self._on = True
         for term in terms:
             weight = term.weight
             final = weight.final if isinstance(weight, Ramp) else weight
-            if isinstance(final, int | float):
+            if isinstance(final, int | float) and names.count(term.name) == 1:
                 self.weights[term.name] = float(final)
-        if len(self.weights) < len(terms):
-            self.weights.clear()
+        self.whole = 0 < len(self.weights) == len(terms)
 
     def turn(self, at: Changes, on: bool) -> None:
         """Switch the field on or off."""

@@ -65,7 +65,7 @@ class PostureGrip(Grip):
             t for t in terms_of(self._controller.field) if isinstance(t, TargetPosture)
         ]
         weights = np.array([sample_weight(term.weight, state)[0] for term in terms])
-        if not weights.any():  # the field is switched off: the newest counts
+        if terms and not weights.any():  # the field is switched off: the newest counts
             weights[-1] = 1.0
         moved = np.zeros(self._robot.nv)
         for term, weight in zip(terms, weights / weights.sum(), strict=True):
