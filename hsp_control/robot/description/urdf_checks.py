@@ -98,7 +98,7 @@ def parse_urdf(source: RobotSource) -> Element:
     count = sum(1 for _ in robot.iter("link"))
     if count > MAX_LINKS:
         raise ModelError(f"{urdf}: {count} links; at most {MAX_LINKS}")
-    count = sum(joint.get("type") != "fixed" for joint in robot.iter("joint"))
+    count = sum(joint.get("type") != "fixed" for joint in robot.findall("joint"))
     if count > MAX_DOFS:
         raise ModelError(f"{urdf}: {count} moving joints; at most {MAX_DOFS}")
     return robot
