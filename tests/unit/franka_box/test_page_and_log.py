@@ -68,6 +68,11 @@ def test_the_log_has_the_true_motion(tmp_path: Path) -> None:
         assert true[t].tolist() == q.tolist()
     assert set(run["box.mode"].tolist()) == {2.0}
     assert not log.path.with_suffix(".journal").exists()
+    assert run.status == "completed"
+    with pytest.raises(OSError, match="no line"), BoxLog(log.path, experiment, box):
+        raise OSError("no line")
+    torn = Rollout.load(log.path)
+    assert (torn.status, torn.meta["message"]) == ("stopped", "no line")
 
 
 @pytest.mark.parametrize(
