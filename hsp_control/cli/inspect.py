@@ -15,6 +15,7 @@ from hsp_control.inspection import inspect as inspect_robot
 from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.access import ANYWHERE, only_within
 from hsp_control.robot.description.repaired import write_repaired
+from hsp_control.robot.description.sources import is_path
 
 _WIDTH = 80
 _SHOWN = 12
@@ -126,4 +127,6 @@ def _arguments(texts: list[str]) -> dict[str, str]:
 
 
 def _folders(options: argparse.Namespace) -> list[Path]:
-    return [Path(options.robot).parent, *options.allow]
+    """Return where strict reading reads: beside a robot's file, and what is allowed."""
+    beside = [Path(options.robot).parent] if is_path(options.robot) else []
+    return [*beside, *options.allow]

@@ -51,6 +51,9 @@ _SINGLE = {
     "joint": {"origin", "parent", "child", "axis", "limit", "mimic", "dynamics"},
 }
 """Elements of which others may contain one; parsers use one of several, silently."""
+_OF_MJCF = (
+    "; an MJCF's robot is robot: {mjcf: FILE} in a configuration (docs/mujoco.md)"
+)
 _WITH_AXIS = {"revolute", "continuous", "prismatic"}
 
 
@@ -91,7 +94,7 @@ def parse_urdf(source: RobotSource) -> Element:
     except OSError as error:
         raise RobotNotFoundError(f"{urdf}: {error.strerror}") from error
     if robot.tag != "robot":
-        hint = "; give an MJCF as mjcf, not as name" if robot.tag == "mujoco" else ""
+        hint = _OF_MJCF if robot.tag == "mujoco" else ""
         raise ModelError(
             f"{urdf}: the top element is <{robot.tag}>; in a URDF it is <robot>{hint}"
         )
