@@ -247,7 +247,7 @@ SERVO = CELL.replace('<motor name="m4"', '<position name="p4" kp="50"')
 def test_servos_on_the_robots_joints_are_refused_or_switched_off() -> None:
     robot, model, data = cell(SERVO)
     data.ctrl[4] = 0.04
-    message = r"^actuators p4 of the scene are no torque motors .* disable_servos=True$"
+    message = r"^actuators p4 of the scene are no torque motors .* set disable_servos$"
     with pytest.raises(SimulationError, match=message):
         MujocoScenePlant(robot, model, data)
     plant = MujocoScenePlant(robot, model, data, disable_servos=True)

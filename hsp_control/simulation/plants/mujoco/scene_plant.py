@@ -238,8 +238,8 @@ def _switch_off_servos(
         raise SimulationError(
             f"actuators {listing([names.actuators[a] for a in servos])} of the scene "
             "are no torque motors and act on the robot's joints, where they would work "
-            "against the controller: remove them from the MJCF, or give "
-            "disable_servos=True"
+            "against the controller: remove them from the MJCF, or set "
+            "disable_servos"
         )
     if servos:
         unused = max({*range(_GROUPS)} - {*map(int, model.actuator_group)})
