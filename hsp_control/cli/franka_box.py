@@ -9,7 +9,8 @@ from hsp_control.cli.franka_box_log import BoxLog
 from hsp_control.common.exceptions import LiveError
 from hsp_control.common.resources import bundled_configs, bundled_robots
 from hsp_control.config import Experiment, load_experiment
-from hsp_control.franka_box import PERIOD, PORT, VERSION, Arm, Box, Server
+from hsp_control.franka_box import Arm, Box, Server
+from hsp_control.franka_wire.layouts import PERIOD, PORT, VERSION
 from hsp_control.live import OperatorRequests
 from hsp_control.live.latency import real_time_priority
 from hsp_control.live.simulated_robot import sampled

@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LiveError
-from hsp_control.franka_box.wire import JOINTS
+from hsp_control.franka_wire.layouts import JOINTS
 from hsp_control.robot import Robot
 from hsp_control.robot.description.urdf_checks import read_urdf
 

@@ -14,8 +14,14 @@ from hsp_control.cli.franka_box_log import BoxLog
 from hsp_control.cli.main import main
 from hsp_control.cli.options.command_line import command_line
 from hsp_control.common.exceptions import LogError
-from hsp_control.franka_box import PERIOD, Arm, Box, generators, reflexes
-from hsp_control.franka_box.wire import COMMAND, Controller, Error, MotionGenerator
+from hsp_control.franka_box import Arm, Box, generators, reflexes
+from hsp_control.franka_wire.layouts import (
+    COMMAND,
+    PERIOD,
+    Controller,
+    Error,
+    MotionGenerator,
+)
 from hsp_control.live.simulated_robot import sampled
 
 PAGE = (Path(__file__).parents[3] / "docs" / "franka_box.md").read_text("utf-8")

@@ -8,7 +8,7 @@ from franka_boxes import panda
 from hsp_control import Robot
 from hsp_control.common.exceptions import LiveError
 from hsp_control.franka_box.arm import Arm, ArmLimits
-from hsp_control.franka_box.wire import COMMAND, HEADER, REQUESTS, STATE, Command
+from hsp_control.franka_wire.layouts import COMMAND, HEADER, REQUESTS, STATE, Command
 
 FR3_URDF_LIMITS = {
     "lower": [-2.7501, -1.7918, -2.9065, -3.0481, -2.8101, 0.54092, -3.01960],

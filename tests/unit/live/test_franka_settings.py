@@ -9,7 +9,7 @@ import pytest
 from places import ROOT
 
 from hsp_control.common.exceptions import LiveError
-from hsp_control.franka_box.wire import Error
+from hsp_control.franka_wire.layouts import Error
 from hsp_control.live import backends
 from hsp_control.live.franka import FrankaSettings, Load, connect
 from hsp_control.live.franka.reflexes import MODES, REFLEXES, explained
