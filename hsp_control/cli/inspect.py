@@ -48,7 +48,7 @@ def inspect(options: argparse.Namespace) -> int:
 
 def report(inspection: Inspection) -> Iterator[str]:
     """Yield the lines that are printed, of at most 80 characters."""
-    for name, text in inspection.facts():
+    for name, text in inspection.facts.items():
         line = f"{name:12}  {text}"
         yield from [line] if name == "file" else _wrapped(line, "", " " * 14)
     for (severity, check, cure), findings in inspection.groups().items():
@@ -78,7 +78,7 @@ def _write_page(inspection: Inspection, path: Path) -> Path:
 
     if inspection.robot is None:
         raise ExportError(f"{path}: there is no picture of a robot that does not load")
-    facts = [f"{name}: {text}" for name, text in inspection.facts() if name != "file"]
+    facts = [f"{name}: {text}" for name, text in inspection.facts.items()][1:]
     notes = [
         Note(f"{severity}: {check}", [f"{f.element}: {f.message}" for f in found], cure)
         for (severity, check, cure), found in inspection.groups().items()
