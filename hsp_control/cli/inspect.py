@@ -9,13 +9,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from hsp_control.cli.consoles import out
+from hsp_control.cli.loading import robot_access
 from hsp_control.common.exceptions import ExportError, ModelError
 from hsp_control.inspection import Inspection
 from hsp_control.inspection import inspect as inspect_robot
 from hsp_control.robot import RobotDescription
-from hsp_control.robot.description.access import ANYWHERE, only_within
 from hsp_control.robot.description.repaired import write_repaired
-from hsp_control.robot.description.sources import is_path
 
 _WIDTH = 80
 _SHOWN = 12
@@ -25,9 +24,7 @@ _SHOWN = 12
 def inspect(options: argparse.Namespace) -> int:
     """Print what is odd about a robot; return 2 if it does not load."""
     description = RobotDescription(options.robot, xacro_args=_arguments(options.args))
-    strict = options.strict or bool(options.allow)
-    access = only_within(_folders(options)) if strict else ANYWHERE
-    source = description.find(access)
+    source = description.find(robot_access(str(options.robot), options))
     with _no_warnings():
         inspection = inspect_robot(source, description)
     if options.json:
@@ -124,9 +121,3 @@ def _arguments(texts: list[str]) -> dict[str, str]:
             raise ModelError(f"{text!r}: an argument of a xacro file is name:=value")
         arguments[name] = value
     return arguments
-
-
-def _folders(options: argparse.Namespace) -> list[Path]:
-    """Return where strict reading reads: beside a robot's file, and what is allowed."""
-    beside = [Path(options.robot).parent] if is_path(options.robot) else []
-    return [*beside, *options.allow]

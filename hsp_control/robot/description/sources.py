@@ -170,6 +170,12 @@ def is_path(name: str) -> bool:
     return name.endswith(FILE_ENDINGS) or os.sep in name
 
 
+def is_robot(name: str) -> bool:
+    """Return whether a name is that of a robot, or of a URDF or xacro file."""
+    known = {*bundled_robots(), *example_robots(), *described_names()}
+    return name in known or name.endswith((".urdf", ".xacro"))
+
+
 def example_robots() -> dict[str, RobotSource]:
     """Return the robots of example-robot-data by name; empty if it is not installed."""
     loaders = _example_loaders()

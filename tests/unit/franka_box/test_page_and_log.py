@@ -100,6 +100,14 @@ def test_a_mistake_is_one_line(
     assert said in line
 
 
+def test_strict_reading_expands_no_xacro_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "arm.urdf.xacro").write_text("<robot/>")
+    assert main(["franka-box", str(tmp_path / "arm.urdf.xacro"), "--strict"]) == 2
+    assert "strict reading allows no xacro file" in capsys.readouterr().err
+
+
 def test_a_log_has_the_name_of_one(tmp_path: Path) -> None:
     box = Box(panda(), plant(), home(), print)
     experiment = load_experiment(

@@ -13,8 +13,7 @@ from odd_robots import FACES, OCTAHEDRON, write_stl
 from robot_texts import ARM, INERTIA, joint, link, robot_xml
 
 from hsp_control import Robot
-from hsp_control.cli import inspect as cli_inspect
-from hsp_control.cli import main
+from hsp_control.cli import loading, main
 from hsp_control.inspection import Finding, inspect
 from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.access import ANYWHERE
@@ -244,9 +243,7 @@ def test_strict_reading_of_a_name_allows_no_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read = []
-    monkeypatch.setattr(
-        cli_inspect, "only_within", lambda f: read.append(f) or ANYWHERE
-    )
+    monkeypatch.setattr(loading, "only_within", lambda f: read.append(f) or ANYWHERE)
     monkeypatch.chdir(tmp_path)
     Path("arm.urdf").write_text(ARM)
     for written in ("planar3r", "arm.urdf"):
