@@ -75,10 +75,8 @@ def _experiment(options: argparse.Namespace) -> Experiment:
     """Return the experiment of a configuration, or of a robot at home."""
     source, name = options.config, str(options.config)
     if is_robot(name):
-        access = robot_access(name, options)
-        Arm(
-            Robot.load(name, access=access)
-        )  # says what is wrong with it, not with a task
+        # This says what is wrong with it, not with a task.
+        Arm(Robot.load(name, access=robot_access(name, options)))
         source = {
             "robot": {"name": name},
             "tasks": {"hand": {"type": "frame_pose"}},
