@@ -2,6 +2,7 @@
 
 import _thread
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mjcf_texts import CELL
 
 from hsp_control import Rollout
 from hsp_control.cli import main
@@ -136,28 +138,23 @@ def test_a_diverging_run_keeps_its_log(
         assert json.loads(str(columns["meta"]))["status"] == "diverged"
 
 
-@pytest.mark.process
-def test_ctrl_c_keeps_what_was_computed(tmp_path: Path) -> None:
-    main(["run", MOVING, "--out", str(tmp_path / "short"), *SHORT])  # compiles
-    command = [sys.executable, "-m", "hsp_control", "run", MOVING, "--out"]
+def test_ctrl_c_keeps_what_was_computed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    check, rows = DeferredInterrupt.check, iter(range(1000))
+
+    def pressed_at_the_tenth_row(self: DeferredInterrupt) -> None:
+        if next(rows) == 10:
+            os.kill(os.getpid(), signal.SIGINT)
+        check(self)
+
+    monkeypatch.setattr(DeferredInterrupt, "check", pressed_at_the_tenth_row)
     long = ["--set", "simulation.duration=10000", "--set", "simulation.log_period=0.1"]
-    log = tmp_path / "4_moving_obstacle.npz"
-    for patience in (3.0, 8.0, 20.0, 60.0):  # a loaded machine takes its time to start
-        process = subprocess.Popen(
-            [*command, str(tmp_path), *long],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-        )
-        time.sleep(patience)
-        process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=60)
-        assert process.returncode == 2, errors.decode()
-        assert b"stopped by the user" in errors
-        if log.exists():
-            break
-    with np.load(log, allow_pickle=False) as columns:
-        assert json.loads(str(columns["meta"]))["status"] == "interrupted"
-        assert len(columns["t"]) > 1
+    assert main(["run", MOVING, "--out", str(tmp_path), *long]) == 2
+    assert "stopped by the user at t = " in capsys.readouterr().err
+    log = Rollout.load(tmp_path / "4_moving_obstacle.npz")
+    assert log.status == "interrupted"
+    assert 9 <= len(log) <= 12
 
 
 @pytest.mark.slow
@@ -210,3 +207,20 @@ def test_the_module_is_the_command() -> None:
 def test_help_is_printed_without_a_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 0
     assert "COMMAND" in capsys.readouterr().out
+
+
+def test_check_takes_a_robot_of_a_mujoco_model(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mujoco")
+    (tmp_path / "cell.xml").write_text(CELL)
+    file = tmp_path / "cell.yaml"
+    file.write_text(
+        "robot: {mjcf: cell.xml, root: base, joints: [j1, j2, j3, j4]}\n"
+        "start: {configuration: [0, 0.5, 0, 1]}\n"
+        "tasks: {hand: {type: frame_position, frame: tip}}\n"
+        "plant: mujoco_scene\n"
+        "simulation: {duration: 1, control_period: 0.001}\n"
+    )
+    assert main(["check", str(file)]) == 0
+    assert f"{file}: OK" in capsys.readouterr().out
