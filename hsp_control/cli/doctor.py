@@ -27,8 +27,8 @@ class Check(NamedTuple):
 
     Attributes:
         topic: What was looked at.
-        state: ``ok``; ``note``: something is slower, later or absent; ``bad``: something
-            does not work.
+        state: ``ok``; ``note``: something is slower, later or absent; ``bad``:
+            something does not work.
         found: What was found.
         advice: What would change it.
     """
@@ -80,7 +80,9 @@ def _cache() -> Check:
         )
     from hsp_control.law.law import acceleration
 
-    folder = kernel_cache.Kept(acceleration.py_func).cache_path
+    folder = kernel_cache.Kept(
+        getattr(acceleration, "py_func", acceleration)
+    ).cache_path
     if folder is None:
         return Check(
             topic,

@@ -8,6 +8,8 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,7 @@ import pytest
 from mjcf_texts import CELL
 
 from hsp_control import Rollout
-from hsp_control.cli import main
+from hsp_control.cli import doctor, main
 from hsp_control.cli.interrupts import PATIENCE, DeferredInterrupt
 
 MOVING = "paper/4_moving_obstacle"
@@ -80,12 +82,68 @@ def test_check_warns_of_a_singular_start(capsys: pytest.CaptureFixture[str]) -> 
 def test_robots_lists_what_can_be_loaded(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["robots"]) == 0
     rows = capsys.readouterr().out.splitlines()
+    assert max(map(len, rows)) <= 80
     (planar,) = [row for row in rows if row.startswith("planar3r ")]
-    assert planar.split()[:6] == ["planar3r", "bundled", "fixed", "6", "3", "10"]
-    (bravo,) = [row for row in rows if row.startswith("bravo7_gripper ")]
-    assert "no mass" in bravo
+    assert planar.split() == ["planar3r", "3", "tip", "2", "+", "1", "-"]
+    (bravo,) = [k for k, row in enumerate(rows) if row.startswith("bravo7_gripper ")]
+    assert "no mass" in rows[bravo + 1]
+    assert main(["robots", "--json"]) == 0
+    found = {row["name"]: row for row in json.loads(capsys.readouterr().out)}
+    assert found["planar3r"]["nv"] == 3
     assert main(["robots", "iiwa14"]) == 0
     assert "iiwa_joint_7" in capsys.readouterr().out
+
+
+def test_doctor_says_what_this_machine_lacks(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    assert main(["doctor", "--json"]) == 0
+    found = {each["topic"]: each for each in json.loads(capsys.readouterr().out)}
+    assert found["BLAS threads"]["state"] == "note"
+    assert found["extra mujoco"]["state"] == "ok"
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("HSP_BROWSER", raising=False)
+    monkeypatch.setattr(doctor.metadata, "version", versions_without("pyarrow"))
+    assert main(["doctor"]) == 0
+    text = capsys.readouterr().out
+    assert "no Chromium on the path" in text
+    assert "not installed: pyarrow" in text
+    assert "pip install 'hsp_control[sweeps]'" in text
+    assert "not set" not in text
+
+
+def versions_without(package: str) -> Callable[[str], str]:
+    version = metadata.version
+
+    def found(name: str) -> str:
+        if name == package:
+            raise metadata.PackageNotFoundError(name)
+        return version(name)
+
+    return found
+
+
+@pytest.mark.parametrize(
+    ("typed", "told"),
+    [
+        (["rnu"], "there is no command 'rnu'; did you mean 'run'?"),
+        (
+            ["run", MOVING, "--veiw"],
+            "there is no '--veiw' here; did you mean '--view'?",
+        ),
+        (["check", MOVING, "twice"], "there is no 'twice' here"),
+    ],
+)
+def test_what_was_mistyped_is_guessed(
+    typed: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(typed)
+    assert ended.value.code == 2
+    assert told in capsys.readouterr().err
 
 
 def test_schema_is_json(capsys: pytest.CaptureFixture[str]) -> None:
@@ -150,7 +208,7 @@ def test_ctrl_c_keeps_what_was_computed(
 
     monkeypatch.setattr(DeferredInterrupt, "check", pressed_at_the_tenth_row)
     long = ["--set", "simulation.duration=10000", "--set", "simulation.log_period=0.1"]
-    assert main(["run", MOVING, "--out", str(tmp_path), *long]) == 2
+    assert main(["run", MOVING, "--out", str(tmp_path), *long]) == 130
     assert "stopped by the user at t = " in capsys.readouterr().err
     log = Rollout.load(tmp_path / "4_moving_obstacle.npz")
     assert log.status == "interrupted"
@@ -177,7 +235,7 @@ def test_ctrl_c_does_not_wait_for_a_row_that_never_comes(
         "--set",
         "simulation.log_period=1e4",
     ]
-    assert main(["run", MOVING, "--out", str(tmp_path), *for_ever]) == 2
+    assert main(["run", MOVING, "--out", str(tmp_path), *for_ever]) == 130
     assert "stopped by the user at t = 0 s" in capsys.readouterr().err
     log = Rollout.load(tmp_path / "4_moving_obstacle.npz")
     assert log.status == "interrupted"
