@@ -75,7 +75,7 @@ def _write_page(inspection: Inspection, path: Path) -> Path:
 
     if inspection.robot is None:
         raise ExportError(f"{path}: there is no picture of a robot that does not load")
-    facts = [f"{name}: {text}" for name, text in inspection.facts.items()][1:]
+    facts = [f"{k}: {text}" for k, text in inspection.facts.items() if k != "file"]
     notes = [
         Note(f"{severity}: {check}", [f"{f.element}: {f.message}" for f in found], cure)
         for (severity, check, cure), found in inspection.groups().items()

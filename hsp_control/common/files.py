@@ -9,3 +9,11 @@ def is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):  # too long for a path, or with a null character
         return False
+
+
+def is_folder(path: Path) -> bool:
+    """Return whether a path leads to a folder; False if it can be none."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False

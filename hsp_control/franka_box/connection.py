@@ -157,7 +157,7 @@ class Connection:
         """Close the connection.
 
         Args:
-            broken: Whether to break it instead: a client that waits for a message
+            broken: Whether to break it instead: a client that waits for a response
                 then fails at once; libfranka waits for ever at a regular end.
         """
         if broken:

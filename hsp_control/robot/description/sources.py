@@ -15,6 +15,7 @@ from hsp_control.common.exceptions import (
     ModelError,
     RobotNotFoundError,
 )
+from hsp_control.common.files import is_folder
 from hsp_control.common.resources import bundled_robots
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.access import ANYWHERE, Access
@@ -122,7 +123,7 @@ def find_robot(
             f"robot {text!r} of example-robot-data has no URDF; robots can only be "
             "loaded from a URDF"
         )
-    if Path(text).is_dir():
+    if text and is_folder(Path(text)):
         return _from_path(Path(text), access, xacro_args)  # which says what is in it
     known = [*bundled, *sorted(set(others) - set(bundled)), *described_names()]
     hint = (

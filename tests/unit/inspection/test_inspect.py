@@ -239,6 +239,14 @@ def test_a_folder_is_told_however_it_is_written(
         assert capsys.readouterr().err == told
 
 
+@pytest.mark.parametrize("name", ["", "a" * 300, "a\0b"])
+def test_what_can_be_no_folder_is_no_robot(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["inspect", name]) == 2
+    assert capsys.readouterr().err.startswith("hsp: no robot ")
+
+
 def test_strict_reading_of_a_name_allows_no_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
