@@ -3,8 +3,7 @@
 from dataclasses import replace
 from typing import Self
 
-from hsp_control.common.exceptions import ContactError, ControllerError
-from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.common.exceptions import ContactError
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.control.change import Change
 from hsp_control.control.setup import Setup
@@ -24,7 +23,7 @@ class ChangeContact(Change, type="contact"):
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the contact; see `Change.apply`."""
-        contacts, k = list(setup.contacts), _find_contact(setup, self.contact)
+        contacts, k = list(setup.contacts), setup.find_contact(self.contact)
         presence = contacts[k].presence.then(self.at, self.ramp, float(self.bears))
         contacts[k] = replace(contacts[k], presence=presence)
         return replace(setup, contacts=tuple(contacts))
@@ -44,7 +43,7 @@ class ChangeForce(Change, type="force"):
         Raises:
             ContactError: If the contact cannot exert the force.
         """
-        contact = setup.contacts[_find_contact(setup, self.contact)].contact
+        contact = setup.contacts[setup.find_contact(self.contact)].contact
         replace(contact, force=self.force).placed(start)
         return self
 
@@ -55,7 +54,7 @@ class ChangeForce(Change, type="force"):
             ContactError: If the contact has no commanded force, or one with another
                 number of coordinates.
         """
-        contacts, k = list(setup.contacts), _find_contact(setup, self.contact)
+        contacts, k = list(setup.contacts), setup.find_contact(self.contact)
         contact = contacts[k].contact
         old, new = contact.force, self.force
         with within("force"):
@@ -75,18 +74,3 @@ class ChangeForce(Change, type="force"):
         following = replace(contact, force=CommandedForce(trajectory=changed))
         contacts[k] = replace(contacts[k], contact=following)
         return replace(setup, contacts=tuple(contacts))
-
-
-def _find_contact(setup: Setup, name: str) -> int:
-    """Return the index of the contact that has a name.
-
-    Raises:
-        ControllerError: If there is none.
-    """
-    there = {each.contact.name: k for k, each in enumerate(setup.contacts)}
-    if name not in there:
-        raise ControllerError(
-            f"there is no contact {name!r}{did_you_mean(name, there)} "
-            f"(there are {listing(there) or 'none'})"
-        )
-    return there[name]
