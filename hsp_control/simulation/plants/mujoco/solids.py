@@ -34,12 +34,12 @@ class Solid(Part, error=SimulationError):
 
     The robot touches it with the shapes that the plant's ``contacts`` declare.
 
-    MuJoCo's friction is soft: it damps the slip u as if the surfaces were to stop at the
-    rate b, until the friction cone limits the force. A shape that goes on sliding is
-    pushed off by the acceleration μ b ‖u‖, since the cone's dual couples the two. The
-    surface takes (1 - d)/d of the acceleration with which the shape is pressed; if the
-    first is larger, the contact opens and closes for ever. With ``slip_damping`` b and
-    ``impedance`` d things slide on a surface as Coulomb says, see ``docs/forces.md``.
+    MuJoCo's friction is soft: it damps the slip u as if the surfaces were to stop at
+    the rate b, until the friction cone limits the force. A shape that goes on sliding
+    is pushed off by the acceleration μ b ‖u‖, since the cone's dual couples the two.
+    The surface supplies (1 - d)/d of the acceleration with which the shape is pressed;
+    if that is less, the contact opens and closes for ever. With ``slip_damping`` b and
+    ``impedance`` d things slide as Coulomb says, see ``docs/forces.md``.
     """
 
     yaml_key: ClassVar[str | None] = "name"
