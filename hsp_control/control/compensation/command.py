@@ -165,7 +165,7 @@ class Command:
             self._integrate(self._integral, output, period, clipped)
         if self._force_feedback is not None:
             hindered = output.status >= Status.LIMITED or clipped
-            self._force_feedback.advance(t, period, hindered)
+            self._force_feedback.advance(state.t, period, output.forces, hindered)
         if self._observer is not None or own.predictor is not None:
             self._pressing = self._expected(output)
             self._record_sent(tau - self._friction_sent + self._pressing)

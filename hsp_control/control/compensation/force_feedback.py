@@ -16,6 +16,8 @@ from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Names, Positive
 from hsp_control.robot import RobotState
 
+_MISSED = 0.01
+"""Share of a command by which the programme must miss it to stop the integral."""
 _SMALLEST = 1e-9
 """Mobility, relative to the largest, below which an estimate takes a direction for
 immobile."""
@@ -29,8 +31,8 @@ class ForceFeedback(Part, error=CompensationError):
         λ = λ_d + K_i ∫ (λ_d - λ_m) dt
 
     A rigid contact answers with λ_m = λ - (what the model lacks), so the error decays
-    like exp(-K_i t). The integral rests while the contact does not fully bear and while
-    limits leave no room for it.
+    like exp(-K_i t). The integral rests while the contact does not fully bear, and
+    while limits leave no room for what it would add.
     """
 
     gain: Positive = 5.0
@@ -143,14 +145,16 @@ class RunningForceFeedback:
             expected = forces[columns].reshape(-1, 3)[:, 2].sum()
             self.felt[contact.name] = float(expected + (inverse @ F.T @ unexpected)[2])
 
-    def advance(self, t: float, period: float, saturated: bool) -> None:
+    def advance(self, t: float, period: float, forces: Array, hindered: bool) -> None:
         """Integrate the errors over one period, for the next effort.
 
         Args:
             t: The time [s].
             period: The period [s].
-            saturated: Whether the law was not delivered exactly.
+            forces: The forces of this step, of the active contacts [N].
+            hindered: Whether the law was not delivered exactly.
         """
+        support = self._controller.active_stack.support
         gain, bound = self._declared.gain, self._declared.bound
         for contact in self._fed:
             felt, name = self.felt[contact.name], contact.name
@@ -159,9 +163,17 @@ class RunningForceFeedback:
             assert contact.force is not None
             command = contact.force.followed.sample(t).position
             wanted = command[0 if contact.force.dimension == NORMAL else 2]
-            integral = self.integrals[name]
+            points = support.points[support.contacts.index(contact)]
+            planned, commanded = (
+                float(each.reshape(-1, 3)[points, 2].sum())
+                for each in (forces, support.reference)
+            )
             change = gain * period * (float(wanted) - felt)
-            if saturated and change * integral >= 0.0:
+            integral = self.integrals[name]
+            missing = commanded - planned  # the programme has given way
+            if change * missing > 0.0 and abs(missing) > _MISSED * (1.0 + commanded):
+                continue
+            if hindered and change * integral >= 0.0:
                 continue
             integral = min(max(integral + change, -bound), bound)
             self.integrals[name] = self._controller.force_offset(name)[0] = integral
