@@ -30,6 +30,8 @@ from hsp_control.simulation.plants.mujoco.solids import Solid
 MIN_INERTIA = 1e-12
 """Smallest mass and inertia of a body [kg, kg·m²]; MuJoCo needs positive ones."""
 
+_OWN_IMPEDANCE = 0.95
+"""MuJoCo's own impedance of contacts, where they are deep."""
 _CONTACT, _GROUND = 1, 2  # kinds of geoms; they collide only with the other kind
 
 
@@ -156,9 +158,11 @@ def _add_pair(pairs: Element, solid: str, shape: str, of: Solid) -> None:
     mu = of.friction
     pair = SubElement(pairs, "pair", geom1=solid, geom2=shape, condim="3")
     pair.set("friction", _numbers([mu, mu, 0.0, 0.0, 0.0]))
-    # Negative numbers are stiffness and damping; friction has no stiffness.
+    # Negative numbers are stiffness, which friction has not, and damping, which MuJoCo
+    # divides by the impedance.
     assert of.slip_damping is not None
-    pair.set("solreffriction", _numbers([-1.0, -of.slip_damping]))
+    scale = _OWN_IMPEDANCE if of.impedance is None else of.impedance
+    pair.set("solreffriction", _numbers([-1.0, -of.slip_damping * scale]))
     _set_impedance(pair, of)
 
 
