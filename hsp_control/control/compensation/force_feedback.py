@@ -101,11 +101,12 @@ class RunningForceFeedback:
         for name in names:
             controller.force_offset(name)[0] = 0.0
 
-    def measure(self, wrenches: Mapping[str, Array]) -> None:
+    def measure(self, wrenches: Mapping[str, Array], pressed: bool) -> None:
         """Read the sensors.
 
         Args:
             wrenches: Of the world on the robot, by frame; see `Measurement`.
+            pressed: Whether an effort acted in the period that ends.
 
         Raises:
             CompensationError: If a contact has no sensor.
@@ -119,7 +120,8 @@ class RunningForceFeedback:
                         "'estimated' needs none"
                     )
             wrench = wrenches[contact.frame]
-            self.felt[contact.name] = float(contact.axes[:, 2] @ wrench[:3])
+            felt = float(contact.axes[:, 2] @ wrench[:3])
+            self.felt[contact.name] = felt if pressed else np.nan
 
     def estimate(self, state: RobotState, disturbance: Array, forces: Array) -> None:
         """Estimate the forces from what the model does not explain.
