@@ -105,6 +105,22 @@ def test_talos_leans_while_it_is_heavier_than_its_model() -> None:
     assert log.q[-1, 2] > 0.95
 
 
+def test_two_pandas_lift_a_box() -> None:
+    """60 N between the palms, half of the weight on each; it hangs on friction alone."""
+    log = load_experiment("forces/pandas_box", "simulation.duration=1.7").run()
+    late = log.t > 1.3
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        force = log[f"plant.contact.{side}_panda_tcp.force"][late]
+        np.testing.assert_allclose(force[:, 1], 60.0 * sign, atol=0.2)
+        np.testing.assert_allclose(force[:, 2], -24.5, atol=3.0)
+    box = log["plant.solid.box.position"]
+    assert box[-1, 2] > 0.46  # it lay at 0.4
+    hand = log["task.left.actual"][:, 1]
+    np.testing.assert_allclose((box[:, 2] - hand)[late], box[0, 2] - hand[0], atol=2e-3)
+    assert np.abs(box[:, 1]).max() < 1e-3
+    assert not log["status"].any()
+
+
 def test_the_page_about_forces_is_true() -> None:
     text = (ROOT / "docs" / "forces.md").read_text(encoding="utf-8")
     (snippet,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
@@ -114,7 +130,9 @@ def test_the_page_about_forces_is_true() -> None:
     assert isinstance(controller, hsp.Controller)
     out = controller.compute(0.0, controller.robot.home(), [0.0] * 7)
     assert out.forces[2] == 20.0
-    first, stairs = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    first, box, stairs = re.findall(
+        r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL
+    )
     talos = yaml.safe_load(
         (ROOT / "configs" / "forces" / "talos_wall.yaml").read_text(encoding="utf-8")
     )
@@ -123,3 +141,8 @@ def test_the_page_about_forces_is_true() -> None:
     talos["plant"]["solids"] = yaml.safe_load(first)["plant"]["solids"]
     talos["plant"]["solids"] |= yaml.safe_load(stairs)["plant"]["solids"]
     load_experiment(talos)
+    pandas = yaml.safe_load(
+        (ROOT / "configs" / "forces" / "pandas_box.yaml").read_text(encoding="utf-8")
+    )
+    pandas["contacts"] = yaml.safe_load(box)["contacts"]
+    load_experiment(pandas)

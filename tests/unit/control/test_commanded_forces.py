@@ -361,9 +361,9 @@ REFUSED: dict[str, tuple[Any, str]] = {
         "at point 1 of 4, its share of the wrench, is -22.5 N",
     ),
     "slides without": (lambda: SlidingContact(TIP), "a sliding contact needs the"),
-    "slides aside": (
-        lambda: SlidingContact(TIP, force=CommandedForce([0.0, 0.0, 1.0])),
-        "it has 3 coordinates; a sliding contact takes the normal force alone",
+    "slides and turns": (
+        lambda: SlidingContact(TIP, force=CommandedForce([0.0, 0, 1, 0, 0, 0])),
+        "a sliding contact takes 1 .it slides. or 3",
     ),
     "frame": (
         lambda: pressing(PointContact("panda_tcq", force=CommandedForce(1.0))),

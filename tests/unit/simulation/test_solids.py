@@ -43,6 +43,25 @@ def test_stairs_are_copies() -> None:
         np.testing.assert_allclose(geom.quat, [np.cos(0.05), 0, 0, np.sin(0.05)])
 
 
+def test_what_is_loose_falls_onto_what_is_fixed() -> None:
+    """Beside a robot, whose coordinates do not change; with the mass that is given."""
+    table = Solid("table", Box([0.4, 0.4, 0.1]), [2.0, 0.0, 0.5])
+    ball = Solid("ball", Sphere(0.05), [2.0, 0.0, 0.7], mass=3.0)
+    made = plant(table, ball)
+    q0, rest = panda().home(), np.zeros(7)
+    tau = panda().state(0.0, q0, rest).nonlinear_effects.copy()
+    for _ in range(2):  # a second run begins where the first did
+        made.reset(0.0, q0, rest)
+        q, v = made.advance(0.0, 0.1, tau)
+        np.testing.assert_allclose(q, q0, atol=1e-9)
+        log = made.log_channels(0.1, q, v, tau)
+        height = log["plant.solid.ball.position"].value
+        np.testing.assert_allclose(height, [2.0, 0.0, 0.7 - 9.81 * 0.005], atol=6e-4)
+    made.advance(0.1, 0.6, tau)
+    assert made.data.body("solid/ball/0").xpos[2] == pytest.approx(0.6, abs=1e-3)
+    assert made.model.body("solid/ball/0").mass[0] == pytest.approx(3.0)
+
+
 @pytest.mark.parametrize("slip_damping", [None, 30.0])
 def test_its_own_friction_counts(slip_damping: float | None) -> None:
     """Not the ground's, which the robot's shapes have. It pushes along its normal."""
