@@ -159,7 +159,7 @@ def head(task: str) -> str:
 
 
 def carried(overrides: tuple[str, ...]) -> str:
-    """Return the cells of a run with the box, from when it is lifted to when it lands."""
+    """Return the cells of a run with the box, while it is in the air."""
     log = hsp.load_experiment("forces/pandas_box", *overrides).run()
     rows = (log.t > 1.2) & (log.t < 5.4)
     sides = {"left": 1.0, "right": -1.0}
@@ -194,8 +194,8 @@ def pulled_ball(impedance: float, slip_damping: float) -> float:
     <joint type="slide" axis="0 0 1"/>
     <geom name="ball" type="sphere" size="0.02" mass="3"/></body></worldbody>
     <contact><pair geom1="plane" geom2="ball" condim="3" friction="0.3 0.3 0 0 0"
-    solimp="{impedance} {impedance} 0.001 0.5 2" solreffriction="-1 {-slip_damping * impedance}"/>
-    </contact></mujoco>""")
+    solimp="{impedance} {impedance} 0.001 0.5 2"
+    solreffriction="-1 {-slip_damping * impedance}"/></contact></mujoco>""")
     data = mujoco.MjData(model)
     data.qvel[0] = 0.1
     data.qfrc_applied[:] = [3000 * 0.1, -20.0]

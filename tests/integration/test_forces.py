@@ -106,7 +106,7 @@ def test_talos_leans_while_it_is_heavier_than_its_model() -> None:
 
 
 def test_two_pandas_lift_a_box() -> None:
-    """60 N between the palms, half of the weight on each; it hangs on friction alone."""
+    """60 N between the palms, half of the weight on each: friction alone holds it."""
     log = load_experiment("forces/pandas_box", "simulation.duration=1.7").run()
     late = log.t > 1.3
     for side, sign in (("left", 1.0), ("right", -1.0)):

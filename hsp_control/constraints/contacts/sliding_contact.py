@@ -45,7 +45,7 @@ class SlidingContact(Contact, type="sliding"):
     """Speed u_s at which three quarters of the friction are expected [m/s]."""
 
     def __post_init__(self) -> None:
-        """Check that the normal force is commanded, and nothing else."""
+        """Check that there is a command, without moments."""
         if self.force is None:
             with within("force"):
                 raise ContactError(

@@ -36,7 +36,8 @@ class ForceFeedback(Part, error=CompensationError):
     """
 
     gain: Positive = 5.0
-    """K_i [1/s]; small beside 1/(period and delays of the loop)."""
+    """K_i [1/s]; a tenth of 1/(a period and the delays of the loop) at most: at one
+    over that it does not decay."""
     _: KW_ONLY
     bound: Positive = 50.0
     """Largest magnitude of the integral's share of the command [N]."""
