@@ -1,30 +1,29 @@
 """Changes of a controller while it runs: events on one time line."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator
 
 from hsp_control.common.exceptions import ControllerError
-from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.constraints.limits import Limits, LimitsOrNone
+from hsp_control.control.change import Change
 from hsp_control.control.composition import check_tasks, checked_gain
+from hsp_control.control.contact_changes import ChangeContact, ChangeForce
 from hsp_control.control.evolution import ABSENT
+from hsp_control.control.field_changes import ChangeField, ChangeWeight, ExchangeField
 from hsp_control.control.setup import (
-    PlannedTerm,
     Setup,
     planned_task,
-    planned_terms,
 )
 from hsp_control.declaration import AnyOf, Part, within
 from hsp_control.declaration.nested import parts_within
-from hsp_control.declaration.quantities import Flag, Gain, NonNegative, Number
+from hsp_control.declaration.quantities import Gain
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
-from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
+from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.tasks import Gains, Impedance, Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.impedance import check_bounded, parts_of
@@ -36,7 +35,6 @@ from hsp_control.trajectories import (
     crossfade,
 )
 from hsp_control.trajectories.crossfade import AnyReference
-from hsp_control.trajectories.remembering import with_memories_copied
 from hsp_control.trajectories.streams.stream import (
     Streamed,
     stream_for,
@@ -47,6 +45,7 @@ __all__ = [
     "Change",
     "ChangeContact",
     "ChangeField",
+    "ChangeForce",
     "ChangeGains",
     "ChangeImpedance",
     "ChangeLimits",
@@ -58,47 +57,6 @@ __all__ = [
     "MoveObstacle",
     "RemoveTask",
 ]
-
-
-class Change(Part, ABC, family="changes", error=ControllerError):
-    """A change that begins at a time and takes a while; efforts stay continuous.
-
-    Changes count in the order of their times, whatever the order in which they are
-    made. Each continues from what is then in force, so that several may overlap. A
-    subclass implements `apply`.
-    """
-
-    _: KW_ONLY
-    at: Number
-    """When it begins [s]; a time that has passed means now."""
-    ramp: NonNegative = 0.3
-    """How long it takes [s]; 0 is a jump."""
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return the change; what has a memory in it goes on by itself."""
-        return with_memories_copied(self, memo)
-
-    @property
-    def end(self) -> float:
-        """When it is complete [s]."""
-        return self.at + self.ramp
-
-    @abstractmethod
-    def apply(self, setup: Setup) -> Setup:
-        """Return the setup with this change, after all earlier ones.
-
-        Raises:
-            ControllerError: If it names something that does not exist then.
-        """
-
-    def placed(self, start: Start, setup: Setup) -> Self:
-        """Return the change with its parts placed; see `Task.placed`.
-
-        Args:
-            start: Where the robot is when the change is made.
-            setup: The setup with all earlier changes.
-        """
-        return self
 
 
 class AddTask(Change, type="add_task"):
@@ -237,103 +195,6 @@ class ChangeReference(Change, type="reference"):
         return setup.with_task(k, task=task.following(changed))
 
 
-class ChangeField(Change, type="field"):
-    """The null-space field changes to another one; Proposition 2 holds throughout."""
-
-    fields: Annotated[Sequence[NullSpaceField], AfterValidator(tuple)]
-    """The new fields; their sum is used. Without fields, self-motion comes to rest."""
-
-    def placed(self, start: Start, setup: Setup) -> Self:
-        """Return the change with its fields placed."""
-        placed = []
-        for k, field in enumerate(self.fields):
-            with within("fields", k):
-                placed.append(field.placed(start))
-        return replace(self, fields=placed)
-
-    def apply(self, setup: Setup) -> Setup:
-        """Return the setup with the field; see `Change.apply`."""
-        old = [
-            PlannedTerm(each.field, each.presence.then(self.at, self.ramp, 0.0))
-            for each in setup.terms
-        ]
-        fields = self.fields or (Rest(),)
-        sum_of = fields[0] if len(fields) == 1 else FieldSum(fields)
-        new = planned_terms(sum_of, ABSENT.then(self.at, self.ramp, 1.0))
-        if not all(each.field.controls for each in (*old, *new)):
-            raise ControllerError(
-                "an uncontrolled null space cannot be blended with a controlled one"
-            )
-        return replace(setup, terms=(*old, *new))
-
-
-class ChangeWeight(Change, type="weight"):
-    """The weight of one field changes."""
-
-    field: str
-    """Name of the field."""
-    weight: NonNegative
-    """The new weight [-]."""
-
-    def apply(self, setup: Setup) -> Setup:
-        """Return the setup with the weight; see `Change.apply`."""
-        k = _find_field(setup, self.field)
-        # The old weight fades out, and the same field fades in with the new weight:
-        # so weights that are ramps or functions of the state work alike.
-        new = replace(setup.terms[k].field, weight=self.weight)
-        return _with_field(setup, k, new, self)
-
-
-class ExchangeField(Change, type="exchange_field"):
-    """One field is replaced by another one, which keeps its weight; the others stay."""
-
-    field: str
-    """Name of the field that goes."""
-    by: NullSpaceField
-    """The field that comes; its own weight does not count."""
-
-    def placed(self, start: Start, setup: Setup) -> Self:
-        """Return the change with its field placed."""
-        with within("by"):
-            return replace(self, by=self.by.placed(start))
-
-    def apply(self, setup: Setup) -> Setup:
-        """Return the setup with the other field; see `Change.apply`."""
-        k = _find_field(setup, self.field)
-        if not self.by.controls:
-            raise ControllerError("an uncontrolled null space replaces no other field")
-        new = replace(self.by, weight=setup.terms[k].field.weight)
-        return _with_field(setup, k, new, self)
-
-
-def _find_field(setup: Setup, name: str) -> int:
-    """Return the index of the term that has a name and is to stay.
-
-    Raises:
-        ControllerError: If there is none.
-    """
-    there = {
-        each.field.name: k
-        for k, each in enumerate(setup.terms)
-        if each.presence.target > 0.0
-    }
-    if name not in there:
-        raise ControllerError(
-            f"there is no field {name!r}{did_you_mean(name, there)} "
-            f"(there are {listing(there) or 'none'})"
-        )
-    return there[name]
-
-
-def _with_field(setup: Setup, index: int, new: NullSpaceField, change: Change) -> Setup:
-    """Return the setup in which a term fades out while another one fades in."""
-    terms, at, ramp = list(setup.terms), change.at, change.ramp
-    old = terms[index]
-    terms[index] = PlannedTerm(old.field, old.presence.then(at, ramp, 0.0))
-    terms.append(PlannedTerm(new, ABSENT.then(at, ramp, 1.0)))
-    return replace(setup, terms=tuple(terms))
-
-
 class ChangeNullSpaceGain(Change, type="null_space_gain"):
     """The null-space gain K_N changes; V decays throughout."""
 
@@ -345,22 +206,6 @@ class ChangeNullSpaceGain(Change, type="null_space_gain"):
         with within("gain"):
             target = checked_gain(self.gain, setup.start.state.robot, setup.metric)
         return replace(setup, gain=setup.gain.then(self.at, self.ramp, target))
-
-
-class ChangeContact(Change, type="contact"):
-    """A contact is lifted, or set down again; its force fades."""
-
-    contact: str
-    """Name of the contact."""
-    bears: Flag
-    """Whether it bears from then on."""
-
-    def apply(self, setup: Setup) -> Setup:
-        """Return the setup with the contact; see `Change.apply`."""
-        contacts, k = list(setup.contacts), setup.find_contact(self.contact)
-        presence = contacts[k].presence.then(self.at, self.ramp, float(self.bears))
-        contacts[k] = replace(contacts[k], presence=presence)
-        return replace(setup, contacts=tuple(contacts))
 
 
 class MoveObstacle(Change, type="obstacle"):
@@ -513,6 +358,10 @@ class Changes:
     def contact(self, contact: str, *, bears: bool) -> Self:
         """Lift a contact, or set it down; see `ChangeContact`."""
         return self._do(ChangeContact(contact, bears, at=self._at, ramp=self._ramp))
+
+    def force(self, contact: str, force: CommandedForce) -> Self:
+        """Change the commanded force of a contact; see `ChangeForce`."""
+        return self._do(ChangeForce(contact, force, at=self._at, ramp=self._ramp))
 
     def _do(self, change: Change) -> Self:
         self._make(change)

@@ -11,7 +11,7 @@ from hsp_control.common.kernels import kernel
 from hsp_control.control.compensation import Command
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import Measurement
+from hsp_control.control.measurement import NO_WRENCHES, Measurement
 from hsp_control.control.output import ControlOutput
 from hsp_control.plans import RunningPlan
 from hsp_control.robot import RobotState
@@ -109,10 +109,12 @@ def sampled_loop(
         for k in range(periods):
             t = start + k * (end - start) / periods
             measured = plant.measure(t, q, v)
-            if plan is not None:
+            wrenches = NO_WRENCHES
+            if plan is not None or command.feels_contacts:
                 wrenches = plant.contact_wrenches(t, q, v, tau)
+            if plan is not None:
                 plan.update(Measurement(t, *measured, wrenches))
-            tau = command.effort(t, *measured, period).copy()
+            tau = command.effort(t, *measured, period, wrenches).copy()
             if k == 0:
                 output, state = command.output, command.state
                 if not (t == state.t and _equal(state.q, q) and _equal(state.v, v)):
