@@ -112,7 +112,7 @@ class HandTargets(
         self.hand = HandControl(robot, frame, config, gains=_GAINS, axes=axes)
         self._absolute = absolute
         rows = 6 if axes is None else len(axes)
-        linear, angular = _positive_pair(scale)
+        linear, angular = _two_numbers(scale)
         self._scale = np.repeat([linear, angular], 3)[:rows]
         taken = {each.control for each in self.plant.motors.values()}
         self._others = [k for k in range(base.model.nu) if k not in taken]
@@ -190,7 +190,7 @@ class HandTargets(
         import_mujoco().mj_rnePostConstraint(plant.model, data)
 
 
-def _positive_pair(scale: Any) -> tuple[float, float]:
+def _two_numbers(scale: Any) -> tuple[float, float]:
     """Return the two numbers of a scale.
 
     Raises:
@@ -200,9 +200,9 @@ def _positive_pair(scale: Any) -> tuple[float, float]:
         linear, angular = (float(each) for each in scale)
     except (TypeError, ValueError):
         linear = angular = nan
-    if not (0.0 < linear < inf and 0.0 < angular < inf):
+    if not (0.0 <= linear < inf and 0.0 <= angular < inf):
         raise ControllerError(
-            f"scale: needs two positive numbers, for position [m] and orientation "
+            f"scale: needs two numbers of at least 0, for position [m] and orientation "
             f"[rad]; got {scale!r}"
         )
     return linear, angular

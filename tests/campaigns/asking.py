@@ -41,7 +41,9 @@ def judge(status: int, errors: str) -> list[str]:
     if status == 0:
         return ["fine", ""]
     told = [line for line in errors.splitlines() if line.startswith("hsp: ")]
-    if status != 2 or not told or not errors.startswith("hsp: "):
+    stopped = status == 130 and "hsp: stopped by the user" in errors
+    refused = status == 2 or stopped
+    if not refused or not told or not errors.startswith("hsp: "):
         return ["unclear", f"status {status}: {errors}"]
     if len(errors) > LONGEST or len(told) > 2:
         return ["unclear", f"{len(errors)} characters: {errors[:LONGEST]}"]
