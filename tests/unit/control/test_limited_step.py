@@ -39,6 +39,18 @@ def arm(**options: Any) -> hsp.Controller:
     return hsp.Controller(panda(), [hand, elbow], field, limits=limits, **options)
 
 
+def pressing() -> hsp.Controller:
+    """Return a weak arm that presses with more than its motors may have left."""
+    contact = hsp.contacts.SlidingContact(
+        "panda_tcp", friction=0.4, force=hsp.contacts.CommandedForce([4.0, 2.0, 40.0])
+    )
+    gains = hsp.Gains(natural_frequency=10.0)
+    path = hsp.Circle(0.2, 4.0, [0.45, 0.0])
+    hand = hsp.FramePosition("panda_tcp", path, axes="xy", gains=gains, name="hand")
+    limits = hsp.Limits(effort=Scaled(0.4), velocity="none", position="none")
+    return hsp.Controller(panda(), [hand], contacts=[contact], limits=limits)
+
+
 @cache
 def controller(name: str) -> tuple[hsp.Controller, Array]:
     """Return a controller, and the configuration around which it is tried."""
@@ -47,6 +59,8 @@ def controller(name: str) -> tuple[hsp.Controller, Array]:
         return arm(metric=metric), panda().home()
     if name == "arm":
         return arm(), panda().home()
+    if name == "pressing":
+        return pressing(), panda().home()
     loaded = hsp.load_experiment(name)
     return loaded.controller, loaded.q0
 
@@ -78,6 +92,8 @@ def repeated(made: hsp.Controller, barriers: Barriers | None = None) -> Delivere
     [
         ("arm", 0.5),
         ("mass matrix", 0.5),
+        ("pressing", 0.5),
+        ("forces/talos_wall", 0.01),
         ("whole_body/solo12_trunk", 0.05),
         ("whole_body/talos_circle", 0.01),
     ],
