@@ -110,7 +110,7 @@ class RunningWalk(RunningPlan):
     def update(self, measured: Measurement) -> None:
         """Write references and switch contacts; see `RunningPlan.update`."""
         t, state = measured.t, self._state
-        state.update(*measured[:3])
+        state.update(t, measured.q, measured.v)
         if not self._begun:
             self.start(state)
         self._falling.check(state)

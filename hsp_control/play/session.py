@@ -95,9 +95,15 @@ class Session:
         rows, plan = self._rows(), experiment.scenario.plan
         times = [k * self.row for k in range(rows)]
         running = None if plan is None else plan.begin(self.controller)
+        estimator = experiment.scenario.estimator
+        estimating = (
+            None
+            if estimator is None
+            else estimator.begin(self.controller, self._plant.inertial())
+        )
         self._loop: Iterator[Instant] = sampled_loop(
             self._command, self._plant, round(self.row / self.period), times,
-            experiment.q0, experiment.v0, running,
+            experiment.q0, experiment.v0, running, estimating,
         )  # fmt: skip
         self.recorder = Recorder(self.controller, self.controller.scene, rows, running)
         self.over = ""

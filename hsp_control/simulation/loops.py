@@ -13,6 +13,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Measurement
 from hsp_control.control.output import ControlOutput
+from hsp_control.estimation import RunningEstimator
 from hsp_control.plans import RunningPlan
 from hsp_control.robot import RobotState
 from hsp_control.robot.integrators import Integrator, bound
@@ -83,6 +84,7 @@ def sampled_loop(
     q: Array,
     v: Array,
     plan: RunningPlan | None = None,
+    estimator: RunningEstimator | None = None,
 ) -> Iterator[Instant]:
     """Yield the instants of a loop that holds each effort for a control period.
 
@@ -94,25 +96,35 @@ def sampled_loop(
         q: Start configuration, shape (nq,).
         v: Start velocity, shape (nv,).
         plan: Writes references and switches contacts, before each effort.
+        estimator: Estimates the base, for the plan and for the command.
 
     Raises:
+        EstimationError: If what the estimator needs is not measured.
         FallError: If the plan finds that the robot falls.
         SimulationError: If the motion diverges.
     """
     plant.reset(times[0], q, v)
     command.restart()
     period = (times[1] - times[0]) / periods
-    tau = np.zeros(plant.robot.nv)
+    tau, count = np.zeros(plant.robot.nv), 0
     for start, end in zip(times, (*times[1:], times[-1]), strict=True):
         if end > start:
             period = (end - start) / periods
         for k in range(periods):
             t = start + k * (end - start) / periods
-            measured = plant.measure(t, q, v)
+            measured = Measurement(count, t, *plant.measure(t, q, v))
+            count += 1
+            if plan is not None or estimator is not None:
+                measured = measured._replace(
+                    applied=tau,
+                    wrenches=plant.contact_wrenches(t, q, v, tau),
+                    inertial=plant.inertial(),
+                )
+            if estimator is not None:
+                measured = estimator.update(measured)
             if plan is not None:
-                wrenches = plant.contact_wrenches(t, q, v, tau)
-                plan.update(Measurement(t, *measured, wrenches))
-            tau = command.effort(t, *measured, period).copy()
+                plan.update(measured)
+            tau = command.effort(t, measured.q, measured.v, period).copy()
             if k == 0:
                 output, state = command.output, command.state
                 if not (t == state.t and _equal(state.q, q) and _equal(state.v, v)):
@@ -120,6 +132,8 @@ def sampled_loop(
                 channels = command.log_channels()
                 if plan is not None:
                     channels = {**channels, **plan.log_channels()}
+                if estimator is not None:
+                    channels = {**channels, **estimator.log_channels(q, v)}
                 yield Instant(state, output, tau, channels)
             if end == start:  # the last row
                 return

@@ -179,7 +179,7 @@ def test_a_walk_may_begin_in_any_direction(talos, heading):
     robot = experiment.robot
     state = robot.state(0.0, robot.integrate(experiment.q0, step), np.zeros(robot.nv))
     running = experiment.scenario.plan.begin(experiment.controller)
-    running.update(Measurement(0.0, state.q, state.v))
+    running.update(Measurement(0, 0.0, state.q, state.v))
     trunk = {task.name: task for task in experiment.controller.tasks}["trunk"]
     frame = state.frame("base_link")
     assert trunk.followed.sample(0.0).rotation == pytest.approx(frame.rotation)
