@@ -357,14 +357,7 @@ class ChangeContact(Change, type="contact"):
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the contact; see `Change.apply`."""
-        there = {each.contact.name: k for k, each in enumerate(setup.contacts)}
-        if self.contact not in there:
-            raise ControllerError(
-                f"there is no contact {self.contact!r}"
-                f"{did_you_mean(self.contact, there)} "
-                f"(there are {listing(there) or 'none'})"
-            )
-        contacts, k = list(setup.contacts), there[self.contact]
+        contacts, k = list(setup.contacts), setup.find_contact(self.contact)
         presence = contacts[k].presence.then(self.at, self.ramp, float(self.bears))
         contacts[k] = replace(contacts[k], presence=presence)
         return replace(setup, contacts=tuple(contacts))

@@ -1,12 +1,11 @@
 """The controller: from tasks, a null-space field and a metric to one effort."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
-from itertools import pairwise, takewhile
 from math import isfinite
 from threading import Lock
-from typing import Any, overload
+from typing import Any, NoReturn, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,56 +13,35 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
     ControllerError,
-    FieldError,
     ImmutableError,
     NonFiniteError,
 )
-from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation
 from hsp_control.control.actuation.status import RELAXED
 from hsp_control.control.changes import Change, Changes
-from hsp_control.control.composition import (
-    Base,
-    check_kind,
-    check_support,
-    check_tasks,
-    checked_gain,
-    priority_of,
-)
-from hsp_control.control.evolution import PRESENT, Evolution
+from hsp_control.control.composition import Base, priority_of
+from hsp_control.control.declared import Declared
+from hsp_control.control.explanation import flow_of, raise_not_finite
+from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.held_gains import check_held
+from hsp_control.control.mixture import Mixture
 from hsp_control.control.output import ControlOutput, Diagnostics
-from hsp_control.control.planned_contact import PlannedContact
-from hsp_control.control.planned_limits import PlannedLimits
 from hsp_control.control.read_only import read_only
-from hsp_control.control.setup import (
-    PlannedTask,
-    PlannedTerm,
-    Setup,
-    levels_of,
-    planned_task,
-)
-from hsp_control.control.stiffening import changes_impedance, next_numbers
-from hsp_control.declaration import within
-from hsp_control.declaration.nested import parts_within, with_parts_replaced
+from hsp_control.control.time_line import TimeLine
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
-from hsp_control.law import Outcome, Resolution
-from hsp_control.law.outcome import DAMPED, EXACT, NOT_FINITE
-from hsp_control.null_space.fields import NullSpaceField, Rest
-from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.metrics import IdentityMetric, Metric
-from hsp_control.null_space.metrics.metric import CONSTANT
+from hsp_control.law import Outcome
+from hsp_control.law.outcome import DAMPED, NOT_FINITE
+from hsp_control.null_space.fields import NullSpaceField
+from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task, TaskSample
 from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.gains import as_gain
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.task import Feedback, InForce
-from hsp_control.trajectories.streams.stream import Streamed
 
 AccelerationModifier = Callable[
     [RobotState, ActiveStack, Array], tuple[Array, Array | None]
@@ -139,165 +117,92 @@ class Controller:
             HspControlError: If a part does not fit the robot; the message contains its
                 key path.
         """
-        if not 0.0 < singularity_threshold < np.inf:
-            raise ControllerError(
-                f"singularity_threshold is {singularity_threshold}; must be positive"
-            )
-        self._robot = robot
-        self._declared_tasks = tuple(tasks)
-        self._declared_field = Rest() if field is None else field
-        self._declared_limits = limits
-        self._declared_contacts = tuple(contacts)
-        self._declared_metric = IdentityMetric() if metric is None else metric
-        for task in self._declared_tasks:
-            check_kind("tasks contains", task, Task)
-        for contact in self._declared_contacts:
-            check_kind("contacts contains", contact, Contact)
-        check_kind("field is", self._declared_field, NullSpaceField)
-        check_kind("metric is", self._declared_metric, Metric)
-        if limits is not None:
-            check_kind("limits is", limits, Limits)
-        self._base = base
-        self._scene = scene if isinstance(scene, Scene) else Scene(scene)
-        self._threshold = float(singularity_threshold)
-        self._changes = tuple(changes)
-        self._given_start = None
-        if start is not None:
-            self._given_start = robot.check_configuration(start).copy()
-        check_support(robot, self._declared_contacts, base)
-        with within("null_space", "gain"):
-            self._declared_gain = as_gain(null_space_gain, "null_space_gain")
-        self._allocate()
+        self._declared = Declared.checked(
+            robot,
+            tasks,
+            field,
+            null_space_gain,
+            metric,
+            singularity_threshold,
+            limits,
+            contacts,
+            base,
+            scene,
+            start,
+        )
+        self._allocate(changes)
 
-    def _allocate(self) -> None:
+    def _allocate(self, changes: Sequence[Change]) -> None:
         """Set up what a copy has of its own, and compose the parts."""
-        robot = self._robot
+        robot, given = self._declared.robot, self._declared.start
         self._lock = Lock()
         self._state = RobotState(robot)
-        self._modified, self._mixed = np.zeros((2, robot.nv))
-        self._gain = np.zeros((robot.nv, robot.nv))
-        self._feedback: dict[int, InForce] = {}
-        self._waiting: dict[int, Array] = {}
-        self._by_key: dict[int, Task] = {}
-        self._stacks: dict[tuple[int, ...], ActiveStack] = {}
-        self._field: NullSpaceField = Rest()
+        self._modified = np.zeros(robot.nv)
+        self._gains = GainsInForce(robot.nv)
         self._now, self._begun = -np.inf, False
-        q = robot.home() if self._given_start is None else self._given_start
+        q = robot.home() if given is None else given
         state = robot.state(0.0, q, np.zeros(robot.nv))
-        self._compose(Start(state, self._scene, known=self._given_start is not None))
+        start = Start(state, self._declared.scene, known=given is not None)
+        self._compose(start, changes)
 
-    # -- composition ------------------------------------------------------------------
+    # -- what counts at a time --------------------------------------------------------
 
-    def _compose(self, start: Start) -> None:
+    def _compose(self, start: Start, changes: Sequence[Change]) -> None:
         """Place all parts, and apply the changes."""
-        robot = self._robot
-        tasks = []
-        for task in self._declared_tasks:
-            with within("tasks", task.name):
-                tasks.append(task.placed(start))
-        with within("tasks"):
-            check_tasks(tasks, robot)
-        with within("null_space", "metric"):
-            metric = self._declared_metric.placed(start)
-        with within("null_space", "gain"):
-            gain = checked_gain(self._declared_gain, robot, metric)
-        fields = []
-        for k, term in enumerate(terms_of(self._declared_field)):
-            with within("null_space", "fields", k):
-                _refuse_streams(term)
-                fields.append(PlannedTerm(term.placed(start), PRESENT))
-        contacts = []
-        for contact in self._declared_contacts:
-            with within("contacts", contact.name):
-                contacts.append(PlannedContact(contact.placed(start), PRESENT))
-        limits: RobotLimits | None = None
-        if self._declared_limits is not None:
-            with within("limits"):
-                limits = self._declared_limits.placed(start)
-        planned = PlannedLimits.of(limits, robot)
-        self._actuation = Actuation(
-            robot, planned, () if self._base == "driven" else robot.unactuated
+        placed, robot = self._declared.placed(start), self._declared.robot
+        driven = self._declared.base == "driven"
+        unactuated = () if driven else robot.unactuated
+        self._actuation = Actuation(robot, placed.limits, unactuated)
+        time_line = TimeLine.of(placed, changes)
+        self._mixture = Mixture(
+            self._state,
+            self._actuation,
+            self._gains,
+            time_line.setup,
+            self._declared.threshold,
         )
-        self._start = start
-        self._settled = Setup(
-            start,
-            metric,
-            tuple(planned_task(k, task, PRESENT) for k, task in enumerate(tasks)),
-            tuple(fields),
-            Evolution(gain),
-            tuple(contacts),
-            planned,
-            len(tasks),
-        )
-        # In order of time: a change may refer to what an earlier one has made.
-        order = sorted(range(len(self._changes)), key=lambda k: self._changes[k].at)
-        setup, placed = self._settled, []
-        for k in order:
-            with within("changes", k):
-                placed.append(self._changes[k].placed(start, setup))
-                setup = placed[-1].apply(setup)
-        self._stacks.clear()
-        self._field = Rest()  # an equal one may have a stream of the last run
-        self._install(setup)
-        self._open = tuple(placed)
+        self._follow(time_line)
 
-    def _install(self, setup: Setup) -> None:
-        """Let the steps follow a setup; what stays the same is not compiled again."""
-        self._setup = setup
-        field = setup.field
-        if field != self._field:
-            self._field = field
-            self._stacks.clear()
-        known = {id(task): self._feedback[key] for key, task in self._by_key.items()}
-        by_key = {each.key: each.task for each in setup.tasks}
-        if any(self._by_key.get(key, task) is not task for key, task in by_key.items()):
-            self._stacks.clear()
-        self._feedback = {
-            key: known.get(id(task)) or self._feedback_of(key, task)
-            for key, task in by_key.items()
-        }
-        self._by_key = by_key
-        self._written: set[int] = set()
-        self._fading = [each for each in setup.tasks if not each.always]
-        self._stiffening = any(
-            changes_impedance(each.task, each.gains) for each in setup.tasks
-        )
-        self._levels = levels_of(setup.tasks, self._robot)
-        self._steady = setup.steady and setup.end == -np.inf
-        self._active: ActiveStack | None = None
-        self._actuation.plan(setup.limits, self._latest)
-        self._write_gains(self._latest)
-
-    def _feedback_of(self, key: int, task: Task) -> InForce:
-        """Return the feedback of a task that is new, or follows a new trajectory."""
-        old = self._by_key.get(key)
-        if old is not None and old.name == task.name and old.rows == task.rows:
-            return self._feedback[key]
-        return task.in_force()
-
-    def _write_gains(self, t: float) -> None:
-        """Write the gains of a time; every step reads these arrays."""
-        for each in self._setup.tasks:
-            if not (each.gains.constant and each.key in self._written):
-                numbers = self._waiting.get(each.key)
-                numbers = each.gains.at(t) if numbers is None else numbers
-                self._feedback[each.key].numbers[:] = numbers
-        self._written = set(self._by_key)
-        self._gain[:] = self._setup.gain.at(t)
+    def _follow(self, time_line: TimeLine) -> None:
+        """Let the steps follow a time line."""
+        self._time_line, self._setup = time_line, time_line.setup
+        exchanged = self._gains.plan(self._setup, self._latest)
+        self._mixture.plan(self._setup, exchanged=exchanged)
+        self._actuation.plan(self._setup.limits, self._latest)
 
     @property
     def _latest(self) -> float:
         """The latest time of a step [s]; -inf before the first one."""
         return max(self._now, self._state.t) if self._begun else -np.inf
 
-    def _begin(self, state: RobotState) -> None:
+    def _here(self) -> Start:
+        """Return where the robot was at the last step."""
+        state = self._state
+        here = self._declared.robot.state(state.t, state.q, state.v)
+        return Start(here, self._setup.start.scene)
+
+    def _begin(self) -> None:
         """Place what is relative at the first state, unless a start was given."""
-        if self._given_start is None:
-            here = self._robot.state(state.t, state.q, state.v)
+        if self._declared.start is None:
+            here = self._here()._replace(scene=self._declared.scene)
             last_effort = self._actuation.memory()
-            self._compose(Start(here, self._scene))
+            self._compose(here, self._time_line.made)
             self._actuation.remember(last_effort)
         self._begun = True
+
+    def _resolve(self) -> tuple[Array, Outcome]:
+        """Return the law's acceleration for what counts now, and its outcome."""
+        t = self._state.t
+        if not self._begun:
+            self._begin()
+        self._now = max(self._now, t)
+        opened = self._time_line.open
+        if opened:
+            if self._now > opened[0].end + _MEMORY:
+                self._follow(self._time_line.settled_at(self._now - _MEMORY))
+            self._gains.write(t)
+            self._actuation.update_limits(t)
+        return self._mixture.resolve(t)
 
     # -- the step ---------------------------------------------------------------------
 
@@ -353,15 +258,16 @@ class Controller:
                 state.update(t, q, v)  # type: ignore[arg-type]
             elif t is not state:
                 self._adopt(t)
-            active = self._active
-            if active is None or not self._steady:
-                a, outcome = self._mix()
+            mixture = self._mixture
+            active = mixture.active
+            if active is None or not mixture.steady:
+                a, outcome = self._resolve()
                 active = self.active_stack
             else:
                 outcome = active.resolve(state.t)
                 a = active.acceleration
             if outcome is NOT_FINITE:
-                self._explain_non_finite()
+                self._raise_not_finite()
             offset = None
             if modifier is not None:
                 self._modified[:], offset = modifier(state, active, a)
@@ -373,7 +279,7 @@ class Controller:
             self._actuation.delivered = a
             # The kernel of limited steps has looked at all efforts already.
             if (status is RELAXED or offset is not None) and not isfinite(tau @ tau):
-                self._explain_non_finite()
+                self._raise_not_finite()
             # By name, and without a call of nine arguments, which costs 1 µs.
             if out is None:
                 out = ControlOutput()
@@ -398,10 +304,10 @@ class Controller:
                 "compute needs t, q and v, or a RobotState; got "
                 f"{type(state).__name__} alone"
             )
-        if state.robot is not self._robot:
+        if state.robot is not self._declared.robot:
             raise ControllerError(
                 f"the state is of another robot object ({state.robot.name}); "
-                f"this controller is for {self._robot.name}"
+                f"this controller is for {self._declared.robot.name}"
             )
         self._state.update(state.t, state.q, state.v)
 
@@ -428,14 +334,14 @@ class Controller:
             or tau.dtype != own.dtype
             or not isfinite(tau @ tau)
         ):
-            tau = self._robot.check_tangent(tau, "effort tau")
+            tau = self._declared.robot.check_tangent(tau, "effort tau")
         if not isfinite(period):
             raise NonFiniteError(f"period is {period}; needs a finite number")
         if not period > 0.0:
             raise ControllerError(f"period is {period} s; must be positive")
         self._actuation.applied(self._state, tau, period)
-        if self._stiffening or self._waiting:
-            self._wait(period)
+        if self._gains.stiffening:
+            self._gains.wait(self.active_stack, self._state.t, period)
 
     def disturbed(self, acceleration: ArrayLike) -> None:
         """Store an acceleration that something else than the efforts causes.
@@ -452,35 +358,8 @@ class Controller:
             ShapeError: If it has another shape.
             NonFiniteError: If it contains NaN or inf.
         """
-        known = self._robot.check_tangent(acceleration, "acceleration")
+        known = self._declared.robot.check_tangent(acceleration, "acceleration")
         self._actuation.disturbed(known)
-
-    def _wait(self, period: float) -> None:
-        """Let changes of impedances wait where they would add energy."""
-        t, active = self._state.t, self.active_stack
-        for each in self._setup.tasks:
-            changes = each.key in self._waiting or changes_impedance(
-                each.task, each.gains
-            )
-            rows = active.task_rows.get(each.task.name)
-            if not changes or rows is None:
-                continue
-            in_force, sample = self._feedback[each.key], active.rows
-            following = next_numbers(
-                in_force.numbers,
-                each.gains,
-                in_force.mobility,
-                sample.error[rows],
-                sample.error_rate[rows],
-                t,
-                period,
-            )
-            if following is None:
-                self._waiting.pop(each.key, None)
-                following = each.gains.at(t + period)
-            else:
-                self._waiting[each.key] = following
-            in_force.numbers[:] = following
 
     def restart(self) -> None:
         """Begin anew: forget the last effort, the offsets of tasks, and where it began.
@@ -490,89 +369,11 @@ class Controller:
         with self._lock:
             self._actuation.forget()
             self._now, self._begun = -np.inf, False
-            self._waiting.clear()
-            self._active = None  # the next step places what is relative
-            for in_force in self._feedback.values():
-                in_force.feedback.offset[:] = 0.0
-            if self._changes or any(each.task.remembers for each in self._setup.tasks):
-                self._compose(self._start)
-
-    def _mix(self) -> tuple[Array, Outcome]:
-        """Return the law's acceleration for the tasks that are active, and its outcome.
-
-        A task that fades in or out has a weight between 0 and 1. With w1 ≥ w2 ≥ ... the
-        weights of such tasks, the acceleration is
-
-            (1 - w1) a{} + (w1 - w2) a{1} + (w2 - w3) a{1, 2} + ...
-
-        with a{...} the law for the tasks of weight 1 and those in the braces. It is
-        continuous in the weights. The rows of the tasks in all sets are linear in a, so
-        that these tasks keep their exact error equation throughout.
-        """
-        t = self._state.t
-        if not self._begun:
-            self._begin(self._state)
-        self._now = max(self._now, t)
-        if self._open:
-            if self._now > self._open[0].end + _MEMORY:
-                self._settle(self._now - _MEMORY)
-            self._write_gains(t)
-            self._actuation.update_limits(t)
-        weights = {each.key: each.weight(t) for each in self._fading}
-        coming = sorted(
-            (key for key, w in weights.items() if 0.0 < w < 1.0),
-            key=lambda key: -weights[key],
-        )
-        off = {key for key, w in weights.items() if w < 1.0}
-        shares = [1.0, *(weights[key] for key in coming), 0.0]
-        mixed = self._mixed
-        mixed[:] = 0.0
-        outcome = EXACT
-        for k, (share, following) in enumerate(pairwise(shares)):
-            active = self._stack_without(t, off - set(coming[:k]))
-            self._active = active
-            outcome = max(outcome, active.resolve(t))
-            a = active.resolution.acceleration
-            if not coming:
-                break
-            mixed += (share - following) * a
-            a = mixed
-        return a, outcome
-
-    def _settle(self, t: float) -> None:
-        """Forget the changes that were complete at a time, and all changes before."""
-        done = list(takewhile(lambda each: each.end <= t, self._open))
-        self._settled = _applied(done, self._settled).settled(t)
-        self._open = self._open[len(done) :]
-        self._install(_applied(self._open, self._settled))
-
-    def _stack_without(self, t: float, off: Set[int]) -> ActiveStack:
-        """Return the stack of the contacts that are active now, without some tasks."""
-        bearing = [each for each in self._setup.contacts if each.active(t)]
-        return self._stack_of(bearing, off)
-
-    def _stack_of(
-        self, bearing: Sequence[PlannedContact], off: Set[int]
-    ) -> ActiveStack:
-        """Return the stack of some contacts, without some tasks."""
-        on = [each.key for each in self._setup.tasks if each.key not in off]
-        # By identity: to compare values would cost more than the step.
-        key = (*map(id, bearing), -1, *on, id(self._field))
-        if key not in self._stacks:
-            stack = ActiveStack(
-                self._state,
-                self._actuation.support(bearing),
-                [[each for each in level if each.key in on] for level in self._levels],
-                self._feedback,
-                self._actuation.base,
-                self._setup.metric,
-                self._field,
-                self._gain,
-                self._threshold,
-            )
-            self._actuation.prepare(self._state, stack.resolution, stack.support)
-            self._stacks[key] = stack
-        return self._stacks[key]
+            self._gains.forget()
+            self._mixture.active = None  # the next step places what is relative
+            made = self._time_line.made
+            if made or any(each.task.remembers for each in self._setup.tasks):
+                self._compose(self._time_line.start, made)
 
     def prepare(
         self,
@@ -592,10 +393,7 @@ class Controller:
         with self._lock:
             if state is not self._state:
                 self._adopt(state)
-            setup = self._setup
-            bearing = [c for c in setup.contacts if c.contact.name not in lifted]
-            off = {each.key for each in setup.tasks if each.task.name in without}
-            self._stack_of(bearing, off).prepare()
+            self._mixture.prepare(self._mixture.stack_without(lifted, without))
 
     # -- changes while running --------------------------------------------------------
 
@@ -619,33 +417,24 @@ class Controller:
             HspControlError: If its parts do not fit the robot.
         """
         with self._lock:
-            start, now = self._start, self._latest
+            here, now = None, self._latest
             if self._begun:
                 change = replace(change, at=max(change.at, now))
-                state = self._state
-                here = self._robot.state(state.t, state.q, state.v)
-                start = Start(here, self._setup.start.scene)
-            earlier = [each for each in self._open if each.at <= change.at]
-            placed = change.placed(start, _applied(earlier, self._settled))
-            opened = _in_order((*self._open, placed))
-            setup = _applied(opened, self._settled)
+                here = self._here()
+            time_line = self._time_line.with_change(change, here)
             if self._actuation.period:
-                check_held(self._setup, setup, start.state, self._actuation.period)
-            self._install(setup)
-            self._open = opened
-            made = placed if self._begun else change
-            self._changes = (*self._changes, made)
+                state = (here or time_line.start).state
+                check_held(self._setup, time_line.setup, state, self._actuation.period)
+            self._follow(time_line)
             if self._begun:  # compile now, not in a step
-                stack = self._stack_without(now, set())
-                stack.prepare()
-                self._actuation.prepare(self._state, stack.resolution, stack.support)
+                self._mixture.prepare(self._mixture.stack_at(now))
 
     # -- what it is made of -----------------------------------------------------------
 
     @read_only()
     def robot(self) -> Robot:
         """The robot."""
-        return self._robot
+        return self._declared.robot
 
     @read_only("use at(t).add(task) and at(t).remove(name)")
     def tasks(self) -> tuple[Task, ...]:
@@ -658,19 +447,19 @@ class Controller:
         now = self._latest
         levels = [
             tuple(each.task for each in level if each.presence.at(now) > 0.0)
-            for level in self._levels
+            for level in self._mixture.levels
         ]
         return tuple(level for level in levels if level)
 
     @read_only("use at(t).field(...)")
     def field(self) -> NullSpaceField:
         """The null-space field, placed; while it changes, all terms of old and new."""
-        return self._field
+        return self._mixture.field
 
     @read_only("use at(t).null_space_gain(...)")
     def null_space_gain(self) -> Array:
         """K_N in force, shape (nv, nv) [1/s]."""
-        return self._gain.copy()
+        return self._gains.null_space.copy()
 
     @read_only()
     def metric(self) -> Metric:
@@ -680,7 +469,7 @@ class Controller:
     @read_only()
     def singularity_threshold(self) -> float:
         """Singular value below which an inverse is bounded instead of exact."""
-        return self._threshold
+        return self._declared.threshold
 
     @read_only("use at(t).limits(...)")
     def limits(self) -> RobotLimits | None:
@@ -695,7 +484,7 @@ class Controller:
     @read_only()
     def base(self) -> Base | None:
         """What else than contacts acts on a floating base."""
-        return self._base
+        return self._declared.base
 
     @read_only("use at(t).obstacle(name, center)")
     def scene(self) -> Scene:
@@ -705,7 +494,7 @@ class Controller:
     @read_only("use at(t)")
     def changes(self) -> tuple[Change, ...]:
         """All changes that were made, in order of their times."""
-        return tuple(sorted(self._changes, key=lambda each: each.at))
+        return tuple(sorted(self._time_line.made, key=lambda each: each.at))
 
     @read_only("call compute")
     def state(self) -> RobotState:
@@ -735,22 +524,14 @@ class Controller:
         Raises:
             ControllerError: If there is no such task.
         """
-        planned = self._present(task)
-        now = planned.task.linear_feedback(state, self._feedback[planned.key])
+        planned = self._setup.present_task(task, self._latest)
+        now = planned.task.linear_feedback(state, self._gains.feedback[planned.key])
         found = {-np.inf: now}
         for each in planned.gains.transitions:
             later = planned.task.in_force()
             later.numbers[:] = each.target
             found[each.end] = planned.task.linear_feedback(state, later)
         return found
-
-    def _present(self, task: str) -> PlannedTask:
-        """Return the task of a name that counts now, or is to come."""
-        now = self._latest
-        for each in self._setup.tasks:
-            if each.task.name == task and each.presence.at(now) > 0.0:
-                return each
-        return self._setup.tasks[self._setup.find_task(task)]
 
     def stiffness(self, task: str) -> Array:
         """Return the stiffness K in force of a task with an impedance, shape (m, m).
@@ -760,13 +541,13 @@ class Controller:
         Raises:
             ControllerError: If there is no such task, or it has no impedance.
         """
-        planned = self._present(task)
+        planned = self._setup.present_task(task, self._latest)
         if impedance_of(planned.task) is None:
             raise ControllerError(f"task {task!r} has gains, and no stiffness")
-        return parts_of(self._feedback[planned.key].numbers)[0].copy()
+        return parts_of(self._gains.feedback[planned.key].numbers)[0].copy()
 
     def _in_force(self, task: str) -> InForce:
-        return self._feedback[self._setup.tasks[self._setup.find_task(task)].key]
+        return self._gains.feedback[self._setup.tasks[self._setup.find_task(task)].key]
 
     def weight_of(self, task: str, t: float) -> float:
         """Return how much a task counts at time t [s], in [0, 1].
@@ -782,13 +563,7 @@ class Controller:
         Raises:
             ControllerError: If there is no such contact.
         """
-        there = {each.contact.name: each for each in self._setup.contacts}
-        if contact not in there:
-            raise ControllerError(
-                f"there is no contact {contact!r}{did_you_mean(contact, there)} "
-                f"(there are {listing(there) or 'none'})"
-            )
-        return there[contact].weight(t)
+        return self._setup.contacts[self._setup.find_contact(contact)].weight(t)
 
     def priority_of(self, task: str) -> int:
         """Return the priority of a task, 1 the highest.
@@ -797,7 +572,7 @@ class Controller:
             ControllerError: If there is no such task.
         """
         planned = self._setup.tasks[self._setup.find_task(task)]
-        return priority_of(planned.task, self._robot)
+        return priority_of(planned.task, self._declared.robot)
 
     # -- what explains it -------------------------------------------------------------
 
@@ -808,16 +583,17 @@ class Controller:
         Raises:
             ControllerError: If there was none yet.
         """
-        if self._active is None:
+        active = self._mixture.active
+        if active is None:
             raise ControllerError("nothing has been computed yet")
-        return self._active
+        return active
 
     def stack(self, state: RobotState) -> TaskSample:
         """Return the rows of all active contacts and tasks at a state."""
         with self._lock:
             if state is not self._state:
                 self._adopt(state)
-            self._mix()
+            self._resolve()
             return self.active_stack.rows
 
     @read_only("call compute")
@@ -831,7 +607,7 @@ class Controller:
         resolution = active.resolution
         singular_values, manipulability = resolution.spectrum(active.first_task_row)
         return Diagnostics(
-            self._field.value(self._state),
+            self.field.value(self._state),
             resolution.null_space_norm(),
             singular_values,
             manipulability,
@@ -844,45 +620,13 @@ class Controller:
         (13) over a metric; Liégeois 1977). So it shows what a field will do, and a
         start with this velocity has no transient.
         """
-        nv, state = self._robot.nv, self._state
-        self.compute(t, q, np.zeros(nv))
-        active = self.active_stack
-        problem = active.resolution.problem
-        # At rest, without drift and with unit gain the law's acceleration is the flow.
-        flow = Resolution(
-            np.diff(active.resolution.ends, prepend=0).tolist(),
-            nv,
-            min(self.metric.form, CONSTANT),
-            np.eye(nv),
-            self._threshold,
+        self.compute(t, q, np.zeros(self.robot.nv))
+        return flow_of(
+            self.active_stack, self._state, self.metric, self.singularity_threshold
         )
-        flow.problem.task.jacobian[:] = active.rows.jacobian
-        for level in active.levels:
-            for task in level:
-                rate = task.reference_rate(state)
-                flow.problem.task.acceleration[active.task_rows[task.name]] = rate
-        flow.problem.field.g[:] = problem.field.g
-        flow.problem.metric.W[:], flow.problem.metric.L[:] = problem.metric[:2]
-        return flow.resolve(state.v).acceleration
 
-    def _explain_non_finite(self) -> None:
-        state = self._state
-        part = self.active_stack.not_finite()
-        if part is not None:
-            raise NonFiniteError(
-                f"{part} is not finite at t = {state.t:.6g} s; "
-                "does its trajectory return NaN or infinity there?"
-            )
-        problem = self.active_stack.resolution.problem
-        if not all(np.isfinite(array).all() for array in problem.field):
-            raise NonFiniteError(
-                f"field {self._field.name!r} is not finite at t = {state.t:.6g} s"
-            )
-        self._setup.metric.evaluate(state, problem.metric)  # may say what is wrong
-        raise NonFiniteError(
-            f"the effort is not finite at t = {state.t:.6g} s, "
-            f"q = {state.q.tolist()}, v = {state.v.tolist()}"
-        )
+    def _raise_not_finite(self) -> NoReturn:
+        raise_not_finite(self.active_stack, self._state, self.field, self.metric)
 
     def __setattr__(self, name: str, value: object) -> None:
         if not name.startswith("_") and not hasattr(type(self), name):
@@ -896,11 +640,8 @@ class Controller:
 
         It is of the same robot object. What its streams hear counts for it alone.
         """
-        other = deepcopy(self, {id(self._robot): self._robot})
-        other._declared_tasks = tuple(
-            with_parts_replaced(task, Streamed, Streamed.preview)
-            for task in self._declared_tasks
-        )
+        other = deepcopy(self, {id(self._declared.robot): self._declared.robot})
+        other._declared = other._declared.preview()
         other.restart()
         return other
 
@@ -909,70 +650,20 @@ class Controller:
     def __getstate__(self) -> dict[str, Any]:
         state = self._state
         return {
-            "declared": {name: getattr(self, name) for name in _DECLARED},
+            "declared": self._declared,
+            "time_line": self._time_line,
             "begun": self._begun,
-            "start": self._start,
-            "settled": self._settled,
-            "open": self._open,
             "now": self._now,
-            "waiting": {k: each.copy() for k, each in self._waiting.items()},
             "at": (state.t, state.q.copy(), state.v.copy()),
-            "offsets": {
-                k: each.feedback.offset.copy() for k, each in self._feedback.items()
-            },
+            "gains": self._gains.memory(),
             "last_effort": self._actuation.memory(),
         }
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
-        vars(self).update(saved["declared"])
-        self._allocate()
-        self._start, self._settled = saved["start"], saved["settled"]
-        self._open, self._begun, self._now = saved["open"], saved["begun"], saved["now"]
-        self._waiting = saved["waiting"]
-        self._install(_applied(self._open, self._settled))
-        for key, offset in saved["offsets"].items():
-            self._feedback[key].feedback.offset[:] = offset
+        self._declared = saved["declared"]
+        self._allocate(())
+        self._begun, self._now = saved["begun"], saved["now"]
+        self._follow(saved["time_line"])
+        self._gains.remember(saved["gains"])
         self._state.update(*saved["at"])
         self._actuation.remember(saved["last_effort"])
-
-
-_DECLARED = (
-    "_base",
-    "_changes",
-    "_declared_contacts",
-    "_declared_field",
-    "_declared_gain",
-    "_declared_limits",
-    "_declared_metric",
-    "_declared_tasks",
-    "_given_start",
-    "_robot",
-    "_scene",
-    "_threshold",
-)
-"""The attributes from which all others are made."""
-
-
-def _refuse_streams(field: NullSpaceField) -> None:
-    """Raise for a field that a stream leads from the start: only a change's is logged.
-
-    Raises:
-        FieldError: If there is one.
-    """
-    if any(True for _ in parts_within(field, Streamed)):
-        raise FieldError(
-            "a stream cannot lead a field from the start; while the controller runs, "
-            "controller.at(t).field(...) with a stream does"
-        )
-
-
-def _in_order(changes: Iterable[Change]) -> tuple[Change, ...]:
-    """Return changes in order of time; those of one time in their order."""
-    return tuple(sorted(changes, key=lambda change: change.at))
-
-
-def _applied(changes: Iterable[Change], setup: Setup) -> Setup:
-    """Return the setup with changes, in order of time."""
-    for change in _in_order(changes):
-        setup = change.apply(setup)
-    return setup

@@ -141,6 +141,31 @@ class Setup:
             )
         return there[name]
 
+    def present_task(self, name: str, t: float) -> PlannedTask:
+        """Return the task of a name that counts at time t [s], or is to come.
+
+        Raises:
+            ControllerError: If there is none.
+        """
+        for each in self.tasks:
+            if each.task.name == name and each.presence.at(t) > 0.0:
+                return each
+        return self.tasks[self.find_task(name)]
+
+    def find_contact(self, name: str) -> int:
+        """Return the index of the contact that has a name.
+
+        Raises:
+            ControllerError: If there is none.
+        """
+        there = {each.contact.name: k for k, each in enumerate(self.contacts)}
+        if name not in there:
+            raise ControllerError(
+                f"there is no contact {name!r}{did_you_mean(name, there)} "
+                f"(there are {listing(there) or 'none'})"
+            )
+        return there[name]
+
     def with_task(self, index: int, **changes: Any) -> "Setup":
         """Return the setup with some attributes of one `PlannedTask` replaced."""
         tasks = list(self.tasks)

@@ -284,7 +284,7 @@ def test_a_hand_that_is_held_becomes_softer_at_once() -> None:
     for _ in range(3):  # all else goes on
         controller.at(6.0).ramp(0.1).null_space_gain(5.0)
     hold(6.0, 8.0)
-    assert len(controller._open) == 0
+    assert len(controller._time_line.open) == 0
 
 
 @pytest.mark.parametrize("seed", range(20))

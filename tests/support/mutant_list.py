@@ -175,9 +175,9 @@ MUTANTS = (
     ),
     Mutant(
         "gains: Kv is not ramped",
-        CONTROL + "controller.py",
-        "self._feedback[each.key].numbers[:] = numbers",
-        "self._feedback[each.key].numbers[0] = numbers[0]",
+        CONTROL + "gains_in_force.py",
+        "self.feedback[each.key].numbers[:] = numbers",
+        "self.feedback[each.key].numbers[0] = numbers[0]",
         UNIT + "tasks/test_gains.py",
     ),
     Mutant(
