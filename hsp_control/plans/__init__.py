@@ -3,5 +3,7 @@
 from .plan import Plan as Plan
 from .plan import PlanParts as PlanParts
 from .plan import RunningPlan as RunningPlan
+from .sensed import Sensed as Sensed
+from .sensed import SensedContact as SensedContact
 from .trot import Trot as Trot
 from .walk import Walk as Walk
