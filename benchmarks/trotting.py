@@ -59,7 +59,7 @@ def configuration(
             "ground": {"friction": 0.7},
             "sensors": {"imu": trunk, **(NOISE if estimated else {})},
         },
-        **({"estimator": {}} if estimated else {}),
+        **({"estimators": {"base": True}} if estimated else {}),
     }
 
 

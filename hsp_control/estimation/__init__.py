@@ -1,6 +1,8 @@
-"""Estimation: where a floating base is, from what can be measured on board."""
+"""Estimation: what is not measured of a robot, from what is."""
 
 from .base_estimator import BaseEstimator as BaseEstimator
-from .base_estimator import RunningEstimator as RunningEstimator
-from .contact_observer import ContactObserver as ContactObserver
-from .contact_observer import RunningContactObserver as RunningContactObserver
+from .contact_forces import ContactForces as ContactForces
+from .estimator import Estimator as Estimator
+from .estimator import Estimators as Estimators
+from .estimator import RunningEstimator as RunningEstimator
+from .estimator import begun as begun

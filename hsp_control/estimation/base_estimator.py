@@ -1,6 +1,7 @@
 """The pose and the velocity of a floating base, from what is measured on board."""
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,8 +16,8 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Inertial, Measurement
-from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Positive
+from hsp_control.estimation.estimator import Estimator, RunningEstimator
 from hsp_control.estimation.invariant_filter import (
     ACCELEROMETER,
     FIXED,
@@ -31,7 +32,7 @@ from hsp_control.estimation.invariant_filter import (
 from hsp_control.estimation.leg_kinematics import LegKinematics, Seen, rolled
 
 
-class BaseEstimator(Part, error=EstimationError):
+class BaseEstimator(Estimator, type="base"):
     """The base is estimated from an inertial measurement unit and the legs' joints.
 
     By the contact-aided invariant extended Kalman filter
@@ -42,6 +43,8 @@ class BaseEstimator(Part, error=EstimationError):
     nothing on board observes them. The noise is that of a small industrial unit, the
     ADIS16448, as in the EuRoC data set (Burri et al. 2016, Int. J. Robotics Research).
     """
+
+    stage: ClassVar[float] = 10.0
 
     gyroscope_noise: Positive = 1.7e-4
     """Density of the gyroscope's white noise [rad/s/√Hz]."""
@@ -71,27 +74,17 @@ class BaseEstimator(Part, error=EstimationError):
 
     def begin(
         self, controller: Controller, inertial: Inertial | None
-    ) -> "RunningEstimator":
-        """Return what estimates, for one run.
-
-        Args:
-            controller: The controller, whose contacts bear the robot.
-            inertial: A reading of the robot's unit, which says where that is; None:
-                there is no unit.
-
-        Raises:
-            EstimationError: If there is no unit, no floating base, or no contact.
-            FrameNotFoundError: If the robot has no such frame.
-        """
+    ) -> "RunningBaseEstimator":
+        """Return what estimates; see `Estimator.begin`."""
         if inertial is None:
             raise EstimationError(
                 "no inertial measurement unit is there; add one to the plant, for "
                 "example plant.sensors: {imu: base_link}"
             )
-        return RunningEstimator(self, controller, inertial.frame)
+        return RunningBaseEstimator(self, controller, inertial.frame)
 
 
-class RunningEstimator:
+class RunningBaseEstimator(RunningEstimator):
     """A `BaseEstimator` in one run.
 
     Attributes:
@@ -164,12 +157,7 @@ class RunningEstimator:
         return measured._replace(q=self._q, v=self._v)
 
     def log_channels(self, q: Array, v: Array) -> Mapping[str, LogChannel]:
-        """Return the last estimate and its errors.
-
-        Args:
-            q: The true configuration at that time, shape (nq,).
-            v: The true velocity, shape (nv,).
-        """
+        """Return the last estimate and its errors; see `RunningEstimator`."""
         assert self.filter is not None
         P = self.filter.covariance
         turn = np.zeros(3)

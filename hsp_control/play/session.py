@@ -13,6 +13,7 @@ from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.config import Experiment
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
+from hsp_control.estimation import begun
 from hsp_control.live.simulated_robot import sampled
 from hsp_control.play.handles import Handles
 from hsp_control.play.knobs import Knob
@@ -95,11 +96,8 @@ class Session:
         rows, plan = self._rows(), experiment.scenario.plan
         times = [k * self.row for k in range(rows)]
         running = None if plan is None else plan.begin(self.controller)
-        estimator = experiment.scenario.estimator
-        estimating = (
-            None
-            if estimator is None
-            else estimator.begin(self.controller, self._plant.inertial())
+        estimating = begun(
+            experiment.scenario.estimators, self.controller, self._plant.inertial()
         )
         self._loop: Iterator[Instant] = sampled_loop(
             self._command, self._plant, round(self.row / self.period), times,

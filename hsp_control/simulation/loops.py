@@ -84,7 +84,7 @@ def sampled_loop(
     q: Array,
     v: Array,
     plan: RunningPlan | None = None,
-    estimator: RunningEstimator | None = None,
+    estimators: Sequence[RunningEstimator] = (),
 ) -> Iterator[Instant]:
     """Yield the instants of a loop that holds each effort for a control period.
 
@@ -96,10 +96,10 @@ def sampled_loop(
         q: Start configuration, shape (nq,).
         v: Start velocity, shape (nv,).
         plan: Writes references and switches contacts, before each effort.
-        estimator: Estimates the base, for the plan and for the command.
+        estimators: Estimate what is not measured, for the plan and for the command.
 
     Raises:
-        EstimationError: If what the estimator needs is not measured.
+        EstimationError: If what an estimator needs is not measured.
         FallError: If the plan finds that the robot falls.
         SimulationError: If the motion diverges.
     """
@@ -114,14 +114,14 @@ def sampled_loop(
             t = start + k * (end - start) / periods
             measured = Measurement(count, t, *plant.measure(t, q, v))
             count += 1
-            if plan is not None or estimator is not None:
+            if plan is not None or estimators:
                 measured = measured._replace(
                     applied=tau,
                     wrenches=plant.contact_wrenches(t, q, v, tau),
                     inertial=plant.inertial(),
                 )
-            if estimator is not None:
-                measured = estimator.update(measured)
+            for each in estimators:
+                measured = each.update(measured)
             if plan is not None:
                 plan.update(measured)
             tau = command.effort(t, measured.q, measured.v, period).copy()
@@ -132,8 +132,8 @@ def sampled_loop(
                 channels = command.log_channels()
                 if plan is not None:
                     channels = {**channels, **plan.log_channels()}
-                if estimator is not None:
-                    channels = {**channels, **estimator.log_channels(q, v)}
+                for each in estimators:
+                    channels = {**channels, **each.log_channels(q, v)}
                 yield Instant(state, output, tau, channels)
             if end == start:  # the last row
                 return

@@ -18,7 +18,7 @@ def largest(run, name):
 def test_talos_takes_a_step_on_an_estimated_base():
     """One key turns it on; nothing else of the configuration changes."""
     given = ("plan.steps=1", "simulation.duration=2.2")
-    run = load_experiment("whole_body/talos_walk", "estimator={}", *given).run()
+    run = load_experiment("whole_body/talos_walk", "estimators.base=true", *given).run()
     assert run.status == "completed"
     assert run["plan.steps"][-1] == 1
     assert run["plan.phase"][-1] > 1
@@ -35,7 +35,7 @@ def test_talos_takes_a_step_on_an_estimated_base():
 
 @pytest.mark.slow
 def test_solo_trots_on_an_estimated_base_and_again_the_same(tmp_path):
-    given = ("estimator={}", "plan.until=0.6", "simulation.duration=1.2")
+    given = ("estimators.base=true", "plan.until=0.6", "simulation.duration=1.2")
     run = load_experiment("whole_body/solo12_trot", *given).run()
     assert run.status == "completed"
     assert run["plan.steps"][-1] >= 3

@@ -130,7 +130,7 @@ def test_a_push_that_fells_is_said():
 
 def test_the_page_s_yaml_and_python_run():
     text = (ROOT / "docs" / "plans.md").read_text(encoding="utf-8")
-    (yaml_text,) = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    yaml_text, _ = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     (snippet,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     assert len(yaml_text.splitlines()) <= 10
     data = yaml.safe_load(yaml_text)

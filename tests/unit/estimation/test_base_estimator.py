@@ -168,13 +168,15 @@ def test_what_does_not_fit_is_said():
     running = BaseEstimator().begin(experiment.controller, heard[0].inertial)
     with pytest.raises(EstimationError, match=r"at t = 0.002 s .* reported nothing"):
         running.update(heard[1]._replace(inertial=None))
-    with pytest.raises(SimulationError, match=r"an estimator estimates once a period"):
+    with pytest.raises(SimulationError, match=r"estimators estimate once a period"):
         simulate(experiment.controller, experiment.q0, duration=0.1,
-                 estimator=BaseEstimator())  # fmt: skip
+                 estimators=[BaseEstimator()])  # fmt: skip
 
 
 def test_a_configuration_without_a_unit_is_refused_at_its_key():
-    with pytest.raises(HspControlError, match=r"estimator: no inertial measurement un"):
-        load_experiment("whole_body/solo12_trunk", "estimator={}")
+    with pytest.raises(
+        HspControlError, match=r"estimators.base: no inertial measurement un"
+    ):
+        load_experiment("whole_body/solo12_trunk", "estimators.base=true")
     with pytest.raises(HspControlError, match=r"imu.frame: no frame 'base_lnk'; did y"):
         load_experiment("whole_body/solo12_trunk", "plant.sensors={imu: base_lnk}")

@@ -7,6 +7,7 @@ weight, as for constraint forces: J M⁻¹ Jᵀ w = J M⁻¹ r.
 """
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,21 +17,23 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.control.compensation.momentum_observer import RunningObserver
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import Measurement
-from hsp_control.declaration import Part
+from hsp_control.control.measurement import Inertial, Measurement
 from hsp_control.declaration.quantities import Flag, Positive
+from hsp_control.estimation.estimator import Estimator, RunningEstimator
 from hsp_control.robot import RobotState
 
 _SMALLEST = 1e-9
 """Eigenvalues below this share of the largest belong to wrenches that are not seen."""
 
 
-class ContactObserver(Part, error=EstimationError):
+class ContactForces(Estimator, type="contact_forces"):
     """Wrenches of contacts are estimated where nothing measures them.
 
     Joint friction, payloads and pushes elsewhere count as forces of contacts. A wrench
     that no motion feels (legs that are stretched) is estimated as zero.
     """
+
+    stage: ClassVar[float] = 20.0
 
     bandwidth: Positive = 100.0
     """Rate at which the estimate converges [1/s]."""
@@ -38,23 +41,21 @@ class ContactObserver(Part, error=EstimationError):
     """Whether measured wrenches are replaced, too [-]; by default only missing ones are
     estimated."""
 
-    def begin(self, controller: Controller) -> "RunningContactObserver":
-        """Return what estimates, for one run of a controller.
-
-        Raises:
-            EstimationError: If there are no contacts.
-        """
-        return RunningContactObserver(self, controller)
+    def begin(
+        self, controller: Controller, inertial: Inertial | None
+    ) -> "RunningContactForces":
+        """Return what estimates; see `Estimator.begin`."""
+        return RunningContactForces(self, controller)
 
 
-class RunningContactObserver:
-    """A `ContactObserver` in one run.
+class RunningContactForces(RunningEstimator):
+    """A `ContactForces` in one run.
 
     Attributes:
         wrenches: The estimates, by the name of the frame; see `Measurement.wrenches`.
     """
 
-    def __init__(self, observer: ContactObserver, controller: Controller) -> None:
+    def __init__(self, estimator: ContactForces, controller: Controller) -> None:
         """Begin with zeros.
 
         Raises:
@@ -63,12 +64,12 @@ class RunningContactObserver:
         if not controller.contacts:
             raise EstimationError(
                 "there are no contacts whose forces could be estimated; declare "
-                "contacts, or remove the observer"
+                "contacts, or remove the estimator"
             )
         robot = controller.robot
         self._contacts = tuple(controller.contacts)
-        self._instead = observer.instead
-        self._momentum = RunningObserver(observer.bandwidth, np.zeros(robot.nv))
+        self._instead = estimator.instead
+        self._momentum = RunningObserver(estimator.bandwidth, np.zeros(robot.nv))
         self._state = RobotState(robot)
         self._t = 0.0
         self.wrenches = {each.frame: np.zeros(6) for each in self._contacts}
@@ -93,8 +94,8 @@ class RunningContactObserver:
             estimated=measured.estimated | frozenset(missing),
         )
 
-    def log_channels(self) -> Mapping[str, LogChannel]:
-        """Return the estimated forces and moments."""
+    def log_channels(self, q: Array, v: Array) -> Mapping[str, LogChannel]:
+        """Return the estimated forces and moments; see `RunningEstimator`."""
         channels: dict[str, LogChannel] = {}
         for frame, wrench in self.wrenches.items():
             prefix = f"estimate.contact.{frame}"
@@ -110,7 +111,7 @@ class RunningContactObserver:
         """Distribute an external effort among the contacts."""
         rows = [_rows(each, state) for each in self._contacts]
         J = np.vstack(rows)
-        response = np.linalg.solve(_symmetric(state.mass_matrix), J.T)
+        response = np.linalg.solve(state.mass_matrix, J.T)
         values, vectors = np.linalg.eigh(J @ response)
         kept = values > _SMALLEST * values[-1]
         share = vectors[:, kept].T @ (response.T @ effort) / values[kept]
@@ -133,8 +134,3 @@ def _rows(contact: Contact, state: RobotState) -> Array:
     if contact.rows == 6:
         return J.copy()
     return np.asarray(J[:3] - np.cross(_arm(contact, state), J[3:], axis=0))
-
-
-def _symmetric(M: Array) -> Array:
-    """Return the whole of a matrix whose upper half is given."""
-    return np.asarray(np.triu(M) + np.triu(M, 1).T)
