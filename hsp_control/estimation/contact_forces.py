@@ -129,7 +129,7 @@ def _arm(contact: Contact, state: RobotState) -> Array:
 
 
 def _rows(contact: Contact, state: RobotState) -> Array:
-    """Return the Jacobian of what a contact can push: a point (3, nv), a sole (6, nv)."""
+    """Return the Jacobian of what a contact pushes: of a point or of a whole sole."""
     J = state.frame(contact.frame).jacobian
     if contact.rows == 6:
         return J.copy()
