@@ -89,7 +89,7 @@ class SensedContact(Part, error=PlanError):
 
 
 class Sensed(Plan, type="sensed"):
-    """Contacts are switched by what is felt: by measured or estimated forces, or height.
+    """Contacts are switched by what is felt: measured or estimated forces, or height.
 
     Everything else, tasks and their references, is as it is declared. A contact rises
     and fades over its ramp, so that efforts stay continuous.

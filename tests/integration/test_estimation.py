@@ -1,7 +1,11 @@
 """Robots walk and trot on an estimated base, with a noisy unit, on MuJoCo."""
 
+import re
+
 import numpy as np
 import pytest
+import yaml
+from places import ROOT
 
 from hsp_control import load_experiment
 
@@ -44,3 +48,13 @@ def test_solo_trots_on_an_estimated_base_and_again_the_same(tmp_path):
     again = load_experiment(run.save(tmp_path / "trot.npz")).run()
     assert np.array_equal(run.q, again.q)
     assert np.array_equal(run["estimate.base"], again["estimate.base"])
+
+
+def test_the_page_s_yaml_runs():
+    text = (ROOT / "docs" / "estimation.md").read_text(encoding="utf-8")
+    (given,) = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    data = yaml.safe_load(given)
+    data["simulation"]["duration"] = 0.05
+    run = load_experiment(data).run()
+    assert run.status == "completed"
+    assert "estimate.base" in run.columns

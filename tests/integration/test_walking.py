@@ -11,7 +11,7 @@ from places import ROOT
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.plans import Walk
+from hsp_control.plans import Sensed, Walk
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
@@ -130,12 +130,16 @@ def test_a_push_that_fells_is_said():
 
 def test_the_page_s_yaml_and_python_run():
     text = (ROOT / "docs" / "plans.md").read_text(encoding="utf-8")
-    yaml_text, _ = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    yaml_text, felt = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     (snippet,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     assert len(yaml_text.splitlines()) <= 10
     data = yaml.safe_load(yaml_text)
     data["simulation"]["duration"] = 0.05
     assert load_experiment(data).run().status == "completed"
+    without = "contacts.front_left.schedule=null", "tasks.foot.schedule=null"
+    plan = f"plan={yaml.safe_load(felt)['plan']}".replace("None", "null")
+    sensed = load_experiment("whole_body/solo12_swing", *without, plan)
+    assert isinstance(sensed.scenario.plan, Sensed)
     space: dict = {}
     exec(compile(snippet, "plans.md", "exec"), space)
     made = space["walk"].scenario

@@ -71,7 +71,8 @@ def test_it_ends_when_the_ground_is_gone_but_not_at_once():
 
 def test_what_is_not_wanted_fades_and_returns_only_when_it_is():
     experiment, running = told(
-        "{force: 2, wanted: [[null, 1], [2, null]], ramp: 0.1, starts: true, task: foot}"
+        "{force: 2, wanted: [[null, 1], [2, null]], ramp: 0.1, starts: true, "
+        "task: foot}"
     )
     contact, task = feel(experiment, running, 0.5, 9.0)
     assert contact.is_on
