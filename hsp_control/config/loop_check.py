@@ -26,7 +26,9 @@ def check_compensation(
             "[s], for example to 0.001",
         )
     with document.at("compensation"):
-        compensation.check(controller.robot, controller.tasks, controller.limits)
+        compensation.check(
+            controller.robot, controller.tasks, controller.limits, controller.contacts
+        )
 
 
 def check_rates(

@@ -1,8 +1,7 @@
 """Changes of a controller while it runs: events on one time line."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, replace
+from dataclasses import replace
 from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
@@ -10,8 +9,11 @@ from pydantic import AfterValidator
 
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.constraints.limits import Limits, LimitsOrNone
+from hsp_control.control.change import Change
 from hsp_control.control.composition import check_tasks, checked_gain
+from hsp_control.control.contact_changes import ChangeContact, ChangeForce
 from hsp_control.control.evolution import ABSENT
 from hsp_control.control.setup import (
     PlannedTerm,
@@ -21,7 +23,7 @@ from hsp_control.control.setup import (
 )
 from hsp_control.declaration import AnyOf, Part, within
 from hsp_control.declaration.nested import parts_within
-from hsp_control.declaration.quantities import Flag, Gain, NonNegative, Number
+from hsp_control.declaration.quantities import Gain, NonNegative
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.start import Start
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
@@ -36,7 +38,6 @@ from hsp_control.trajectories import (
     crossfade,
 )
 from hsp_control.trajectories.crossfade import AnyReference
-from hsp_control.trajectories.remembering import with_memories_copied
 from hsp_control.trajectories.streams.stream import (
     Streamed,
     stream_for,
@@ -47,6 +48,7 @@ __all__ = [
     "Change",
     "ChangeContact",
     "ChangeField",
+    "ChangeForce",
     "ChangeGains",
     "ChangeImpedance",
     "ChangeLimits",
@@ -58,47 +60,6 @@ __all__ = [
     "MoveObstacle",
     "RemoveTask",
 ]
-
-
-class Change(Part, ABC, family="changes", error=ControllerError):
-    """A change that begins at a time and takes a while; efforts stay continuous.
-
-    Changes count in the order of their times, whatever the order in which they are
-    made. Each continues from what is then in force, so that several may overlap. A
-    subclass implements `apply`.
-    """
-
-    _: KW_ONLY
-    at: Number
-    """When it begins [s]; a time that has passed means now."""
-    ramp: NonNegative = 0.3
-    """How long it takes [s]; 0 is a jump."""
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return the change; what has a memory in it goes on by itself."""
-        return with_memories_copied(self, memo)
-
-    @property
-    def end(self) -> float:
-        """When it is complete [s]."""
-        return self.at + self.ramp
-
-    @abstractmethod
-    def apply(self, setup: Setup) -> Setup:
-        """Return the setup with this change, after all earlier ones.
-
-        Raises:
-            ControllerError: If it names something that does not exist then.
-        """
-
-    def placed(self, start: Start, setup: Setup) -> Self:
-        """Return the change with its parts placed; see `Task.placed`.
-
-        Args:
-            start: Where the robot is when the change is made.
-            setup: The setup with all earlier changes.
-        """
-        return self
 
 
 class AddTask(Change, type="add_task"):
@@ -347,22 +308,6 @@ class ChangeNullSpaceGain(Change, type="null_space_gain"):
         return replace(setup, gain=setup.gain.then(self.at, self.ramp, target))
 
 
-class ChangeContact(Change, type="contact"):
-    """A contact is lifted, or set down again; its force fades."""
-
-    contact: str
-    """Name of the contact."""
-    bears: Flag
-    """Whether it bears from then on."""
-
-    def apply(self, setup: Setup) -> Setup:
-        """Return the setup with the contact; see `Change.apply`."""
-        contacts, k = list(setup.contacts), setup.find_contact(self.contact)
-        presence = contacts[k].presence.then(self.at, self.ramp, float(self.bears))
-        contacts[k] = replace(contacts[k], presence=presence)
-        return replace(setup, contacts=tuple(contacts))
-
-
 class MoveObstacle(Change, type="obstacle"):
     """An obstacle leaves its trajectory for another one; C² if both are."""
 
@@ -513,6 +458,10 @@ class Changes:
     def contact(self, contact: str, *, bears: bool) -> Self:
         """Lift a contact, or set it down; see `ChangeContact`."""
         return self._do(ChangeContact(contact, bears, at=self._at, ramp=self._ramp))
+
+    def force(self, contact: str, force: CommandedForce) -> Self:
+        """Change the commanded force of a contact; see `ChangeForce`."""
+        return self._do(ChangeForce(contact, force, at=self._at, ramp=self._ramp))
 
     def _do(self, change: Change) -> Self:
         self._make(change)

@@ -105,20 +105,18 @@ def check_support(robot: Robot, contacts: Sequence[Contact], base: Base | None) 
     """Check that contacts and ``base`` are given exactly where the robot needs them.
 
     Raises:
-        ContactError: If a floating base has neither, a fixed base has one of them, or a
-            contact has another robot or a duplicate name.
+        ContactError: If a floating base has neither, a fixed base has a ``base``, or
+            two contacts have one name.
     """
     if base not in {None, "flying", "driven"}:
         raise ContactError(f"base is {base!r}; needs 'flying', 'driven' or None")
-    if not robot.unactuated:
-        if contacts or base is not None:
-            with within("contacts" if contacts else "base"):
-                raise ContactError(
-                    f"{robot.name} has no free-flyer root: contacts and base are only "
-                    "for robots with a floating base"
-                )
-        return
-    if not contacts and base is None:
+    if not robot.unactuated and base is not None:
+        with within("base"):
+            raise ContactError(
+                f"{robot.name} has no free-flyer root: base is only for robots with a "
+                "floating base"
+            )
+    if robot.unactuated and not contacts and base is None:
         raise ContactError(
             f"no motor moves the free-flyer root of {robot.name}: declare contacts, or "
             "base='flying' (nothing acts on it), or base='driven' (something else "

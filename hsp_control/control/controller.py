@@ -565,6 +565,16 @@ class Controller:
         """
         return self._setup.contacts[self._setup.find_contact(contact)].weight(t)
 
+    def force_offset(self, contact: str) -> Array:
+        """Return what is added to the commanded normal force of a contact, (1,) [N].
+
+        Compensators write this array.
+
+        Raises:
+            ControllerError: If there is no such contact.
+        """
+        return self._setup.contacts[self._setup.find_contact(contact)].force_offset
+
     def priority_of(self, task: str) -> int:
         """Return the priority of a task, 1 the highest.
 

@@ -1,7 +1,10 @@
 """A contact, and when it is part of a controller."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import numpy as np
+
+from hsp_control.common.arrays import Array
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.evolution import PRESENT, Evolution
 
@@ -13,10 +16,13 @@ class PlannedContact:
     Attributes:
         contact: The contact.
         presence: 1 while it bears, 0 while it is lifted.
+        force_offset: What a compensator adds to the commanded normal force, shape (1,)
+            [N]; every step reads this array.
     """
 
     contact: Contact
     presence: Evolution[float]
+    force_offset: Array = field(default_factory=lambda: np.zeros(1), compare=False)
 
     @property
     def always(self) -> bool:

@@ -114,7 +114,7 @@ def sampled_loop(
             t = start + k * (end - start) / periods
             measured = Measurement(count, t, *plant.measure(t, q, v))
             count += 1
-            if plan is not None or estimators:
+            if plan is not None or estimators or command.feels_contacts:
                 measured = measured._replace(
                     applied=tau,
                     wrenches=plant.contact_wrenches(t, q, v, tau),
@@ -124,7 +124,9 @@ def sampled_loop(
                 measured = each.update(measured)
             if plan is not None:
                 plan.update(measured)
-            tau = command.effort(t, measured.q, measured.v, period).copy()
+            tau = command.effort(
+                t, measured.q, measured.v, period, measured.wrenches
+            ).copy()
             if k == 0:
                 output, state = command.output, command.state
                 if not (t == state.t and _equal(state.q, q) and _equal(state.v, v)):

@@ -104,6 +104,9 @@ class Recorder:
         for contact in controller.contacts:
             prefix = f"contact.{contact.name}"
             column(f"{prefix}.force", (3,), "N", "on the robot, in world axes")
+            if contact.force is not None:
+                meaning = "force that is commanded, in world axes"
+                column(f"{prefix}.commanded", (3,), "N", meaning)
             column(f"{prefix}.position", (3,), "m", "centre of pressure")
             column(f"{prefix}.weight", (), "-", "how much it bears, 0 to 1")
             column(
@@ -312,6 +315,7 @@ class Recorder:
     def _record_contacts(self, output: ControlOutput) -> None:
         columns, support = self._columns, self._controller.active_stack.support
         world = support.in_world(output.forces)
+        commanded = support.in_world(support.reference)
         for contact in self._controller.contacts:
             prefix = f"contact.{contact.name}"
             force = columns[f"{prefix}.force"][self._rows]
@@ -326,6 +330,9 @@ class Recorder:
             points = support.points[support.contacts.index(contact)]
             local = output.forces.reshape(-1, 3)[points]
             force[:] = world[points].sum(axis=0)
+            if contact.force is not None:
+                total = commanded[points].sum(axis=0)
+                columns[f"{prefix}.commanded"][self._rows] = total
             normal = np.maximum(local[:, 2], 1e-9)
             center[:] = normal @ support.positions[points] / normal.sum()
             tangential = np.hypot(local[:, 0], local[:, 1])  # without overflow

@@ -13,6 +13,12 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError
 from hsp_control.common.kernels import kernel
 from hsp_control.common.step_plan import StepPlan
+from hsp_control.constraints.contacts.commanded_force import (
+    WRENCH,
+    CommandedForce,
+    check_points,
+    shares,
+)
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Positive, Vector3, read_only
 from hsp_control.geometry.start import Start
@@ -49,9 +55,11 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
 
     Attributes:
         rows: Number of constraint rows.
+        slides: Whether the tangential force follows from the motion.
     """
 
     rows: ClassVar[int]
+    slides: ClassVar[bool] = False
     yaml_key: ClassVar[str | None] = "name"
 
     frame: str
@@ -65,6 +73,9 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
     """Kd, the rate at which a remaining velocity of the contact decays [1/s]."""
     schedule: Schedule | None = None
     """When the contact is active [-]; always by default."""
+    force: CommandedForce | None = None
+    """The force that the world is to exert here [N]; by default it is what the balance
+    needs."""
     name: str = ""
     """Name of the contact in the log [-]; that of its frame by default."""
 
@@ -91,7 +102,41 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         """
         with within("frame"):
             start.state.robot.frame_id(self.frame)
+        if self.force is not None:
+            with within("force"):
+                self._check_command(self.force, start.state)
         return self
+
+    def _check_command(self, force: CommandedForce, state: RobotState) -> None:
+        """Check that the commanded force is possible, as it is at the start.
+
+        Raises:
+            ContactError: If the contact has too few points for it, or it pulls or lies
+                outside the friction pyramid.
+        """
+        if force.dimension == WRENCH and len(self.points) < 3:
+            raise ContactError(
+                f"it has 6 coordinates; a contact of type {self.yaml_type} exerts no "
+                "moment: needs 1 or 3"
+            )
+        command = force.followed.sample(state.t).position
+        shared = shares(force.dimension, self.arms_in_axes(state.frame(self.frame)))
+        points = (shared @ command).reshape(-1, 3)
+        with within("value" if force.trajectory is None else "trajectory"):
+            check_points(points, self.side, force.dimension == WRENCH)
+
+    def arms_in_axes(self, frame: FrameKinematics) -> Array:
+        """Return the points from their middle, in the contact's axes, (k, 3) [m]."""
+        arms = self.arms(frame)
+        return np.asarray((arms - arms.mean(axis=0)) @ self.axes)
+
+    @property
+    def side(self) -> float:
+        """The largest tangential force along an axis, per normal force.
+
+        It makes a pyramid that is inscribed in the friction cone.
+        """
+        return self.friction / float(np.sqrt(2.0))
 
     @property
     def always(self) -> bool:

@@ -234,12 +234,13 @@ class Actuation:
                 [N·m or N]; None: none. The limits hold for the sum.
         """
         wanted = state.inverse_dynamics(a)  # M a + N
-        if self._free and offset is None:
+        unsupported = self._only_box_limits and not support.size
+        if self._free and unsupported and offset is None:
             return wanted, a, self._no_forces, EXACT, 0.0
         violated = 0.0
         if self.limits is not None:
             violated = self._check.get(state, a)(state.t)
-        if offset is None and self._only_box_limits:
+        if offset is None and unsupported:
             if not violated:
                 return wanted, a, self._no_forces, EXACT, 0.0
             return self._limit(state, wanted, a, False, resolution, support, _NO_ROWS)
@@ -248,10 +249,10 @@ class Actuation:
             wanted = wanted + offset
             effort_ok = within(wanted, self._tau_lower, self._tau_upper)
         forces, tau = self._no_forces, wanted
-        if self._only_box_limits and motion_ok and effort_ok:
+        if unsupported and motion_ok and effort_ok:
             return wanted, a, forces, EXACT, 0.0
         if support.size:
-            support.update(state)
+            support.update(state, resolution)
             forces, tau = support.minimum_norm_forces(self.base, wanted)
         barriers = self._barriers(state, support)
         for A, least in barriers.values():

@@ -45,6 +45,7 @@ def minimum_norm_forces(
     F: Array,
     base: Indices,
     inverse_cost: Array,
+    reference: Array,
     wanted: Array,
     A: Array,
     G: Array,
@@ -53,16 +54,17 @@ def minimum_norm_forces(
     forces: Array,
     tau: Array,
 ) -> None:
-    """Write the forces of minimum Σ f²/e on the base, and the remaining effort.
+    """Write the forces of minimum Σ (f - r)²/e, and the remaining effort.
 
-    f = E Aᵀ(A E Aᵀ)⁺ w with A the base's rows of F, E = diag(e), and w the base's
-    rows of the wanted effort. w lies in the range of A: directions without support are
-    left out.
+    f = r + E Aᵀ(A E Aᵀ)⁺(w - A r) with A the base's rows of F, E = diag(e), w the
+    base's rows of the wanted effort, and r what is commanded. w lies in the range of A:
+    directions without support are left out.
 
     Args:
         F: Generalised forces of unit forces, shape (nv, size).
         base: Indices of the degrees of freedom without a motor.
         inverse_cost: e, shape (size,).
+        reference: r, shape (size,) [N].
         wanted: The effort without contacts, shape (nv,) [N·m or N].
         A: Scratch, shape (len(base), size).
         G: Scratch, shape (len(base), len(base)).
@@ -77,6 +79,7 @@ def minimum_norm_forces(
         w[i] = wanted[base[i]]
         for k in range(size):
             A[i, k] = F[base[i], k]
+            w[i] -= A[i, k] * reference[k]
     for i in range(n):
         for j in range(i + 1):
             total = 0.0
@@ -99,7 +102,7 @@ def minimum_norm_forces(
     multiply_transposed(U, scaled, w)
     multiply_transposed(A, w, forces)
     for k in range(size):
-        forces[k] *= inverse_cost[k]
+        forces[k] = reference[k] + inverse_cost[k] * forces[k]
     multiply(F, forces, tau)
     for i in range(tau.shape[0]):
         tau[i] = wanted[i] - tau[i]

@@ -69,10 +69,10 @@ class Forces(NamedTuple):
 
     Attributes:
         map: F, shape (nv, p).
-        first: The forces of minimum norm, shape (p,) [N].
+        first: The forces nearest to the commanded ones, shape (p,) [N].
         lower: Lower bounds, shape (p,) [N].
         upper: Upper bounds, shape (p,) [N].
-        inverse_cost: e, shape (p,): the cost is Σ f²/e.
+        inverse_cost: e, shape (p,): the cost is Σ (f - f_ref)²/e.
         weight: The robot's weight [N].
     """
 

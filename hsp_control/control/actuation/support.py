@@ -8,12 +8,17 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.identity_cache import IdentityCache
 from hsp_control.constraints.contacts import Contact
+from hsp_control.control.actuation.commanded_forces import (
+    COMMANDED_INVERSE_COST,
+    CommandedForces,
+)
 from hsp_control.control.actuation.contact_forces import (
     force_map,
     minimum_norm_forces,
     within_cones,
 )
 from hsp_control.control.planned_contact import PlannedContact
+from hsp_control.law import Resolution
 from hsp_control.robot import Robot, RobotState
 
 _MAX_FORCE = 3.0
@@ -35,7 +40,8 @@ class Support:
         upper: Upper bounds of the forces, shape (size,) [N].
         supporting_dofs: Degrees of freedom between the root and a contact, whose
             efforts depend on the forces.
-        inverse_cost: e, shape (size,): the closed form minimises Σ f²/e.
+        inverse_cost: e, shape (size,): the closed form minimises Σ (f - f_ref)²/e.
+        reference: f_ref, shape (size,): the commanded forces, zero where none is.
         forces: What `minimum_norm_forces` wrote last, shape (size,) [N].
     """
 
@@ -66,27 +72,37 @@ class Support:
         ends = np.cumsum([0, *counts])
         self.points = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         for contact, where in zip(self.contacts, self.points, strict=True):
-            side = contact.friction / np.sqrt(2.0)  # pyramid inscribed in the cone
             for k in range(where.start, where.stop):
                 for row, (axis, sign) in enumerate(
                     ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0))
                 ):
                     self.cone[4 * k + row, 3 * k + axis] = sign
-                    self.cone[4 * k + row, 3 * k + 2] = side
+                    self.cone[4 * k + row, 3 * k + 2] = contact.side
 
+        self.reference = np.zeros(self.size)
         self._parts: list[tuple[PlannedContact, Array, Array, slice, Array]] = []
+        self._commanded: list[tuple[PlannedContact, CommandedForces, Array]] = []
         for planned, where in zip(contacts, self.points, strict=True):
             columns = slice(3 * where.start, 3 * where.stop)
             friction = planned.contact.friction
             full = np.tile([friction**2, friction**2, 1.0], where.stop - where.start)
+            if planned.contact.force is not None:
+                command = CommandedForces(planned)
+                full[command.mask] *= COMMANDED_INVERSE_COST
+                self._commanded.append((planned, command, self.reference[columns]))
             self.inverse_cost[columns] = full
             positions, part = self.positions[where], self.map[:, columns]
             self._parts.append((planned, positions, part, columns, full))
         self._tau, self.forces = np.zeros(nv), np.zeros(self.size)
         self._scratch = IdentityCache(self._allocate)
 
-    def update(self, state: RobotState) -> None:
-        """Compute the map, the positions, and the bounds that the schedules set."""
+    def update(self, state: RobotState, resolution: Resolution) -> None:
+        """Compute the map, the positions, the bounds of schedules, and the commands.
+
+        Args:
+            state: The robot's state.
+            resolution: The law, resolved there.
+        """
         for planned, positions, part, columns, full in self._parts:
             contact = planned.contact
             frame = state.frame(contact.frame)
@@ -96,9 +112,11 @@ class Support:
                 on = max(planned.weight(state.t), 1e-6)
                 self.upper[columns][2::3] = on * _MAX_FORCE * self._weight
                 self.inverse_cost[columns] = on * full
+        for planned, command, own in self._commanded:
+            command.write(state, planned.weight(state.t), resolution, own)
 
     def minimum_norm_forces(self, base: Indices, wanted: Array) -> tuple[Array, Array]:
-        """Return the forces of minimum Σ f²/e on the base, and the remaining effort.
+        """Return the forces of minimum Σ (f - f_ref)²/e, and the remaining effort.
 
         Args:
             base: Indices of the degrees of freedom without a motor.
@@ -112,6 +130,7 @@ class Support:
             self.map,
             base,
             self.inverse_cost,
+            self.reference,
             wanted,
             *self._scratch.get(base),
             self.forces,

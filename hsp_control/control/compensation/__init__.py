@@ -2,6 +2,7 @@
 
 from .command import Command as Command
 from .compensation import Compensation as Compensation
+from .force_feedback import ForceFeedback as ForceFeedback
 from .friction_feed_forward import FrictionFeedForward as FrictionFeedForward
 from .integral_action import IntegralAction as IntegralAction
 from .momentum_observer import MomentumObserver as MomentumObserver

@@ -6,7 +6,8 @@
 The friction feed-forward and the observer's estimate r are an offset of the effort of
 the model, M a + N + friction - r; the controller's limits hold for the sum. The two do
 not cancel each other: the observer gets the effort sent minus the feed-forward, because
-friction consumes that part.
+friction consumes that part. For the same reason it gets the contact forces that the
+controller expects, so that r is what else acts.
 """
 
 from collections import deque
@@ -20,6 +21,7 @@ from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation.status import Status
 from hsp_control.control.compensation.compensation import Compensation
 from hsp_control.control.compensation.effort_rate import EffortRateClip
+from hsp_control.control.compensation.force_feedback import RunningForceFeedback
 from hsp_control.control.compensation.friction_feed_forward import FrictionFeedForward
 from hsp_control.control.compensation.integral_action import RunningIntegral
 from hsp_control.control.compensation.momentum_observer import RunningObserver
@@ -29,6 +31,7 @@ from hsp_control.control.compensation.task_wrench import task_wrench
 from hsp_control.control.compensation.velocity_filter import RunningFilter
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import NO_WRENCHES
 from hsp_control.control.output import ControlOutput
 from hsp_control.robot import RobotState
 from hsp_control.tasks.compliant_task import CompliantTask
@@ -63,7 +66,7 @@ class Command:
         self.controller = controller
         self.compensation = Compensation() if compensation is None else compensation
         own, robot = self.compensation, controller.robot
-        own.check(robot, controller.tasks, controller.limits)
+        own.check(robot, controller.tasks, controller.limits, controller.contacts)
         self.state = controller.state
         self._measured = self.state if own.predictor is None else RobotState(robot)
         self._tau, self._zero = np.zeros(robot.nv), np.zeros(robot.nv)
@@ -92,19 +95,35 @@ class Command:
         self._integral: RunningIntegral | None = None
         if own.integral_action is not None:
             self._integral = own.integral_action.begin(self.controller)
+        self._force_feedback: RunningForceFeedback | None = None
+        if own.force_feedback is not None:
+            self._force_feedback = own.force_feedback.begin(self.controller)
         self._clip: EffortRateClip | None = None
         if own.effort_rate is not None:
             self._clip = EffortRateClip(robot, own.effort_rate)
         self._ramp: RunningRamp | None = None  # begins at the first state
         self._predictor: RunningPredictor | None = None
         self._period = 0.0
-        self._friction_sent = self._friction = self._zero
+        self._friction_sent = self._friction = self._pressing = self._zero
         self._shown = self.state.q.copy(), self.state.v.copy()
         # The efforts on the model, less friction: one for each period from the last
         # measurement to the period that begins now.
         self._under_way: deque[Array] = deque()
 
-    def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
+    @property
+    def feels_contacts(self) -> bool:
+        """Whether `effort` needs the wrenches that sensors in contacts measure."""
+        own = self.compensation.force_feedback
+        return own is not None and own.force == "measured"
+
+    def effort(
+        self,
+        t: float,
+        q: Array,
+        v: Array,
+        period: float,
+        wrenches: Mapping[str, Array] = NO_WRENCHES,
+    ) -> Array:
         """Return the effort to send now.
 
         Args:
@@ -112,6 +131,7 @@ class Command:
             q: Measured configuration, shape (nq,).
             v: Measured velocity, shape (nv,).
             period: Time until the next effort [s].
+            wrenches: What sensors in the contacts measure; see `Measurement`.
 
         Returns:
             The effort, shape (nv,) [N·m or N], overwritten by the next call.
@@ -130,6 +150,9 @@ class Command:
         state = self.state.update(t, q, v)
         if own.start_up_ramp is not None and self._ramp is None:
             self._ramp = own.start_up_ramp.begin(state)
+        if self.feels_contacts:
+            assert self._force_feedback is not None
+            self._force_feedback.measure(wrenches)
         self.output = output = self._law(state)
         self._friction_sent = self._friction
         if self._changes_state:
@@ -140,8 +163,12 @@ class Command:
         self.controller.applied(tau, period)
         if self._integral is not None:
             self._integrate(self._integral, output, period, clipped)
+        if self._force_feedback is not None:
+            hindered = output.status >= Status.LIMITED or clipped
+            self._force_feedback.advance(state.t, period, output.forces, hindered)
         if self._observer is not None or own.predictor is not None:
-            self._record_sent(tau - self._friction_sent)
+            self._pressing = self._expected(output)
+            self._record_sent(tau - self._friction_sent + self._pressing)
         self._period = period
         return tau
 
@@ -154,7 +181,7 @@ class Command:
         """
         self.controller.applied(tau, period)
         if self._under_way:
-            self._under_way[-1] = tau - self._friction_sent
+            self._under_way[-1] = tau - self._friction_sent + self._pressing
 
     def evaluate(self, t: float, q: Array, v: Array) -> ControlOutput:
         """Evaluate the law at another state, with the present memory.
@@ -186,6 +213,18 @@ class Command:
                 found[f"task.{name}.integral"] = LogChannel(
                     integral, "m·s or rad·s", "∫e"
                 )
+        if self._force_feedback is not None:
+            how = self.compensation.force_feedback
+            assert how is not None
+            for name, felt in self._force_feedback.felt.items():
+                found[f"contact.{name}.{how.force}"] = LogChannel(
+                    felt, "N", f"normal force, {how.force}"
+                )
+                found[f"contact.{name}.integral"] = LogChannel(
+                    self._force_feedback.integrals[name],
+                    "N",
+                    "what force feedback adds to the commanded normal force",
+                )
         if self._changes_state:
             found["shown.q"] = LogChannel(
                 self._shown[0], "rad or m", "configuration at which the law is computed"
@@ -207,6 +246,13 @@ class Command:
                 )
         return found
 
+    def _expected(self, output: ControlOutput) -> Array:
+        """Return what the contact forces that the law expects do, shape (nv,)."""
+        support = self.controller.active_stack.support
+        if not support.size:
+            return self._zero
+        return np.asarray(support.map @ output.forces)
+
     # -- the links of the chain -------------------------------------------------------
 
     def _observe(
@@ -216,6 +262,9 @@ class Command:
         acted = self._under_way[0] if self._under_way else self._zero
         state = self._measured.update(t, q, v)
         observer.update(state, acted, period)
+        feedback = self._force_feedback
+        if feedback is not None and not self.feels_contacts and self._under_way:
+            feedback.estimate(state, observer.disturbance, self.output.forces)
         if self.controller.limits is not None:
             besides: Array = observer.disturbance - observer.cancelled
             if besides.any():  # what is cancelled causes nothing

@@ -7,9 +7,11 @@ from typing import Literal
 import numpy as np
 
 from hsp_control.common.exceptions import CompensationError
+from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.numbers_by_joint import Positives
 from hsp_control.control.compensation.checks import per_dof
+from hsp_control.control.compensation.force_feedback import ForceFeedback
 from hsp_control.control.compensation.friction_feed_forward import FrictionFeedForward
 from hsp_control.control.compensation.integral_action import IntegralAction
 from hsp_control.control.compensation.momentum_observer import MomentumObserver
@@ -42,6 +44,8 @@ class Compensation(Part, error=CompensationError):
     friction from the robot's file."""
     integral_action: IntegralAction | None = None
     """Removes constant task errors by integral feedback."""
+    force_feedback: ForceFeedback | None = None
+    """Lets the commanded forces of contacts be those that are felt."""
     effort_rate: Positives | None = None
     """Maximum rate of the effort that is sent [N·m/s or N/s], one number or nv; for
     controllers without `limits.effort_rate`, which deviate in the null space first."""
@@ -61,9 +65,13 @@ class Compensation(Part, error=CompensationError):
         return given
 
     def check(
-        self, robot: Robot, tasks: Sequence[Task], limits: RobotLimits | None = None
+        self,
+        robot: Robot,
+        tasks: Sequence[Task],
+        limits: RobotLimits | None = None,
+        contacts: Sequence[Contact] = (),
     ) -> None:
-        """Check that the compensators fit a robot, its tasks and its limits.
+        """Check that the compensators fit a robot, its tasks, limits and contacts.
 
         Raises:
             CompensationError: Names the compensator, the setting, and what it must be.
@@ -80,6 +88,7 @@ class Compensation(Part, error=CompensationError):
                 with within(name):
                     part.check(robot)
         self._check_compliance(tasks)
+        self._check_forces(contacts)
         if self.integral_action is not None:
             with within("integral_action"):
                 self.integral_action.check(tasks)
@@ -91,6 +100,19 @@ class Compensation(Part, error=CompensationError):
                         "limits.effort_rate keeps the rate already, and deviates in "
                         "the null space first; remove one of the two"
                     )
+
+    def _check_forces(self, contacts: Sequence[Contact]) -> None:
+        """Check that there are forces to feed back, and that none is cancelled."""
+        observer = self.momentum_observer
+        if observer is not None and observer.cancel and contacts:
+            with within("momentum_observer"):
+                raise CompensationError(
+                    f"the observer would cancel the force at contact "
+                    f"{contacts[0].name!r}; set cancel to false"
+                )
+        if self.force_feedback is not None:
+            with within("force_feedback"):
+                self.force_feedback.check(contacts, observer is not None)
 
     def _check_compliance(self, tasks: Sequence[Task]) -> None:
         """Check that no force is cancelled to which a task is to yield."""

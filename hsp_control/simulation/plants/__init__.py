@@ -21,6 +21,7 @@ from .mujoco import Ground as Ground
 from .mujoco import Mujoco as Mujoco
 from .mujoco import MujocoScene as MujocoScene
 from .mujoco import MujocoScenePlant as MujocoScenePlant
+from .mujoco import Solid as Solid
 from .plant import ContinuousPlant as ContinuousPlant
 from .plant import Plant as Plant
 from .plant import SampledPlant as SampledPlant

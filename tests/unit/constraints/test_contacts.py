@@ -39,8 +39,10 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.constraints.contacts import (
     BallContact,
+    CommandedForce,
     Contact,
     PointContact,
+    SlidingContact,
     SurfaceContact,
 )
 from hsp_control.constraints.contacts.unactuated import UnactuatedRows
@@ -102,6 +104,16 @@ CONTACTS: dict[str, tuple[Callable[[], Robot], Contact]] = {
     "sole": (talos, sole(SOLES[0])),
     "point": (talos, PointContact(SOLES[1], point=[0.1, 0.02, -0.03])),
     "ball": (solo, BallContact(FEET[2], radius=0.02, normal=[0.1, 0.2, 1.0])),
+    "sliding": (
+        talos,
+        SlidingContact(
+            SOLES[0],
+            point=[0.1, 0.02, -0.03],
+            offset=[-0.02, 0.0, 0.01],
+            normal=[0.1, 0.2, 1.0],
+            force=CommandedForce(5.0),
+        ),
+    ),
 }
 
 
@@ -128,6 +140,11 @@ def test_rows_are_the_velocity_of_what_touches(kind: str, seed: int) -> None:
         moving = np.concatenate([slope(lambda s: place(s).translation), turning])
     elif kind == "point":
         moving = slope(lambda s: place(s).act(contact.points[0]))
+    elif kind == "sliding":
+        assert isinstance(contact, SlidingContact)
+        point = slope(lambda s: place(s).act(contact.points[0]))
+        point = point + np.cross(turning, np.asarray(contact.offset))
+        moving = contact.axes[:, 2:].T @ point
     else:
         assert isinstance(contact, BallContact)
         arm = -contact.radius * contact.axes[:, 2]

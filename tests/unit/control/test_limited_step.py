@@ -66,7 +66,7 @@ def repeated(made: hsp.Controller, barriers: Barriers | None = None) -> Delivere
     a = stack.resolution.acceleration
     wanted = state.inverse_dynamics(a)
     if stack.support.size:
-        stack.support.update(state)
+        stack.support.update(state, stack.resolution)
         stack.support.minimum_norm_forces(actuation.base, wanted)
     return actuation._limit(
         *(state, wanted, a, False, stack.resolution, stack.support, barriers or {})

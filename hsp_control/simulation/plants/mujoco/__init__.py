@@ -7,3 +7,4 @@ from .mujoco_scene import MujocoScene as MujocoScene
 from .plant import MujocoIntegrator as MujocoIntegrator
 from .plant import MujocoPlant as MujocoPlant
 from .scene_plant import MujocoScenePlant as MujocoScenePlant
+from .solids import Solid as Solid

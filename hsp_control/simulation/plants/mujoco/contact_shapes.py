@@ -25,7 +25,7 @@ _MIN_HALF_HEIGHT = 1e-3
 """Half the height of the box for a flat mesh [m]; MuJoCo needs a positive one."""
 
 
-def _supported(shape: Shape) -> Shape:
+def supported_shape(shape: Shape) -> Shape:
     """Return a shape that MuJoCo has.
 
     Raises:
@@ -52,7 +52,7 @@ class ContactShape(Part, error=SimulationError):
 
     frame: str
     """Name of the frame [-]; forces are logged under it. In YAML, its key."""
-    shape: Annotated[Shape, AfterValidator(_supported)] | None = None
+    shape: Annotated[Shape, AfterValidator(supported_shape)] | None = None
     """The shape [-]; by default made from the link's collision geometry."""
     position: Vector3 = (0.0, 0.0, 0.0)
     """Position of the shape in the frame [m]."""
@@ -97,9 +97,7 @@ def geoms_of(robot: Robot, contact: ContactShape) -> list[Geom]:
         raise SimulationError("it is fixed to the world and never moves")
     if contact.shape is not None:
         offset = pin.SE3(matrix_of(contact.rotation), np.asarray(contact.position))
-        return [
-            _geom(contact.shape.geometry(), frame.placement * offset, frame.placement)
-        ]
+        return [geom_of(contact.shape.geometry(), frame.placement * offset)]
     fixed = [s for s in link_shapes(robot, "meshes") if s.joint == frame.parentJoint]
     own = [s for s in fixed if s.link == contact.frame] or fixed
     # For a robot without any geometry, `link_shapes` invents capsules between joints.
@@ -107,10 +105,17 @@ def geoms_of(robot: Robot, contact: ContactShape) -> list[Geom]:
     real = [s for s in own if s.link in bodies]
     if not real:
         raise SimulationError("no collision geometry is fixed to it; give a shape")
-    return [_geom(s.geometry, s.placement, frame.placement) for s in real]
+    return [geom_of(s.geometry, s.placement, frame.placement) for s in real]
 
 
-def _geom(geometry: Any, place: pin.SE3, frame: pin.SE3) -> Geom:
+def geom_of(geometry: Any, place: pin.SE3, frame: pin.SE3 | None = None) -> Geom:
+    """Return the geom of Coal's geometry at a placement.
+
+    Args:
+        geometry: A primitive; or a mesh, if there is a frame.
+        place: Its placement.
+        frame: The placement of the frame in whose axes a mesh has a box.
+    """
     if isinstance(geometry, coal.Sphere):
         return Geom("sphere", (geometry.radius,), place)
     if isinstance(geometry, coal.Box):
@@ -119,6 +124,7 @@ def _geom(geometry: Any, place: pin.SE3, frame: pin.SE3) -> Geom:
         return Geom("capsule", (geometry.radius, geometry.halfLength), place)
     if isinstance(geometry, coal.Cylinder):
         return Geom("cylinder", (geometry.radius, geometry.halfLength), place)
+    assert frame is not None
     vertices = geometry.vertices if hasattr(geometry, "vertices") else geometry.points
     points = np.array([frame.actInv(place.act(point)) for point in vertices()])
     return _box_of_sole(points, frame) or _capsule(points, frame)

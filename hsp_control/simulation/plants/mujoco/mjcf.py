@@ -25,10 +25,13 @@ from hsp_control.robot.mujoco_coordinates import (
 )
 from hsp_control.simulation.plants.mujoco.contact_shapes import Geom
 from hsp_control.simulation.plants.mujoco.ground import Ground
+from hsp_control.simulation.plants.mujoco.solids import Solid
 
 MIN_INERTIA = 1e-12
 """Smallest mass and inertia of a body [kg, kg·m²]; MuJoCo needs positive ones."""
 
+_OWN_IMPEDANCE = 0.95
+"""MuJoCo's own impedance of contacts, where they are deep."""
 _CONTACT, _GROUND = 1, 2  # kinds of geoms; they collide only with the other kind
 
 
@@ -41,6 +44,7 @@ def write_mjcf(
     friction: JointFriction | None,
     geoms: Mapping[int, Sequence[tuple[str, Geom]]],
     ground: Ground,
+    solids: Sequence[Solid] = (),
 ) -> str:
     """Return the MJCF text.
 
@@ -52,6 +56,7 @@ def write_mjcf(
         friction: Friction of the joints.
         geoms: Geoms with their names to fix to the joints, by index of the joint.
         ground: The ground; it is written only if there are geoms.
+        solids: The other things that geoms can touch.
     """
     root = Element("mujoco", model=robot.name)
     SubElement(root, "compiler", angle="radian", autolimits="false")
@@ -68,6 +73,11 @@ def write_mjcf(
         place = pin.SE3(np.eye(3), np.array([0.0, 0.0, ground.height]))
         plane = Geom("plane", (0.0, 0.0, 1.0), place)
         _add_geom(world, "ground", plane, ground.friction, _GROUND)
+    for solid in solids:
+        for name, geom in solid.geoms():
+            element = _add_geom(world, name, geom, solid.friction, _GROUND)
+            element.set("priority", "1")  # its friction counts, not the other's
+            _set_impedance(element, solid)
     lower, upper = robot.position_limits()
     bodies = {0: world}
     for joint in joints:
@@ -89,6 +99,14 @@ def write_mjcf(
         if joint.leader is not None:
             tie = SubElement(ties, "joint", joint1=joint.name, joint2=joint.leader.name)
             tie.set("polycoef", _numbers([joint.offset, joint.scaling, 0.0, 0.0, 0.0]))
+    slippery = [solid for solid in solids if solid.slip_damping is not None]
+    if slippery:
+        pairs = SubElement(root, "contact")
+        shapes = [name for each in geoms.values() for name, _ in each]
+        for solid in slippery:
+            for name, _ in solid.geoms():
+                for shape in shapes:
+                    _add_pair(pairs, name, shape, solid)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode")
 
@@ -135,7 +153,26 @@ def _set_armature_and_friction(
         element.set("solimpfriction", "0.999 0.999 0.001 0.5 2")
 
 
-def _add_geom(body: Element, name: str, geom: Geom, mu: float, kind: int) -> None:
+def _add_pair(pairs: Element, solid: str, shape: str, of: Solid) -> None:
+    """Add a contact that has its own damping of a slip; MuJoCo's own is left out."""
+    mu = of.friction
+    pair = SubElement(pairs, "pair", geom1=solid, geom2=shape, condim="3")
+    pair.set("friction", _numbers([mu, mu, 0.0, 0.0, 0.0]))
+    # Negative numbers are stiffness, which friction has not, and damping, which MuJoCo
+    # divides by the impedance.
+    assert of.slip_damping is not None
+    scale = _OWN_IMPEDANCE if of.impedance is None else of.impedance
+    pair.set("solreffriction", _numbers([-1.0, -of.slip_damping * scale]))
+    _set_impedance(pair, of)
+
+
+def _set_impedance(element: Element, of: Solid) -> None:
+    if of.impedance is not None:
+        d = of.impedance
+        element.set("solimp", _numbers([d, d, 0.001, 0.5, 2.0]))
+
+
+def _add_geom(body: Element, name: str, geom: Geom, mu: float, kind: int) -> Element:
     element = SubElement(body, "geom", name=name, type=geom.type)
     element.set("size", _numbers(geom.size))
     _place(element, geom.placement)
@@ -143,6 +180,7 @@ def _add_geom(body: Element, name: str, geom: Geom, mu: float, kind: int) -> Non
     element.set("contype", str(kind))
     element.set("conaffinity", str(_CONTACT + _GROUND - kind))
     element.set("mass", "0")
+    return element
 
 
 def _place(element: Element, placement: pin.SE3) -> None:

@@ -9,6 +9,7 @@ from hsp_control.simulation.plants.frictional import FrictionalPart
 from hsp_control.simulation.plants.mujoco.contact_shapes import ContactShapes
 from hsp_control.simulation.plants.mujoco.ground import Ground
 from hsp_control.simulation.plants.mujoco.plant import MujocoIntegrator, MujocoPlant
+from hsp_control.simulation.plants.mujoco.solids import Solids
 
 
 class Mujoco(FrictionalPart, type="mujoco"):
@@ -22,9 +23,11 @@ class Mujoco(FrictionalPart, type="mujoco"):
     joint_limits: Flag = True
     """Whether MuJoCo keeps joints within their limits [-]."""
     contacts: ContactShapes = ()
-    """Shapes that may touch the ground, by frame name [-]."""
+    """Shapes that may touch the ground and the solids, by frame name [-]."""
     ground: Ground = Ground()
     """The ground [-]; it exists only if `contacts` has entries."""
+    solids: Solids = ()
+    """Walls, tables, slopes and stairs, by name [-]."""
 
     @property
     def longest_step(self) -> float:
@@ -45,6 +48,7 @@ class Mujoco(FrictionalPart, type="mujoco"):
             integrator=self.integrator,
             contacts=self.contacts,
             ground=self.ground,
+            solids=self.solids,
             joint_limits=self.joint_limits,
             friction=self.joint_friction(robot),
             pushes=self.pushes,

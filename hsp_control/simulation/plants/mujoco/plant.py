@@ -26,6 +26,7 @@ from hsp_control.simulation.plants.mujoco.engine import (
 )
 from hsp_control.simulation.plants.mujoco.ground import Ground
 from hsp_control.simulation.plants.mujoco.mjcf import write_mjcf
+from hsp_control.simulation.plants.mujoco.solids import Solid
 from hsp_control.simulation.plants.plant import SampledPlant
 from hsp_control.simulation.plants.push import Push, Pushes
 
@@ -35,7 +36,8 @@ MujocoIntegrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
 class MujocoPlant(SampledPlant):
     """A robot in MuJoCo, built from the Pinocchio model.
 
-    The declared contacts can touch a flat ground; there are no other collisions.
+    The declared contacts can touch a flat ground and the declared solids; there are no
+    other collisions.
 
     Attributes:
         mjcf: The model as MJCF text, for MuJoCo's own tools.
@@ -52,6 +54,7 @@ class MujocoPlant(SampledPlant):
         integrator: MujocoIntegrator = "implicitfast",
         contacts: Sequence[ContactShape] = (),
         ground: Ground | None = None,
+        solids: Sequence[Solid] = (),
         joint_limits: bool = True,
         friction: JointFriction | None = None,
         pushes: Sequence[Push] = (),
@@ -62,15 +65,17 @@ class MujocoPlant(SampledPlant):
             robot: The robot that moves.
             timestep: The largest step [s]; each interval is divided into equal steps.
             integrator: MuJoCo's integrator.
-            contacts: The shapes that may touch the ground.
+            contacts: The shapes that may touch the ground and the solids.
             ground: The ground; None: at height 0, with the friction coefficient 0.8.
+            solids: The other things that these shapes may touch.
             joint_limits: Whether MuJoCo keeps joints within the robot's position
                 limits, by its own soft constraints.
             friction: Friction of the joints, by MuJoCo's own constraints.
             pushes: External wrenches.
 
         Raises:
-            SimulationError: If MuJoCo is not installed or rejects the model.
+            SimulationError: If MuJoCo is not installed or rejects the model, or nothing
+                may touch the solids.
             ModelError: If a joint has no counterpart in MuJoCo.
             FrameNotFoundError: If a contact's frame does not exist.
         """
@@ -86,6 +91,13 @@ class MujocoPlant(SampledPlant):
         self.timestep, self.integrator = timestep, integrator
         self.contacts = tuple(contacts)
         self.ground = Ground() if ground is None else ground
+        self.solids = tuple(solids)
+        if self.solids and not self.contacts:
+            with within("solids"):
+                raise SimulationError(
+                    "nothing may touch them: declare contacts, the shapes of the robot "
+                    "that may"
+                )
         self.joint_limits, self.friction = joint_limits, friction
         self.pushes = Pushes(robot, pushes)
         joints = joints_of(robot)
@@ -107,6 +119,7 @@ class MujocoPlant(SampledPlant):
             friction=friction,
             geoms=geoms,
             ground=self.ground,
+            solids=self.solids,
         )
         try:
             self.model: Any = mujoco.MjModel.from_xml_string(self.mjcf)
@@ -209,6 +222,7 @@ class MujocoPlant(SampledPlant):
             "joint_limits": self.joint_limits,
             "contacts": to_json_data(self.contacts),
             "ground": to_json_data(self.ground),
+            "solids": to_json_data(self.solids),
             "friction": to_json_data(self.friction),
             "pushes": to_json_data(self.pushes.pushes),
         }

@@ -1,0 +1,91 @@
+"""A point that slides on a plane while it presses: one row, and one force."""
+
+from dataclasses import KW_ONLY
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ContactError
+from hsp_control.constraints.contacts.commanded_force import NORMAL
+from hsp_control.constraints.contacts.contact import Contact
+from hsp_control.constraints.contacts.point_contact import point_velocity_rows
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import Positive, Vector3
+from hsp_control.robot.kinematics import FrameKinematics
+from hsp_control.tasks import TaskSample
+
+
+class SlidingContact(Contact, type="sliding"):
+    """A point of a link presses on the plane with a commanded force, and may slide.
+
+    Only the motion along the normal n is a row, nᵀ(J a + J'v) = -Kd nᵀJ v: tasks move
+    the point along the plane. Its friction is known, it acts against the motion:
+
+        f = f_n (n - μ tanh(‖u‖/u_s) u/‖u‖)
+
+    with u the tangential velocity of the point once the errors of all tasks are zero.
+    So the tangential force belongs to the command, and the friction pyramid contains
+    the cone instead of being inscribed.
+
+    Attributes:
+        slides: Whether the tangential force follows from the motion.
+    """
+
+    rows: ClassVar[int] = 1
+    slides: ClassVar[bool] = True
+
+    _: KW_ONLY
+    point: Vector3 = (0.0, 0.0, 0.0)
+    """The point in the frame, shape (3,) [m]."""
+    offset: Vector3 = (0.0, 0.0, 0.0)
+    """From that point to where the plane is touched, in world axes: -r n for a ball of
+    radius r [m]."""
+    smoothing: Positive = 0.01
+    """Speed u_s at which three quarters of the friction are expected [m/s]."""
+
+    def __post_init__(self) -> None:
+        """Check that the normal force is commanded, and nothing else."""
+        if self.force is None:
+            with within("force"):
+                raise ContactError(
+                    "it is missing: a sliding contact needs the normal force with "
+                    "which it presses, for example {value: 20}"
+                )
+        if self.force.dimension != NORMAL:
+            with within("force"):
+                raise ContactError(
+                    f"it has {self.force.dimension} coordinates; a sliding contact "
+                    "takes the normal force alone, friction gives the others"
+                )
+
+    @property
+    def side(self) -> float:
+        """The largest tangential force along an axis, per normal force."""
+        return self.friction
+
+    @cached_property
+    def points(self) -> Array:
+        """The point in the frame, shape (1, 3) [m]."""
+        return np.asarray(self.point)[None]
+
+    def constrain(self, frame: FrameKinematics, out: TaskSample) -> None:
+        """Write the row of the normal: nᵀ times the velocity rows of the point."""
+        J, J_dot = np.empty((2, 3, frame.jacobian.shape[1]))
+        arm = frame.rotation @ self.points[0]
+        point_velocity_rows(
+            frame.jacobian,
+            frame.jacobian_dot,
+            arm + np.asarray(self.offset),
+            np.cross(frame.velocity[3:], arm),
+            J,
+            J_dot,
+        )
+        normal = self.axes[:, 2]
+        out.jacobian[0] = normal @ J
+        out.jacobian_dot[0] = normal @ J_dot
+
+    def arms(self, frame: FrameKinematics) -> Array:
+        """Return where the plane is touched, from the frame's origin, shape (1, 3)."""
+        return self.points @ frame.rotation.T + np.asarray(self.offset)

@@ -1,0 +1,184 @@
+"""Integral feedback of contact forces: what is commanded is what is felt."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY
+from typing import Literal
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import CompensationError
+from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.constraints.contacts import Contact
+from hsp_control.constraints.contacts.commanded_force import NORMAL
+from hsp_control.control.controller import Controller
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.quantities import Names, Positive
+from hsp_control.robot import RobotState
+
+_MISSED = 0.01
+"""Share of a command by which the programme must miss it to stop the integral."""
+_SMALLEST = 1e-9
+"""Mobility, relative to the largest, below which an estimate takes a direction for
+immobile."""
+
+
+class ForceFeedback(Part, error=CompensationError):
+    """The normal force of contacts follows its command in spite of model errors.
+
+    With λ_d the commanded and λ_m the felt normal force, the controller commands
+
+        λ = λ_d + K_i ∫ (λ_d - λ_m) dt
+
+    A rigid contact answers with λ_m = λ - (what the model lacks), so the error decays
+    like exp(-K_i t). The integral rests while the contact does not fully bear, and
+    while limits leave no room for what it would add.
+    """
+
+    gain: Positive = 5.0
+    """K_i [1/s]; small beside 1/(period and delays of the loop)."""
+    _: KW_ONLY
+    bound: Positive = 50.0
+    """Largest magnitude of the integral's share of the command [N]."""
+    force: Literal["measured", "estimated"] = "measured"
+    """What is felt [-]: what sensors in the contacts measure, or what the momentum
+    observer estimates (for robots with a fixed base)."""
+    contacts: Names | None = None
+    """Names of the contacts; all with a commanded force by default."""
+
+    def check(self, contacts: Sequence[Contact], observed: bool) -> None:
+        """Check that there is something to feed back.
+
+        Args:
+            contacts: The contacts of the controller.
+            observed: Whether there is a momentum observer.
+
+        Raises:
+            CompensationError: If there is not.
+        """
+        names = [contact.name for contact in contacts if contact.force is not None]
+        with within("contacts"):
+            for name in self.contacts or ():
+                if name not in names:
+                    raise CompensationError(
+                        f"there is no contact {name!r} with a commanded force"
+                        f"{did_you_mean(name, names)} (there are "
+                        f"{listing(names) or 'none'})"
+                    )
+        if not names:
+            raise CompensationError("no contact has a commanded force; give one")
+        if self.force == "estimated" and not observed:
+            with within("force"):
+                raise CompensationError(
+                    "'estimated' needs compensation.momentum_observer, with cancel: "
+                    "false"
+                )
+
+    def begin(self, controller: Controller) -> "RunningForceFeedback":
+        """Return the feedback of a controller for one run; it begins at zero."""
+        return RunningForceFeedback(self, controller)
+
+
+class RunningForceFeedback:
+    """Force feedback in one run: it keeps the integrals.
+
+    Attributes:
+        felt: λ_m by contact, at the last step [N].
+        integrals: What is added to each command [N].
+    """
+
+    def __init__(self, declared: ForceFeedback, controller: Controller) -> None:
+        """Begin with no offset."""
+        self._declared, self._controller = declared, controller
+        names = [
+            contact.name
+            for contact in controller.contacts
+            if contact.force is not None
+            and (declared.contacts is None or contact.name in declared.contacts)
+        ]
+        self.integrals = dict.fromkeys(names, 0.0)
+        self.felt = dict.fromkeys(names, np.nan)
+        for name in names:
+            controller.force_offset(name)[0] = 0.0
+
+    def measure(self, wrenches: Mapping[str, Array]) -> None:
+        """Read the sensors.
+
+        Args:
+            wrenches: Of the world on the robot, by frame; see `Measurement`.
+
+        Raises:
+            CompensationError: If a contact has no sensor.
+        """
+        for contact in self._fed:
+            if contact.frame not in wrenches:
+                with within("compensation", "force_feedback", "force"):
+                    raise CompensationError(
+                        f"no sensor measures the force at {contact.frame!r} of contact "
+                        f"{contact.name!r} (measured: {listing(wrenches) or 'none'}); "
+                        "'estimated' needs none"
+                    )
+            wrench = wrenches[contact.frame]
+            self.felt[contact.name] = float(contact.axes[:, 2] @ wrench[:3])
+
+    def estimate(self, state: RobotState, disturbance: Array, forces: Array) -> None:
+        """Estimate the forces from what the model does not explain.
+
+        Args:
+            state: The state as measured.
+            disturbance: r: what acts besides the forces that were expected, (nv,).
+            forces: The forces that were expected, of the active contacts [N].
+        """
+        unexpected = np.linalg.solve(state.mass_matrix, disturbance)
+        support = self._controller.active_stack.support
+        for contact in self._fed:
+            if contact not in support.contacts:
+                self.felt[contact.name] = 0.0
+                continue
+            points = support.points[support.contacts.index(contact)]
+            columns = slice(3 * points.start, 3 * points.stop)
+            F = support.map[:, columns].reshape(len(disturbance), -1, 3).sum(axis=1)
+            F = F / (points.stop - points.start)
+            # The force that moves the contact as r does: Λ J M⁻¹ r, with J = Fᵀ.
+            mobility = F.T @ np.linalg.solve(state.mass_matrix, F)
+            inverse = np.linalg.pinv(mobility, rcond=_SMALLEST, hermitian=True)
+            expected = forces[columns].reshape(-1, 3)[:, 2].sum()
+            self.felt[contact.name] = float(expected + (inverse @ F.T @ unexpected)[2])
+
+    def advance(self, t: float, period: float, forces: Array, hindered: bool) -> None:
+        """Integrate the errors over one period, for the next effort.
+
+        Args:
+            t: The time [s].
+            period: The period [s].
+            forces: The forces of this step, of the active contacts [N].
+            hindered: Whether the law was not delivered exactly.
+        """
+        support = self._controller.active_stack.support
+        gain, bound = self._declared.gain, self._declared.bound
+        for contact in self._fed:
+            felt, name = self.felt[contact.name], contact.name
+            if not np.isfinite(felt) or self._controller.bearing_of(name, t) < 1.0:
+                continue
+            assert contact.force is not None
+            command = contact.force.followed.sample(t).position
+            wanted = command[0 if contact.force.dimension == NORMAL else 2]
+            points = support.points[support.contacts.index(contact)]
+            planned, commanded = (
+                float(each.reshape(-1, 3)[points, 2].sum())
+                for each in (forces, support.reference)
+            )
+            change = gain * period * (float(wanted) - felt)
+            integral = self.integrals[name]
+            missing = commanded - planned  # the programme has given way
+            if change * missing > 0.0 and abs(missing) > _MISSED * (1.0 + commanded):
+                continue
+            if hindered and change * integral >= 0.0:
+                continue
+            integral = min(max(integral + change, -bound), bound)
+            self.integrals[name] = self._controller.force_offset(name)[0] = integral
+
+    @property
+    def _fed(self) -> list[Contact]:
+        """The contacts whose force is fed back, with the commands in force."""
+        return [c for c in self._controller.contacts if c.name in self.integrals]

@@ -1,0 +1,395 @@
+"""Commanded contact forces: in the allocation alone, balanced by the other contacts.
+
+The closed form against its optimality conditions; the law with and without a command;
+motions of plants that solve the contact for themselves, where errors and null space
+obey their equations and the force is the commanded one.
+"""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hsp_control import (
+    CenterOfMass,
+    Circle,
+    Controller,
+    FrameOrientation,
+    FramePosition,
+    Gains,
+    Robot,
+    RobotState,
+    TargetPosture,
+    simulate,
+)
+from hsp_control.common.exceptions import ContactError, ControllerError
+from hsp_control.constraints.contacts import (
+    CommandedForce,
+    Contact,
+    PointContact,
+    SlidingContact,
+    SurfaceContact,
+)
+from hsp_control.control.actuation import Status
+from hsp_control.control.actuation.contact_forces import minimum_norm_forces
+from hsp_control.robot.integrators import Dop853
+from hsp_control.simulation.plants import ContactPlant, ContinuousPlant, RigidContact
+from hsp_control.trajectories import CallableTrajectory, Schedule
+
+pytest.importorskip("example_robot_data")
+Array = NDArray[np.float64]
+seeds = st.integers(0, 2**32 - 1)
+GAINS = Gains(natural_frequency=8.0)
+HAND, TIP = "gripper_right_base_link", "panda_tcp"
+SOLES = ("left_sole_link", "right_sole_link")
+
+
+@cache
+def talos() -> Robot:
+    return Robot.load(
+        "talos", locked={"gripper_left_joint": 0, "gripper_right_joint": 0}
+    )
+
+
+@cache
+def panda() -> Robot:
+    return Robot.load("panda")
+
+
+def wall(force: CommandedForce | None, **options: Any) -> PointContact:
+    return PointContact(HAND, normal=[-1.0, 0.0, 0.0], force=force, **options)
+
+
+def leaning(*contacts: Contact, friction: float = 0.7, **options: Any) -> Controller:
+    """Return Talos on two soles with further contacts."""
+    soles = [
+        SurfaceContact(frame, length=0.16, width=0.1, friction=friction)
+        for frame in SOLES
+    ]
+    tasks = [CenterOfMass(gains=GAINS), FrameOrientation("torso_2_link", gains=GAINS)]
+    return Controller(
+        talos(),
+        tasks,
+        TargetPosture("home"),
+        null_space_gain=6.0,
+        contacts=[*soles, *contacts],
+        start=talos().home(),
+        **({"limits": None} | options),
+    )
+
+
+def random_state(robot: Robot, seed: int) -> RobotState:
+    rng = np.random.default_rng(seed)
+    q = robot.integrate(robot.home(), 0.02 * rng.standard_normal(robot.nv))
+    return robot.state(0.0, q, 0.01 * rng.standard_normal(robot.nv))
+
+
+# --- the closed form -----------------------------------------------------------------
+
+
+@given(seeds)
+@settings(max_examples=20)
+def test_the_closed_form_is_the_optimum(seed: int) -> None:
+    """A f = w, and E⁻¹(f - r) lies in the range of Aᵀ: the conditions of Lagrange."""
+    rng = np.random.default_rng(seed)
+    n, size, nv = 6, 15, 10
+    F, r, wanted = (
+        rng.standard_normal((nv, size)),
+        *map(rng.standard_normal, (size, nv)),
+    )
+    e = rng.uniform(0.1, 1.0, size)
+    base = np.arange(n)
+    forces, tau, zeros = np.zeros(size), np.zeros(nv), np.zeros
+    scratch = zeros((n, size)), zeros((n, n)), zeros((n, n)), zeros((2, n))
+    minimum_norm_forces(F, base, e, r, wanted, *scratch, forces, tau)
+    A = F[:n]
+    np.testing.assert_allclose(A @ forces, wanted[:n], atol=1e-9)
+    multipliers = np.linalg.lstsq(A.T, (forces - r) / e, rcond=None)[0]
+    np.testing.assert_allclose(A.T @ multipliers, (forces - r) / e, atol=1e-9)
+    np.testing.assert_allclose(tau, wanted - F @ forces, atol=1e-12)
+
+
+# --- the law does not notice ---------------------------------------------------------
+
+
+@given(seeds)
+@settings(max_examples=10)
+def test_the_law_is_the_same_with_and_without_a_force(seed: int) -> None:
+    """a and e_N are equal bit for bit; M a + N = Sᵀτ + F f with the commanded f."""
+    state = random_state(talos(), seed)
+    outputs = {}
+    for pressed in (0.0, 10.0):
+        controller = leaning(wall(CommandedForce([0.0, 0.0, pressed])))
+        out = outputs[pressed] = controller.compute(state)
+        assume(out.status in (Status.EXACT, Status.REDISTRIBUTED))
+        support = controller.active_stack.support
+        rest = state.inverse_dynamics(out.acceleration) - out.tau
+        rest = rest - support.map @ out.forces
+        assert np.abs(rest).max() < 1e-6  # [N] of 900 N
+        assume(abs(out.forces[-1] - pressed) < 5e-3)  # or the wall must hold the robot
+    np.testing.assert_array_equal(outputs[0.0].acceleration, outputs[10.0].acceleration)
+    np.testing.assert_array_equal(
+        outputs[0.0].null_space_error, outputs[10.0].null_space_error
+    )
+    assert np.abs(outputs[0.0].tau - outputs[10.0].tau).max() > 0.01
+
+
+def test_the_feet_balance_what_the_hand_presses() -> None:
+    """The horizontal forces of the soles take the wall's, within a millinewton."""
+    state = talos().state(0.0, talos().home(), np.zeros(talos().nv))
+    totals = []
+    for pressed in (0.0, 20.0):
+        controller = leaning(wall(CommandedForce([0.0, 0.0, pressed])))
+        out = controller.compute(state)
+        world = controller.active_stack.support.in_world(out.forces)
+        totals.append(world[:-1].sum(axis=0))
+        assert world[-1] @ [-1.0, 0.0, 0.0] == pytest.approx(pressed, abs=2e-3)
+    np.testing.assert_allclose(totals[1] - totals[0], [20.0, 0.0, 0.0], atol=5e-3)
+
+
+def test_other_forces_are_found_within_the_programme() -> None:
+    """Where least forces leave the cones, the soles' change, and the command stays."""
+    state = talos().state(0.0, talos().home(), np.zeros(talos().nv))
+    controller = leaning(wall(CommandedForce([0.0, 0.0, 40.0])), friction=0.2)
+    out = controller.compute(state)
+    assert out.status == Status.REDISTRIBUTED
+    np.testing.assert_allclose(out.forces[-3:], [0.0, 0.0, 40.0], atol=2e-2)
+    assert not controller.active_stack.support.permits(
+        controller.active_stack.support.forces
+    )
+
+
+def test_a_force_that_nothing_can_balance_gives_way_before_the_law() -> None:
+    """60 N, and soles on ice: the hand presses less, and the law is untouched."""
+    state = talos().state(0.0, talos().home(), np.zeros(talos().nv))
+    controller = leaning(wall(CommandedForce([0.0, 0.0, 60.0])), friction=0.2)
+    out = controller.compute(state)
+    law = leaning(wall(CommandedForce([0.0, 0.0, 0.0])), friction=0.2).compute(state)
+    assert out.status == Status.REDISTRIBUTED
+    assert 20.0 < out.forces[-1] < 50.0
+    np.testing.assert_array_equal(out.acceleration, law.acceleration)
+    soles = out.forces[:-3].reshape(-1, 3)
+    assert (np.abs(soles[:, :2]).max(axis=1) <= 0.15 * soles[:, 2] + 1e-5).all()
+
+
+# --- motions -------------------------------------------------------------------------
+
+
+def pressing(contact: Contact, **options: Any) -> Controller:
+    """Return a Panda that turns its hand as it pleases, and presses."""
+    return Controller(
+        panda(),
+        [FrameOrientation(TIP, gains=GAINS, name="turn")],
+        TargetPosture(panda().home()),
+        null_space_gain=5.0,
+        contacts=[contact],
+        **({"limits": None} | options),
+    )
+
+
+def test_a_fixed_base_presses_with_what_is_commanded() -> None:
+    """tau = M a + N - Jᵀλ: a rigid contact answers with λ, to rounding, in motion."""
+
+    def command(t: float) -> Array:
+        return np.array([3.0 * np.sin(4.0 * t), 2.0, 20.0 + 5.0 * np.cos(3.0 * t)])
+
+    contact = PointContact(TIP, force=CommandedForce(
+        trajectory=CallableTrajectory(command, 3)), damping=40.0)  # fmt: skip
+    controller = pressing(contact)
+    J = controller.robot.state(0.0, panda().home(), np.zeros(7)).frame(TIP).jacobian
+    v0 = 0.3 * np.linalg.svd(J)[2][-1]  # self-motion
+    log = simulate(
+        controller,
+        panda().home(),
+        v0,
+        duration=0.4,
+        log_period=0.05,
+        integrator=Dop853(rtol=1e-10, atol=1e-10),
+        plant=ContactPlant(panda(), [RigidContact(TIP, "point")], damping=40.0),
+    )
+    expected = np.array([command(t) for t in log.t])
+    for column in (f"plant.contact.{TIP}.force", f"contact.{TIP}.force",
+                   f"contact.{TIP}.commanded"):  # fmt: skip
+        np.testing.assert_allclose(log[column], expected, atol=1e-9)
+    norm = log["null_space_norm"]
+    assert norm[0] > 0.1
+    np.testing.assert_allclose(norm, norm[0] * np.exp(-5.0 * log.t), rtol=1e-7)
+    assert np.abs(log["task.turn.error"]).max() < 1e-9
+
+
+class SlidingPlant(ContinuousPlant):
+    """A point on a plane: one rigid row, and kinetic friction that it does not tell."""
+
+    def __init__(self, robot: Robot, contact: SlidingContact) -> None:
+        super().__init__(robot)
+        self._contact = contact
+        self.pressed = 0.0
+
+    def acceleration(self, t: float, q: Array, v: Array, tau: Array) -> Array:
+        contact, state = self._contact, self.robot.state(t, q, v)
+        frame, n = state.frame(contact.frame), contact.axes[:, 2]
+        J, J_dot = frame.jacobian[:3], frame.jacobian_dot[:3]
+        slip = (np.eye(3) - np.outer(n, n)) @ J @ v
+        speed = float(np.linalg.norm(slip))
+        along = np.tanh(speed / contact.smoothing) * slip / max(speed, 1e-12)
+        force = J.T @ (n - contact.friction * along)
+        M = np.triu(state.mass_matrix)
+        M = M + np.triu(M, 1).T
+        free, response = np.linalg.solve(
+            M, np.column_stack([tau - state.nonlinear_effects, force])
+        ).T
+        missing = -n @ (J_dot @ v + 40.0 * J @ v) - n @ J @ free
+        self.pressed = float(missing / (n @ J @ response))
+        return np.asarray(free + response * self.pressed)
+
+
+@pytest.mark.parametrize("normal", [[0.0, 0.0, 1.0], [0.3, -0.2, 1.0]])
+def test_a_sliding_point_keeps_force_and_path(normal: list[float]) -> None:
+    """Hybrid control: the path and the null space are exact, the force is commanded."""
+    contact = SlidingContact(
+        TIP, friction=0.3, normal=normal, force=CommandedForce(20.0)
+    )
+    state = panda().state(0.0, panda().home(), np.zeros(7))
+    here = state.position(TIP)[:2].copy()
+    path = Circle(0.05, 2.0, here - [0.05, 0.0])
+    tasks = [
+        FramePosition(TIP, path, axes="xy", gains=GAINS, name="path"),
+        FrameOrientation(TIP, gains=GAINS, name="upright"),
+    ]
+    controller = Controller(
+        panda(),
+        tasks,
+        TargetPosture(panda().home() + 0.1),
+        null_space_gain=5.0,
+        contacts=[contact],
+        limits=None,
+    )
+    plant = SlidingPlant(panda(), contact)
+    log = simulate(
+        controller,
+        panda().home(),
+        controller.flow(0.0, panda().home()),
+        duration=0.5,
+        log_period=0.05,
+        integrator=Dop853(rtol=1e-10, atol=1e-10),
+        plant=plant,
+    )
+    assert np.abs(log["task.path.error"]).max() < 1e-8
+    norm = log["null_space_norm"]
+    assert norm.max() < 1e-7
+    for t, q, v, tau in zip(log.t, log.q, log.v, log.tau, strict=True):
+        plant.acceleration(t, q, v, tau)
+        assert plant.pressed == pytest.approx(20.0, abs=1e-6)
+    used = log[f"contact.{TIP}.friction_used"]
+    np.testing.assert_allclose(used, np.tanh(0.1 / contact.smoothing), atol=0.2)
+
+
+# --- commands in time ----------------------------------------------------------------
+
+
+def test_a_change_ramps_and_a_schedule_fades_the_force() -> None:
+    q, v = panda().home(), np.zeros(7)
+    contact = PointContact(
+        TIP, force=CommandedForce(20.0), schedule=Schedule([(0.0, 4.0)], ramp=0.5)
+    )
+    controller = pressing(contact)
+    controller.at(1.0).ramp(1.0).force(TIP, CommandedForce(30.0))
+    expected = {0.25: 10.0, 0.8: 20.0, 1.5: 25.0, 2.5: 30.0, 3.75: 15.0}
+    for t, force in expected.items():
+        assert controller.compute(t, q, v).forces[-1] == pytest.approx(force, abs=1e-4)
+
+
+def test_a_wrench_of_a_surface() -> None:
+    """Six numbers: the forces at the corners have this sum and these moments."""
+    wrench = np.array([2.0, -1.0, 30.0, 0.4, -0.5, 0.1])
+    contact = SurfaceContact(TIP, length=0.1, width=0.08, force=CommandedForce(wrench))
+    controller = Controller(
+        panda(),
+        [FramePosition(TIP, axes="x", gains=GAINS)],
+        contacts=[contact],
+        limits=None,
+    )
+    state = random_state(panda(), 1)
+    out = controller.compute(state)
+    arms = contact.arms_in_axes(state.frame(TIP))
+    forces = out.forces.reshape(-1, 3)
+    np.testing.assert_allclose(forces.sum(axis=0), wrench[:3], atol=1e-9)
+    moments = np.cross(arms, forces).sum(axis=0)
+    np.testing.assert_allclose(moments, wrench[3:], atol=1e-9)
+
+
+# --- what is refused -----------------------------------------------------------------
+
+
+def press(**options: Any) -> PointContact:
+    return PointContact(TIP, force=CommandedForce(**options))
+
+
+REFUSED: dict[str, tuple[Any, str]] = {
+    "none": (lambda: CommandedForce(), "give either the value of the force or its"),
+    "two": (
+        lambda: CommandedForce(1.0, trajectory=Circle(1.0, 1.0, [0.0, 0.0])),
+        "give either the value of the force or its trajectory",
+    ),
+    "size": (lambda: CommandedForce([1.0, 2.0]), "value: it has 2 coordinates; needs"),
+    "pulls": (
+        lambda: pressing(press(value=-5.0)),
+        r"contacts\.panda_tcp\.force\.value: the normal force is -5 N; a contact",
+    ),
+    "cone": (
+        lambda: pressing(press(value=[6.0, 0.0, 10.0])),
+        r"panda_tcp\.force\.value: the tangential force is \(6, 0\) N beside a normal "
+        r"force of 10 N: outside the friction pyramid, which allows 4",
+    ),
+    "moments": (
+        lambda: pressing(press(value=[0.0, 0.0, 10.0, 0.0, 0.0, 0.0])),
+        "a contact of type point exerts no moment: needs 1 or 3",
+    ),
+    "tips": (
+        lambda: pressing(
+            SurfaceContact(
+                TIP,
+                length=0.1,
+                width=0.1,
+                force=CommandedForce([0.0, 0.0, 10.0, 0.0, 5.0, 0.0]),
+            )
+        ),
+        "at point 1 of 4, its share of the wrench, is -22.5 N",
+    ),
+    "slides without": (lambda: SlidingContact(TIP), "a sliding contact needs the"),
+    "slides aside": (
+        lambda: SlidingContact(TIP, force=CommandedForce([0.0, 0.0, 1.0])),
+        "it has 3 coordinates; a sliding contact takes the normal force alone",
+    ),
+    "frame": (
+        lambda: pressing(PointContact("panda_tcq", force=CommandedForce(1.0))),
+        r"contacts\.panda_tcq\.frame.*did you mean 'panda_tcp'",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_commanded(case: str) -> None:
+    make, message = REFUSED[case]
+    with pytest.raises(Exception, match=message) as raised:
+        make()
+    assert "Error" in type(raised.value).__name__
+
+
+def test_changes_that_do_not_fit() -> None:
+    controller = pressing(press(value=20.0))
+    change = controller.at(1.0)
+    with pytest.raises(ControllerError, match="did you mean 'panda_tcp'"):
+        change.force("panda_tcq", CommandedForce(10.0))
+    with pytest.raises(
+        ContactError, match="it has 3 coordinates; the force of contact"
+    ):
+        change.force(TIP, CommandedForce([0.0, 0.0, 10.0]))
+    with pytest.raises(ContactError, match=r"force\.value: the normal force is -1 N"):
+        change.force(TIP, CommandedForce(-1.0))
+    with pytest.raises(ContactError, match="has no commanded force from the start"):
+        pressing(PointContact(TIP)).at(1.0).force(TIP, CommandedForce(10.0))
