@@ -145,3 +145,21 @@ def test_the_page_s_yaml_and_python_run():
     made = space["walk"].scenario
     assert made.plan == Walk(speed=0.3, steps=4)
     assert load_experiment(yaml.safe_load(space["walk"].to_yaml())).scenario == made
+
+
+def test_it_walks_on_footsteps_that_are_given():
+    """A step to the left ahead, and the other foot beside it."""
+    rows = "[[0.15, 0.1, 0.1], [0.15, -0.08, 0.1]]"
+    plan = f"plan={{type: walk, footsteps: {rows}}}"
+    run = load_experiment(
+        "whole_body/talos_walk", plan, "simulation.duration=4.2"
+    ).run()
+    assert run.status == "completed"
+    assert run["plan.steps"][-1] == 2
+    assert run["plan.phase"][-1] == 0
+    assert np.abs(run.v[-1]).max() < 0.05
+    first = run["task.left_foot.actual"][0], run["task.right_foot.actual"][0]
+    middle = 0.5 * (first[0][:2] + first[1][:2])
+    for name, place in (("left_foot", (0.15, 0.1)), ("right_foot", (0.15, -0.08))):
+        there = run[f"task.{name}.actual"][-1][:2] - middle
+        assert there == pytest.approx(place, abs=0.02), name
