@@ -1,8 +1,8 @@
-"""Six quadrupeds trot on MuJoCo, with one set of parameters.
+"""Six quadrupeds trot and crawl on MuJoCo, with one set of parameters.
 
-    .venv/bin/python benchmarks/trotting.py [--estimated] [robot ...]
+    .venv/bin/python benchmarks/trotting.py [--estimated] [--case WORD] [robot ...]
 
-Prints one line for each robot and speed: whether it stood at the end, how far it came,
+Prints one line for each robot and case: whether it stood at the end, how far it came,
 and its mean speed while it trotted at full speed. ``--estimated``: with an estimated
 base, from a noisy inertial measurement unit and noisy encoders.
 """
@@ -24,8 +24,23 @@ FEET = {
     "hyq": ("lf_foot rf_foot lh_foot rh_foot", 0.021, "trunk"),
 }
 """The frames of the feet, their radius [m], and the frame of the unit."""
-SPEEDS = ((0.3, 0.0), (0.6, 0.0), (0.2, 0.4))
-"""Speed forward [m/s], and rate of turning [rad/s]."""
+STEPS = {
+    "shape": {"type": "box", "size": [0.4, 2.0, 0.04]},
+    "position": [0.6, 0.0, 0.0],
+    "copies": 2,
+    "spacing": [0.8, 0.0, 0.0],
+}
+"""Plates of 2 cm, up and down again."""
+CASES: dict[str, dict[str, Any]] = {
+    "0.3 m/s": {"plan": {"speed": 0.3}},
+    "0.6 m/s": {"plan": {"speed": 0.6}},
+    "0.2 m/s, 0.4 rad/s": {"plan": {"speed": 0.2, "turn": 0.4}},
+    "0.2 m/s sideways": {"plan": {"sideways": 0.2}},
+    "0.3 m/s, friction 0.4": {"plan": {"speed": 0.3}, "friction": 0.4},
+    "0.3 m/s, steps of 2 cm": {"plan": {"speed": 0.3}, "solids": {"steps": STEPS}},
+    "crawl, 0.06 m/s": {"plan": {"type": "crawl", "speed": 0.06}, "duration": 9.0},
+}
+"""What is different in each case."""
 NOISE = {"position_noise": 1e-4, "velocity_noise": 0.01}
 """Noise of the encoders [rad, rad/s]; that of the unit is an ADIS16448's."""
 UNTIL, DURATION = 4.0, 6.0
@@ -33,39 +48,46 @@ UNTIL, DURATION = 4.0, 6.0
 
 
 def configuration(
-    robot: str, speed: float, turn: float, *, estimated: bool
+    robot: str, case: dict[str, Any], *, estimated: bool
 ) -> dict[str, Any]:
-    """Return the configuration of a robot that trots."""
+    """Return the configuration of a robot in a case."""
+    friction = case.get("friction", 0.7)
     feet, radius, trunk = FEET[robot]
     frames, shape = feet.split(), {"type": "sphere", "radius": radius}
     return {
         "robot": {"name": robot},
         "start": {"ground": 0},
         "contacts": {
-            f: {"type": "ball", "frame": f, "radius": radius, "friction": 0.65}
+            f: {
+                "type": "ball",
+                "frame": f,
+                "radius": radius,
+                "friction": friction - 0.03,
+            }
             for f in frames
         },
-        "plan": {"type": "trot", "speed": speed, "turn": turn, "until": UNTIL},
+        "plan": {"type": "trot", "until": UNTIL, **case["plan"]},
         "null_space": {"fields": [{"type": "target_posture", "target": "start"}]},
         "limits": {"velocity": "none", "position": "none"},
         "simulation": {
-            "duration": DURATION,
+            "duration": case.get("duration", DURATION),
             "control_period": 0.001,
             "integrator": {"type": "rk4", "step": 0.001},
         },
         "plant": {
             "type": "mujoco",
             "contacts": {f: {"shape": shape} for f in frames},
-            "ground": {"friction": 0.7},
+            "ground": {"friction": friction},
+            "solids": case.get("solids", {}),
             "sensors": {"imu": trunk, **(NOISE if estimated else {})},
         },
         **({"estimators": {"base": True}} if estimated else {}),
     }
 
 
-def said(robot: str, speed: float, turn: float, *, estimated: bool) -> str:
+def said(robot: str, case: dict[str, Any], *, estimated: bool) -> str:
     """Return how a run went."""
-    given = configuration(robot, speed, turn, estimated=estimated)
+    given = configuration(robot, case, estimated=estimated)
     try:
         run = load_experiment(given).run()
     except SimulationError as error:
@@ -96,18 +118,17 @@ def _errors(run: Rollout) -> str:
 
 
 def main() -> None:
-    """Run all speeds of some robots, or of all."""
+    """Run the cases of some robots, or of all."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("robots", nargs="*", help="names; all by default")
+    parser.add_argument("--case", default="", help="part of the names of cases")
     parser.add_argument("--estimated", action="store_true", help="estimate the base")
     options = parser.parse_args()
     for robot in options.robots or FEET:
-        for speed, turn in SPEEDS:
-            print(
-                f"{robot:8} {speed:.1f} m/s {turn:.1f} rad/s | "
-                f"{said(robot, speed, turn, estimated=options.estimated)}",
-                flush=True,
-            )
+        for name, case in CASES.items():
+            if options.case in name:
+                result = said(robot, case, estimated=options.estimated)
+                print(f"{robot:8} {name:24} | {result}", flush=True)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import Measurement
 from hsp_control.plans.falling import FallDetector
 from hsp_control.plans.footsteps import Footstep, Velocity
+from hsp_control.plans.legs import hip_height, leg_length
 from hsp_control.plans.pendulum import GRAVITY
 from hsp_control.plans.plan import RunningPlan
 from hsp_control.plans.quadruped import QuadrupedPlan
@@ -150,6 +151,52 @@ class RunningQuadruped(RunningPlan):
             aloft = [foot.name for foot in lifted]
             self._controller.prepare(state, lifted=aloft, without=down)
         self._begun = True
+
+    def _corners(self) -> tuple[PointFoot, PointFoot, PointFoot, PointFoot]:
+        """Return the feet: front left and right, hind left and right.
+
+        Raises:
+            PlanError: If the feet do not stand at the corners of a body.
+        """
+        corners: dict[tuple[bool, bool], PointFoot] = {}
+        for foot in self._feet:
+            corners[bool(foot.offset[0] > 0.0), bool(foot.offset[1] > 0.0)] = foot
+        if len(corners) < 4:
+            raise PlanError(
+                "the feet do not stand at the four corners of the body, so that there "
+                f"are no diagonals to {self.gait.gait} with"
+            )
+        return (
+            corners[True, True],
+            corners[True, False],
+            corners[False, True],
+            corners[False, False],
+        )
+
+    def _check_stride(self, state: RobotState, time: float) -> None:
+        """Check that the legs are long enough for the speed.
+
+        Args:
+            state: The state in which the robot stands.
+            time: How long a foot moves to one side of its hip [s].
+
+        Raises:
+            PlanError: If they are not.
+        """
+        speed = float(np.hypot(self.gait.speed, self.gait.sideways))
+        excursion = speed * time
+        for foot in self._feet:
+            square = (
+                leg_length(state.robot, foot.frame) ** 2
+                - hip_height(state, foot.frame) ** 2
+            )
+            reach = 0.9 * float(np.sqrt(max(square, 0.0)))
+            if excursion > reach:
+                raise PlanError(
+                    f"at {speed:.3g} m/s a foot is {excursion:.3g} m before and behind "
+                    f"its hip; the leg of {foot.name!r} reaches {reach:.3g} m. "
+                    f"{self.gait.gait.capitalize()} slower, or with a shorter swing"
+                )
 
     @abstractmethod
     def _start_gait(self, state: RobotState) -> None:

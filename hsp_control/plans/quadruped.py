@@ -29,10 +29,12 @@ class QuadrupedPlan(MovingPlan):
         gait: What the robot does, for messages: it trots.
         center_priority: The level of the centre of mass: on two feet it cannot be kept
             with all else.
+        center_gains: The gains of the centre of mass.
     """
 
     gait: ClassVar[str]
     center_priority: ClassVar[int]
+    center_gains: ClassVar[Gains]
 
     _: KW_ONLY
     until: Positive | None = None
@@ -81,7 +83,7 @@ class QuadrupedPlan(MovingPlan):
                 axes="z", gains=Gains(natural_frequency=15.0), name="height", priority=1
             ),
             CenterOfMass(
-                axes="xy", gains=Gains(6.0, 5.0), priority=self.center_priority
+                axes="xy", gains=self.center_gains, priority=self.center_priority
             ),
         ]
         for name in names:

@@ -5,6 +5,7 @@ from typing import ClassVar
 from hsp_control.control.controller import Controller
 from hsp_control.plans.quadruped import QuadrupedPlan
 from hsp_control.plans.trotting import RunningTrot
+from hsp_control.tasks import Gains
 
 
 class Trot(QuadrupedPlan, type="trot"):
@@ -18,6 +19,7 @@ class Trot(QuadrupedPlan, type="trot"):
 
     gait: ClassVar[str] = "trot"
     center_priority: ClassVar[int] = 2
+    center_gains: ClassVar[Gains] = Gains(6.0, 5.0)
 
     def begin(self, controller: Controller) -> RunningTrot:
         """Return what trots; see `Plan.begin`."""

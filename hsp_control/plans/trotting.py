@@ -6,12 +6,10 @@ from typing import Literal
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import PlanError
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Measurement
 from hsp_control.plans.footsteps import Footstep
 from hsp_control.plans.four_feet import PointFoot, RunningQuadruped
-from hsp_control.plans.legs import hip_height, leg_length
 from hsp_control.plans.pendulum import GRAVITY
 from hsp_control.robot import RobotState
 
@@ -36,7 +34,7 @@ class RunningTrot(RunningQuadruped):
         self._pairs = self._diagonals()
         lowest = min(foot.height for foot in self._feet)
         self._time_constant = float(np.sqrt((mass[2] - lowest) / GRAVITY))
-        self._check_stride(state)
+        self._check_stride(state, 0.5 * (self.gait.swing + 2.0 * self.gait.stance))
         self._reference: Array = mass[:2].copy()
         self._since = state.t
         self._mode: Mode = "standing"
@@ -47,39 +45,9 @@ class RunningTrot(RunningQuadruped):
         return [aloft for pair in self._pairs for aloft in (pair, pair[:1], pair[1:])]
 
     def _diagonals(self) -> tuple[list[PointFoot], list[PointFoot]]:
-        """Return the two pairs of diagonal feet.
-
-        Raises:
-            PlanError: If the feet do not stand at the corners of a body.
-        """
-        corners: dict[tuple[bool, bool], PointFoot] = {}
-        for foot in self._feet:
-            corners[bool(foot.offset[0] > 0.0), bool(foot.offset[1] > 0.0)] = foot
-        if len(corners) < 4:
-            raise PlanError(
-                "the feet do not stand at the four corners of the body, so that there "
-                "are no diagonals to trot with"
-            )
-        front_left, front_right = corners[True, True], corners[True, False]
-        hind_left, hind_right = corners[False, True], corners[False, False]
+        """Return the two pairs of diagonal feet."""
+        front_left, front_right, hind_left, hind_right = self._corners()
         return [front_left, hind_right], [front_right, hind_left]
-
-    def _check_stride(self, state: RobotState) -> None:
-        trot = self.gait
-        speed = float(np.hypot(trot.speed, trot.sideways))
-        excursion = 0.5 * speed * (trot.swing + 2.0 * trot.stance)
-        for foot in self._feet:
-            square = (
-                leg_length(state.robot, foot.frame) ** 2
-                - hip_height(state, foot.frame) ** 2
-            )
-            reach = 0.9 * float(np.sqrt(max(square, 0.0)))
-            if excursion > reach:
-                raise PlanError(
-                    f"at {speed:.3g} m/s a foot is {excursion:.3g} m before and behind "
-                    f"its hip; the leg of {foot.name!r} reaches {reach:.3g} m. Trot "
-                    "slower, or with a shorter swing"
-                )
 
     def log_channels(self) -> Mapping[str, LogChannel]:
         """Return the phase and the velocity."""
