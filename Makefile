@@ -27,11 +27,20 @@ help: ## list the targets
 # The bytecode of what the demo imports is written, whatever the shell says: without it
 # each later start would take seconds more.
 demo: export PYTHONDONTWRITEBYTECODE :=
-demo: $(USE) ## run the paper's moving obstacle, plot it, say where it is
+demo: $(USE) ## the paper's run, and a Panda under a ball, with and without its field
 	@echo "Running paper/4_moving_obstacle; the first run compiles its kernels, once ..."
 	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo --no-view
 	@$(BIN)/hsp plot out/demo/4_moving_obstacle.npz --out out/demo
-	@echo "The log and the figures are in out/demo:" && ls out/demo
+	@echo "Running panda_obstacle, with its field and without ..."
+	@$(BIN)/hsp run panda_obstacle --out out/demo/with --no-view
+	@$(BIN)/hsp run panda_obstacle --out out/demo/without --no-view \
+	  --set 'null_space.fields=[{type: rest}]'
+	@$(BIN)/hsp export out/demo/with/panda_obstacle.npz out/demo/without/panda_obstacle.npz \
+	  --html out/demo/panda.html
+	@echo
+	@echo "Open out/demo/panda.html in a browser; the switch (or w) shows it with and without."
+	@echo "Touch it: $(BIN)/hsp play panda"
+	@echo "The paper's log and figures are in out/demo, too."
 
 ##@ Check
 quick: $(STAMP) ## what to run after every edit: a minute of CPU
@@ -96,6 +105,13 @@ wheel-test: wheel ## build the wheel, install it elsewhere, use it from there
 	if [ -n "$$compiled" ]; then echo "Compiled, though the wheel has code: $$compiled"; exit 1; fi; \
 	echo "The wheel works."
 
+##@ Documents
+docs: $(STAMP) ## build the site into docs/_build/html, with its replays; warnings are errors
+	@echo "Running what the site's frames play (a minute, once) ..."
+	@$(BIN)/python tools/replays.py
+	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
+	@echo "The site is docs/_build/html/index.html"
+
 ##@ Keep
 figures: $(STAMP) ## draw the documents' figures anew, into docs/figures
 	@$(BIN)/python docs/make_figures.py
@@ -124,10 +140,10 @@ constraints: ## refresh constraints.txt with the newest version of everything
 	cp "$$dir/new" constraints.txt; echo "Wrote constraints.txt; now: make lint test"
 
 clean: ## remove caches, builds and the demo's output; .venv stays
-	@rm -rf build dist machine_code out/demo .coverage .*_cache .hypothesis
+	@rm -rf build dist machine_code docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help figures screenshots animations demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test format constraints clean
+.PHONY: help docs figures screenshots animations demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test format constraints clean
 
 # ------------------------------------------------------------------- the environment
 
@@ -136,7 +152,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 # constraints.txt is newer than the stamp.
 $(USE): pyproject.toml constraints.txt
 	@echo "Installing hsp_control into .venv (0.9 GB, once) ..."
-	@$(find-python); "$$python" tools/install.py .venv --editable .
+	@$(find-python); "$$python" tools/install.py .venv --editable ".[export]"
 	@touch $@
 
 $(STAMP): pyproject.toml constraints.txt

@@ -1,4 +1,4 @@
-"""Commanded contact forces on MuJoCo: wiping, pushing, and why a sliding hand chatters.
+"""Commanded contact forces on MuJoCo: wiping, pushing, carrying, and why hands chatter.
 
     .venv/bin/python benchmarks/forces.py
 
@@ -53,6 +53,10 @@ WIPING = {
     "all masses +10 %": (HEAVIER,),
     "all masses +10 %, without feedback": (HEAVIER, NO_FEEDBACK),
     "all masses +10 %, with the estimate": (HEAVIER, *ESTIMATED),
+    "all masses +10 %, integral action on the path": (
+        HEAVIER,
+        "compensation.integral_action={rate: 5, tasks: [path]}",
+    ),
     "controller believes μ = 0.2": ("contacts.wiper.friction=0.2",),
     "controller believes μ = 0.4": ("contacts.wiper.friction=0.4",),
     "controller expects no friction": ("contacts.wiper.friction=0.001",),
@@ -72,6 +76,15 @@ WALL = {
     "`talos_lean`, 120 N, all masses +10 %": ("talos_lean", ()),
     "the same without feedback": ("talos_lean", (NO_FEEDBACK,)),
     "the same with the right masses": ("talos_lean", ("plant.inertias={}",)),
+}
+CARRYING = {
+    "as configured": (),
+    "without feedback": (NO_FEEDBACK,),
+    "a box of 4 kg, commanded as 5": ("plant.solids.box.mass=4",),
+    "a box of 6 kg, commanded as 5": ("plant.solids.box.mass=6",),
+    "the arms' masses +10 %": (HEAVIER,),
+    "μ = 0.6": ("plant.solids.box.friction=0.6",),
+    "μ = 0.35, too little for 24.5 of 60 N": ("plant.solids.box.friction=0.35",),
 }
 
 
@@ -145,6 +158,30 @@ def head(task: str) -> str:
     )
 
 
+def carried(overrides: tuple[str, ...]) -> str:
+    """Return the cells of a run with the box, while it is in the air."""
+    log = hsp.load_experiment("forces/pandas_box", *overrides).run()
+    rows = (log.t > 1.2) & (log.t < 5.4)
+    sides = {"left": 1.0, "right": -1.0}
+    error = np.concatenate(
+        [
+            sign * log[f"plant.contact.{side}_panda_tcp.force"][rows, 1] - 60.0
+            for side, sign in sides.items()
+        ]
+    )
+    hands = 0.5 * sum(log[f"task.{side}.actual"] for side in sides)
+    box = log["plant.solid.box.position"]
+    slip = (box[:, [0, 2]] - hands)[rows]
+    slip = 1e3 * np.linalg.norm(slip - slip[0], axis=1)
+    away = 1e3 * np.linalg.norm(log["task.left.error"][rows], axis=1)
+    return (
+        f"{np.sqrt((error**2).mean()):.2g} / {np.abs(error).max():.2g} | "
+        f"{slip.max():.2g} | {1e3 * np.abs(box[rows, 1]).max():.2g} | "
+        f"{np.sqrt((away**2).mean()):.2g} / {away.max():.2g} | "
+        f"{log['null_space_norm'][rows].max():.2g} | {log.meta['status']}"
+    )
+
+
 def pulled_ball(impedance: float, slip_damping: float) -> float:
     """Return the share of time in which a ball that is pulled does not touch.
 
@@ -157,8 +194,8 @@ def pulled_ball(impedance: float, slip_damping: float) -> float:
     <joint type="slide" axis="0 0 1"/>
     <geom name="ball" type="sphere" size="0.02" mass="3"/></body></worldbody>
     <contact><pair geom1="plane" geom2="ball" condim="3" friction="0.3 0.3 0 0 0"
-    solimp="{impedance} {impedance} 0.001 0.5 2" solreffriction="-1 {-slip_damping * impedance}"/>
-    </contact></mujoco>""")
+    solimp="{impedance} {impedance} 0.001 0.5 2"
+    solreffriction="-1 {-slip_damping * impedance}"/></contact></mujoco>""")
     data = mujoco.MjData(model)
     data.qvel[0] = 0.1
     data.qfrc_applied[:] = [3000 * 0.1, -20.0]
@@ -197,6 +234,15 @@ def main() -> None:
         text += row(label, run(name, overrides, "center_of_mass", 4.0))
     print(text)
     replace_section(page, "wall", "\n" + text + "\n")
+    text = (
+        "| | internal force, rms / max error [N] | slip in the hands, max [mm] | box "
+        "off the middle, max [mm] | hand, rms / max error [mm] | ‖e_N‖, max [rad/s] | "
+        "|\n|---|--:|--:|--:|--:|--:|---|\n"
+    )
+    for label, overrides in CARRYING.items():
+        text += f"| {label} | {carried(overrides)} |\n"
+    print(text)
+    replace_section(page, "box", "\n" + text + "\n")
 
 
 if __name__ == "__main__":

@@ -297,7 +297,7 @@ def main() -> None:
             for name, (runs, limits) in found.items()
         )
         table += f"\n{costs}\n{beside_tsid.CPP}"
-        replace_section(DOCS.parent / "README.md", "make bench, limits", costs)
+        replace_section(DOCS / "step_cost.md", "make bench, limits", costs)
     print(table)
     replace_section(DOCS / "limits.md", "limit_side_by_side", "\n" + table + "\n")
     with styled():

@@ -300,7 +300,7 @@ def placo_row(
 
 
 def larger_robots(rounds: int, block: int, say: Callable[[str], None]) -> list[str]:
-    """Time this law and TSID on larger robots; return the rows of the README."""
+    """Time this law and TSID on larger robots; return the rows of docs/step_cost.md."""
     say("## Larger robots, several poses at once\n\n")
     say("| problem | this law, rms [mm] | TSID, rms [mm] | this law / TSID | µs |\n")
     say("|---|--:|--:|--:|--:|\n")
@@ -328,7 +328,7 @@ def larger_robots(rounds: int, block: int, say: Callable[[str], None]) -> list[s
 
 
 def summarise(times: dict[int, dict[str, Array]], larger: list[str]) -> None:
-    """Write the README's table, between its two markers."""
+    """Write the table of docs/step_cost.md, between its two markers."""
     if "TSID" not in times[6]:
         return
     lines = (
@@ -336,23 +336,23 @@ def summarise(times: dict[int, dict[str, Array]], larger: list[str]) -> None:
         "pink + RNEA = 1 |\n|---|--:|--:|--:|\n"
     )
     for rows, what in ((6, "Panda, pose"), (3, "Panda, position")):
-        for name, field_name in README_ROWS.items():
+        for name, field_name in SUMMARY_ROWS.items():
             cells = [
                 spread(ratios(times[rows], name, r)) if r in times[rows] else ""
                 for r in REFERENCES
             ]
             lines += f"| {what}, {field_name} | " + " | ".join(cells) + " |\n"
-    readme = ROOT / "README.md"
-    text = readme.read_text()
+    page = ROOT / "docs" / "step_cost.md"
+    text = page.read_text()
     head, rest = text.split(MARKERS[0] + "\n", 1)
     _, tail = rest.split(MARKERS[1], 1)
-    readme.write_text(
+    page.write_text(
         head + MARKERS[0] + "\n" + lines + "".join(larger) + MARKERS[1] + tail
     )
 
 
 MARKERS = ("<!-- make bench: begin -->", "<!-- make bench: end -->")
-README_ROWS = {
+SUMMARY_ROWS = {
     "this law": "joint centering",
     "this law, and `diagnose`": "joint centering, `diagnose` included",
     "this law, manipulability": "manipulability",
@@ -453,8 +453,8 @@ def main() -> None:
             for rows in (6, 3)
         )
         say(f"\n{beside_tsid.CPP}\n")
-        readme = ROOT / "README.md"
-        replace_section(readme, "make bench, ball", beside_tsid.HEADER + rows)
+        page = ROOT / "docs" / "step_cost.md"
+        replace_section(page, "make bench, ball", beside_tsid.HEADER + rows)
     say(
         f"Python {platform.python_version()}, {os.cpu_count()} cores, hsp_control "
         f"{hsp.__version__}, numpy {np.__version__}. Only ratios are valid for other "

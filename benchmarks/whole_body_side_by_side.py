@@ -240,7 +240,7 @@ def compare(
         )
         say(f"By the status of this law's step:\n\n{costs}\n{beside_tsid.CPP}\n")
         if body is TALOS:
-            replace_section(ROOT / "README.md", "make bench, Talos", costs)
+            replace_section(ROOT / "docs" / "step_cost.md", "make bench, Talos", costs)
     parts = parts_table(case, path[::5])
     say(
         "Times of the parts of this law's step (*deliver* contains inverse dynamics, "

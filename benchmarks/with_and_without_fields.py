@@ -5,8 +5,7 @@
 Runs each configuration of `configs/` as it is, and once more without its first field
 (with g = 0 if there is no other), measures both the same way, times the control step
 against the Pinocchio calls that every controller needs, and prints the tables. A run of
-all configurations also writes docs/configurations.md. The table of README.md is copied
-from there by hand.
+all configurations also writes docs/configurations.md.
 """
 
 import argparse

@@ -9,11 +9,12 @@ from hsp_control.visualization.viewer.export import FilmStyle, export_film
 FOLDER = Path(__file__).parent / "figures"
 PERIOD = 2.0 * pi / 3.0  # of the paper's circle and disk [s]
 FRAME_RATE = 15.0  # Hz
+NO_FIELD = "null_space.fields=[{type: rest}]"
 VIEW = {"camera": [2.0, 0.75, 1.1], "show": {"influence": False}}
 
 
 def main() -> None:
-    """Write both into docs/figures."""
+    """Write them into docs/figures."""
     film_paper()
     film_panda()
     for file in sorted(FOLDER.glob("*.webp")):
@@ -39,12 +40,18 @@ def film_paper() -> None:
 
 
 def film_panda() -> None:
-    """Film the Panda whose elbow a ball sweeps past: all of it, with the plots."""
-    rollout = hsp.load_experiment("panda_obstacle").run()
-    style = FilmStyle(
-        size=(900, 560), frame_rate=FRAME_RATE, speed=2.0, caption=False, end=9.99
-    )
-    export_film(rollout, FOLDER / "panda.webp", style=style, **VIEW)
+    """Film the Panda whose elbow a ball sweeps past, with its field and without."""
+    for name, changes in (("with", ()), ("without", (NO_FIELD,))):
+        rollout = hsp.load_experiment("panda_obstacle", *changes).run()
+        style = FilmStyle(
+            size=(420, 420),
+            frame_rate=FRAME_RATE,
+            speed=2.0,
+            plots=False,
+            caption=False,
+            end=9.99,
+        )
+        export_film(rollout, FOLDER / f"panda_{name}.webp", style=style, **VIEW)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ env = HandTargets(gymnasium.make("Pusher-v5"), "tips_arm", "hand.yaml", axes="xy
 observation, reward, terminated, truncated, info = env.step([0.0, 0.5, 0.0])
 """
 
-from math import inf
+from math import inf, nan
 from typing import Any
 
 import numpy as np
@@ -112,7 +112,8 @@ class HandTargets(
         self.hand = HandControl(robot, frame, config, gains=_GAINS, axes=axes)
         self._absolute = absolute
         rows = 6 if axes is None else len(axes)
-        self._scale = np.repeat(scale, 3) if axes is None else np.full(rows, scale[0])
+        linear, angular = _positive_pair(scale)
+        self._scale = np.repeat([linear, angular], 3)[:rows]
         taken = {each.control for each in self.plant.motors.values()}
         self._others = [k for k in range(base.model.nu) if k not in taken]
         limit = np.full(rows, inf if absolute else 1.0)
@@ -187,3 +188,21 @@ class HandTargets(
             effort = self.hand.effort(t, *self._state, period)
             plant.advance(t, t + period, effort)
         import_mujoco().mj_rnePostConstraint(plant.model, data)
+
+
+def _positive_pair(scale: Any) -> tuple[float, float]:
+    """Return the two numbers of a scale.
+
+    Raises:
+        ControllerError: If it is anything else.
+    """
+    try:
+        linear, angular = (float(each) for each in scale)
+    except (TypeError, ValueError):
+        linear = angular = nan
+    if not (0.0 < linear < inf and 0.0 < angular < inf):
+        raise ControllerError(
+            f"scale: needs two positive numbers, for position [m] and orientation "
+            f"[rad]; got {scale!r}"
+        )
+    return linear, angular

@@ -70,9 +70,10 @@ class HspPose(OperationalSpaceController):  # type: ignore[misc]
                 an actuator is no torque motor.
         """
         for key, value in _FIXED.items():
-            if settings.get(key, value) != value:
+            given = settings.get(key, value)  # perhaps an array, which has no truth
+            if not isinstance(given, type(value)) or given != value:
                 raise ControllerError(
-                    f"{key}: {TYPE} supports {value!r} only; got {settings[key]!r}"
+                    f"{key}: {TYPE} supports {value!r} only; got {given!r}"
                 )
         super().__init__(**settings)
         model, qpos = self.sim.model._model, self.sim.data.qpos

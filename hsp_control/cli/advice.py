@@ -20,6 +20,8 @@ def robot_advice(robot: Robot) -> Iterator[str]:
         placed = (description.parts or {}).get(part.prefix.removesuffix("_"))
         if placed is not None and placed.project_inertias:
             continue
+        if part.source.shapes is not None:  # no URDF: MuJoCo has checked its inertias
+            continue
         links = [found.link for found in impossible_inertias(read_urdf(part.source))]
         if links:
             yield (

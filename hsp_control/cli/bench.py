@@ -10,6 +10,7 @@ from rich.table import Table
 
 from hsp_control.cli.consoles import errors, out
 from hsp_control.cli.loading import load
+from hsp_control.cli.startup import INTERRUPTED
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError, SimulationError
 from hsp_control.live.latency import (
@@ -55,7 +56,7 @@ def bench(options: argparse.Namespace) -> int:
         _draw(found, options.plot, f"{experiment.name}: a loop at {options.rate:g} Hz")
     if len(found.step) < round(options.seconds * options.rate):
         print("hsp: stopped by the user", file=sys.stderr)
-        return 2
+        return INTERRUPTED
     return 0
 
 

@@ -6,12 +6,18 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TextColumn,
+    TimeRemainingColumn,
+    track,
+)
 from rich.table import Table
 
 from hsp_control.cli import robot_table
@@ -21,6 +27,7 @@ from hsp_control.cli.consoles import message_of, renamed_keys_printed
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import DeferredInterrupt
 from hsp_control.cli.loading import load
+from hsp_control.cli.startup import INTERRUPTED
 from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema
@@ -68,7 +75,7 @@ def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") ->
         if rollout.status == "interrupted":
             at = f" at t = {rollout.t[-1]:g} s" if len(rollout) else ""
             print(f"hsp: stopped by the user{at}", file=sys.stderr)
-            status = 2
+            status = INTERRUPTED
         elif rollout.status == "stopped":
             print(f"hsp: {rollout.meta['message']}", file=sys.stderr)
             status = 2
@@ -267,6 +274,13 @@ def inspect(options: argparse.Namespace) -> int:
     return inspections.inspect(options)
 
 
+def doctor(options: argparse.Namespace) -> int:
+    """Print what this machine lacks."""
+    from hsp_control.cli import doctor as doctors
+
+    return doctors.doctor(options)
+
+
 def robots(options: argparse.Namespace) -> int:
     """List all robots, or describe one."""
     if options.name is not None:
@@ -275,24 +289,13 @@ def robots(options: argparse.Namespace) -> int:
     if options.markdown:
         print(robot_table.markdown(), end="")
         return 0
-    table = Table(box=None, pad_edge=False)
-    for heading in ("robot", "origin", "root"):
-        table.add_column(heading)
-    for heading in ("nq", "nv", "frames"):
-        table.add_column(heading, justify="right")
-    for heading in ("end effector", "position", "pose", "note"):
-        table.add_column(heading)
-    for row in robot_table.rows():
-        counts = (row.nq, row.nv, row.frames)
-        table.add_row(
-            *(row.name, row.origin, row.root),
-            *("-" if count is None else str(count) for count in counts),
-            row.end_effector or "-",
-            robot_table.task(row, row.position, 3),
-            robot_table.task(row, row.pose, 6),
-            escape(row.note.replace("`", "")),
-        )
-    _out.print(table)
+    found = list(track(robot_table.rows(), "robots", console=_errors, transient=True))
+    if options.json:
+        rows = [asdict(row) for row in found]
+        print(json.dumps(rows, indent=2, ensure_ascii=False))
+        return 0
+    for line in robot_table.text(found):
+        _out.print(line, markup=False)
     if not example_robots():
         _out.print("More with: pip install example-robot-data-loaders")
     return 0

@@ -6,16 +6,17 @@ from collections.abc import Callable
 from contextlib import nullcontext
 
 from hsp_control.cli.franka_box_log import BoxLog
+from hsp_control.cli.loading import robot_access
 from hsp_control.common.exceptions import LiveError
-from hsp_control.common.resources import bundled_configs, bundled_robots
 from hsp_control.config import Experiment, load_experiment
-from hsp_control.franka_box import PERIOD, PORT, VERSION, Arm, Box, Server
+from hsp_control.franka_box import Arm, Box, Server
+from hsp_control.franka_wire.layouts import PERIOD, PORT, VERSION
 from hsp_control.live import OperatorRequests
 from hsp_control.live.latency import real_time_priority
 from hsp_control.live.simulated_robot import sampled
 from hsp_control.live.stop_signals import stop_signals
 from hsp_control.robot import Robot
-from hsp_control.robot.description.sources import example_robots
+from hsp_control.robot.description.sources import is_robot
 
 MOTOR_INERTIA = 0.1
 """Rotor inertia behind the gear of every joint, where only a robot is named [kg·m²].
@@ -73,9 +74,9 @@ def franka_box(options: argparse.Namespace) -> int:
 def _experiment(options: argparse.Namespace) -> Experiment:
     """Return the experiment of a configuration, or of a robot at home."""
     source, name = options.config, str(options.config)
-    robots = {*bundled_robots(), *example_robots()} - {*bundled_configs()}
-    if name in robots or name.endswith(".urdf"):
-        Arm(Robot.load(name))  # says what is wrong with it, not with a task
+    if is_robot(name):
+        # This says what is wrong with it, not with a task.
+        Arm(Robot.load(name, access=robot_access(name, options)))
         source = {
             "robot": {"name": name},
             "tasks": {"hand": {"type": "frame_pose"}},

@@ -64,7 +64,10 @@ class BoxLog:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._log.end("completed", "the box was switched off")
+        if error is None:
+            self._log.end("completed", "the box was switched off")
+        else:
+            self._log.end("stopped", str(error) or type(error).__name__)
         Rollout.load(self._log.path).save(self.path)
         self._log.path.unlink()
 

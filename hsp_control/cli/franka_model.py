@@ -18,7 +18,7 @@ def franka_model(options: argparse.Namespace) -> int:
     if options.urdf.suffix != ".urdf":
         raise ModelError(f"{options.urdf}: the file's name must end in .urdf")
     settings = FrankaSettings.parse(options.address)
-    process, found = reached(settings, np.empty((0, 7)))
+    process, found = reached(settings, np.empty((0, 7)), moves=False)
     process.close()
     urdf, carried = robot_urdf(settings.address), found["total"]
     if options.like is None:

@@ -9,11 +9,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from hsp_control.cli.consoles import out
+from hsp_control.cli.loading import robot_access
 from hsp_control.common.exceptions import ExportError, ModelError
 from hsp_control.inspection import Inspection
 from hsp_control.inspection import inspect as inspect_robot
 from hsp_control.robot import RobotDescription
-from hsp_control.robot.description.access import ANYWHERE, only_within
 from hsp_control.robot.description.repaired import write_repaired
 
 _WIDTH = 80
@@ -24,9 +24,7 @@ _SHOWN = 12
 def inspect(options: argparse.Namespace) -> int:
     """Print what is odd about a robot; return 2 if it does not load."""
     description = RobotDescription(options.robot, xacro_args=_arguments(options.args))
-    strict = options.strict or bool(options.allow)
-    access = only_within(_folders(options)) if strict else ANYWHERE
-    source = description.find(access)
+    source = description.find(robot_access(str(options.robot), options))
     with _no_warnings():
         inspection = inspect_robot(source, description)
     if options.json:
@@ -47,7 +45,7 @@ def inspect(options: argparse.Namespace) -> int:
 
 def report(inspection: Inspection) -> Iterator[str]:
     """Yield the lines that are printed, of at most 80 characters."""
-    for name, text in inspection.facts():
+    for name, text in inspection.facts.items():
         line = f"{name:12}  {text}"
         yield from [line] if name == "file" else _wrapped(line, "", " " * 14)
     for (severity, check, cure), findings in inspection.groups().items():
@@ -77,7 +75,7 @@ def _write_page(inspection: Inspection, path: Path) -> Path:
 
     if inspection.robot is None:
         raise ExportError(f"{path}: there is no picture of a robot that does not load")
-    facts = [f"{name}: {text}" for name, text in inspection.facts() if name != "file"]
+    facts = [f"{k}: {text}" for k, text in inspection.facts.items() if k != "file"]
     notes = [
         Note(f"{severity}: {check}", [f"{f.element}: {f.message}" for f in found], cure)
         for (severity, check, cure), found in inspection.groups().items()
@@ -123,7 +121,3 @@ def _arguments(texts: list[str]) -> dict[str, str]:
             raise ModelError(f"{text!r}: an argument of a xacro file is name:=value")
         arguments[name] = value
     return arguments
-
-
-def _folders(options: argparse.Namespace) -> list[Path]:
-    return [Path(options.robot).parent, *options.allow]

@@ -30,7 +30,7 @@ from hsp_control.live import (
     connect,
     run_loop,
 )
-from hsp_control.live.adapting import AdaptingHardware
+from hsp_control.live.adapting import AdaptingHardware, LocatedHardware
 from hsp_control.live.latency import Quantiles
 from hsp_control.live.ros2 import publish
 from hsp_control.live.settings import check_fixed
@@ -104,10 +104,12 @@ def live(options: argparse.Namespace) -> int:
             hardware = connect(options.robot, experiment.robot, live_period(experiment))
             stack.callback(hardware.close)
         if isinstance(hardware, AdaptingHardware):
-            settings = hardware.adapted(experiment.scenario.live)
+            options_of_loop["settings"] = hardware.adapted(experiment.scenario.live)
+        if isinstance(hardware, LocatedHardware):
             experiment = begun_where_it_is(experiment, options, hardware.q)
-            options_of_loop |= {"settings": settings, "scene": experiment.scene}
+            options_of_loop["scene"] = experiment.scene
             command = Command(experiment.controller, experiment.compensation)
+        if isinstance(hardware, AdaptingHardware):
             for line in hardware.lines:
                 out.print(line, highlight=False)
         if options.publish is not None:
@@ -118,12 +120,13 @@ def live(options: argparse.Namespace) -> int:
             report = run(hardware)
             out.print(_times(report, experiment))
             out.print(f"The loop: {report.reason}")
-            fault = getattr(hardware, "fault", None)
-            if fault is not None and fault not in report.reason:
-                out.print(f"The robot: {fault}", highlight=False)
             _convert(loop_log)
-            regular = report.ended in {"completed", "operator"} and fault is None
-            return 0 if regular else 2
+            fault = getattr(hardware, "fault", None)
+            if fault is None and report.ended in {"completed", "operator"}:
+                return 0
+            told = fault is None or fault in report.reason
+            print(f"hsp: {report.reason if told else fault}", file=sys.stderr)
+            return 2
         with RobotProcess(
             experiment, faults=faults, log=robot_log, log_period=simulation.log_period
         ) as robot:

@@ -1,8 +1,11 @@
-"""The experiment that a command is about."""
+"""The experiment or the robot that a command is about."""
 
 import argparse
+from pathlib import Path
 
 from hsp_control.config import Experiment, load_experiment
+from hsp_control.robot.description.access import ANYWHERE, Access, only_within
+from hsp_control.robot.description.sources import is_path
 
 
 def load(options: argparse.Namespace, *overrides: str) -> Experiment:
@@ -19,3 +22,18 @@ def load(options: argparse.Namespace, *overrides: str) -> Experiment:
         strict=options.strict or bool(options.allow),
         allow=options.allow,
     )
+
+
+def robot_access(name: str, options: argparse.Namespace) -> Access:
+    """Return which files a command may read that is given a robot, not a configuration.
+
+    Strict reading reads beside the robot's file; a name allows no folder.
+
+    Args:
+        name: The robot's name, or the path of its file.
+        options: Of the command line.
+    """
+    if not (options.strict or options.allow):
+        return ANYWHERE
+    beside = [Path(name).parent] if is_path(name) else []
+    return only_within([*beside, *options.allow])

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from hsp_control.cli.options.command_line import command_line
-from hsp_control.cli.startup import end_quietly, is_command
+from hsp_control.cli.startup import INTERRUPTED, end_quietly, is_command
 from hsp_control.common.exceptions import HspControlError
 
 _OWN_INTERRUPTS = {"bench", "export", "play", "sweep", "view"}
@@ -16,7 +16,7 @@ FAILURE = 2
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run ``hsp`` and return its exit status: 0, or 2 after one clear message."""
+    """Run ``hsp``: status 0, 2 after one clear message, 130 after Ctrl-C."""
     parser = command_line()
     if "_ARGCOMPLETE" in os.environ:  # a shell asks what may come next
         import argcomplete
@@ -65,4 +65,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("hsp: not enough memory for what was asked", file=sys.stderr)
     except KeyboardInterrupt:
         print("hsp: stopped by the user", file=sys.stderr)
+        return INTERRUPTED
     return FAILURE

@@ -1,6 +1,7 @@
 """Run a live loop's page in a process of its own, which always ends."""
 
 import json
+import select
 import subprocess
 import sys
 from contextlib import suppress
@@ -13,6 +14,9 @@ from hsp_control.common.exceptions import ViewerError
 from hsp_control.config import Experiment
 from hsp_control.config.streams import without_sources
 from hsp_control.play.channel import channel_pair
+
+START = 60.0
+"""Time in which the page's process must say its address [s]."""
 
 
 class PageProcess:
@@ -60,7 +64,7 @@ class PageProcess:
         """Start the process, and wait for the page's address.
 
         Raises:
-            ViewerError: If it does not start; it has then said why.
+            ViewerError: If it does not start; it has said why, or takes too long.
         """
         self._process = subprocess.Popen(
             [sys.executable, "-m", "hsp_control.cli.live_page"],
@@ -72,6 +76,11 @@ class PageProcess:
         self._there.close()
         assert self._process.stdout is not None
         self._say(json.dumps(self._settings))
+        ready, _, _ = select.select([self._process.stdout], [], [], START)
+        if not ready:
+            self._process.kill()
+            self.close()
+            raise ViewerError(f"the loop's page did not start within {START:g} s")
         self.url = self._process.stdout.readline().decode().strip()
         if not self.url:
             self.close()

@@ -34,7 +34,7 @@ def begun_where_it_is(
     distances = np.abs(experiment.robot.difference(experiment.q0, q))
     worst = int(np.argmax(distances))
     start = f"start={{configuration: [{', '.join(f'{each:.6f}' for each in q)}]}}"
-    if distances[worst] > _FARTHEST:
+    if not distances[worst] <= _FARTHEST:  # also of a state that is NaN
         raise HardwareError(
             f"{experiment.robot.dof_names[worst]} is {distances[worst]:.3g} from the "
             f"configuration's start; {_FARTHEST:g} is allowed. Move the robot there, "

@@ -1,6 +1,7 @@
 """The table of ``hsp robots``: every known robot, and the tasks that it can do."""
 
-from collections.abc import Iterator
+import textwrap
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -133,6 +134,27 @@ def markdown() -> str:
         )
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
+
+
+def text(found: Sequence[Row]) -> Iterator[str]:
+    """Yield the table's lines, of at most 80 characters."""
+    headings = ("nv", "end effector", "position", "pose")
+    for origin in dict.fromkeys(row.origin for row in found):
+        yield _line(origin, *headings)
+        for row in found:
+            if row.origin != origin:
+                continue
+            tasks = task(row, row.position, 3), task(row, row.pose, 6)
+            yield _line(row.name, _number(row.nv), row.end_effector or "-", *tasks)
+            note = row.note.replace("`", "")
+            yield from textwrap.wrap(
+                note, 76, initial_indent="    ", subsequent_indent="    "
+            )
+        yield ""
+
+
+def _line(name: str, nv: str, end_effector: str, position: str, pose: str) -> str:
+    return f"{name:27} {nv:>2}  {end_effector:29} {position:8}  {pose}".rstrip()
 
 
 def task(row: Row, rank: int, full: int) -> str:

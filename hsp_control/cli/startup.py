@@ -13,6 +13,9 @@ from itertools import pairwise
 from pathlib import Path
 from types import FrameType
 
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells have it: 128 and the number of SIGINT."""
+
 
 def is_command() -> bool:
     """Return whether this process is ``hsp`` or ``python -m hsp_control``."""
@@ -24,7 +27,7 @@ def is_command() -> bool:
 def end_quietly(_: int, __: FrameType | None) -> None:
     """End the process with the message and exit status of a stopped run."""
     os.write(2, b"hsp: stopped by the user\n")
-    os._exit(2)
+    os._exit(INTERRUPTED)
 
 
 def guard_imports() -> None:

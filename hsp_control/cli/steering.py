@@ -11,6 +11,7 @@ from typing import Any
 from hsp_control.cli.consoles import out
 from hsp_control.cli.live_experiment import live_period
 from hsp_control.cli.page_process import PageProcess
+from hsp_control.common.exceptions import ViewerError
 from hsp_control.config import Experiment
 from hsp_control.control.controller import Controller
 from hsp_control.live import OperatorRequests
@@ -61,6 +62,9 @@ def let_steer(
 
     With a dead-man's key it returns when the key is held for the first time, or when
     the operator stops.
+
+    Raises:
+        ViewerError: If the page's process ends before its key was ever held.
     """
     controller, period = experiment.controller, live_period(experiment)
     controller.compute(0.0, experiment.q0, experiment.v0)
@@ -76,6 +80,11 @@ def let_steer(
             loop.listen()
             loop.tell()
             sleep(_POLL)
+        if page.channel.lost:
+            raise ViewerError(
+                "the loop's page has ended before anybody held its key; the loop did "
+                "not begin"
+            )
     return loop.on_period
 
 

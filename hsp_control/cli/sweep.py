@@ -19,6 +19,7 @@ from rich.progress import (
 from rich.table import Table
 
 from hsp_control.cli.consoles import errors, out
+from hsp_control.cli.startup import INTERRUPTED
 from hsp_control.common.exceptions import SweepError
 from hsp_control.config import load_experiment
 from hsp_control.sweeps import Sensitivity, Sweep, sensitivity
@@ -77,7 +78,7 @@ def sweep(options: argparse.Namespace) -> int:
             "continues",
             file=sys.stderr,
         )
-        return 2
+        return INTERRUPTED
     if options.plot:
         _draw(swept, file.parent, file.stem, ["png"])
     return 0

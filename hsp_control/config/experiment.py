@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError, ImmutableError, ModelError
+from hsp_control.common.files import is_file
 from hsp_control.common.resources import bundled_configs
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.config.document import Document
@@ -337,7 +338,7 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
         )
         return Document(config | {"changes": made}, {}, str(path))
     known = bundled_configs()
-    if path.suffix in {".yaml", ".yml"} or _is_file(path):
+    if path.suffix in {".yaml", ".yml"} or is_file(path):
         return Document.read(path)
     if str(source) in known:
         return Document.read(known[str(source)])
@@ -363,13 +364,6 @@ def _check_heard(path: Path, run: Rollout) -> None:
                     f"took {taken:.0f} messages, and the log holds {len(messages)} of "
                     "them, because it has no end"
                 )
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # not a valid file name
-        return False
 
 
 def build(document: Document) -> Experiment:

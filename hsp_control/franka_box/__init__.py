@@ -4,6 +4,3 @@ from .arm import Arm as Arm
 from .box import Box as Box
 from .server import DEADLINE as DEADLINE
 from .server import Server as Server
-from .wire import PERIOD as PERIOD
-from .wire import PORT as PORT
-from .wire import VERSION as VERSION

@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LiveError
-from hsp_control.franka_box.wire import JOINTS
+from hsp_control.franka_wire.layouts import JOINTS
 from hsp_control.robot import Robot
 from hsp_control.robot.description.urdf_checks import read_urdf
 
@@ -156,7 +156,7 @@ def _limits_of(robot: Robot) -> ArmLimits:
     offset, deceleration = np.zeros(JOINTS), np.full(JOINTS, np.inf)
     elements = {
         joint.get("name"): joint.find("position_based_velocity_limits")
-        for joint in read_urdf(robot.source).iter("joint")
+        for joint in read_urdf(robot.source).findall("joint")
     }
     for at, name in enumerate(robot.joint_names):
         element = elements.get(name)

@@ -14,7 +14,7 @@ from hsp_control.franka_box.model import Model
 from hsp_control.franka_box.motion import Motion, finished, is_finite
 from hsp_control.franka_box.readings import Readings
 from hsp_control.franka_box.reflexes import Reference, SelfDistance, Violation
-from hsp_control.franka_box.wire import (
+from hsp_control.franka_wire.layouts import (
     JOINTS,
     PERIOD,
     Command,
@@ -23,7 +23,7 @@ from hsp_control.franka_box.wire import (
     MoveStatus,
     RobotMode,
     Status,
-    response,
+    message,
 )
 from hsp_control.simulation.plants import SampledPlant
 
@@ -334,7 +334,7 @@ class Box:
         )
 
     def _respond(self, command: Command, number: int, status: int) -> None:
-        self.outbox.append(response(command, number, bytes([status])))
+        self.outbox.append(message(command, number, bytes([status])))
 
 
 _ZERO = np.zeros(JOINTS)

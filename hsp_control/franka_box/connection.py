@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.exceptions import HardwareError
-from hsp_control.franka_box.wire import (
+from hsp_control.franka_wire.layouts import (
     COMMAND,
+    CONNECTED,
     HEADER,
     INCOMPATIBLE_VERSION,
     REQUESTS,
@@ -18,7 +19,7 @@ from hsp_control.franka_box.wire import (
     VERSION,
     Command,
     Status,
-    response,
+    message,
 )
 
 _TIMESTAMPS = 35
@@ -174,8 +175,8 @@ class Connection:
         version, port = (int(x) for x in asked)
         same = version == VERSION
         status = Status.SUCCESS if same else INCOMPATIBLE_VERSION
-        payload = struct.pack("<BH", status, VERSION)
-        self.respond(response(Command.CONNECT, request.number, payload))
+        payload = np.array((status, VERSION), CONNECTED).tobytes()
+        self.respond(message(Command.CONNECT, request.number, payload))
         if not same:
             end = ConnectionEnd(
                 f"the client speaks version {version} of the research interface; this "

@@ -12,7 +12,7 @@ from hsp_control.franka_box.arm import ELBOW_FLIP, ArmLimits
 from hsp_control.franka_box.hand import HandMotion
 from hsp_control.franka_box.model import Model
 from hsp_control.franka_box.reflexes import Reference, Violation
-from hsp_control.franka_box.wire import PERIOD, Error, MotionGenerator
+from hsp_control.franka_wire.layouts import PERIOD, Error, MotionGenerator
 
 _ELBOW = 2
 """Index of the joint whose position is the elbow's."""

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.franka_box.wire import PERIOD
+from hsp_control.franka_wire.layouts import PERIOD
 
 _TOLERANCE = 1e-5
 """How far a matrix may be from a rotation, as in libfranka's ``checkMatrix``."""

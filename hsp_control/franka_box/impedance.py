@@ -7,7 +7,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.franka_box.model import Model
 from hsp_control.franka_box.reflexes import Reference
-from hsp_control.franka_box.wire import JOINTS, PERIOD
+from hsp_control.franka_wire.layouts import JOINTS, PERIOD
 
 JOINT_STIFFNESS = np.array([3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0])
 """Unless a client sets another one [N·m/rad]; as the next one from libfranka's

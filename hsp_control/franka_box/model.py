@@ -6,7 +6,7 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation.momentum_observer import MomentumObserver
 from hsp_control.franka_box.arm import Arm
-from hsp_control.franka_box.wire import JOINTS, PERIOD
+from hsp_control.franka_wire.layouts import JOINTS, PERIOD
 from hsp_control.robot import RobotState
 
 OBSERVER = MomentumObserver(50.0, cancel=False)

@@ -8,7 +8,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.franka_box.generators import Generator
 from hsp_control.franka_box.reflexes import Reference, Violation, effort_rate
-from hsp_control.franka_box.wire import JOINTS, Controller, MotionGenerator
+from hsp_control.franka_wire.layouts import JOINTS, Controller, MotionGenerator
 
 _WINDOW = 100
 """Commands over which the success rate is taken (libfranka, ``RobotState``)."""

@@ -10,7 +10,7 @@ from hsp_control.franka_box.arm import ELBOW_FLIP
 from hsp_control.franka_box.hand import HandMotion
 from hsp_control.franka_box.model import Model
 from hsp_control.franka_box.reflexes import Reference, Thresholds
-from hsp_control.franka_box.wire import PERIOD, STATE
+from hsp_control.franka_wire.layouts import PERIOD, STATE
 
 
 class Readings:

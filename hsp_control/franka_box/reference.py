@@ -5,7 +5,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.franka_box.arm import ACCELERATION
 from hsp_control.franka_box.reflexes import Reference
-from hsp_control.franka_box.wire import JOINTS, PERIOD
+from hsp_control.franka_wire.layouts import JOINTS, PERIOD
 
 RETREAT_SPEED = 0.2
 """Speed of the way back into the range that is allowed [rad/s]."""

@@ -14,7 +14,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.franka_box.arm import ACCELERATION, EFFORT_RATE, JERK, ArmLimits
 from hsp_control.franka_box.hand import HandMotion
-from hsp_control.franka_box.wire import JOINTS, PERIOD, Error
+from hsp_control.franka_wire.layouts import JOINTS, PERIOD, Error
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.robot import RobotState
 

@@ -10,7 +10,7 @@ from hsp_control.franka_box.box import Box
 from hsp_control.franka_box.hand import placement
 from hsp_control.franka_box.motion import OF_THE_HAND, SERVED
 from hsp_control.franka_box.reflexes import Thresholds
-from hsp_control.franka_box.wire import (
+from hsp_control.franka_wire.layouts import (
     REQUESTS,
     Command,
     Controller,
@@ -18,7 +18,7 @@ from hsp_control.franka_box.wire import (
     MoveStatus,
     RobotMode,
     Status,
-    response,
+    message,
 )
 
 Say = Callable[[str], object]
@@ -56,7 +56,7 @@ class Requests:
         outbox = self._box.outbox
         if command is Command.GET_ROBOT_MODEL:
             urdf = self._box.arm.urdf.encode()
-            outbox.append(response(command, number, bytes([Status.SUCCESS]) + urdf))
+            outbox.append(message(command, number, bytes([Status.SUCCESS]) + urdf))
             return
         kind = REQUESTS[command]
         body = np.frombuffer(payload, kind)[0] if kind.itemsize else np.void(b"")
@@ -66,7 +66,7 @@ class Requests:
         else:
             status = self._handlers[command](number, body)
         if status is not None:
-            outbox.append(response(command, number, bytes([status])))
+            outbox.append(message(command, number, bytes([status])))
 
     def _impossible(self, command: Command, why: str) -> int:
         self._say(f"refused: {_spelled(command)}: {why}")

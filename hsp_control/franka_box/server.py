@@ -16,7 +16,7 @@ from hsp_control.franka_box.box import Box, Say
 from hsp_control.franka_box.connection import Connection, ConnectionEnd, break_off
 from hsp_control.franka_box.motion import Motion
 from hsp_control.franka_box.requests import Requests
-from hsp_control.franka_box.wire import PERIOD, PORT, MoveStatus
+from hsp_control.franka_wire.layouts import PERIOD, PORT, MoveStatus
 from hsp_control.live.latency import no_garbage_collection
 
 DEADLINE = 300e-6

@@ -1,6 +1,6 @@
 """Look at a robot's description with all checks."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -30,31 +30,18 @@ class Inspection:
         source: Where the robot comes from.
         findings: What is odd, errors first.
         robot: The robot; None if it does not load.
+        facts: What can be said about it in general: names and texts.
     """
 
     source: RobotSource
     findings: tuple[Finding, ...]
     robot: Robot | None
+    facts: Mapping[str, str]
 
     @property
     def loads(self) -> bool:
         """Whether the robot loads as it was described."""
         return all(finding.severity != "error" for finding in self.findings)
-
-    def facts(self) -> Iterator[tuple[str, str]]:
-        """Yield what can be said about the robot in general: names and texts."""
-        yield "file", str(self.source.urdf)
-        robot = self.robot
-        if robot is None:
-            return
-        root = "floating base" if robot.unactuated else "fixed base"
-        yield "robot", f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}, {root}"
-        yield "end effector", f"{robot.end_effector} (by default)"
-        yield "mass", f"{pin.computeTotalMass(robot.model):.4g} kg move"
-        condition, dof = worst_condition(robot)
-        yield "mass matrix", f"condition number up to {condition:.2g}, by {dof}"
-        home = ", ".join(f"{x:.3g}" for x in robot.joint_positions(robot.home()) + 0.0)
-        yield "home", f"[{home}]"
 
     def groups(self) -> dict[tuple[str, str, str], list[Finding]]:
         """Return the findings by severity, check and cure."""
@@ -67,7 +54,7 @@ class Inspection:
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
         return {
-            "facts": dict(self.facts()),
+            "facts": dict(self.facts),
             "findings": [finding.to_dict() for finding in self.findings],
         }
 
@@ -90,6 +77,7 @@ def inspect(source: RobotSource, description: RobotDescription) -> Inspection:
     findings = list(check_elements(xml))
     if not findings:
         findings = list(_of_file(xml, source))
+    facts = {"file": str(source.urdf)}
     robot, errors = None, [f for f in findings if f.severity == "error"]
     if all(error.check == "inertia" for error in errors):
         if errors:
@@ -97,14 +85,28 @@ def inspect(source: RobotSource, description: RobotDescription) -> Inspection:
         try:
             model = load_model(source, description, description.gravity)
             robot = Robot(model, source, description=description)
-            findings += _of_robot(robot)
+            worst = worst_condition(robot)
+            facts |= _facts(robot, *worst)
+            findings += [*check_mass_matrix(*worst), *_of_robot(robot)]
         except ModelError as error:
             findings.append(
                 Finding("error", "robot", source.name, _reason(error, source))
             )
     order = ("error", "warning", "note")
     findings.sort(key=lambda finding: order.index(finding.severity))
-    return Inspection(source, tuple(findings), robot)
+    return Inspection(source, tuple(findings), robot, facts)
+
+
+def _facts(robot: Robot, condition: float, dof: str) -> dict[str, str]:
+    root = "floating base" if robot.unactuated else "fixed base"
+    home = ", ".join(f"{x:.3g}" for x in robot.joint_positions(robot.home()) + 0.0)
+    return {
+        "robot": f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}, {root}",
+        "end effector": f"{robot.end_effector} (by default)",
+        "mass": f"{pin.computeTotalMass(robot.model):.4g} kg move",
+        "mass matrix": f"condition number up to {condition:.2g}, by {dof}",
+        "home": f"[{home}]",
+    }
 
 
 def _of_file(xml: Element, source: RobotSource) -> Iterator[Finding]:
@@ -114,7 +116,6 @@ def _of_file(xml: Element, source: RobotSource) -> Iterator[Finding]:
 
 
 def _of_robot(robot: Robot) -> Iterator[Finding]:
-    yield from check_mass_matrix(robot)
     try:
         yield from check_self_collisions(robot)
     except ModelError as error:

@@ -31,9 +31,8 @@ def worst_condition(robot: Robot) -> tuple[float, str]:
     return worst, robot.dof_names[which]
 
 
-def check_mass_matrix(robot: Robot) -> Iterator[Finding]:
-    """Yield the mass matrix if it is nearly singular somewhere."""
-    condition, dof = worst_condition(robot)
+def check_mass_matrix(condition: float, dof: str) -> Iterator[Finding]:
+    """Yield the mass matrix if its `worst_condition` is doubtful."""
     if condition > _DOUBTFUL:
         yield Finding(
             "warning",

@@ -1,4 +1,4 @@
-"""Robots that know how they take efforts, whatever a configuration says."""
+"""Robots that know where they are, and how they take efforts, before the run."""
 
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
@@ -9,17 +9,26 @@ from hsp_control.live.settings import LiveSettings
 
 
 @runtime_checkable
-class AdaptingHardware(Hardware, Protocol):
-    """`Hardware` that corrects the settings of its loop, and tells what it found.
+class LocatedHardware(Hardware, Protocol):
+    """`Hardware` that knows where the robot is: a run can begin there.
 
     Attributes:
         q: Its configuration when it was connected, shape (nq,).
+    """
+
+    q: Array
+
+
+@runtime_checkable
+class AdaptingHardware(LocatedHardware, Protocol):
+    """`Hardware` that corrects the settings of its loop, and tells what it found.
+
+    Attributes:
         lines: What the user should know of the robot, one sentence each.
         fault: Why the robot stopped by itself or was lost, once it is known; also if
             that was after the loop's safe stop began, or only in `close`.
     """
 
-    q: Array
     lines: Sequence[str]
 
     @property

@@ -16,6 +16,7 @@ from hsp_control.common.exceptions import HspControlError, StreamError
 from hsp_control.control.controller import Controller
 from hsp_control.declaration.nested import parts_within
 from hsp_control.geometry.scene import Obstacle
+from hsp_control.play.knobs import RAMP
 from hsp_control.robot import RobotState
 from hsp_control.tasks import FrameOrientation, FramePose, FramePosition, Task
 from hsp_control.trajectories import Stream, StreamOrientation, StreamPose
@@ -23,8 +24,8 @@ from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.remembering import Written
 from hsp_control.trajectories.streams.stream import Streamed
 
-RAMP = 0.2
-"""Time over which a stream takes over, and a path of its own comes back [s]."""
+BACK = 1.5
+"""Time over which a path of its own comes back [s]: half a metre at 0.6 m/s at most."""
 _MOVING: dict[str, Any] = {"speed": 0.5, "acceleration": 3.0, "jerk": 60.0}
 """Bounds of what is dragged [m/s, m/s², m/s³]: those that arms bear, whose limits then
 rarely bind."""
@@ -34,7 +35,7 @@ _TURNING: dict[str, Any] = {
     "angular_jerk": 200.0,
 }
 """The same for turning [rad/s, rad/s², rad/s³]."""
-_DELAY = 0.03
+DELAY = 0.03
 """Time to a target that is dragged [s]: about two of a page's pictures."""
 
 
@@ -138,10 +139,10 @@ class TargetGrip(Grip):
 
     def _make_stream(self) -> Streamed:
         if self._kind is FramePosition:
-            return Stream(**_MOVING, delay=_DELAY)
+            return Stream(**_MOVING, delay=DELAY)
         if self._kind is FrameOrientation:
-            return StreamOrientation(**_TURNING, delay=_DELAY)
-        return StreamPose(**_MOVING, **_TURNING, delay=_DELAY)
+            return StreamOrientation(**_TURNING, delay=DELAY)
+        return StreamPose(**_MOVING, **_TURNING, delay=DELAY)
 
     def _wanted(self, value: Array) -> Array:
         if value.shape != (7,) or not np.isfinite(value).all():
@@ -151,14 +152,14 @@ class TargetGrip(Grip):
         return value[3:] if self._kind is FrameOrientation else value
 
     def _let_follow(self, stream: Streamed, t: float) -> None:
-        self._refer(stream, t)  # type: ignore[arg-type]
+        self._refer(stream, t, RAMP)  # type: ignore[arg-type]
 
     def _return(self, t: float) -> None:
         assert self._own is not None
-        self._refer(self._own, t)
+        self._refer(self._own, t, BACK)
 
-    def _refer(self, reference: AnyReference, t: float) -> None:
-        self._controller.at(t).ramp(RAMP).reference(self.name, reference)
+    def _refer(self, reference: AnyReference, t: float, ramp: float) -> None:
+        self._controller.at(t).ramp(ramp).reference(self.name, reference)
 
 
 class ObstacleGrip(Grip):
@@ -184,7 +185,7 @@ class ObstacleGrip(Grip):
         return [float(x) for x in place.translation]
 
     def _make_stream(self) -> Streamed:
-        return Stream(**_MOVING, delay=_DELAY)
+        return Stream(**_MOVING, delay=DELAY)
 
     def _wanted(self, value: Array) -> Array:
         if value.shape != (3,) or not np.isfinite(value).all():
@@ -197,7 +198,7 @@ class ObstacleGrip(Grip):
 
     def _return(self, t: float) -> None:
         own = self._obstacle.center
-        self._controller.at(t).ramp(RAMP).obstacle(self.name, own)
+        self._controller.at(t).ramp(BACK).obstacle(self.name, own)
 
 
 def targets_of(controller: Controller) -> dict[str, TargetGrip]:

@@ -55,8 +55,8 @@ class Handles:
     def take(self, message: Mapping[str, Any]) -> None:
         """Do what a page says; what is wrong is answered in `message`.
 
-        ``move`` and ``resume`` a target, move an ``obstacle``, ``set`` a knob. A target
-        that is ``release``d stays where it is.
+        ``move`` a target or an ``obstacle``, let it ``resume`` its own path, ``set`` a
+        knob. A target that is ``release``d stays where it is.
         """
         try:
             self.obey(message)
@@ -80,6 +80,8 @@ class Handles:
                 _grip(self.targets, name).resume(t)
             case {"do": "obstacle", "name": str(name), "position": list(where)}:
                 _grip(self.obstacles, name).move(where, t)
+            case {"do": "resume", "name": str(name)}:
+                _grip(self.obstacles, name).resume(t)
             case {"do": "set", "id": str(name), "value": value}:
                 if name not in self.knobs:
                     raise ValueError(f"there is no knob {name!r}")
@@ -106,6 +108,11 @@ class Handles:
                 self.say("")
             except HspControlError as error:
                 self.say(str(error), warning=True)
+
+    @property
+    def settings(self) -> dict[str, float | bool]:
+        """What the knobs are set to, or will be as soon as the time goes on."""
+        return {**self.values, **self._wanted}
 
     def rehearse(self) -> None:
         """Ask for everything once, so that what it needs is compiled."""

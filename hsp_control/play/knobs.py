@@ -14,6 +14,7 @@ from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
 from hsp_control.null_space.fields import NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
+from hsp_control.null_space.fields.weight import Ramp
 from hsp_control.tasks import Gains, Impedance
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.task import SecondOrderTask
@@ -62,7 +63,6 @@ class Knob(NamedTuple):
             "low": self.low,
             "high": self.high,
             "log": self.low > 0.0 and self.high / self.low > 20.0,
-            "options": [],
         }
 
     def checked(self, value: object) -> float | bool:
@@ -97,24 +97,57 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
     field, group = controller.field, "Null space"
     if not field.controls:
         return
-    terms = [term for term in terms_of(field) if not isinstance(term, Rest)]
-    if terms:
-        turn = partial(_switch_field, terms)
-        yield Knob("field", group, "field", "", True, 0.0, 1.0, turn)
+    switch = _FieldSwitch(field)
+    if switch.whole:
+        yield Knob("field", group, "field", "", True, 0.0, 1.0, switch.turn)
     K = controller.null_space_gain
     gain = float(np.diag(K).mean())
     if np.allclose(K, gain * np.eye(len(K))):
         low, high = _span(gain, period)
         yield Knob("null_space_gain", group, "K_N", "1/s", gain, low, high, _set_gain)
-    names = [term.name for term in terms]
-    for term in terms:
-        weight, name = term.weight, term.name
-        if isinstance(weight, int | float) and weight and names.count(name) == 1:
-            turn, label = partial(_weigh, name), f"{name}, weight"
+    for name, weight in switch.weights.items():
+        if weight:
+            turn, label = partial(switch.weigh, name), f"{name}, weight"
             most = 5.0 * weight
-            yield Knob(
-                f"weight.{name}", group, label, "", float(weight), 0.0, most, turn
-            )
+            yield Knob(f"weight.{name}", group, label, "", weight, 0.0, most, turn)
+
+
+class _FieldSwitch:
+    """Lets the field go, and brings it back as it is by then.
+
+    Its terms stay, with the weight 0: obstacles that are moved meanwhile, and a posture
+    that is led, move in them, too.
+
+    Attributes:
+        weights: What each term weighs while the field is on, by its name; without those
+            that share a name, or whose weight is a function.
+        whole: Whether these are all terms; else the field cannot be switched.
+    """
+
+    def __init__(self, field: NullSpaceField) -> None:
+        """Begin with the field as it is."""
+        terms = [term for term in terms_of(field) if not isinstance(term, Rest)]
+        names = [term.name for term in terms]
+        self.weights: dict[str, float] = {}
+        self._on = True
+        for term in terms:
+            weight = term.weight
+            final = weight.final if isinstance(weight, Ramp) else weight
+            if isinstance(final, int | float) and names.count(term.name) == 1:
+                self.weights[term.name] = float(final)
+        self.whole = 0 < len(self.weights) == len(terms)
+
+    def turn(self, at: Changes, on: bool) -> None:
+        """Switch the field on or off."""
+        for name, weight in self.weights.items():
+            at.weight(name, weight if on else 0.0)
+        self._on = on
+
+    def weigh(self, name: str, at: Changes, weight: float) -> None:
+        """Change the weight of a term, or what it will be when the field is on."""
+        if self._on:
+            at.weight(name, weight)
+        self.weights[name] = weight
 
 
 def _tasks(controller: Controller, period: float) -> Iterator[Knob]:
@@ -141,16 +174,8 @@ def _span(rate: float, period: float) -> tuple[float, float]:
     return rate / _REACH, min(_REACH * rate, max(_BORNE / period, rate))
 
 
-def _switch_field(terms: list[NullSpaceField], at: Changes, on: bool) -> None:
-    at.field(*(terms if on else ()))
-
-
 def _set_gain(at: Changes, gain: float) -> None:
     at.null_space_gain(gain)
-
-
-def _weigh(name: str, at: Changes, weight: float) -> None:
-    at.weight(name, weight)
 
 
 def _tune(name: str, ratio: float, at: Changes, frequency: float) -> None:

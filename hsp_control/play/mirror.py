@@ -110,7 +110,7 @@ class Mirror:
     def say(self, message: dict[str, Any]) -> None:
         """Pass on what a page says."""
         self._channel.send(message)
-        if message.get("do") == "obstacle":
+        if "name" in message:  # of an obstacle
             self.handles.take(message)  # zones and distances follow it here, too
 
     def read(self) -> None:

@@ -1,5 +1,6 @@
 """What the page of a session shows: the scene, its handles, its knobs and its plots."""
 
+import operator
 from collections.abc import Iterator
 from typing import Any, Literal, NamedTuple, Protocol
 
@@ -8,6 +9,9 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.config import Experiment
 from hsp_control.control.controller import Controller
+from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
+from hsp_control.null_space.fields.field import terms_of
+from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.play.handles import Handles
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_distances import distance_label
@@ -144,7 +148,7 @@ class Picture:
         session, viewer = self._session, self._viewer
         self._sent = 0
         self._meta = session.meta
-        self._field = session.controller.field
+        self._field, self._acting = session.controller.field, self._acting_terms()
         motion = self._motion()
         self._shown = viewer.view.show.all_fields()
         self._run = RunDrawing(
@@ -169,8 +173,9 @@ class Picture:
             del layers["targets"]  # the handles are there
         obstacles = layers["obstacles"]
         assert isinstance(obstacles, ObstacleLayer)
-        field, ink = controller.field, CHALK if dark else INK
-        layers["influence"] = Influence(field, obstacles.shapes, "/influence")
+        ink = CHALK if dark else INK
+        acting = FieldSum(self._acting) if self._acting else Rest()
+        layers["influence"] = Influence(acting, obstacles.shapes, "/influence")
         layers["distances"] = Distances(controller, "/distances", ink)
         layers["capsules"] = Capsules(controller, "/capsules")
         return layers
@@ -210,17 +215,29 @@ class Picture:
                 message=text, level="warning" if handles.warning or session.over
                 else "info",
             ),
-            play_command("play_values", "values", values=handles.values),
+            play_command("play_values", "values", values=handles.settings),
             self._force(),
             *self._samples(),
         ]  # fmt: skip
 
-    def _changed_field(self) -> Iterator[Command]:
-        """Draw the field's layers again, if there is another field."""
+    def _acting_terms(self) -> tuple[NullSpaceField, ...]:
+        """Return the terms of the field that weigh anything now."""
         controller = self._session.controller
-        if controller.field is self._field:
+        return tuple(
+            term
+            for term in terms_of(controller.field)
+            if term.controls and sample_weight(term.weight, controller.state)[0] > 0.0
+        )
+
+    def _changed_field(self) -> Iterator[Command]:
+        """Draw the field's layers again, if the field or what acts of it is another."""
+        field, acting = self._session.controller.field, self._acting_terms()
+        same = len(acting) == len(self._acting) and all(
+            map(operator.is_, acting, self._acting)
+        )
+        if field is self._field and same:
             return
-        self._field = controller.field
+        self._field, self._acting = field, acting
         self._meta = self._session.meta
         layers = self._layers(self._motion())
         for name in _FIELD_LAYERS:

@@ -7,14 +7,13 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError
-from hsp_control.common.resources import bundled_configs, bundled_robots
+from hsp_control.common.resources import bundled_configs
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build, read_document
 from hsp_control.play.session import ROW
 from hsp_control.robot import Robot
-from hsp_control.robot.description.described import described_names
-from hsp_control.robot.description.sources import example_robots
+from hsp_control.robot.description.sources import is_robot
 
 _PERIOD = 0.001
 """Control period where a configuration has none [s]."""
@@ -38,7 +37,7 @@ def playable(
         ConfigError: If it is neither, or a robot that needs contacts.
         HspControlError: See `load_experiment`.
     """
-    if str(source) not in bundled_configs() and _is_robot(str(source)):
+    if str(source) not in bundled_configs() and is_robot(str(source)):
         document = Document(_for_robot(str(source)), {}, str(source))
     else:
         document = read_document(source, strict=strict, **reading)
@@ -55,11 +54,6 @@ def playable(
         document.override(f"simulation.log_period={row!r}")
         document.override(f"simulation.duration={row!r}")
     return build(document)
-
-
-def _is_robot(name: str) -> bool:
-    known = {*bundled_robots(), *example_robots(), *described_names()}
-    return name in known or name.endswith((".urdf", ".xacro"))
 
 
 def _for_robot(name: str) -> dict[str, Any]:

@@ -17,7 +17,9 @@ from hsp_control.common.exceptions import StreamError
 from hsp_control.control.controller import Controller
 from hsp_control.null_space.fields import TargetPosture
 from hsp_control.null_space.fields.field import terms_of
-from hsp_control.play.grips import RAMP, Grip
+from hsp_control.null_space.fields.weight import sample_weight
+from hsp_control.play.grips import BACK, DELAY, Grip
+from hsp_control.play.knobs import RAMP
 from hsp_control.robot import Robot, RobotState
 from hsp_control.trajectories import Stream
 from hsp_control.trajectories.streams.stream import Streamed
@@ -25,7 +27,6 @@ from hsp_control.visualization.palette import FIELD
 
 _MOVING: dict[str, Any] = {"speed": 1.0, "acceleration": 5.0, "jerk": 100.0}
 """Bounds of the target of each joint [1/s, 1/s², 1/s³, in rad or m]."""
-_DELAY = 0.03
 _STEPS = 20
 _DAMPING, _HOLDING = 1e-2, 0.3
 """Of the least squares: how much joints stay [m/rad], and how much the hand does."""
@@ -56,17 +57,26 @@ class PostureGrip(Grip):
         }
 
     def where(self, state: RobotState) -> list[float]:
-        """Return where the joint is in the target posture, and its orientation."""
+        """Return where the joint is in the target posture, and its orientation.
+
+        While one target takes over from another, it is between them by their weights.
+        """
+        terms = [
+            t for t in terms_of(self._controller.field) if isinstance(t, TargetPosture)
+        ]
+        weights = np.array([sample_weight(term.weight, state)[0] for term in terms])
+        if terms and not weights.any():  # the field is switched off: the newest counts
+            weights[-1] = 1.0
         moved = np.zeros(self._robot.nv)
-        for term in terms_of(self._controller.field):
-            if isinstance(term, TargetPosture) and term.displacement is not None:
-                moved = term.displacement.sample(state.t).position
+        for term, weight in zip(terms, weights / weights.sum(), strict=True):
+            if term.displacement is not None:
+                moved += weight * term.displacement.sample(state.t).position
         q = self._robot.integrate(self._own, moved)
         pin.forwardKinematics(self._robot.model, self._data, q)
         return [float(x) for x in pin.SE3ToXYZQUAT(self._data.oMi[self._joint])]
 
     def _make_stream(self) -> Streamed:
-        return Stream(np.zeros(self._robot.nv), **_MOVING, delay=_DELAY)
+        return Stream(np.zeros(self._robot.nv), **_MOVING, delay=DELAY)
 
     def _wanted(self, value: Array) -> Array:
         if value.shape != (7,) or not (np.abs(value) < 1e3).all():
@@ -81,7 +91,7 @@ class PostureGrip(Grip):
 
     def _return(self, t: float) -> None:
         self._target = self._own.copy()
-        self._controller.at(t).ramp(RAMP).exchange(self._field.name, self._field)
+        self._controller.at(t).ramp(BACK).exchange(self._field.name, self._field)
 
     def _posture_with(self, q: Array, point: Array) -> Array:
         """Return the posture near q whose joint is nearest to a point [m]."""

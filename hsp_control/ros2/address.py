@@ -4,8 +4,8 @@ import os
 import re
 from collections.abc import Collection
 from typing import NamedTuple
-from urllib.parse import parse_qsl
 
+from hsp_control.common.addresses import name_and_options
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.common.suggestions import did_you_mean, listing
 
@@ -38,22 +38,19 @@ def parse(address: str, options: Collection[str] = ()) -> Address:
     Raises:
         HardwareError: If a name, an option or the domain is not valid.
     """
-    name, _, query = address.removeprefix(SCHEME).partition("?")
-    where = f"{SCHEME}{name}" + (f"?{query}" if query else "")
+    address = address.removeprefix(SCHEME)
+    where = SCHEME + address
     try:
-        given = parse_qsl(query, strict_parsing=True) if query else []
-    except ValueError:
-        raise HardwareError(f"{where}: needs options KEY=VALUE&...") from None
-    found = dict(given)
-    for key, _ in given:
+        name, found = name_and_options(address)
+    except ValueError as error:
+        raise HardwareError(f"{where}: {error}") from None
+    for key in found:
         if key not in {"domain", *options}:
             known = listing(["domain", *options])
             raise HardwareError(
                 f"{where}: there is no option {key!r}"
                 f"{did_you_mean(key, ['domain', *options])} (known: {known})"
             )
-    if len(found) < len(given):
-        raise HardwareError(f"{where}: an option is given twice")
     domain = found.pop("domain", None)
     if domain is None:
         domain, where = os.environ.get("ROS_DOMAIN_ID") or "0", "ROS_DOMAIN_ID"

@@ -1,7 +1,7 @@
 """The task of the angular momentum about the centre of mass."""
 
 from dataclasses import replace
-from typing import Any, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.placing import place_point
 from hsp_control.tasks.task import ErrorPart, Feedback, Task, TaskSample
 from hsp_control.trajectories import Hold, Trajectory
-from hsp_control.trajectories.crossfade import AnyReference
 
 
 class AngularMomentum(Task, type="angular_momentum"):
@@ -49,11 +48,6 @@ class AngularMomentum(Task, type="angular_momentum"):
     def followed(self) -> Trajectory:
         """The trajectory of a placed task."""
         return self.trajectory
-
-    def following(self, trajectory: AnyReference) -> Self:
-        """Return the task with another trajectory."""
-        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
-        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory about zero; see `Task.placed`."""

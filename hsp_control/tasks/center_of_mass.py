@@ -2,7 +2,7 @@
 
 from dataclasses import KW_ONLY, replace
 from functools import partial
-from typing import Any, Self
+from typing import Self
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.native import bind
@@ -15,7 +15,6 @@ from hsp_control.tasks.frame_task import TrackingTask
 from hsp_control.tasks.placing import place_point
 from hsp_control.tasks.task import ErrorPart, Feedback, TaskSample
 from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
-from hsp_control.trajectories.crossfade import AnyReference
 
 
 class CenterOfMass(TrackingTask, type="center_of_mass"):
@@ -43,11 +42,6 @@ class CenterOfMass(TrackingTask, type="center_of_mass"):
     def followed(self) -> Trajectory:
         """The trajectory of a placed task."""
         return self.trajectory
-
-    def following(self, trajectory: AnyReference) -> Self:
-        """Return the task with another trajectory."""
-        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
-        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the world; see `Task.placed`."""

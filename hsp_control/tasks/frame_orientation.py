@@ -41,7 +41,6 @@ from hsp_control.trajectories import (
     OrientationSample,
     OrientationTrajectory,
 )
-from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.following import Follower
 
 ORIENTATION_SCRATCH = 12
@@ -77,11 +76,6 @@ class FrameOrientation(
     def followed(self) -> OrientationTrajectory:
         """The trajectory of a placed task."""
         return self.trajectory
-
-    def following(self, trajectory: AnyReference) -> Self:
-        """Return the task with another trajectory."""
-        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
-        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the world; see `Task.placed`."""

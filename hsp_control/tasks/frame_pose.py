@@ -38,7 +38,6 @@ from hsp_control.trajectories import (
     PoseTrajectory,
     Trajectory,
 )
-from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.following import Follower
 
 PoseOrPoint = Annotated[PoseTrajectory | Trajectory, AnyOf(PoseTrajectory, Trajectory)]
@@ -86,11 +85,6 @@ class FramePose(FrameTask, TrackingTask, CompliantTask, type="frame_pose"):
     def followed(self) -> PoseTrajectory:
         """The trajectory of a placed task."""
         return self.pose
-
-    def following(self, trajectory: AnyReference) -> Self:
-        """Return the task with another trajectory."""
-        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
-        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the world; see `Task.placed`."""

@@ -16,7 +16,6 @@ from hsp_control.tasks.frame_task import FrameTask, TrackingTask, frame_of
 from hsp_control.tasks.placing import place_point
 from hsp_control.tasks.task import Drawn, ErrorPart, Feedback, TaskSample
 from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
-from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.following import Follower
 
 
@@ -45,11 +44,6 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
     def followed(self) -> Trajectory:
         """The trajectory of a placed task."""
         return self.trajectory
-
-    def following(self, trajectory: AnyReference) -> Self:
-        """Return the task with another trajectory."""
-        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
-        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the world; see `Task.placed`."""

@@ -1,7 +1,7 @@
 """The task of a frame's pose relative to another frame, as for two hands on a part."""
 
 from dataclasses import KW_ONLY, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import pinocchio as pin
@@ -22,7 +22,6 @@ from hsp_control.tasks.frame_task import TrackingTask, frame_of
 from hsp_control.tasks.placing import place_pose
 from hsp_control.tasks.task import ErrorPart, Feedback, TaskSample, default_name
 from hsp_control.trajectories import ComposedPose, PoseSample, PoseTrajectory
-from hsp_control.trajectories.crossfade import AnyReference
 
 
 class RelativePose(TrackingTask, type="relative_pose"):
@@ -75,11 +74,6 @@ class RelativePose(TrackingTask, type="relative_pose"):
     def followed(self) -> PoseTrajectory:
         """The trajectory of a placed task."""
         return self.pose
-
-    def following(self, trajectory: AnyReference) -> Self:
-        """Return the task with another trajectory."""
-        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
-        return replace(self, **changes)
 
     def placed(self, start: Start) -> Self:
         """Return the task with its trajectory in the reference; see `Task.placed`.

@@ -3,7 +3,7 @@
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import KW_ONLY
+from dataclasses import KW_ONLY, replace
 from functools import partial
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
@@ -277,7 +277,10 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         Raises:
             TaskError: If it follows none.
         """
-        raise TaskError(f"task {self.name!r} follows no trajectory")
+        if self.followed is None:
+            raise TaskError(f"task {self.name!r} follows no trajectory")
+        changes: dict[str, Any] = {"trajectory": trajectory}  # checked there
+        return replace(self, **changes)
 
     def keeps_balance(self, robot: Robot) -> bool:
         """Whether a floating base needs the task to stand; see `priority`."""

@@ -199,14 +199,16 @@ def interrupted(random: Random, folder: Path, log: Path, longest: float) -> Faul
         found.add(which, f"did not end within a minute: {errors}")
         return found
     status, problem = process.returncode, ""
-    outcome = {0: "done before", 2: "stopped"}.get(status, f"status {status}")
+    outcome = {0: "done before", 130: "stopped"}.get(status, f"status {status}")
     if status == -signal.SIGINT or (
         "Traceback" in errors and "hsp_control/" not in errors.replace("-m", "")
     ):
         outcome = "stopped before Python had begun with hsp"
     elif "Traceback" in errors or "Exception ignored" in errors:
         problem = errors
-    elif status not in (0, 2) or (status == 2 and "hsp: stopped by the" not in errors):
+    elif status not in (0, 130) or (
+        status == 130 and "hsp: stopped by the" not in errors
+    ):
         problem = f"status {status}: {errors}"
     for file in folder.iterdir():
         if file.name.endswith(".part"):

@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import ConfigError, SceneError
+from hsp_control.geometry.scene import Obstacle
+from hsp_control.null_space.fields import ObstacleClearance
+from hsp_control.null_space.fields.field import terms_of
+from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.play import Picture, Session, play
 from hsp_control.play.playable import playable
 from hsp_control.simulation.plants import RigidBody
@@ -28,6 +32,12 @@ def experiment() -> hsp.Experiment:
 @pytest.fixture
 def session(experiment: hsp.Experiment) -> Session:
     return Session(experiment)
+
+
+@pytest.fixture
+def still() -> Session:
+    """A hand that holds its pose, beside a ball that rests."""
+    return Session(playable("panda"))
 
 
 def go(session: Session, seconds: float) -> None:
@@ -83,8 +93,8 @@ def test_its_own_path_comes_back(session: Session) -> None:
     assert abs(pose_of(session)[2] - pose[2]) < 1e-3
     session.take({"do": "resume", "target": "hand"})
     session.handles.obstacles["ball"].resume(session.t)
-    go(session, 1.0)
-    go(untouched, 2.0)
+    go(session, 2.0)
+    go(untouched, 3.0)
     np.testing.assert_allclose(pose_of(session), pose_of(untouched), atol=1e-9)
     for each in (session, untouched):
         assert each.controller.scene["ball"].placement(2.0).translation[2] < 0.9
@@ -120,16 +130,75 @@ def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.q, log.q)
 
 
-def test_without_the_field_self_motion_comes_to_rest(session: Session) -> None:
-    go(session, 0.3)
+def test_without_the_field_self_motion_comes_to_rest(still: Session) -> None:
+    go(still, 0.3)
+    still.take({"do": "set", "id": "field", "value": False})
+    go(still, 1.5)
+    log = still.rollout()
+    np.testing.assert_array_equal(log["field.g"][-1], np.zeros(7))
+    assert log["null_space_norm"][-1] < 1e-4
+    still.take({"do": "set", "id": "field", "value": True})
+    go(still, 0.5)
+    assert np.abs(still.rollout()["field.g"][-1]).max() > 1e-6
+
+
+def test_the_field_comes_back_as_it_is_by_then(still: Session) -> None:
+    """What is moved or weighed while it is off counts when it is on again."""
+    go(still, 0.1)
+    still.take({"do": "set", "id": "field", "value": False})
+    go(still, 0.5)
+    ball, weight = [0.1, 0.3, 0.6], "weight.obstacle_clearance"
+    still.take({"do": "obstacle", "name": "ball", "position": ball})
+    still.take({"do": "set", "id": weight, "value": 0.5})
+    wanted = pose_of(still, "posture")
+    wanted[1] += 0.05
+    still.take({"do": "move", "target": "posture", "pose": wanted.tolist()})
+    go(still, 2.0)
+    assert not still.handles.warning
+    assert still.rollout()["null_space_norm"][-1] < 1e-4
+    led = pose_of(still, "posture")
+    np.testing.assert_allclose(led[1], wanted[1], atol=0.01)
+    still.take({"do": "set", "id": "field", "value": True})
+    go(still, 1.5)
+    np.testing.assert_allclose(pose_of(still, "posture"), led, atol=1e-9)
+    terms = {term.name: term for term in terms_of(still.controller.field)}
+    clearance = terms["obstacle_clearance"]
+    assert isinstance(clearance, ObstacleClearance)
+    assert sample_weight(clearance.weight, still.controller.state)[0] == 0.5
+    (obstacle,) = clearance.obstacles or ()
+    assert isinstance(obstacle, Obstacle)
+    where = obstacle.placement(still.t).translation
+    np.testing.assert_allclose(where, ball, atol=1e-9)
+
+
+def test_a_return_is_no_jolt(still: Session) -> None:
+    """A target and an obstacle that were led far away return at a bearable speed."""
+    go(still, 0.1)
+    targets, obstacles = still.handles.places()
+    far = np.add(targets["hand"], [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    still.take({"do": "move", "target": "hand", "pose": far.tolist()})
+    away = np.add(obstacles["ball"], [0.0, 0.0, 0.5])
+    still.take({"do": "obstacle", "name": "ball", "position": away.tolist()})
+    go(still, 2.0)
+    first = still.recorder.count
+    still.take({"do": "resume", "target": "hand"})
+    still.take({"do": "resume", "name": "ball"})
+    go(still, 2.0)
+    np.testing.assert_allclose(still.handles.places()[1]["ball"], obstacles["ball"])
+    np.testing.assert_allclose(pose_of(still)[:3], targets["hand"][:3], atol=1e-4)
+    rows = still.recorder.rows(first)
+    for column in ("task.hand.actual", "obstacle.ball"):
+        steps = np.linalg.norm(np.diff(rows[column][:, :3], axis=0), axis=1)
+        assert steps.max() < 0.65 * still.row  # 15/8 of half a metre in 1.5 s
+    assert not rows["status"].any()
+
+
+def test_a_setting_is_shown_before_the_time_goes_on(session: Session) -> None:
     session.take({"do": "set", "id": "field", "value": False})
-    go(session, 1.5)
-    assert session.controller.field.name == "rest"
-    session.take({"do": "set", "id": "field", "value": True})
-    go(session, 0.5)
-    names = session.controller.field.name
-    assert "obstacle_clearance" in names
-    assert "target_posture" in names
+    assert session.handles.settings["field"] is False  # while it is paused
+    assert session.handles.values["field"] is True
+    session.advance()
+    assert session.handles.values["field"] is False
 
 
 BAD: list[dict[str, Any]] = [
@@ -148,6 +217,8 @@ BAD: list[dict[str, Any]] = [
     {"do": "set", "id": "null_space_gain", "value": "fast"},
     {"do": "set", "id": "field", "value": 1.0},
     {"do": "set", "id": "nothing", "value": 1.0},
+    {"do": "resume", "target": "ball"},
+    {"do": "resume", "name": "hand"},
     {"do": "dance"},
     {},
 ]
@@ -314,9 +385,13 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     assert samples is not None
     assert len(samples["times"]) == 150
     session.take({"do": "set", "id": "field", "value": False})
-    go(session, 1.5)  # past the ramp, and the second for which changes are kept
+    go(session, 0.25)  # past the ramp: its zone is no longer one
     picture.draw(running=True, rate=1.0)
     assert not recorder.paths("/influence")
+    session.take({"do": "set", "id": "field", "value": True})
+    go(session, 0.25)
+    picture.draw(running=True, rate=1.0)
+    assert recorder.paths("/influence")
 
 
 def test_the_loop_does_what_the_page_says_about_time(session: Session) -> None:

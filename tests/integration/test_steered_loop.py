@@ -12,6 +12,8 @@ import hsp_control as hsp
 from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.control.compensation import Command
 from hsp_control.live import InProcessRobot, LoopReport, OperatorRequests, run_loop
+from hsp_control.null_space.fields.field import terms_of
+from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.play import Picture
 from hsp_control.play.channel import Channel, channel_pair
 from hsp_control.play.dead_mans_key import TIMEOUT, DeadMansKey
@@ -193,7 +195,12 @@ def test_the_picture_follows_the_journal(steered: Steered) -> None:
         picture.frame(running=False, rate=1.0)
     assert mirror.over == "the duration is over"
     assert mirror.handles.values["field"] is False
-    assert mirror.controller.field.name == "rest"
+    mirrored = mirror.controller
+    weights = [
+        sample_weight(term.weight, mirrored.state)[0]
+        for term in terms_of(mirrored.field)
+    ]
+    assert weights == [0.0, 0.0]
     targets, _ = mirror.handles.places()
     np.testing.assert_allclose(targets["hand"], pose, atol=1e-9)
     log = hsp.Rollout.load(steered.journal)

@@ -214,6 +214,8 @@ def test_two_resets_give_the_same_bits() -> None:
     [
         ({"impedance_mode": "variable"}, ControllerError, "impedance_mode: HSP_POSE"),
         ({"interpolation": "linear"}, ControllerError, "interpolation: HSP_POSE"),
+        ({"position_limits": [[0.0] * 3, [1.0] * 3]}, ControllerError, "position_lim"),
+        ({"position_limits": np.ones((2, 3))}, ControllerError, "position_limits: HSP"),
         ({"kp": [150, 0, 150, 150, 150, 150]}, GainError, "kp: must be positive"),
         ({"hsp": {"limit": "none"}}, ConfigError, "limit"),
         ({"hsp": "nowhere.yaml"}, ConfigError, "nowhere.yaml"),

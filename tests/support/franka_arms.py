@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from hsp_control import Robot, load_experiment
 from hsp_control.config import Experiment
-from hsp_control.franka_box import PERIOD, Arm, Box, Server
+from hsp_control.franka_box import Arm, Box, Server
+from hsp_control.franka_wire.layouts import PERIOD
 from hsp_control.live import LiveSettings, Measurement
 from hsp_control.live.franka import FrankaHardware, connect
 from hsp_control.live.simulated_robot import sampled

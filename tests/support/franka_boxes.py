@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from hsp_control import Robot
 from hsp_control.common.exceptions import HardwareError
-from hsp_control.franka_box import PERIOD, Arm, Box, Server
+from hsp_control.franka_box import Arm, Box, Server
+from hsp_control.franka_wire.layouts import PERIOD
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, RigidBody, SampledPlant
 

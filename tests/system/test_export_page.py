@@ -289,6 +289,14 @@ def test_the_switch_shows_one_run_or_both(page: Any) -> None:
     assert page.evaluate("player.playing")
 
 
+def test_what_is_active_stands_above_the_switch(page: Any) -> None:
+    active = "'<span>a limit is active</span>'"
+    page.evaluate(f"document.querySelector('.moments').innerHTML = {active}")
+    told = page.locator(".moments span").bounding_box()
+    switch = page.locator(".run-switch").bounding_box()
+    assert told["y"] + told["height"] <= switch["y"]
+
+
 def test_the_floor_is_drawn_where_the_effort_is_held(page: Any) -> None:
     section = page.locator("#side section").nth(1)
     assert section.locator("small").inner_text() == "effort held for 2 ms"

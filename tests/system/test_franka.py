@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 import yaml
 from franka_arms import Patiently, circle, connect_patiently, host, serving
+from franka_boxes import served
 from places import ROOT
 
 from hsp_control import Robot, Rollout, load_experiment
@@ -243,6 +244,15 @@ def test_real_time_is_enforced_unless_told_otherwise() -> None:
             connect(box.host, Robot.load("panda"), PERIOD)
 
 
+def test_who_only_reads_sets_no_thresholds(tmp_path: Path) -> None:
+    with served() as rig:
+        address = f"{rig.host}?realtime=ignore"
+        assert main(["franka-model", address, str(tmp_path / "read.urdf")]) == 0
+        assert np.isinf(rig.box.thresholds.upper_effort).all()
+        connect(address, Robot.load("panda"), PERIOD).close()
+        assert np.isfinite(rig.box.thresholds.upper_effort).all()
+
+
 def test_the_load_is_in_both_models(tmp_path: Path) -> None:
     """A load in one model only is refused; in both, the arm follows its path."""
     load = {"mass": 0.8, "center": [0.02, 0.0, 0.15]}
@@ -296,7 +306,7 @@ def test_the_command_line_drives_the_arm(
         assert "The loop: the duration is over" in told
         box.wait_alone()
         assert main([*options, f"franka://{box.address}", "--duration", "1"]) == 2
-        assert "_reflex: " in capsys.readouterr().out
+        assert "_reflex: " in capsys.readouterr().err
         box.wait_alone()
         away = ["--set", "start={joints: {panda_joint2: -0.3}}"]
         recover = f"franka://{box.address}&recover=true"

@@ -23,7 +23,7 @@ from franka_boxes import (
 )
 
 from hsp_control import Rollout, load_experiment
-from hsp_control.franka_box.wire import Error
+from hsp_control.franka_wire.layouts import Error
 from hsp_control.simulation.plants import Payload
 
 COMMAND = [

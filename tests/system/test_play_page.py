@@ -56,14 +56,6 @@ SETUP: dict[str, Any] = {
             "kind": "switch",
             "value": False,
         },
-        {
-            "id": "field",
-            "group": "Robot",
-            "label": "Field",
-            "kind": "choice",
-            "value": "off",
-            "options": ["off", "posture"],
-        },
     ],
     "plots": [
         {
@@ -456,6 +448,13 @@ def test_a_page_that_watches_says_nothing(page: Any) -> None:
     page.evaluate("camera(placed.command)")
 
 
+def told_until(page: Any, values: dict[str, Any], expression: str) -> None:
+    """Say what the settings are, as with each picture, until an expression is true."""
+    text = json.dumps(values)
+    until(page, f"viewer.handle_command({{type: 'play_values', values: {text}}}), "
+          + expression)  # fmt: skip
+
+
 def test_a_refused_value_goes_back(page: Any) -> None:
     slider, shown = page.locator("#play-stiffness"), page.locator(".slider output")
     before = slider.input_value()
@@ -463,21 +462,28 @@ def test_a_refused_value_goes_back(page: Any) -> None:
     assert until_sent(page, "set")[-1] == {"do": "set", "id": "stiffness", "value": 200}
     assert shown.inner_text() == "200 N/m"
     tell(page, "play_values", values={"stiffness": 400.0})
+    assert shown.inner_text() == "200 N/m"  # the program had not heard of it yet
+    told_until(page, {"stiffness": 400.0}, "document.querySelector('#play-stiffness')"
+               ".getAttribute('aria-valuetext') === '400 N/m'")  # fmt: skip
     assert slider.input_value() == before
-    assert shown.inner_text() == "400 N/m"
     page.evaluate("sent.length = 0")
     page.get_by_role("switch", name="Friction").click()
-    page.get_by_role("radio", name="posture").click()
-    until_sent(page, "set", 2)
-    assert [message["value"] for message in sent(page)] == [True, "posture"]
-    tell(page, "play_values", values={"friction": False, "field": "off"})
-    assert page.get_by_role("switch", name="Friction").is_checked() is False
-    assert page.get_by_role("radio", name="off").is_checked()
+    until_sent(page, "set")
+    assert [message["value"] for message in sent(page)] == [True]
+    tell(page, "play_values", values={"friction": False})
+    assert page.get_by_role("switch", name="Friction").is_checked()
+    told_until(
+        page, {"friction": False}, "!document.querySelector('.switch input').checked"
+    )
 
 
-def test_a_target_returns_to_its_path(page: Any) -> None:
-    page.get_by_role("button", name="elbow: back to its own path").click()
-    assert sent(page) == [{"do": "resume", "target": "elbow"}]
+def test_a_target_and_an_obstacle_return_to_their_paths(page: Any) -> None:
+    for name in ("elbow", "ball"):
+        page.get_by_role("button", name=f"{name}: back to its own path").click()
+    assert sent(page) == [
+        {"do": "resume", "target": "elbow"},
+        {"do": "resume", "name": "ball"},
+    ]
 
 
 SAMPLES = """(times) => viewer.handle_command({
@@ -571,6 +577,19 @@ def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:
         assert box["x"] + box["width"] <= 390
         if thing.get_attribute("role") != "switch":  # its whole row is
             assert box["height"] >= 40, thing.evaluate("(it) => it.outerHTML")
+    # The legend takes the sheet's place, and ends with the picture.
+    page.locator(".layers-toggle").tap()
+    until(
+        page, "getComputedStyle(document.querySelector('.play-panel')).opacity === '0'"
+    )
+    legend, picture = (
+        page.locator(name).bounding_box() for name in ("#layers", "#meshcat-pane")
+    )
+    assert legend["y"] + legend["height"] <= picture["y"] + picture["height"]
+    heading = page.locator("#caption h1").bounding_box()
+    assert heading["x"] < 20
+    page.locator(".play-bar .panel").tap()
+    assert page.locator("#layers").is_hidden()
     page.get_by_role("button", name="Close the panel").tap()
     until(
         page, "getComputedStyle(document.querySelector('.play-panel')).opacity === '0'"

@@ -260,7 +260,7 @@ def test_ctrl_c_leaves_a_readable_file_and_the_same_command_ends_it(
     process = started(out, 2)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=30)
-    assert process.returncode == 2, errors.decode()
+    assert process.returncode == 130, errors.decode()
     assert b"stopped by the user" in errors
     assert b"Traceback" not in errors
     part = Sweep.load(out)

@@ -9,6 +9,7 @@ from hsp_control.cli.options.franka_box import add_box_options
 from hsp_control.cli.options.franka_model import add_model_options
 from hsp_control.cli.options.inspect import add_inspect
 from hsp_control.cli.options.live import add_live
+from hsp_control.cli.options.parser import Parser
 from hsp_control.cli.options.shared import (
     add_configuration,
     add_host,
@@ -23,11 +24,12 @@ from hsp_control.common.version import __version__
 
 def command_line() -> argparse.ArgumentParser:
     """Return the parser of the whole command line."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="hsp",
         description="Torque control of redundant robots with a null space that "
         "provably converges.",
-        epilog='completion in bash and zsh: eval "$(register-python-argcomplete hsp)"',
+        epilog='completion in bash and zsh: eval "$(register-python-argcomplete hsp)"; '
+        "in fish: register-python-argcomplete --shell fish hsp | source",
     )
     parser.add_argument("--version", action="version", version=f"hsp {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
@@ -137,18 +139,19 @@ def command_line() -> argparse.ArgumentParser:
         "name", nargs="?", metavar="ROBOT", help="a name or a URDF"
     )
     complete(name, bundled_robots)
+    which.add_argument("--json", action="store_true", help="print JSON")
     which.add_argument("--markdown", action="store_true", help="print docs/robots.md")
 
     add_inspect(_command(commands, "inspect", "say what is odd about a robot's URDF"))
+    doctor = _command(commands, "doctor", "say what this machine lacks")
+    doctor.add_argument("--json", action="store_true", help="print JSON")
     _command(commands, "schema", "print the JSON Schema of a configuration")
     return parser
 
 
 def _command(
-    commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
-    name: str,
-    text: str,
-) -> argparse.ArgumentParser:
+    commands: "argparse._SubParsersAction[Parser]", name: str, text: str
+) -> Parser:
     return commands.add_parser(
         name, help=text, description=text[:1].upper() + text[1:] + "."
     )

@@ -1,7 +1,7 @@
 """The force with which a contact is to press."""
 
 from dataclasses import KW_ONLY
-from typing import Annotated, Any, Self
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError, TrajectoryError
 from hsp_control.declaration import Part, within
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import ArrayField, Number, read_only
 from hsp_control.trajectories import Hold, Trajectory
-from hsp_control.trajectories.remembering import with_memories_copied
+from hsp_control.trajectories.streams.stream import Streamed
 
 NORMAL, FORCE, WRENCH = 1, 3, 6
 """What is commanded, by the number of coordinates."""
@@ -40,22 +41,23 @@ class CommandedForce(Part, error=ContactError):
     """Instead: the command in time, of dimension 1, 3 or 6 [N, N·m]."""
 
     def __post_init__(self) -> None:
-        """Check that there is one command, of a known dimension."""
+        """Check that there is one command, of a known dimension, and no stream."""
         if (self.value is None) == (self.trajectory is None):
             raise ContactError("give either the value of the force or its trajectory")
         if self.trajectory is None:
             self._check_dimension("value", np.size(np.asarray(self.value)))
             return
         with within("trajectory"):
+            if any(True for _ in parts_within(self.trajectory, Streamed)):
+                raise ContactError(
+                    "a stream cannot command a force; while the controller runs, "
+                    "controller.at(t).force(contact, force) does"
+                )
             try:
                 self.trajectory.anchored(None)
             except TrajectoryError as error:
                 raise ContactError(str(error)) from None
         self._check_dimension("trajectory", self.trajectory.dimension)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return the command; what has a memory in it goes on by itself."""
-        return with_memories_copied(self, memo)
 
     @property
     def dimension(self) -> int:

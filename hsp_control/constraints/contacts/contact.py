@@ -55,11 +55,9 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
 
     Attributes:
         rows: Number of constraint rows.
-        slides: Whether the tangential force follows from the motion.
     """
 
     rows: ClassVar[int]
-    slides: ClassVar[bool] = False
     yaml_key: ClassVar[str | None] = "name"
 
     frame: str
@@ -129,6 +127,11 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         """Return the points from their middle, in the contact's axes, (k, 3) [m]."""
         arms = self.arms(frame)
         return np.asarray((arms - arms.mean(axis=0)) @ self.axes)
+
+    @property
+    def slides(self) -> bool:
+        """Whether the tangential force follows from the motion."""
+        return False
 
     @property
     def side(self) -> float:

@@ -1,4 +1,4 @@
-"""A point that slides on a plane while it presses: one row, and one force."""
+"""A point that moves along a plane while it presses: one row, and one force."""
 
 from dataclasses import KW_ONLY
 from functools import cached_property
@@ -8,7 +8,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError
-from hsp_control.constraints.contacts.commanded_force import NORMAL
+from hsp_control.constraints.contacts.commanded_force import NORMAL, WRENCH
 from hsp_control.constraints.contacts.contact import Contact
 from hsp_control.constraints.contacts.point_contact import point_velocity_rows
 from hsp_control.declaration import within
@@ -18,23 +18,22 @@ from hsp_control.tasks import TaskSample
 
 
 class SlidingContact(Contact, type="sliding"):
-    """A point of a link presses on the plane with a commanded force, and may slide.
+    """A point of a link presses on a plane with a commanded force, and moves along it.
 
     Only the motion along the normal n is a row, nᵀ(J a + J'v) = -Kd nᵀJ v: tasks move
-    the point along the plane. Its friction is known, it acts against the motion:
+    the point along the plane. If the normal force alone is commanded, the point slides,
+    and friction acts against the motion:
 
         f = f_n (n - μ tanh(‖u‖/u_s) u/‖u‖)
 
     with u the tangential velocity of the point once the errors of all tasks are zero.
     So the tangential force belongs to the command, and the friction pyramid contains
-    the cone instead of being inscribed.
-
-    Attributes:
-        slides: Whether the tangential force follows from the motion.
+    the cone instead of being inscribed. If three numbers are commanded, the point
+    carries what it presses on along with it, and the tangential force is what that
+    weighs.
     """
 
     rows: ClassVar[int] = 1
-    slides: ClassVar[bool] = True
 
     _: KW_ONLY
     point: Vector3 = (0.0, 0.0, 0.0)
@@ -46,24 +45,29 @@ class SlidingContact(Contact, type="sliding"):
     """Speed u_s at which three quarters of the friction are expected [m/s]."""
 
     def __post_init__(self) -> None:
-        """Check that the normal force is commanded, and nothing else."""
+        """Check that there is a command, without moments."""
         if self.force is None:
             with within("force"):
                 raise ContactError(
                     "it is missing: a sliding contact needs the normal force with "
                     "which it presses, for example {value: 20}"
                 )
-        if self.force.dimension != NORMAL:
+        if self.force.dimension == WRENCH:
             with within("force"):
                 raise ContactError(
-                    f"it has {self.force.dimension} coordinates; a sliding contact "
-                    "takes the normal force alone, friction gives the others"
+                    "it has 6 coordinates; a sliding contact takes 1 (it slides) or 3 "
+                    "(it carries what it presses on)"
                 )
+
+    @property
+    def slides(self) -> bool:
+        """Whether the tangential force follows from the motion."""
+        return self.force is not None and self.force.dimension == NORMAL
 
     @property
     def side(self) -> float:
         """The largest tangential force along an axis, per normal force."""
-        return self.friction
+        return self.friction if self.slides else super().side
 
     @cached_property
     def points(self) -> Array:
@@ -88,4 +92,5 @@ class SlidingContact(Contact, type="sliding"):
 
     def arms(self, frame: FrameKinematics) -> Array:
         """Return where the plane is touched, from the frame's origin, shape (1, 3)."""
-        return self.points @ frame.rotation.T + np.asarray(self.offset)
+        arms: Array = self.points @ frame.rotation.T + np.asarray(self.offset)
+        return arms

@@ -64,7 +64,7 @@ class CommandedForces:
             arms = contact.arms_in_axes(state.frame(contact.frame))
             self._shares[:] = shares(WRENCH, arms)
         out[:] = weight * (self._shares @ command)
-        if isinstance(contact, SlidingContact):
+        if isinstance(contact, SlidingContact) and contact.slides:
             slip = _slip(contact, state, intended_velocity(state, resolution))
             speed = float(np.hypot(slip[0], slip[1]))
             if speed > 0.0:

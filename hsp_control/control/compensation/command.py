@@ -152,7 +152,7 @@ class Command:
             self._ramp = own.start_up_ramp.begin(state)
         if self.feels_contacts:
             assert self._force_feedback is not None
-            self._force_feedback.measure(wrenches)
+            self._force_feedback.measure(wrenches, pressed=last > 0.0)
         self.output = output = self._law(state)
         self._friction_sent = self._friction
         if self._changes_state:

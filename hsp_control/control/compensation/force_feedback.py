@@ -36,7 +36,8 @@ class ForceFeedback(Part, error=CompensationError):
     """
 
     gain: Positive = 5.0
-    """K_i [1/s]; small beside 1/(period and delays of the loop)."""
+    """K_i [1/s]; a tenth of 1/(a period and the delays of the loop) at most: at one
+    over that it does not decay."""
     _: KW_ONLY
     bound: Positive = 50.0
     """Largest magnitude of the integral's share of the command [N]."""
@@ -101,11 +102,12 @@ class RunningForceFeedback:
         for name in names:
             controller.force_offset(name)[0] = 0.0
 
-    def measure(self, wrenches: Mapping[str, Array]) -> None:
+    def measure(self, wrenches: Mapping[str, Array], pressed: bool) -> None:
         """Read the sensors.
 
         Args:
             wrenches: Of the world on the robot, by frame; see `Measurement`.
+            pressed: Whether an effort acted in the period that ends.
 
         Raises:
             CompensationError: If a contact has no sensor.
@@ -119,7 +121,8 @@ class RunningForceFeedback:
                         "'estimated' needs none"
                     )
             wrench = wrenches[contact.frame]
-            self.felt[contact.name] = float(contact.axes[:, 2] @ wrench[:3])
+            felt = float(contact.axes[:, 2] @ wrench[:3])
+            self.felt[contact.name] = felt if pressed else np.nan
 
     def estimate(self, state: RobotState, disturbance: Array, forces: Array) -> None:
         """Estimate the forces from what the model does not explain.

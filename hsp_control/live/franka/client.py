@@ -70,8 +70,9 @@ class Client:
             state = self.robot.read_once()
         if state.robot_mode != pylibfranka.RobotMode.Idle:
             return described(state)
-        torque, force = wanted["collision_torque"], wanted["collision_force"]
-        self.robot.set_collision_behavior(torque, torque, force, force)
+        if wanted["collision"] is not None:
+            torque, force = wanted["collision"]
+            self.robot.set_collision_behavior(torque, torque, force, force)
         if (load := wanted["load"]) is not None:
             self.robot.set_load(load["mass"], load["center"], load["inertia"])
             state = self.robot.read_once()

@@ -41,7 +41,7 @@ def connect(
     settings = FrankaSettings.parse(address) if isinstance(address, str) else address
     _check(robot, period)
     chosen = postures(robot)
-    process, found = reached(settings, chosen)
+    process, found = reached(settings, chosen, moves=True)
     try:
         q = np.vstack([found["q"], chosen])
         masses = np.array(found["masses"]).reshape(-1, 7, 7)
@@ -62,20 +62,23 @@ def connect(
 
 
 def reached(
-    settings: FrankaSettings, chosen: Array
+    settings: FrankaSettings, chosen: Array, *, moves: bool
 ) -> tuple[ClientProcess, dict[str, Any]]:
     """Return a connection to an arm that is ready, and what it said (`client`).
 
     Args:
         settings: What is set there.
         chosen: Postures at which the robot's model is asked, shape (n, 7).
+        moves: Whether the arm is to move; otherwise its collision behaviour stays.
 
     Raises:
         HardwareError: If the arm cannot be reached, or is not ready.
     """
     process = ClientProcess()
     try:
-        found = process.asked(client.CONNECT + _wanted(settings, chosen), _TIMEOUT)
+        found = process.asked(
+            client.CONNECT + _wanted(settings, chosen, moves), _TIMEOUT
+        )
         if found["mode"] != "Idle":
             errors = f" ({about(found['errors'])})" if found["errors"] else ""
             raise HardwareError(
@@ -117,16 +120,17 @@ def _check(robot: Robot, period: float) -> None:
         )
 
 
-def _wanted(settings: FrankaSettings, chosen: Array) -> bytes:
+def _wanted(settings: FrankaSettings, chosen: Array, moves: bool) -> bytes:
     """Return what the client shall set, as JSON."""
     load = settings.load
+    torque, force = settings.collision_torque, settings.collision_force
+    thresholds = [np.asarray(each).tolist() for each in (torque, force)]
     return json.dumps(
         {
             "address": settings.address,
             "enforce": settings.realtime == "enforce",
             "recover": settings.recover,
-            "collision_torque": np.asarray(settings.collision_torque).tolist(),
-            "collision_force": np.asarray(settings.collision_force).tolist(),
+            "collision": thresholds if moves else None,
             "load": None
             if load is None
             else {

@@ -1,19 +1,22 @@
-"""Ask a control box for the robot's URDF, which pylibfranka does not hand out.
-
-The research interface (libfranka-common, ``service_types.h``): requests over TCP, each
-with a header of three numbers: command, its count, its size with the header.
-"""
+"""Ask a control box for the robot's URDF, which pylibfranka does not hand out."""
 
 import socket
-import struct
 from time import monotonic, sleep
 
-from hsp_control.common.exceptions import HardwareError
+import numpy as np
 
-_PORT = 1337
-_VERSION = 10  # of the research interface: libfranka 0.18 to 0.21
-_CONNECT, _MODEL = 0, 11
-_HEADER = struct.Struct("<III")
+from hsp_control.common.exceptions import HardwareError
+from hsp_control.franka_wire.layouts import (
+    CONNECTED,
+    HEADER,
+    PORT,
+    REQUESTS,
+    VERSION,
+    Command,
+    Status,
+    message,
+)
+
 _TIMEOUT = 10.0
 _OTHER_CLIENT = 2.0
 _LARGEST = 20_000_000
@@ -39,26 +42,32 @@ def robot_urdf(address: str) -> str:
                     f"the control box at {address} serves another client: {error}"
                 ) from None
             sleep(0.1)
-        except (OSError, struct.error, UnicodeDecodeError) as error:
+        except (OSError, UnicodeDecodeError) as error:
             raise HardwareError(f"the control box at {address}: {error}") from None
 
 
 def _received(address: str) -> str:
     with (
-        socket.create_connection((address, _PORT), _TIMEOUT) as link,
+        socket.create_connection((address, PORT), _TIMEOUT) as link,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as states,
     ):
         states.bind(("", 0))
         port = states.getsockname()[1]
-        answer = _asked(link, _CONNECT, 0, struct.pack("<HH", _VERSION, port))
-        status, version = struct.unpack_from("<BH", answer)
-        if status != 0:
+        hello = np.array((VERSION, port), REQUESTS[Command.CONNECT]).tobytes()
+        answer = _asked(link, Command.CONNECT, 0, hello)
+        if len(answer) < CONNECTED.itemsize:
+            raise HardwareError(
+                f"the control box at {address} answered with {len(answer)} bytes; "
+                f"needs {CONNECTED.itemsize}"
+            )
+        status, version = np.frombuffer(answer, CONNECTED, 1)[0]
+        if status != Status.SUCCESS:
             raise HardwareError(
                 f"the control box at {address} speaks version {version} of the "
-                f"research interface; this is version {_VERSION}"
+                f"research interface; this is version {VERSION}"
             )
-        answer = _asked(link, _MODEL, 1, b"")
-        if answer[:1] != b"\0":
+        answer = _asked(link, Command.GET_ROBOT_MODEL, 1, b"")
+        if answer[0] != Status.SUCCESS:
             raise HardwareError(
                 f"the control box at {address} does not hand out its model now: "
                 "unlock the joints, end other programs"
@@ -67,11 +76,11 @@ def _received(address: str) -> str:
 
 
 def _asked(link: socket.socket, command: int, count: int, request: bytes) -> bytes:
-    link.sendall(_HEADER.pack(command, count, _HEADER.size + len(request)) + request)
-    _, _, size = _HEADER.unpack(_exactly(link, _HEADER.size))
-    if not _HEADER.size < size < _LARGEST:
+    link.sendall(message(command, count, request))
+    size = int(np.frombuffer(_exactly(link, HEADER.itemsize), HEADER)[0]["size"])
+    if not HEADER.itemsize < size < _LARGEST:
         raise HardwareError(f"the control box announced an answer of {size} bytes")
-    return _exactly(link, size - _HEADER.size)
+    return _exactly(link, size - HEADER.itemsize)
 
 
 def _exactly(link: socket.socket, size: int) -> bytes:

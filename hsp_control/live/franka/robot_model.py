@@ -58,7 +58,7 @@ def calibrated(urdf: str, carried: dict[str, Any], like: Robot) -> str:
     """
     own, top = _parsed(urdf), read_urdf(like.source)
     names = list(like.dof_names)
-    joints = {joint.get("name", ""): joint for joint in top.iter("joint")}
+    joints = {joint.get("name", ""): joint for joint in top.findall("joint")}
     if len(names) != 7:
         raise ModelError(f"{like.name} has {len(names)} moving joints; needs seven")
     _replace_inertia(_link(top, _parent(joints[names[0]])), _link(own, "link0"))

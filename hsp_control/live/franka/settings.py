@@ -3,13 +3,13 @@
 from dataclasses import KW_ONLY
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
-from urllib.parse import unquote
 
 import numpy as np
 import yaml
 from numpy.typing import ArrayLike
 from pydantic import Field
 
+from hsp_control.common.addresses import name_and_options
 from hsp_control.common.exceptions import LiveError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import (
@@ -97,12 +97,14 @@ class FrankaSettings(Part, error=LiveError):
         Raises:
             LiveError: If a name or a value is wrong, or the file cannot be read.
         """
-        where, _, query = text.partition("?")
+        try:
+            where, options = name_and_options(text)
+        except ValueError as error:
+            raise LiveError(f"franka://{text}: {error}") from None
         data: dict[str, Any] = {"address": where}
         if where.endswith((".yaml", ".yml")):
             data = _read(Path(where))
-        for part in filter(None, query.split("&")):
-            name, _, value = (unquote(piece) for piece in part.partition("="))
+        for name, value in options.items():
             _put(data, name.split("."), _yaml(value, f"{name}={value}"))
         if "address" not in data:
             raise LiveError(f"{where}: the key address is missing")

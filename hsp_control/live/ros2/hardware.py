@@ -43,6 +43,7 @@ class Ros2Hardware:
         period: Time between two states [s].
         commands: The topic of the efforts.
         states: The topic of the states.
+        q: Configuration of the robot when it was connected, shape (nq,).
         old: Number of states whose stamp was not later than the last one's.
     """
 
@@ -78,7 +79,7 @@ class Ros2Hardware:
         self._faulty = self._closed = False
         self.old = 0
         end = monotonic() + timeout
-        self._check_period(end)
+        self.q = self._check_period(end).q
         while self._publisher.matched == 0:
             if monotonic() > end:
                 raise HardwareError(self._publisher.why_none())
@@ -161,10 +162,10 @@ class Ros2Hardware:
         self._stamps.sequence += 1  # else it would count as an old state
         return self._last._replace(sequence=self._stamps.sequence, fault=fault)
 
-    def _check_period(self, end: float) -> None:
-        """Hear some states, and compare their period with the loop's."""
+    def _check_period(self, end: float) -> Measurement:
+        """Hear some states, compare their period with the loop's, return the last."""
         stamps: list[int] = []
-        while len(stamps) < _STATES:
+        while self._last is None or len(stamps) < _STATES:
             left = end - monotonic()
             if left <= 0.0 or not self._subscription.wait(left):
                 raise HardwareError(self._why_no_state())
@@ -187,6 +188,7 @@ class Ros2Hardware:
                 f"{self.states}: a state every {there:.4g} s; the loop's period is "
                 f"{self.period:g} s (set simulation.control_period)"
             )
+        return self._last
 
     def _why_no_state(self) -> str:
         if self.old:

@@ -10,6 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from hsp_control.common.exceptions import AccessError
+from hsp_control.common.files import is_file
 from hsp_control.robot.description.access import Access
 from hsp_control.robot.description.packages import package_folders
 from hsp_control.robot.description.sources import RobotSource
@@ -60,7 +61,7 @@ def find_file(source: RobotSource, name: str) -> Path | None:
     It is no file only if there is something else at its place, such as a pipe.
     """
     places = candidates(source, name)
-    file = next(filter(_is_file, places), None)
+    file = next(filter(is_file, places), None)
     return file or next(filter(_is_there, places), None)
 
 
@@ -93,7 +94,7 @@ def check_mesh_name(source: RobotSource, name: str, what: str, access: Access) -
     if not access.strict:
         return
     places = candidates(source, name)
-    found = [place for place in places if _is_file(place)]
+    found = [place for place in places if is_file(place)]
     named_outside = name.rpartition("://")[0] not in ("package", "model")
     # A missing file is reported later. But a path outside the allowed folders is an
     # error in any case, so that the message does not reveal which files exist there.
@@ -129,13 +130,6 @@ def _references(file: Path) -> Iterator[str]:
         if text:
             yield text
             yield unquote(text)
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # too long for a path, or with a null character
-        return False
 
 
 def _is_there(path: Path) -> bool:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Self, get_args
 
 from hsp_control.common.exceptions import ModelError
+from hsp_control.common.files import is_file
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
@@ -220,13 +221,6 @@ def _find(robot: PlacedRobot | RobotDescription, access: Access) -> RobotSource:
 
 def _located(name: str | Path, folder: Path) -> str:
     text = str(name)
-    if text.endswith(FILE_ENDINGS) and _is_file(folder / text):
+    if text.endswith(FILE_ENDINGS) and is_file(folder / text):
         return str(folder / text)
     return text
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # too long for a path, or with a null character
-        return False

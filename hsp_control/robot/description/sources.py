@@ -15,6 +15,7 @@ from hsp_control.common.exceptions import (
     ModelError,
     RobotNotFoundError,
 )
+from hsp_control.common.files import is_folder
 from hsp_control.common.resources import bundled_robots
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.access import ANYWHERE, Access
@@ -122,6 +123,8 @@ def find_robot(
             f"robot {text!r} of example-robot-data has no URDF; robots can only be "
             "loaded from a URDF"
         )
+    if text and is_folder(Path(text)):
+        return _from_path(Path(text), access, xacro_args)  # which says what is in it
     known = [*bundled, *sorted(set(others) - set(bundled)), *described_names()]
     hint = (
         "list all with: hsp robots"
@@ -159,15 +162,19 @@ def find_description(
         srdf=found.srdf,
         package_dirs=folders,
         origin="robot_descriptions",
-        expanded=_expanded(
-            found.file, access, folders, {**found.xacro_args, **(xacro_args or {})}
-        ),
+        expanded=_expanded(found.file, access, folders, xacro_args, found.xacro_args),
     )
 
 
 def is_path(name: str) -> bool:
     """Return whether the name of a robot is a path."""
     return name.endswith(FILE_ENDINGS) or os.sep in name
+
+
+def is_robot(name: str) -> bool:
+    """Return whether a name is that of a robot, or of a URDF or xacro file."""
+    known = {*bundled_robots(), *example_robots(), *described_names()}
+    return name in known or name.endswith((".urdf", ".xacro"))
 
 
 def example_robots() -> dict[str, RobotSource]:
@@ -215,6 +222,7 @@ def _expanded(
     access: Access,
     folders: tuple[Path, ...],
     arguments: Mapping[str, str] | None,
+    defaults: Mapping[str, str] | None = None,
 ) -> str | None:
     """Return the URDF that xacro makes of a file; None if it is no xacro file."""
     if is_xacro(file):
@@ -223,7 +231,7 @@ def _expanded(
                 f"robot {str(file)!r}: strict reading allows no xacro file, because it "
                 "is a program; expand it first"
             )
-        return expand(file, arguments or {}, folders)
+        return expand(file, arguments or {}, folders, defaults)
     if arguments:
         raise ModelError(f"xacro_args: {file} is no xacro file")
     return None

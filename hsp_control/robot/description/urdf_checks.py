@@ -51,6 +51,9 @@ _SINGLE = {
     "joint": {"origin", "parent", "child", "axis", "limit", "mimic", "dynamics"},
 }
 """Elements of which others may contain one; parsers use one of several, silently."""
+_OF_MJCF = (
+    "; an MJCF's robot is robot: {mjcf: FILE} in a configuration (docs/mujoco.md)"
+)
 _WITH_AXIS = {"revolute", "continuous", "prismatic"}
 
 
@@ -91,14 +94,14 @@ def parse_urdf(source: RobotSource) -> Element:
     except OSError as error:
         raise RobotNotFoundError(f"{urdf}: {error.strerror}") from error
     if robot.tag != "robot":
-        hint = "; give an MJCF as mjcf, not as name" if robot.tag == "mujoco" else ""
+        hint = _OF_MJCF if robot.tag == "mujoco" else ""
         raise ModelError(
             f"{urdf}: the top element is <{robot.tag}>; in a URDF it is <robot>{hint}"
         )
     count = sum(1 for _ in robot.iter("link"))
     if count > MAX_LINKS:
         raise ModelError(f"{urdf}: {count} links; at most {MAX_LINKS}")
-    count = sum(joint.get("type") != "fixed" for joint in robot.iter("joint"))
+    count = sum(joint.get("type") != "fixed" for joint in robot.findall("joint"))
     if count > MAX_DOFS:
         raise ModelError(f"{urdf}: {count} moving joints; at most {MAX_DOFS}")
     return robot

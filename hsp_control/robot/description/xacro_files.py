@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hsp_control.common.exceptions import ModelError
+from hsp_control.common.suggestions import did_you_mean
 from hsp_control.robot.description.packages import package_folders
 from hsp_control.robot.description.xml_files import MAX_SIZE
 
@@ -38,8 +39,27 @@ def xacro_text(value: str | bool | float) -> str:
     return str(value)
 
 
+class _Asked(dict[str, str]):
+    """Arguments that remember for which names xacro has asked."""
+
+    def __init__(self, arguments: Mapping[str, str]) -> None:
+        super().__init__(arguments)
+        self.names: set[str] = set()
+
+    def __contains__(self, name: object) -> bool:
+        self.names.add(str(name))
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> str:
+        self.names.add(name)
+        return super().__getitem__(name)
+
+
 def expand(
-    file: Path, arguments: Mapping[str, str], package_dirs: Sequence[Path]
+    file: Path,
+    arguments: Mapping[str, str],
+    package_dirs: Sequence[Path],
+    defaults: Mapping[str, str] | None = None,
 ) -> str:
     """Return the URDF that a xacro file makes.
 
@@ -47,9 +67,11 @@ def expand(
         file: The xacro file.
         arguments: Its arguments, by name; others have their defaults.
         package_dirs: Where ``$(find package)`` looks, see `package_folders`.
+        defaults: Arguments where `arguments` have none; the file need not have them.
 
     Raises:
-        ModelError: If the package xacro is not installed, or cannot expand the file.
+        ModelError: If the package xacro is not installed, cannot expand the file, or
+            the file has no such argument.
     """
     try:
         import xacro  # type: ignore[import-not-found,import-untyped,unused-ignore]
@@ -61,9 +83,10 @@ def expand(
             f"{file}: a xacro file must be expanded: pip install xacro, or expand it "
             f"first: xacro {file.name} > {_expanded_name(file)}"
         ) from None
+    asked = _Asked({**(defaults or {}), **arguments})
     try:
         with _packages_found(substitution_args, package_dirs):
-            document = xacro.process_file(str(file), mappings=dict(arguments))
+            document = xacro.process_file(str(file), mappings=asked)
     except Exception as error:  # whatever its expressions raise
         reason = " ".join(str(error).split()) or type(error).__name__
         if type(error).__name__ == "UndefinedArgumentsException" or reason.startswith(
@@ -71,6 +94,12 @@ def expand(
         ):
             reason += "; give it by xacro_args, or on the command line as name:=value"
         raise ModelError(f"{file}: xacro cannot expand it: {reason}") from error
+    for name in arguments:
+        if name not in asked.names:
+            raise ModelError(
+                f"{file}: xacro_args: the file has no argument {name!r}"
+                f"{did_you_mean(name, sorted(asked.names))}"
+            )
     return str(document.toprettyxml(indent="  "))
 
 

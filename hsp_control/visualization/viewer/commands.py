@@ -187,7 +187,7 @@ def set_plots(plots: Json, arrays: list[Json]) -> Command:
     """Return the command that shows plots beside the scene, in place of earlier ones.
 
     Args:
-        plots: The plots, as ``export/plot_packing.py`` packs them.
+        plots: The plots, as ``packed/plot_packing.py`` packs them.
         arrays: The packed arrays to which they refer.
     """
     return _command("plots", PLOTS, "plots", plots=plots, arrays=arrays)

@@ -11,6 +11,8 @@ from hsp_control.simulation.recorder import Recorder, continuous_dofs
 from hsp_control.simulation.rollout import complete_columns
 from hsp_control.visualization.viewer.commands import Command, Json, set_plots
 from hsp_control.visualization.viewer.comparison import ComparedRun
+from hsp_control.visualization.viewer.packed.packing import ArrayTable
+from hsp_control.visualization.viewer.packed.plot_packing import PlottedRun, pack_panels
 
 PREVIEW_ROWS = 500
 """About so many rows of a run that is being computed are plotted."""
@@ -48,13 +50,6 @@ def plots_so_far(
 
 
 def _command(runs: Sequence[ComparedRun], end: float | None) -> Command:
-    # Here: the export imports the viewer, which imports this module.
-    from hsp_control.visualization.viewer.export.packing import ArrayTable
-    from hsp_control.visualization.viewer.export.plot_packing import (
-        PlottedRun,
-        pack_panels,
-    )
-
     arrays = ArrayTable()
     plotted = [PlottedRun(run.name, run.rollout, run.controller) for run in runs]
     plots = pack_panels(plotted, arrays)

@@ -1,6 +1,7 @@
 """A hand's targets as actions of Gymnasium's environments."""
 
 import re
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -179,8 +180,11 @@ def test_what_does_not_fit_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
         HandTargets(gymnasium.make("CartPole-v1"), "hand")
     with pytest.raises(FrameNotFoundError, match="'hnad'; did you mean 'hand'"):
         HandTargets(arm, "hnad")
-    with pytest.raises(SimulationError, match=r"no torque motors.*disable_servos=True"):
+    with pytest.raises(SimulationError, match=r"no torque motors.*set disable_servos$"):
         HandTargets(ArmEnv(tmp_path, drive="position"), "hand")
+    for scale in ((0.1,), 0.1, [[0.1, 0.2]], (0.1, nan), (0.1, -1.0), (0.1, "a")):
+        with pytest.raises(ControllerError, match="scale: needs two positive numbers"):
+            HandTargets(arm, "hand", scale=scale)  # type: ignore[arg-type]
     env = HandTargets(arm, "hand", absolute=True)
     env.reset()
     with pytest.raises(ShapeError, match=r"shape \(6,\); needs \(7,\)"):

@@ -18,8 +18,10 @@ from hsp_control import Hold, Obstacle, Sphere
 from hsp_control.common.exceptions import ImmutableError
 from hsp_control.constraints.contacts import (
     BallContact,
+    CommandedForce,
     Contact,
     PointContact,
+    SlidingContact,
     SurfaceContact,
 )
 from hsp_control.constraints.limits import (
@@ -54,12 +56,14 @@ BALL = Obstacle("ball", Sphere(0.1), Hold([0.4, 0.0, 0.5]))
 
 EXAMPLES: dict[type[Part], Part] = {
     BallContact: BallContact("foot", radius=0.02),
+    CommandedForce: CommandedForce(20.0),
     Limits: Limits(),
     ObstacleDistance: ObstacleDistance(),
     PointContact: PointContact("foot"),
     PositionRange: PositionRange([-1.0, None], [1.0, 2.0]),
     Scaled: Scaled(0.5),
     SelfDistance: SelfDistance(),
+    SlidingContact: SlidingContact("foot", force=CommandedForce(20.0)),
     SurfaceContact: SurfaceContact("foot", length=0.2, width=0.1),
 }
 """One of each class."""
@@ -70,12 +74,14 @@ _CONTACT: dict[str, Any] = {
     "normal": np.array([0.1, 0.0, 2.0]),
     "damping": 10,
     "schedule": Schedule([(1.0, None)]),
+    "force": CommandedForce(5.0),
     "name": "left",
 }
 _MAXIMUM = ["none", Scaled(0.5), Scaled({"b": 0.5, "a": 2}), 9, np.ones(7)]
 _NUMBERS = [1000.0, [1, 2.5], [3.0, None], np.array([1.0, np.inf])]
 OTHERS: dict[type[Part], dict[str, Any]] = {
     BallContact: {**_CONTACT, "radius": 0.03},
+    CommandedForce: {"value": [3, [1, 0, 5.0], np.array([0, 0, 9, 0, 0, 1.0])]},
     Limits: {
         "effort": _MAXIMUM,
         "effort_rate": _NUMBERS,
@@ -102,6 +108,12 @@ OTHERS: dict[type[Part], dict[str, Any]] = {
     },
     Scaled: {"scale": [2, {"joint": 0.5}]},
     SelfDistance: {"minimum": 0.1},
+    SlidingContact: {
+        **_CONTACT,
+        "point": (0.1, 0, 0.0),
+        "offset": (0.0, 0, -0.1),
+        "smoothing": 0.1,
+    },
     SurfaceContact: {
         **_CONTACT,
         "length": 0.3,
@@ -119,6 +131,8 @@ def others(part: Part) -> Iterator[Part]:
             yield replace(part, **{field: value})  # type: ignore[type-var]
     if isinstance(part, SurfaceContact):
         yield SurfaceContact("foot", corners=TRIANGLE)
+    if isinstance(part, CommandedForce):
+        yield CommandedForce(trajectory=Hold([20.0]))
 
 
 ALL = [each for part in EXAMPLES.values() for each in (part, *others(part))]
@@ -131,7 +145,8 @@ def rebuilt(part: Part) -> Part:
 def test_every_class_and_every_field_is_tried() -> None:
     assert set(EXAMPLES) == set(OTHERS) == set(MEMBERS)
     for cls in MEMBERS:
-        tried = set(OTHERS[cls]) | ({"corners"} if cls is SurfaceContact else set())
+        instead = {SurfaceContact: {"corners"}, CommandedForce: {"trajectory"}}
+        tried = set(OTHERS[cls]) | instead.get(cls, set())
         assert tried == {field.name for field in value_fields(cls)}, cls
 
 
@@ -271,6 +286,7 @@ _WRONG_CONTACT: dict[str, list[tuple[Any, str]]] = {
     ],
     "damping": [(-1, "-1 is negative; must be greater than 0")],
     "schedule": [("always", "expected a mapping")],
+    "force": [(20.0, "expected a mapping")],
     "name": [(3, "name: 3 ")],
 }
 _WRONG_MAXIMUM: list[tuple[Any, str]] = [
@@ -290,6 +306,17 @@ _WRONG_NUMBERS: list[tuple[Any, str]] = [
 ]
 WRONG: dict[type[Part], dict[str, list[tuple[Any, str]]]] = {
     BallContact: {**_WRONG_CONTACT, "radius": [(-0.1, "-0.1 is negative")]},
+    CommandedForce: {
+        "value": [
+            (None, "give either the value of the force or its trajectory"),
+            ([1.0, 2.0], "it has 2 coordinates; needs 1"),
+            ([0.0, np.inf, 1.0], "not a finite"),
+        ],
+        "trajectory": [
+            (Hold([1.0]), "give either the value of the force or its trajectory"),
+            ("hold", "expected a mapping"),
+        ],
+    },
     Limits: {
         "effort": _WRONG_MAXIMUM,
         "effort_rate": _WRONG_NUMBERS,
@@ -339,6 +366,13 @@ WRONG: dict[type[Part], dict[str, list[tuple[Any, str]]]] = {
         ]
     },
     SelfDistance: {"minimum": [(np.inf, "not a finite number")]},
+    SlidingContact: {
+        **_WRONG_CONTACT,
+        "force": [(None, "a sliding contact needs the normal force")],
+        "point": [([0, np.nan, 0], "not a finite")],
+        "offset": [([0, 0], "has 2 entries, needs 3")],
+        "smoothing": [(0.0, "must be greater than 0")],
+    },
     SurfaceContact: {
         **_WRONG_CONTACT,
         "length": [(None, "give length and width"), (-1, "must be greater than 0")],

@@ -38,7 +38,7 @@ from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.contact_forces import minimum_norm_forces
 from hsp_control.robot.integrators import Dop853
 from hsp_control.simulation.plants import ContactPlant, ContinuousPlant, RigidContact
-from hsp_control.trajectories import CallableTrajectory, Schedule
+from hsp_control.trajectories import CallableTrajectory, Hold, Schedule, Stream
 
 pytest.importorskip("example_robot_data")
 Array = NDArray[np.float64]
@@ -335,6 +335,14 @@ REFUSED: dict[str, tuple[Any, str]] = {
         lambda: CommandedForce(1.0, trajectory=Circle(1.0, 1.0, [0.0, 0.0])),
         "give either the value of the force or its trajectory",
     ),
+    "streamed": (
+        lambda: CommandedForce(trajectory=Stream()),
+        "trajectory: a stream cannot command a force; while the controller runs",
+    ),
+    "relative": (
+        lambda: CommandedForce(trajectory=Hold()),
+        "trajectory: point is missing: nothing starts here",
+    ),
     "size": (lambda: CommandedForce([1.0, 2.0]), "value: it has 2 coordinates; needs"),
     "pulls": (
         lambda: pressing(press(value=-5.0)),
@@ -361,9 +369,9 @@ REFUSED: dict[str, tuple[Any, str]] = {
         "at point 1 of 4, its share of the wrench, is -22.5 N",
     ),
     "slides without": (lambda: SlidingContact(TIP), "a sliding contact needs the"),
-    "slides aside": (
-        lambda: SlidingContact(TIP, force=CommandedForce([0.0, 0.0, 1.0])),
-        "it has 3 coordinates; a sliding contact takes the normal force alone",
+    "slides and turns": (
+        lambda: SlidingContact(TIP, force=CommandedForce([0.0, 0, 1, 0, 0, 0])),
+        "a sliding contact takes 1 .it slides. or 3",
     ),
     "frame": (
         lambda: pressing(PointContact("panda_tcq", force=CommandedForce(1.0))),

@@ -9,7 +9,7 @@ from franka_boxes import home, panda, plant
 from hsp_control.common.exceptions import LiveError
 from hsp_control.franka_box import Box
 from hsp_control.franka_box.requests import Requests
-from hsp_control.franka_box.wire import (
+from hsp_control.franka_wire.layouts import (
     COMMAND,
     HEADER,
     PERIOD,

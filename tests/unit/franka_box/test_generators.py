@@ -15,7 +15,7 @@ from hsp_control.franka_box.generators import (
     JointPositions,
 )
 from hsp_control.franka_box.model import Model
-from hsp_control.franka_box.wire import COMMAND, PERIOD, Error
+from hsp_control.franka_wire.layouts import COMMAND, PERIOD, Error
 
 STEPS = 1500
 

@@ -11,7 +11,7 @@ from hsp_control.franka_box import impedance
 from hsp_control.franka_box.impedance import Impedance
 from hsp_control.franka_box.model import Model
 from hsp_control.franka_box.reflexes import Reference
-from hsp_control.franka_box.wire import PERIOD
+from hsp_control.franka_wire.layouts import PERIOD
 
 REST = np.zeros(7)
 STILL = Reference(home(), REST, REST)

@@ -14,8 +14,14 @@ from hsp_control.cli.franka_box_log import BoxLog
 from hsp_control.cli.main import main
 from hsp_control.cli.options.command_line import command_line
 from hsp_control.common.exceptions import LogError
-from hsp_control.franka_box import PERIOD, Arm, Box, generators, reflexes
-from hsp_control.franka_box.wire import COMMAND, Controller, Error, MotionGenerator
+from hsp_control.franka_box import Arm, Box, generators, reflexes
+from hsp_control.franka_wire.layouts import (
+    COMMAND,
+    PERIOD,
+    Controller,
+    Error,
+    MotionGenerator,
+)
 from hsp_control.live.simulated_robot import sampled
 
 PAGE = (Path(__file__).parents[3] / "docs" / "franka_box.md").read_text("utf-8")
@@ -68,6 +74,11 @@ def test_the_log_has_the_true_motion(tmp_path: Path) -> None:
         assert true[t].tolist() == q.tolist()
     assert set(run["box.mode"].tolist()) == {2.0}
     assert not log.path.with_suffix(".journal").exists()
+    assert run.status == "completed"
+    with pytest.raises(OSError, match="no line"), BoxLog(log.path, experiment, box):
+        raise OSError("no line")
+    torn = Rollout.load(log.path)
+    assert (torn.status, torn.meta["message"]) == ("stopped", "no line")
 
 
 @pytest.mark.parametrize(
@@ -87,6 +98,14 @@ def test_a_mistake_is_one_line(
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("hsp: ")
     assert said in line
+
+
+def test_strict_reading_expands_no_xacro_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "arm.urdf.xacro").write_text("<robot/>")
+    assert main(["franka-box", str(tmp_path / "arm.urdf.xacro"), "--strict"]) == 2
+    assert "strict reading allows no xacro file" in capsys.readouterr().err
 
 
 def test_a_log_has_the_name_of_one(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from hsp_control.franka_box import reference, reflexes
 from hsp_control.franka_box.arm import ACCELERATION, JERK
 from hsp_control.franka_box.motion import Motion
 from hsp_control.franka_box.reflexes import Reference, Thresholds
-from hsp_control.franka_box.wire import (
+from hsp_control.franka_wire.layouts import (
     COMMAND,
     PERIOD,
     Controller,

@@ -13,9 +13,16 @@ import pytest
 from franka_boxes import Rig, home, panda, plant, served
 
 from hsp_control.common.exceptions import HardwareError, LiveError
-from hsp_control.franka_box import PORT, Box, Server
+from hsp_control.franka_box import Box, Server
 from hsp_control.franka_box.connection import Connection
-from hsp_control.franka_box.wire import COMMAND, HEADER, STATE, Command, response
+from hsp_control.franka_wire.layouts import (
+    COMMAND,
+    HEADER,
+    PORT,
+    STATE,
+    Command,
+    message,
+)
 
 LONGEST = 30.0
 MOVE = struct.pack("<II", 2, 4).ljust(113, b"\0")
@@ -34,7 +41,7 @@ class RawClient:
 
     def ask(self, command: int, payload: bytes = b"", number: int = 1) -> bytes:
         """Send a request, and return the response's payload; b"" at an end."""
-        self.tcp.sendall(response(command, number, payload))
+        self.tcp.sendall(message(command, number, payload))
         return self.answer()
 
     def answer(self) -> bytes:
@@ -117,7 +124,7 @@ def test_whoever_does_not_connect_first_is_sent_away() -> None:
 def test_a_request_in_pieces_is_whole() -> None:
     with served() as rig, client(rig) as slow:
         assert slow.connect()
-        for byte in response(Command.GET_ROBOT_MODEL, 7, b""):
+        for byte in message(Command.GET_ROBOT_MODEL, 7, b""):
             slow.tcp.sendall(bytes([byte]))
         answer = slow.answer()
         assert answer == b"\0" + rig.box.arm.urdf.encode()
@@ -126,7 +133,7 @@ def test_a_request_in_pieces_is_whole() -> None:
 def test_requests_in_one_piece_are_all_answered() -> None:
     with served() as rig, client(rig) as hasty:
         assert hasty.connect()
-        stop = [response(Command.STOP_MOVE, number, b"") for number in (5, 6, 7)]
+        stop = [message(Command.STOP_MOVE, number, b"") for number in (5, 6, 7)]
         hasty.tcp.sendall(b"".join(stop))
         assert [hasty.answer() for _ in stop] == [b"\0"] * 3
 
@@ -138,7 +145,7 @@ def test_a_command_is_late_by_when_it_arrived_not_by_when_it_is_read() -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp, tcp:
             udp.bind(("127.0.0.1", 0))
             hello = struct.pack("<HH", 10, udp.getsockname()[1])
-            tcp.sendall(response(Command.CONNECT, 1, hello))
+            tcp.sendall(message(Command.CONNECT, 1, hello))
             select([connection.tcp], [], [], LONGEST)
             assert not list(connection.requests())
             box = connection.udp.getsockname()

@@ -1,5 +1,7 @@
 """The layouts of the protocol, and the arm as clients are told it."""
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -8,7 +10,7 @@ from franka_boxes import panda
 from hsp_control import Robot
 from hsp_control.common.exceptions import LiveError
 from hsp_control.franka_box.arm import Arm, ArmLimits
-from hsp_control.franka_box.wire import COMMAND, HEADER, REQUESTS, STATE, Command
+from hsp_control.franka_wire.layouts import COMMAND, HEADER, REQUESTS, STATE, Command
 
 FR3_URDF_LIMITS = {
     "lower": [-2.7501, -1.7918, -2.9065, -3.0481, -2.8101, 0.54092, -3.01960],
@@ -97,6 +99,19 @@ def test_velocity_limits_are_those_that_libfranka_computes() -> None:
                 for room in (limits.upper[k] - q[k], q[k] - limits.lower[k])
             )
             assert (highest[k], lowest[k]) == pytest.approx((up, -down))
+
+
+def test_velocity_limits_are_read_beside_transmissions(tmp_path: Path) -> None:
+    """A URDF names its joints again where it says what drives them."""
+    urdf, arm = panda().robot.source.urdf.read_text(), tmp_path / "arm.urdf"
+    slower = '<position_based_velocity_limits velocity_offset="0.3"/>'
+    driven = '<transmission name="t"><joint name="panda_joint3"/></transmission>'
+    joint = '<joint name="panda_joint3" type="revolute">'
+    assert joint in urdf
+    urdf = urdf.replace(joint, joint + slower)
+    arm.write_text(urdf.replace("</robot>", f"{driven}</robot>"))
+    found = Arm(Robot.load(arm, locked={"panda_finger_joint1": 0.0})).limits
+    assert found.velocity_offset.tolist() == [0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0]
 
 
 def test_velocity_limits_without_a_position_stay() -> None:

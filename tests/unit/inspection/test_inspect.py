@@ -13,9 +13,10 @@ from odd_robots import FACES, OCTAHEDRON, write_stl
 from robot_texts import ARM, INERTIA, joint, link, robot_xml
 
 from hsp_control import Robot
-from hsp_control.cli import main
+from hsp_control.cli import loading, main
 from hsp_control.inspection import Finding, inspect
 from hsp_control.robot import RobotDescription
+from hsp_control.robot.description.access import ANYWHERE
 
 LIMIT = '<limit lower="-3" upper="3" effort="9" velocity="9"/>'
 
@@ -224,3 +225,35 @@ def test_mistakes_of_the_command(
     assert "'mass=3': an argument of a xacro file is name:=value" in (
         capsys.readouterr().err
     )
+
+
+def test_a_folder_is_told_however_it_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "arms").mkdir()
+    (tmp_path / "arms" / "arm.urdf").write_text(ARM)
+    monkeypatch.chdir(tmp_path)
+    for written in ("arms", "./arms"):
+        assert main(["inspect", written]) == 2
+        told = "hsp: arms is a folder; give a .urdf file in it (it contains arm.urdf)\n"
+        assert capsys.readouterr().err == told
+
+
+@pytest.mark.parametrize("name", ["", "a" * 300, "a\0b"])
+def test_what_can_be_no_folder_is_no_robot(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["inspect", name]) == 2
+    assert capsys.readouterr().err.startswith("hsp: no robot ")
+
+
+def test_strict_reading_of_a_name_allows_no_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = []
+    monkeypatch.setattr(loading, "only_within", lambda f: read.append(f) or ANYWHERE)
+    monkeypatch.chdir(tmp_path)
+    Path("arm.urdf").write_text(ARM)
+    for written in ("planar3r", "arm.urdf"):
+        assert main(["inspect", written, "--strict"]) == 0
+    assert read == [[], [Path()]]

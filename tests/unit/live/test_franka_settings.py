@@ -9,7 +9,7 @@ import pytest
 from places import ROOT
 
 from hsp_control.common.exceptions import LiveError
-from hsp_control.franka_box.wire import Error
+from hsp_control.franka_wire.layouts import Error
 from hsp_control.live import backends
 from hsp_control.live.franka import FrankaSettings, Load, connect
 from hsp_control.live.franka.reflexes import MODES, REFLEXES, explained
@@ -32,6 +32,7 @@ def test_text_and_file_say_what_python_says(tmp_path: Path) -> None:
         "load: {mass: 0.4, center: [0, 0, 0.05]}\n"
     )
     assert FrankaSettings.parse(f"{file}?realtime=ignore") == wanted
+    assert FrankaSettings.parse("a?cutoff_frequency=1.0e+2").cutoff_frequency == 100.0
 
 
 @pytest.mark.parametrize(
@@ -40,6 +41,8 @@ def test_text_and_file_say_what_python_says(tmp_path: Path) -> None:
         ("a?realtme=ignore", r"franka://a.*unknown key 'realtme'; did you mean 'realt"),
         ("a?realtime=maybe", "realtime: unknown value 'maybe'"),
         ("a?recover=3", "recover: "),
+        ("a?realtime=ignore&realtime=enforce", "the option 'realtime' is given twice"),
+        ("a?realtime", "needs options KEY=VALUE"),
         ("a?load.mass=-1", "load.mass: -1 is negative"),
         ("a?load.mas=1", r"load.*'mas'; did you mean 'mass'"),
         ("a?load.mass=1&load.inertia=[[a,0,0],[0,1,0],[0,0,1]]", "load.inertia"),

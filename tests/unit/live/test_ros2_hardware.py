@@ -129,6 +129,7 @@ def test_a_run_begins_at_zero_however_long_the_loop_compiles(
 ) -> None:
     made, hardware = rig
     assert isinstance(hardware, Hardware)
+    assert hardware.q.tolist() == start().tolist()
     # The fixture's reads were the first ones.
     hardware._reads = 0
     for wait, t in ((0, 0.0), (5000, 0.001), (1, 0.002), (3, 0.005)):

@@ -84,7 +84,10 @@ def test_file_that_may_not_be_read(
             '<?xml version="1.0" encoding="no-such"?>' + ARM,
             "malformed XML: unknown enc",
         ),
-        ("<mujoco/>", "the top element is <mujoco>; in a URDF it is <robot>"),
+        (
+            "<mujoco/>",
+            r"in a URDF it is <robot>; an MJCF's robot is robot: {mjcf: FILE}",
+        ),
         ("<sdf version='1.6'/>", "the top element is <sdf>"),
         ("<robot/>", "Pinocchio cannot build a model: No name given for the robot"),
         ("<robot name='r'/>", "Pinocchio cannot build a model"),

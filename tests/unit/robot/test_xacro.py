@@ -39,9 +39,9 @@ def xacro(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
             text = text.replace("$(find thing)", args._eval_find("thing"))
         if mappings.get("mass") == "none":
             raise ArgumentMissingError("Undefined substitution argument mass")
-        return minidom.parseString(
-            text.replace("$(arg mass)", mappings.get("mass", "2"))
-        )
+        if "mass" not in mappings:
+            mappings["mass"] = "2"
+        return minidom.parseString(text.replace("$(arg mass)", mappings["mass"]))
 
     args._eval_find, args._eval_dict = None, {}  # type: ignore[attr-defined]
     package.process_file = process_file  # type: ignore[attr-defined]
@@ -119,6 +119,9 @@ def test_mistakes_are_those_of_the_file(tmp_path: Path, xacro: ModuleType) -> No
     plain.write_text(ARM)
     with pytest.raises(ModelError, match=r"plain\.urdf is no xacro file"):
         Robot.load(plain, xacro_args={"mass": 1})
+    wrong = r"no argument 'mas'; did you mean 'mass'"
+    with pytest.raises(ModelError, match=wrong):
+        Robot.load(path, xacro_args={"mas": 1})
     with pytest.raises(AccessError, match="no xacro file, because it is a program"):
         Robot.load(path, access=only_within([tmp_path]))
 

@@ -36,7 +36,7 @@ def test_the_domain_is_that_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
         ("a?domain=233", r"the domain is '233'; needs 0 to 232"),
         ("a?domain=-1", r"the domain is '-1'"),
         ("a?state=/b", r"there is no option 'state'; did you mean 'states'\? \(known"),
-        ("a?states=/b&states=/c", r"an option is given twice"),
+        ("a?states=/b&states=/c", r"the option 'states' is given twice"),
     ],
 )
 def test_what_is_wrong_is_named(address: str, message: str) -> None:

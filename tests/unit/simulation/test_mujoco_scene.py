@@ -247,7 +247,7 @@ SERVO = CELL.replace('<motor name="m4"', '<position name="p4" kp="50"')
 def test_servos_on_the_robots_joints_are_refused_or_switched_off() -> None:
     robot, model, data = cell(SERVO)
     data.ctrl[4] = 0.04
-    message = r"^actuators p4 of the scene are no torque motors .* disable_servos=True$"
+    message = r"^actuators p4 of the scene are no torque motors .* set disable_servos$"
     with pytest.raises(SimulationError, match=message):
         MujocoScenePlant(robot, model, data)
     plant = MujocoScenePlant(robot, model, data, disable_servos=True)
@@ -282,6 +282,28 @@ def test_every_kind_of_servo_can_be_switched_off(servo: str) -> None:
     MujocoScenePlant(robot, model, data, disable_servos=True)
     mujoco.mj_forward(model, data)
     assert data.qfrc_actuator[3] == 0.0
+
+
+def test_a_robot_that_overlaps_itself_is_told_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """Where the parent stands still, MuJoCo lets parent and child collide."""
+    scene = """<mujoco><worldbody>
+      <body name="stand"><geom size="0.1"/>
+        <body name="arm" pos="0 0 {height}">
+          <joint name="turn"/><geom size="0.1"/>
+        </body>
+      </body></worldbody></mujoco>"""
+    for height, told in ((0.15, ["stand and arm (50 mm)"]), (0.2001, [])):
+        model = mujoco.MjModel.from_xml_string(scene.format(height=height))
+        robot = Robot.from_mujoco(model, "stand", ["turn"])
+        plant = MujocoScenePlant(robot, model, mujoco.MjData(model))
+        caplog.clear()
+        for _ in range(2):
+            plant.reset(0.0, np.zeros(1), np.zeros(1))
+        found = [each.getMessage() for each in caplog.records]
+        assert len(found) == len(told)
+        assert all(pair in line for pair, line in zip(told, found, strict=True))
 
 
 def test_a_floating_root_has_no_motor() -> None:

@@ -33,7 +33,15 @@ from hsp_control.visualization.viewer.export.clip_reduction import (
     POSITION_BOUND,
 )
 from hsp_control.visualization.viewer.export.html import write_page
-from hsp_control.visualization.viewer.export.keyframes import (
+from hsp_control.visualization.viewer.export.meshes import read_mesh
+from hsp_control.visualization.viewer.export.scene_reduction import VERTEX_STEP
+from hsp_control.visualization.viewer.export.screenshots import frame_times
+from hsp_control.visualization.viewer.export.triangle_meshes import (
+    sort_along_curve,
+    split_creases,
+    weld,
+)
+from hsp_control.visualization.viewer.packed.keyframes import (
     angle_error,
     distance_error,
     hold,
@@ -41,19 +49,11 @@ from hsp_control.visualization.viewer.export.keyframes import (
     linear,
     slerp,
 )
-from hsp_control.visualization.viewer.export.meshes import read_mesh
-from hsp_control.visualization.viewer.export.packing import ArrayTable
-from hsp_control.visualization.viewer.export.plot_packing import (
+from hsp_control.visualization.viewer.packed.packing import ArrayTable
+from hsp_control.visualization.viewer.packed.plot_packing import (
     CURVE_BOUND,
     PlottedRun,
     pack_panels,
-)
-from hsp_control.visualization.viewer.export.scene_reduction import VERTEX_STEP
-from hsp_control.visualization.viewer.export.screenshots import frame_times
-from hsp_control.visualization.viewer.export.triangle_meshes import (
-    sort_along_curve,
-    split_creases,
-    weld,
 )
 
 MEGABYTE = 1e6

@@ -5,6 +5,7 @@ changed inertias are the same in MuJoCo.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -32,7 +33,9 @@ MIN_INERTIA = 1e-12
 
 _OWN_IMPEDANCE = 0.95
 """MuJoCo's own impedance of contacts, where they are deep."""
-_CONTACT, _GROUND = 1, 2  # kinds of geoms; they collide only with the other kind
+_CONTACT, _GROUND, _LOOSE = 1, 2, 3  # kinds of geoms
+_COLLIDES = {_CONTACT: _GROUND, _GROUND: _CONTACT, _LOOSE: _LOOSE}
+"""With which kinds each collides, bit by bit; what is loose with all."""
 
 
 def write_mjcf(
@@ -73,9 +76,18 @@ def write_mjcf(
         place = pin.SE3(np.eye(3), np.array([0.0, 0.0, ground.height]))
         plane = Geom("plane", (0.0, 0.0, 1.0), place)
         _add_geom(world, "ground", plane, ground.friction, _GROUND)
+    loose: dict[str, Element] = {}
     for solid in solids:
         for name, geom in solid.geoms():
-            element = _add_geom(world, name, geom, solid.friction, _GROUND)
+            kind = _GROUND if solid.mass is None else _LOOSE
+            parent = world
+            if solid.mass is not None:
+                parent = loose[name] = Element("body", name=name)
+                _place(parent, geom.placement)
+                SubElement(parent, "freejoint", name=name)
+                geom = replace(geom, placement=pin.SE3.Identity())
+            element = _add_geom(parent, name, geom, solid.friction, kind)
+            element.set("mass", _numbers([solid.mass or 0.0]))
             element.set("priority", "1")  # its friction counts, not the other's
             _set_impedance(element, solid)
     lower, upper = robot.position_limits()
@@ -94,6 +106,7 @@ def write_mjcf(
                 elements[0].set("range", _numbers(limits))
         for name, geom in geoms.get(joint.index, ()):
             _add_geom(body, name, geom, ground.friction, _CONTACT)
+    world.extend(loose.values())  # after the robot, whose coordinates come first
     ties = SubElement(root, "equality")
     for joint in joints:
         if joint.leader is not None:
@@ -178,7 +191,7 @@ def _add_geom(body: Element, name: str, geom: Geom, mu: float, kind: int) -> Ele
     _place(element, geom.placement)
     element.set("friction", _numbers([mu, 0.0, 0.0]))
     element.set("contype", str(kind))
-    element.set("conaffinity", str(_CONTACT + _GROUND - kind))
+    element.set("conaffinity", str(_COLLIDES[kind]))
     element.set("mass", "0")
     return element
 

@@ -174,13 +174,16 @@ class MujocoPlant(SampledPlant):
     def log_channels(
         self, t: float, q: Array, v: Array, tau: Array
     ) -> Mapping[str, LogChannel]:
-        """Return each contact's force and moment at a true state under an effort."""
+        """Return each contact's force and moment at a true state under an effort.
+
+        Also where each loose solid is.
+        """
         if not self.contacts:
             return {}
         effort = self._roots.remove_effort(t, tau) + self.pushes.effort(t, q)
         self.coordinates.effort_to_mujoco(q, effort, self.data.qfrc_applied)
         self._mujoco.mj_forward(self.model, self.data)
-        return contact_channels(self._wrenches(q))
+        return contact_channels(self._wrenches(q)) | self._places()
 
     def contact_wrenches(
         self, t: float, q: Array, v: Array, tau: Array
@@ -231,6 +234,21 @@ class MujocoPlant(SampledPlant):
     def _mujoco(self) -> Any:
         """The module mujoco; not an attribute, because a module cannot be pickled."""
         return importlib.import_module("mujoco")
+
+    def _places(self) -> dict[str, LogChannel]:
+        """Return position and orientation of each loose solid."""
+        found = {}
+        for solid in self.solids:
+            for k in range(solid.copies if solid.mass is not None else 0):
+                body = self.data.body(f"solid/{solid.name}/{k}")
+                prefix = f"plant.solid.{solid.name}" + (f"_{k + 1}" if k else "")
+                found[f"{prefix}.position"] = LogChannel(
+                    body.xpos.copy(), "m", "of its middle in the world"
+                )
+                found[f"{prefix}.quaternion"] = LogChannel(
+                    body.xquat[[1, 2, 3, 0]], "-", "orientation (x, y, z, w)"
+                )
+        return found
 
     def _wrenches(self, q: Array) -> dict[str, Array]:
         """Return each contact's wrench about its frame's origin, in world axes."""

@@ -1,6 +1,7 @@
 """A MuJoCo scene of one's own as a plant: robot, objects and contacts in it."""
 
 import importlib
+import logging
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -23,9 +24,11 @@ from hsp_control.simulation.plants.mujoco.engine import (
     contact_wrenches,
     import_mujoco,
 )
+from hsp_control.simulation.plants.mujoco.own_contacts import own_overlaps
 from hsp_control.simulation.plants.plant import SampledPlant
 from hsp_control.simulation.plants.push import Push, Pushes
 
+_log = logging.getLogger(__name__)
 _GROUPS = 31
 """Number of groups of actuators that MuJoCo can disable."""
 
@@ -103,6 +106,7 @@ class MujocoScenePlant(SampledPlant):
         self._begin = np.zeros(mujoco.mj_stateSize(model, self._kind))
         mujoco.mj_getState(model, data, self._begin, self._kind)
         self._probe: Any = mujoco.MjData(model) if self.contacts else None
+        self._overlaps_told = False
 
     def reset(self, t: float, q: Array, v: Array) -> None:
         """Set the robot's state, and all else as it was; see `SampledPlant.reset`."""
@@ -112,6 +116,7 @@ class MujocoScenePlant(SampledPlant):
         data.time = t
         self.coordinates.to_mujoco(q, v, data.qpos, data.qvel)
         mujoco.mj_forward(self.model, data)
+        self._tell_overlaps()
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
         """Step MuJoCo from t to ``end``; see `SampledPlant.advance`.
@@ -176,6 +181,20 @@ class MujocoScenePlant(SampledPlant):
         """The module mujoco; not an attribute, because a module cannot be pickled."""
         return importlib.import_module("mujoco")
 
+    def _tell_overlaps(self) -> None:
+        """Warn once of a robot that overlaps itself where it starts."""
+        if self._overlaps_told:
+            return
+        self._overlaps_told = True
+        if found := own_overlaps(self.robot, self.model, self.data):
+            pairs = [f"{pair} ({1e3 * deep:.3g} mm)" for pair, deep in found.items()]
+            _log.warning(
+                "%s: parts overlap in the scene, and MuJoCo pushes them apart, which "
+                "the controller does not know: %s; exclude these contacts in the MJCF",
+                self.robot.name,
+                listing(pairs),
+            )
+
     def _drive(self, data: Any, t: float, q: Array, effort: Array) -> None:
         """Write an effort as controls and as applied forces."""
         applied = effort.copy()
@@ -238,8 +257,8 @@ def _switch_off_servos(
         raise SimulationError(
             f"actuators {listing([names.actuators[a] for a in servos])} of the scene "
             "are no torque motors and act on the robot's joints, where they would work "
-            "against the controller: remove them from the MJCF, or give "
-            "disable_servos=True"
+            "against the controller: remove them from the MJCF, or set "
+            "disable_servos"
         )
     if servos:
         unused = max({*range(_GROUPS)} - {*map(int, model.actuator_group)})

@@ -30,9 +30,10 @@ from hsp_control.simulation.plants.mujoco.contact_shapes import (
 
 
 class Solid(Part, error=SimulationError):
-    """A fixed body: a wall, a table, a slope; with copies, stairs.
+    """A fixed body: a wall, a table, a slope; with copies, stairs; a loose one: a box.
 
-    The robot touches it with the shapes that the plant's ``contacts`` declare.
+    The robot touches it with the shapes that the plant's ``contacts`` declare. What is
+    loose also touches the ground and the other solids.
 
     MuJoCo's friction is soft: it damps the slip u as if the surfaces were to stop at
     the rate b, until the friction cone limits the force. A shape that goes on sliding
@@ -49,11 +50,13 @@ class Solid(Part, error=SimulationError):
     shape: Annotated[Shape, AfterValidator(supported_shape)]
     """Its shape: a box, sphere, cylinder or capsule [-]."""
     position: Vector3 = (0.0, 0.0, 0.0)
-    """Position of its middle in the world [m]."""
+    """Position of its middle in the world, at the start if it is loose [m]."""
     rotation: Rotation = (0.0, 0.0, 0.0)
-    """Its rotation in the world: roll, pitch and yaw [rad], a quaternion (x, y, z, w)
+    """Its rotation, likewise: roll, pitch and yaw [rad], a quaternion (x, y, z, w)
     [-], or a matrix [-]."""
     _: KW_ONLY
+    mass: Positive | None = None
+    """Mass of a loose body, evenly distributed [kg]; it is fixed by default."""
     friction: NonNegative = 0.8
     """Coulomb friction coefficient of its surface [-]; the ground's does not count."""
     slip_damping: Positive | None = None

@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.visualization.viewer.commands import Json
-from hsp_control.visualization.viewer.export.keyframes import (
+from hsp_control.visualization.viewer.packed.keyframes import (
     RelativeError,
     angle_error,
     distance_error,
@@ -16,14 +16,12 @@ from hsp_control.visualization.viewer.export.keyframes import (
     linear,
     slerp,
 )
-from hsp_control.visualization.viewer.export.packing import ArrayTable
+from hsp_control.visualization.viewer.packed.packing import CLOCK_STEP, ArrayTable
 
 POSITION_BOUND = 2e-4
 """Maximum position error of a node [m]."""
 ANGLE_BOUND = np.radians(0.1)
 """Maximum rotation error of a node [rad]."""
-CLOCK_STEP = 1e-6
-"""Resolution of times [s]."""
 
 
 class _Property(NamedTuple):

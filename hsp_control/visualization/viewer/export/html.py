@@ -16,13 +16,13 @@ from hsp_control.visualization.viewer.comparison import (
     ghost_color,
     run_parts,
 )
-from hsp_control.visualization.viewer.export.packing import ArrayTable
 from hsp_control.visualization.viewer.export.page import assemble
-from hsp_control.visualization.viewer.export.plot_packing import (
+from hsp_control.visualization.viewer.export.scene_reduction import reduce_scene
+from hsp_control.visualization.viewer.packed.packing import ArrayTable
+from hsp_control.visualization.viewer.packed.plot_packing import (
     PlottedRun,
     pack_panels,
 )
-from hsp_control.visualization.viewer.export.scene_reduction import reduce_scene
 from hsp_control.visualization.viewer.recorder import Recorder
 from hsp_control.visualization.viewer.replay import rebuild_run
 from hsp_control.visualization.viewer.viewer import Viewer

@@ -7,10 +7,10 @@ from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 from hsp_control.visualization.viewer.commands import CAPTION, PLOTS, unpack
-from hsp_control.visualization.viewer.export.packing import ArrayTable
 from hsp_control.visualization.viewer.export.page import assemble
 from hsp_control.visualization.viewer.export.scene_reduction import reduce_scene
 from hsp_control.visualization.viewer.latest_commands import LatestCommands, key_of
+from hsp_control.visualization.viewer.packed.packing import ArrayTable
 from hsp_control.visualization.viewer.recorder import Recorder
 from hsp_control.visualization.viewer.replay import rebuild_run
 from hsp_control.visualization.viewer.viewer import Viewer

@@ -7,9 +7,9 @@ from typing import NamedTuple
 from hsp_control.robot import Robot
 from hsp_control.visualization.viewer.commands import unpack
 from hsp_control.visualization.viewer.export.html import write_page
-from hsp_control.visualization.viewer.export.packing import ArrayTable
 from hsp_control.visualization.viewer.export.page import assemble
 from hsp_control.visualization.viewer.export.scene_reduction import reduce_scene
+from hsp_control.visualization.viewer.packed.packing import ArrayTable
 from hsp_control.visualization.viewer.recorder import Recorder
 from hsp_control.visualization.viewer.viewer import Viewer
 

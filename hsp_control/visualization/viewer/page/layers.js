@@ -53,7 +53,15 @@ class Layers {
   setOpen(open) {
     this.open = open;
     this.list.hidden = !open;
+    this.measure();
     this.toggle.setAttribute("aria-expanded", open);
+  }
+
+  // End the rows where the picture ends: below it may be a bar, a sheet or plots.
+  measure() {
+    const {bottom} = this.viewer.dom_element.getBoundingClientRect();
+    const room = bottom - this.list.getBoundingClientRect().top - 8;
+    this.list.style.setProperty("--room", `${Math.max(room, 120)}px`);
   }
 
   // Show a legend; a repeated one keeps its rows, and with them the focus.

@@ -40,7 +40,7 @@ class PlayOutbox {
 }
 
 class Play {
-  static ECHO = 400;  // ms: after a release, the program's older places are not shown
+  static ECHO = 400;  // ms: after a release or a change, the program's older word is not shown
 
   constructor(viewer) {
     this.viewer = viewer;
@@ -83,7 +83,7 @@ class Play {
       this.obstacles.set(PlayHand.obstacleKey(rest.name), {...rest, at});
     }
     this.overlay.setThings(this.things(), (key) => this.select(key));
-    this.panel.build({targets: [], controls: [], ...setup});
+    this.panel.build({targets: [], obstacles: [], controls: [], ...setup});
     this.setUpPlots(setup.plots ?? []);
     if (!this.things().some(({key}) => key === this.selected)) this.selected = null;
     if (first) this.panel.setOpen(!this.panel.narrow.matches);
@@ -111,6 +111,7 @@ class Play {
     const sheet = panel.open ? panel.box.offsetHeight - 18 : 0;  // behind its round corners
     const height = Math.max(120, innerHeight - bar.row.offsetHeight - sheet);
     this.viewer.dom_element.style.height = panel.narrow.matches ? `${height}px` : "";
+    layers.measure();
   }
 
   // After a reset the plots are the same: they keep what is shown alone.
@@ -172,7 +173,7 @@ class Play {
   moveTarget(gizmo) {
     const {name} = gizmo.target, key = PlayHand.targetKey(name);
     this.hold(key);
-    this.panel.showMoved(name, true);
+    this.panel.showMoved(key, true);
     this.sendLater(key, {do: "move", target: name, pose: gizmo.pose()});
   }
 
@@ -180,6 +181,7 @@ class Play {
     const key = PlayHand.obstacleKey(obstacle.name);
     obstacle.at.copy(to);
     this.hold(key);
+    this.panel.showMoved(key, true);
     this.sendLater(key, {do: "obstacle", name: obstacle.name, position: to.toArray()});
   }
 
@@ -188,10 +190,11 @@ class Play {
     this.send({do: "release", target: name});
   }
 
-  resume(name) {
-    this.held.delete(PlayHand.targetKey(name));
-    this.panel.showMoved(name, false);
-    this.send({do: "resume", target: name});
+  // Let a target or an obstacle return to its own path.
+  resume(key, name) {
+    this.held.delete(key);
+    this.panel.showMoved(key, false);
+    this.send({do: "resume", [this.gizmos.has(key) ? "target" : "name"]: name});
   }
 
   pullLink({path, point, local}, to) {

@@ -32,7 +32,7 @@ class PlayKeys {
     if (target.matches?.("select, textarea, input[type=text], input[type=number]")) return;
     // In the panel, its own controls take the arrows and the space key first.
     const inControl = target.matches?.("input, button, [tabindex]")
-      && target.closest(".play-panel, .play-bar, .dg, #caption");
+      && target.closest(".play-panel, .play-bar, #caption");
     if (inControl && (key === " " || key.startsWith("Arrow") || key.startsWith("Page"))) return;
     const action = this.action(event);
     if (!action) return;

@@ -1,14 +1,18 @@
 // The panel beside the scene: the targets, the controls in their groups, the live plots.
 //
 // A value is the program's: a change is sent, and the value that the program then reports
-// is shown, so a refused one goes back. While a slider is held it stays with the pointer.
+// is shown, so a refused one goes back. While a slider is held, and a moment after each
+// change, what the program said before does not count.
 "use strict";
 
 class PlayPanel {
+  static OBSTACLE = "#D55E00";  // appearance.OBSTACLE
+  static NARROW = "(max-width: 620px), (max-width: 860px) and (max-aspect-ratio: 6/5)";
+
   constructor(play, parent) {
     this.play = play;
     this.open = false;
-    this.narrow = matchMedia("(max-width: 560px)");
+    this.narrow = matchMedia(PlayPanel.NARROW);
     this.box = document.createElement("aside");
     this.box.className = "play-panel";
     this.box.setAttribute("aria-label", "Controls and plots");
@@ -27,12 +31,18 @@ class PlayPanel {
     this.controls = this.box.querySelector(".play-controls");
     this.plots = this.box.querySelector(".play-plots");
     this.box.querySelector("header button").onclick = () => this.setOpen(false);
+    // On a phone there is room for the sheet or the legend.
+    layers.toggle.addEventListener("click", () => {
+      if (layers.open && this.narrow.matches) this.setOpen(false);
+    });
     parent.append(this.box);
     this.setters = new Map();
+    this.asked = new Map();  // id -> when the page has asked for a value [ms]
   }
 
   setOpen(open) {
     this.open = open;
+    if (open && this.narrow.matches) layers.setOpen(false);
     this.box.inert = !open;
     document.body.classList.toggle("with-panel", open);
     this.play.bar.showPanel(open);
@@ -40,20 +50,26 @@ class PlayPanel {
     this.play.fit();
   }
 
-  build({title, targets, controls}) {
+  build({title, targets, obstacles, controls}) {
     this.title.textContent = title || "Play";
     this.setters.clear();
+    this.asked.clear();
     const groups = new Map();
     for (const control of controls) {
       const group = control.group || "Settings";
       if (!groups.has(group)) groups.set(group, []);
       groups.get(group).push(control);
     }
-    this.resume = new Map();
-    const sections = [...groups].map(([name, own]) =>
-      PlayPanel.section(name, own.map((control) => this.control(control))));
-    if (targets.length) {
-      sections.unshift(PlayPanel.section("Targets", targets.map((one) => this.target(one))));
+    this.things = new Map();
+    const things = {
+      Targets: targets.map((one) => this.thing(PlayHand.targetKey(one.name), one)),
+      Obstacles: obstacles.map((one) =>
+        this.thing(PlayHand.obstacleKey(one.name), {...one, color: PlayPanel.OBSTACLE})),
+    };
+    const sections = Object.entries(things).filter(([, rows]) => rows.length)
+      .map(([name, rows]) => PlayPanel.section(name, rows));
+    for (const [name, own] of groups) {
+      sections.push(PlayPanel.section(name, own.map((control) => this.control(control))));
     }
     this.controls.replaceChildren(...sections);
   }
@@ -66,43 +82,40 @@ class PlayPanel {
     return section;
   }
 
-  // A target's name, which selects it, and the way back to its own path.
-  target({name, kind, color}) {
+  // The name of a target or an obstacle, which selects it, and the way back to its own path.
+  thing(key, {name, kind, color}) {
     const row = PlayPanel.row("target", `<button type="button" class="select"><i></i>
       <span></span><small></small></button>
       <button type="button" class="resume">Back to its path</button>`);
     const [select, resume] = row.querySelectorAll("button");
     row.querySelector("span").textContent = name;
-    row.querySelector("small").textContent = kind;
+    row.querySelector("small").textContent = kind ?? "";
     if (color) row.querySelector("i").style.background = color;
     select.setAttribute("aria-label", `Select ${name}`);
     resume.setAttribute("aria-label", `${name}: back to its own path`);
     select.onclick = () => {
-      this.play.overlay.buttons.get(PlayHand.targetKey(name))?.focus();
+      this.play.overlay.buttons.get(key)?.focus();
       if (this.narrow.matches) this.setOpen(false);
     };
-    resume.onclick = () => this.play.resume(name);
-    this.resume.set(name, row);
+    resume.onclick = () => this.play.resume(key, name);
+    this.things.set(key, row);
     return row;
   }
 
-  // Show that a target was moved away from its path, or is on it again.
-  showMoved(name, moved) { this.resume.get(name)?.classList.toggle("moved", moved); }
+  // Show that a thing was moved away from its path, or is on it again.
+  showMoved(key, moved) { this.things.get(key)?.classList.toggle("moved", moved); }
 
-  showSelected(key) {
-    for (const [name, row] of this.resume) {
-      row.classList.toggle("selected", key === PlayHand.targetKey(name));
-    }
+  showSelected(selected) {
+    for (const [key, row] of this.things) row.classList.toggle("selected", key === selected);
   }
 
   control(control) {
-    const make = {slider: this.slider, switch: this.switch, choice: this.choice}[control.kind];
-    return make.call(this, control);
+    return control.kind === "switch" ? this.switch(control) : this.slider(control);
   }
 
   slider({id, label, unit, value, low, high, log}) {
     const row = PlayPanel.row("slider", `<label><span></span><output></output></label>
-      <input type="range" min="0" max="1" step="0.001">`);
+      <input type="range" min="0" max="1" step="0.005">`);
     const [input, shown] = ["input", "output"].map((tag) => row.querySelector(tag));
     row.querySelector("span").textContent = label;
     row.querySelector("label").htmlFor = input.id = `play-${id}`;
@@ -120,7 +133,7 @@ class PlayPanel {
       const next = PlayPanel.rounded(value_at(Number(input.value)), low, high);
       reported = null;
       show(next, false);
-      this.play.set(id, next);
+      this.set(id, next);
     };
     const let_go = () => {
       held = false;
@@ -144,35 +157,22 @@ class PlayPanel {
     const input = row.querySelector("input");
     row.querySelector("span").textContent = label;
     input.checked = value;
-    input.onchange = () => this.play.set(id, input.checked);
+    input.onchange = () => this.set(id, input.checked);
     this.setters.set(id, (on) => { input.checked = on; });
     return row;
   }
 
-  choice({id, label, unit, value, options}) {
-    const row = PlayPanel.row("choice", `<span></span><div role="radiogroup"></div>`);
-    const group = row.querySelector("div");
-    row.querySelector("span").textContent = unit && unit !== "–" ? `${label} [${unit}]` : label;
-    group.setAttribute("aria-label", label);
-    const inputs = options.map((option) => {
-      const entry = document.createElement("label");
-      const input = document.createElement("input");
-      Object.assign(input, {type: "radio", name: `play-${id}`, checked: option === value});
-      input.onchange = () => this.play.set(id, option);
-      const text = document.createElement("span");
-      text.textContent = String(option);
-      entry.append(input, text);
-      group.append(entry);
-      return input;
-    });
-    this.setters.set(id, (next) => {
-      options.forEach((option, k) => { inputs[k].checked = option === next; });
-    });
-    return row;
+  // Ask for a value; what the program said before it heard of it is not shown.
+  set(id, value) {
+    this.asked.set(id, performance.now());
+    this.play.set(id, value);
   }
 
   setValues(values) {
-    for (const [id, value] of Object.entries(values)) this.setters.get(id)?.(value);
+    for (const [id, value] of Object.entries(values)) {
+      const fresh = !(performance.now() < this.asked.get(id) + Play.ECHO);
+      if (fresh) this.setters.get(id)?.(value);
+    }
   }
 
   setDisabled(disabled) { this.controls.disabled = disabled; }

@@ -38,7 +38,7 @@ const PlotAxes = {
   // The ticks of the time axis, without those that its unit would cover.
   clock(start, end, width) {
     const {ticks, label} = PlotAxes.steps(start, end, Math.max(2, Math.min(6, width / 45)));
-    const free = end - 24 / width * (end - start);
+    const free = end - 38 / width * (end - start);
     return {ticks: ticks.filter((tick) => tick <= free), label};
   },
 

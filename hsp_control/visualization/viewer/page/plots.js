@@ -4,7 +4,7 @@
 //   plots.load({...});   // the same plots with more rows, or others; the zoom stays
 //   plots.select(1);     // emphasise the curves of one run; null: of all
 //
-// with the data of viewer/export/plot_packing.py.
+// with the data of viewer/packed/plot_packing.py.
 //
 //   hover                values of all curves at the time under the pointer, in all plots
 //   click                go to that time

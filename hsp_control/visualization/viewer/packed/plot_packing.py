@@ -10,14 +10,13 @@ from hsp_control.control.controller import Controller
 from hsp_control.simulation import Rollout
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.commands import Json
-from hsp_control.visualization.viewer.export.clip_reduction import CLOCK_STEP
-from hsp_control.visualization.viewer.export.keyframes import (
+from hsp_control.visualization.viewer.packed.keyframes import (
     distance_error,
     keyframe_rows,
     linear,
 )
-from hsp_control.visualization.viewer.export.packing import ArrayTable
-from hsp_control.visualization.viewer.export.panels import Panel, Series, panels_of
+from hsp_control.visualization.viewer.packed.packing import CLOCK_STEP, ArrayTable
+from hsp_control.visualization.viewer.packed.panels import Panel, Series, panels_of
 
 CURVE_BOUND = 1 / 500
 """Maximum error of a curve, over the height of its plot."""

@@ -11,7 +11,7 @@ from hsp_control.simulation import Rollout, log_series
 from hsp_control.simulation.decay import predicted_decay
 from hsp_control.simulation.log_distances import logged_distances
 from hsp_control.visualization import palette
-from hsp_control.visualization.viewer.export.held_effort import expected_floor
+from hsp_control.visualization.viewer.packed.held_effort import expected_floor
 
 _MAX_CURVES, _SELECTED = 14, 7
 """Of more than 14 curves, only the 7 that vary most are shown."""

@@ -224,8 +224,11 @@ REQUESTS = {
 }
 """Payload of each request."""
 
+CONNECTED = np.dtype(_bytes(status=1) + _fields("<u2", version=1))
+"""The answer to `Command.CONNECT`, with the version of the box."""
 
-def response(command: int, number: int, payload: bytes) -> bytes:
-    """Return a response to the request with this command and number."""
+
+def message(command: int, number: int, payload: bytes) -> bytes:
+    """Return a request with a command and number, or the response to it."""
     header = np.array((command, number, HEADER.itemsize + len(payload)), HEADER)
     return header.tobytes() + payload

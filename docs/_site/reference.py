@@ -1,0 +1,35 @@
+"""The reference's pages, written from what there is: names, YAML keys, commands."""
+
+import json
+from pathlib import Path
+
+from commands import commands_page
+from names import names_page, namespace_pages
+from sphinx.application import Sphinx
+from yaml_keys import yaml_page
+
+from hsp_control.cli.options.command_line import command_line
+
+SCHEMA = "../configs/hsp_control.schema.json"
+
+
+def write(app: Sphinx) -> None:
+    """Write all pages that are made of the code."""
+    folder = Path(app.srcdir) / "reference" / "generated"
+    folder.mkdir(parents=True, exist_ok=True)
+    pages = {
+        "names": names_page(),
+        "commands": commands_page(command_line()),
+        "yaml": yaml_page(json.loads((Path(app.srcdir) / SCHEMA).read_text())),
+        **{f"hsp.{name}": page for name, page in namespace_pages()},
+    }
+    for name, page in pages.items():
+        path = folder / f"{name}.md"
+        if not path.exists() or path.read_text() != page:  # Sphinx reads it again
+            path.write_text(page)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Write the pages before Sphinx looks for them."""
+    app.connect("builder-inited", write)
+    return {"parallel_read_safe": True}

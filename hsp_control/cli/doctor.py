@@ -1,0 +1,185 @@
+"""``hsp doctor``: whether this machine has what a fast and punctual loop needs."""
+
+import argparse
+import json
+import os
+import platform
+import resource
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from packaging.requirements import Requirement
+
+from hsp_control.cli.consoles import out
+from hsp_control.common import kernel_cache
+from hsp_control.visualization.viewer.export.chromium import find_browser
+
+_PACKAGE = "hsp_control"
+_SHOWN = ("pin", "numpy", "scipy", "numba", "pydantic", "meshcat")
+_OURS = {"test", "dev", "docs"}
+"""Extras for those who develop the package."""
+
+
+class Check(NamedTuple):
+    """What was looked at, and what was found.
+
+    Attributes:
+        topic: What was looked at.
+        state: ``ok``; ``note``: something is slower, later or absent; ``bad``:
+            something does not work.
+        found: What was found.
+        advice: What would change it.
+    """
+
+    topic: str
+    state: Literal["ok", "note", "bad"]
+    found: str
+    advice: str = ""
+
+
+def doctor(options: argparse.Namespace) -> int:
+    """Print what was found; return 2 if something does not work."""
+    checks = [
+        *_versions(),
+        _cache(),
+        _threads(),
+        _browser(),
+        *_real_time(),
+        *_extras(),
+    ]
+    if options.json:
+        print(json.dumps([each._asdict() for each in checks], indent=2))
+    else:
+        for each in checks:
+            sign = {"ok": " ", "note": "-", "bad": "!"}[each.state]
+            out.print(f"{sign} {each.topic:16} {each.found}", markup=False)
+            if each.advice:
+                out.print(f"  {'':16} {each.advice}", markup=False)
+    return 2 if any(each.state == "bad" for each in checks) else 0
+
+
+def _versions() -> Iterator[Check]:
+    python = f"{platform.python_version()} on {platform.system()} {platform.machine()}"
+    yield Check("Python", "ok", python)
+    yield Check(_PACKAGE, "ok", metadata.version(_PACKAGE))
+    found = ", ".join(f"{name} {metadata.version(name)}" for name in _SHOWN)
+    yield Check("with", "ok", found)
+
+
+def _cache() -> Check:
+    """Look where compiled kernels are kept."""
+    topic = "compiled kernels"
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"}:
+        return Check(
+            topic,
+            "note",
+            "not compiled: NUMBA_DISABLE_JIT is set",
+            "a step takes some hundred times as long; unset it to control a robot",
+        )
+    from hsp_control.law.law import acceleration
+
+    folder = kernel_cache.Kept(
+        getattr(acceleration, "py_func", acceleration)
+    ).cache_path
+    if folder is None:
+        return Check(
+            topic,
+            "note",
+            "no folder can be written: each start compiles anew",
+            "name a folder in NUMBA_CACHE_DIR",
+        )
+    return Check(topic, "ok", f"kept, those of the law in {folder}")
+
+
+def _threads() -> Check:
+    """Look whether BLAS would start threads for small matrices."""
+    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
+    given = {name: os.environ[name] for name in names if name in os.environ}
+    if "1" in given.values():
+        return Check("BLAS threads", "ok", "1")
+    said = ", ".join(f"{name}={value}" for name, value in given.items())
+    return Check(
+        "BLAS threads",
+        "note",
+        said or f"not set: as many as processors ({os.cpu_count()})",
+        "OPENBLAS_NUM_THREADS=1 keeps a loop's period: the matrices are small",
+    )
+
+
+def _browser() -> Check:
+    found = find_browser()
+    if found is None:
+        return Check(
+            "browser",
+            "note",
+            "no Chromium on the path",
+            "films need one (apt-get install chromium); pages open in any browser",
+        )
+    return Check("browser", "ok", found)
+
+
+def _real_time() -> Iterator[Check]:
+    """Look at the kernel, the permission for real-time priority, and the clock."""
+    if platform.system() != "Linux":
+        return
+    preempt = "PREEMPT_RT" in platform.version() or _is("/sys/kernel/realtime", "1")
+    yield Check(
+        "kernel",
+        "ok" if preempt else "note",
+        platform.release() + (" with PREEMPT_RT" if preempt else ""),
+        "" if preempt else "a robot at 1 kHz wants PREEMPT_RT (docs/latency.md)",
+    )
+    most = resource.getrlimit(resource.RLIMIT_RTPRIO)[0]
+    allowed = os.geteuid() == 0 or most == resource.RLIM_INFINITY or most > 0
+    yield Check(
+        "real-time rights",
+        "ok" if allowed else "note",
+        "real-time priority is permitted" if allowed else "no real-time priority",
+        "" if allowed else "a line 'rtprio' in /etc/security/limits.conf permits it",
+    )
+    governor = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
+    if governor.is_file():
+        name = governor.read_text().strip()
+        fast = name == "performance"
+        yield Check(
+            "clock",
+            "ok" if fast else "note",
+            f"governor {name}",
+            "" if fast else "'performance' keeps the clock up (cpupower frequency-set)",
+        )
+
+
+def _is(file: str, text: str) -> bool:
+    path = Path(file)
+    return path.is_file() and path.read_text().strip() == text
+
+
+def _extras() -> Iterator[Check]:
+    """Look which extras are installed."""
+    wanted: dict[str, list[Requirement]] = {}
+    for line in metadata.requires(_PACKAGE) or ():
+        requirement = Requirement(line)
+        if requirement.marker is None or requirement.name.replace("-", "_") == _PACKAGE:
+            continue
+        for extra in set(metadata.metadata(_PACKAGE).get_all("Provides-Extra") or ()):
+            here = requirement.marker.evaluate({"extra": extra})
+            if here and not requirement.marker.evaluate({"extra": ""}):
+                wanted.setdefault(extra, []).append(requirement)
+    for extra in sorted(wanted.keys() - _OURS):
+        missing = [each.name for each in wanted[extra] if not _installed(each)]
+        yield Check(
+            f"extra {extra}",
+            "note" if missing else "ok",
+            f"not installed: {', '.join(missing)}" if missing else "installed",
+            f"pip install '{_PACKAGE}[{extra}]'" if missing else "",
+        )
+
+
+def _installed(requirement: Requirement) -> bool:
+    try:
+        version = metadata.version(requirement.name)
+    except metadata.PackageNotFoundError:
+        return False
+    return requirement.specifier.contains(version, prereleases=True)

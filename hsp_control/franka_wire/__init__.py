@@ -1,0 +1,1 @@
+"""The research interface of a Franka on the wire, for both of its ends."""

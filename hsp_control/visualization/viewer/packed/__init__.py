@@ -1,0 +1,1 @@
+"""What live and exported pages get packed: arrays, keyframes, and plots."""

@@ -1,0 +1,73 @@
+"""``hsp live --robot``: a run begins where the robot is, and ends with one line."""
+
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hsp_control import Robot, Rollout, load_experiment
+from hsp_control.cli import main
+from hsp_control.cli.live_experiment import simulated_robot
+from hsp_control.live import InProcessRobot, backends
+from hsp_control.live.adapting import AdaptingHardware, LocatedHardware
+
+AWAY = 0.1
+
+
+class Somewhere(InProcessRobot):
+    """A robot whose first joint stands aside: at ``hold``, ``halt`` or ``lost``.
+
+    Attributes:
+        q: Where it is, shape (nq,).
+    """
+
+    def __init__(self, address: str, robot: Robot, period: float) -> None:
+        q = load_experiment("panda_obstacle").q0.copy()
+        q[0] += AWAY if address != "lost" else np.nan
+        start = f"start={{configuration: {q.tolist()}}}".replace("nan", "0")
+        super().__init__(simulated_robot(load_experiment("panda_obstacle", start)))
+        self.q, self._halts = q, address == "halt"
+
+    def write(self, effort: np.ndarray) -> None:
+        super().write(effort)
+        if self._halts and self.robot.t > 0.05:
+            self.robot.halt("a door was opened")
+
+
+@pytest.fixture(autouse=True)
+def offered(monkeypatch: pytest.MonkeyPatch) -> None:
+    entry = EntryPoint("some", f"{__name__}:Somewhere", backends.GROUP)
+    monkeypatch.setattr(backends, "entry_points", lambda group: [entry])
+
+
+def command(tmp_path: Path, address: str) -> list[str]:
+    words = ["live", "panda_obstacle", "--duration", "0.1", "--out", str(tmp_path)]
+    return [*words, "--robot", f"some://{address}"]
+
+
+def test_it_begins_where_the_robot_is(tmp_path: Path) -> None:
+    hardware = Somewhere("hold", Robot.load("panda"), 0.001)
+    assert isinstance(hardware, LocatedHardware)
+    assert not isinstance(hardware, AdaptingHardware)
+    assert main(command(tmp_path, "hold")) == 0
+    run = Rollout.load(tmp_path / "panda_obstacle-live.npz")
+    assert run["q"][0] == pytest.approx(hardware.q, abs=1e-6)
+    assert np.abs(run["task.hand.error"][run.t < 0.1]).max() < 1e-5
+
+
+def test_a_robot_that_does_not_know_where_it_is_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(command(tmp_path, "lost")) == 2
+    told = capsys.readouterr().err
+    assert "panda_joint1 is nan from the configuration's start" in told
+
+
+def test_a_fault_is_one_line_of_the_errors(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(command(tmp_path, "halt")) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("hsp: ")
+    assert "stopped" in line

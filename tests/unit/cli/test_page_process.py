@@ -1,0 +1,48 @@
+"""The process of a live loop's page, where it does not start or dies early."""
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import hsp_control as hsp
+from hsp_control.cli import page_process, steering
+from hsp_control.cli.page_process import PageProcess
+from hsp_control.common.exceptions import ViewerError
+from hsp_control.live import OperatorRequests
+from hsp_control.play.channel import channel_pair
+from hsp_control.play.playable import playable
+
+
+@pytest.fixture(scope="module")
+def experiment() -> hsp.Experiment:
+    return playable("planar3r")
+
+
+def test_a_page_that_says_nothing_ends_the_wait(
+    experiment: hsp.Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    silent = tmp_path / "python"
+    silent.write_text("#!/bin/sh\nexec sleep 600\n")
+    silent.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(silent))
+    monkeypatch.setattr(page_process, "START", 0.05)
+    page = PageProcess(
+        experiment, tmp_path / "journal", port=None, host="127.0.0.1", held=True
+    )
+    with pytest.raises(ViewerError, match=r"did not start within 0\.05 s"):
+        page.__enter__()
+    assert page._process.poll() is not None
+
+
+def test_a_page_that_dies_before_its_key_was_held(
+    experiment: hsp.Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing has moved, and nobody has stopped it: that is an error."""
+    channel, there = channel_pair()
+    page = SimpleNamespace(channel=channel, held=True, begin=there.close)
+    monkeypatch.setattr(steering, "_rehearse", lambda *_: None)
+    with pytest.raises(ViewerError, match="before anybody held its key"):
+        steering.let_steer(page, experiment, OperatorRequests())  # type: ignore[arg-type]
+    channel.close()

@@ -1,0 +1,114 @@
+"""Solids in MuJoCo: where they stand, whose friction counts, and what is refused."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hsp_control import Robot
+from hsp_control.common.exceptions import SimulationError
+from hsp_control.geometry.shapes import Box, HalfSpace, Sphere
+from hsp_control.simulation.plants import ContactShape, Ground, Solid
+from hsp_control.simulation.plants.mujoco import MujocoPlant
+
+mujoco = pytest.importorskip("mujoco")
+TIP = "panda_tcp"
+
+
+@cache
+def panda() -> Robot:
+    return Robot.load("panda")
+
+
+def plant(*solids: Solid, **options: Any) -> MujocoPlant:
+    contacts = [ContactShape(TIP, Sphere(0.02))]
+    return MujocoPlant(panda(), **({"contacts": contacts, "solids": solids} | options))
+
+
+def test_stairs_are_copies() -> None:
+    stairs = Solid(
+        "stairs",
+        Box([0.3, 1.0, 0.1]),
+        [0.8, 0.0, 0.05],
+        [0.0, 0.0, 0.1],
+        copies=3,
+        spacing=[0.3, 0.0, 0.1],
+    )
+    model = plant(stairs).model
+    for k in range(3):
+        geom = model.geom(f"solid/stairs/{k}")
+        np.testing.assert_allclose(geom.pos, [0.8 + 0.3 * k, 0.0, 0.05 + 0.1 * k])
+        np.testing.assert_allclose(geom.size, [0.15, 0.5, 0.05])
+        np.testing.assert_allclose(geom.quat, [np.cos(0.05), 0, 0, np.sin(0.05)])
+
+
+def test_what_is_loose_falls_onto_what_is_fixed() -> None:
+    """Beside a robot, whose coordinates do not change; with the mass that is given."""
+    table = Solid("table", Box([0.4, 0.4, 0.1]), [2.0, 0.0, 0.5])
+    ball = Solid("ball", Sphere(0.05), [2.0, 0.0, 0.7], mass=3.0)
+    made = plant(table, ball)
+    q0, rest = panda().home(), np.zeros(7)
+    tau = panda().state(0.0, q0, rest).nonlinear_effects.copy()
+    for _ in range(2):  # a second run begins where the first did
+        made.reset(0.0, q0, rest)
+        q, v = made.advance(0.0, 0.1, tau)
+        np.testing.assert_allclose(q, q0, atol=1e-9)
+        log = made.log_channels(0.1, q, v, tau)
+        height = log["plant.solid.ball.position"].value
+        np.testing.assert_allclose(height, [2.0, 0.0, 0.7 - 9.81 * 0.005], atol=6e-4)
+    made.advance(0.1, 0.6, tau)
+    assert made.data.body("solid/ball/0").xpos[2] == pytest.approx(0.6, abs=1e-3)
+    assert made.model.body("solid/ball/0").mass[0] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("slip_damping", [None, 30.0])
+def test_its_own_friction_counts(slip_damping: float | None) -> None:
+    """Not the ground's, which the robot's shapes have. It pushes along its normal."""
+    tip = panda().state(0.0, panda().home(), np.zeros(7)).position(TIP)
+    slope = Solid(
+        "slope",
+        Box([1.0, 1.0, 0.2]),
+        tip + np.array([np.sin(-0.2), 0.0, -np.cos(0.2)]) * 0.119,
+        [0.0, -0.2, 0.0],
+        friction=0.15,
+        slip_damping=slip_damping,
+        impedance=0.6,
+    )
+    made = plant(slope, ground=Ground(-1.0, 0.9))
+    made.reset(0.0, panda().home(), np.zeros(7))
+    tau = panda().state(0.0, panda().home(), np.zeros(7)).nonlinear_effects.copy()
+    q, v = made.advance(0.0, 0.002, tau)
+    (contact,) = made.data.contact
+    assert contact.friction[0] == 0.15
+    assert contact.solimp[0] == contact.solimp[1] == 0.6
+    asked = 0.0 if slip_damping is None else -0.6 * slip_damping
+    assert contact.solreffriction[1] == pytest.approx(asked)
+    force = made.contact_wrenches(0.002, q, v, tau)[TIP][:3]
+    normal = np.array([-np.sin(0.2), 0.0, np.cos(0.2)])
+    assert force @ normal > 0.0
+    across = force - (force @ normal) * normal
+    assert np.linalg.norm(across) <= 0.15 * (force @ normal) + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: plant(Solid("wall", Box([1.0, 1.0, 1.0])), contacts=()),
+            "solids: nothing may touch them: declare contacts",
+        ),
+        (
+            lambda: Solid("steps", Box([1.0, 1.0, 1.0]), copies=3),
+            "3 copies have the spacing",
+        ),
+        (
+            lambda: Solid("floor", HalfSpace()),
+            "shape: plane is not possible here",
+        ),
+    ],
+)
+def test_what_no_solid_can_be(make: Any, message: str) -> None:
+    with pytest.raises(SimulationError) as raised:
+        make()
+    assert message in str(raised.value)

@@ -1,0 +1,58 @@
+"""Run bundled configurations and export their pages, for the frames of the site.
+
+    .venv/bin/python tools/replays.py [NAME ...]
+
+Writes ``docs/_static/replays``. A page that is newer than its configuration stays;
+delete the folder to have all of them anew.
+"""
+
+import sys
+from pathlib import Path
+
+from hsp_control import load_experiment, viewer
+from hsp_control.common.resources import bundled_configs
+
+FOLDER = Path(__file__).resolve().parents[1] / "docs" / "_static" / "replays"
+
+NO_FIELD = {"fields": [{"type": "rest"}]}
+
+REPLAYS: dict[str, dict[str, dict[str, object]]] = {
+    "paper/4_moving_obstacle": {},
+    "panda_obstacle": {"with the field": {}, "without": NO_FIELD},
+    "panda_manipulability": {"with the field": {}, "without": NO_FIELD},
+    "iiwa_null_space": {"with the field": {}, "without": NO_FIELD},
+    "iiwa_singular": {},
+    "dual_panda": {"with the field": {}, "without": NO_FIELD},
+    "tiago_reach": {"with the field": {}, "without": NO_FIELD},
+    "whole_body/talos_circle": {},
+}
+"""What is shown, and the runs that are compared in it: changes of the null space."""
+
+
+def main() -> None:
+    """Write the pages that are missing or old."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    known = bundled_configs()
+    for name in sys.argv[1:] or REPLAYS:
+        page = FOLDER / f"{name.replace('/', '-')}.html"
+        if page.exists() and page.stat().st_mtime > known[name].stat().st_mtime:
+            continue
+        print(f"{name} ...", flush=True)
+        runs = [_run(name, said, null_space) for said, null_space in _compared(name)]
+        viewer.export_html(runs, page)
+
+
+def _compared(name: str) -> list[tuple[str, dict[str, object]]]:
+    return list(REPLAYS[name].items()) or [(name.rsplit("/", 1)[-1], {})]
+
+
+def _run(name: str, said: str, null_space: dict[str, object]) -> viewer.ComparedRun:
+    changes = [f"null_space.{key}={value}" for key, value in null_space.items()]
+    experiment = load_experiment(name, *changes)
+    return viewer.ComparedRun(
+        said, experiment.robot, experiment.run(), experiment.controller
+    )
+
+
+if __name__ == "__main__":
+    main()
