@@ -12,11 +12,12 @@ from hsp_control.common.rotations import (
     quaternion_from_rotation,
     rotation_from_quaternion,
 )
+from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Inertial, Measurement
-from hsp_control.declaration.quantities import NonNegative, Positive
+from hsp_control.declaration.quantities import Names, NonNegative, Positive
 from hsp_control.estimation.estimator import Estimator, RunningEstimator
 from hsp_control.estimation.invariant_filter import (
     ACCELEROMETER,
@@ -61,6 +62,9 @@ class BaseEstimator(Estimator, type="base"):
     leg_noise: Positive = 1.0e-3
     """What is uncertain of a point of contact besides: the links bend, and the ground
     is soft [m]."""
+    contacts: Names | None = None
+    """Names of the contacts that stand still when they are pressed [-], not of those
+    that slide; all of them by default."""
     contact_force: Positive = 0.1
     """Normal force from which a contact counts, in robot weights [-]."""
     start_tilt: NonNegative = 0.02
@@ -102,7 +106,7 @@ class RunningBaseEstimator(RunningEstimator):
             frame: The frame of the inertial measurement unit.
 
         Raises:
-            EstimationError: If the robot has no floating base, or no contacts.
+            EstimationError: If the robot has no floating base, or no such contacts.
         """
         robot = controller.robot
         if robot.unactuated != tuple(range(6)):
@@ -115,10 +119,18 @@ class RunningBaseEstimator(RunningEstimator):
                 "there are no contacts, by which legs could say where the base is; "
                 "declare contacts, or remove the estimator"
             )
+        there = {each.name: each for each in controller.contacts}
+        names = estimator.contacts or tuple(there)
+        for name in names:
+            if name not in there:
+                raise EstimationError(
+                    f"contacts: there is no contact {name!r}"
+                    f"{did_you_mean(name, there)} (there are {listing(there)})"
+                )
         self.filter: InvariantFilter | None = None
         self._estimator, self._robot = estimator, robot
-        self._contacts = {each.name: each for each in controller.contacts}
-        self._legs = LegKinematics(robot, frame, controller.contacts)
+        self._contacts = {name: there[name] for name in names}
+        self._legs = LegKinematics(robot, frame, tuple(self._contacts.values()))
         weight = sum(inertia.mass for inertia in robot.model.inertias)
         self._gravity: Array = robot.model.gravity.linear.copy()
         self._touch = (

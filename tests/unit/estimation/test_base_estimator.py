@@ -147,6 +147,18 @@ def test_a_foot_counts_while_it_is_pressed():
     assert len(running.filter.names) == 8
 
 
+def test_only_the_named_contacts_count():
+    experiment, heard = swaying()
+    own = BaseEstimator(contacts=["left_foot"])
+    running = own.begin(experiment.controller, heard[0].inertial)
+    for each in heard[:5]:
+        running.update(each)
+    assert {name for name, _ in running.filter.names} == {"left_foot"}
+    wrong = BaseEstimator(contacts=["left_fot"])
+    with pytest.raises(EstimationError, match=r"no contact 'left_fot'; did you mean"):
+        wrong.begin(experiment.controller, heard[0].inertial)
+
+
 def test_without_a_force_the_controller_says_which_foot_bears():
     experiment, heard = swaying()
     running = BaseEstimator().begin(experiment.controller, heard[0].inertial)
