@@ -1,65 +1,95 @@
-"""Six quadrupeds trot on MuJoCo, with one set of parameters.
+"""Six quadrupeds trot and crawl on MuJoCo, with one set of parameters.
 
-    .venv/bin/python benchmarks/trotting.py [robot ...]
+    .venv/bin/python benchmarks/trotting.py [--estimated] [--case WORD] [robot ...]
 
-Prints one line for each robot and speed: whether it stood at the end, how far it came,
-and its mean speed while it trotted at full speed.
+Prints one line for each robot and case: whether it stood at the end, how far it came,
+and its mean speed while it trotted at full speed. ``--estimated``: with an estimated
+base, from a noisy inertial measurement unit and noisy encoders.
 """
 
-import sys
+import argparse
 from typing import Any
 
 import numpy as np
 
-from hsp_control import load_experiment
+from hsp_control import Rollout, load_experiment
 from hsp_control.common.exceptions import SimulationError
 
 FEET = {
-    "solo12": ("FL_FOOT FR_FOOT HL_FOOT HR_FOOT", 0.0165),
-    "go2": ("FL_foot FR_foot RL_foot RR_foot", 0.022),
-    "a1": ("FL_foot FR_foot RL_foot RR_foot", 0.02),
-    "anymal": ("LF_FOOT RF_FOOT LH_FOOT RH_FOOT", 0.03),
-    "b1": ("FL_foot FR_foot RL_foot RR_foot", 0.035),
-    "hyq": ("lf_foot rf_foot lh_foot rh_foot", 0.021),
+    "solo12": ("FL_FOOT FR_FOOT HL_FOOT HR_FOOT", 0.0165, "base_link"),
+    "go2": ("FL_foot FR_foot RL_foot RR_foot", 0.022, "base"),
+    "a1": ("FL_foot FR_foot RL_foot RR_foot", 0.02, "trunk"),
+    "anymal": ("LF_FOOT RF_FOOT LH_FOOT RH_FOOT", 0.03, "base"),
+    "b1": ("FL_foot FR_foot RL_foot RR_foot", 0.035, "trunk"),
+    "hyq": ("lf_foot rf_foot lh_foot rh_foot", 0.021, "trunk"),
 }
-"""The frames of the feet, and their radius [m]."""
-SPEEDS = ((0.3, 0.0), (0.6, 0.0), (0.2, 0.4))
-"""Speed forward [m/s], and rate of turning [rad/s]."""
+"""The frames of the feet, their radius [m], and the frame of the unit."""
+STEPS = {
+    "shape": {"type": "box", "size": [0.4, 2.0, 0.04]},
+    "position": [0.6, 0.0, 0.0],
+    "copies": 2,
+    "spacing": [0.8, 0.0, 0.0],
+}
+"""Plates of 2 cm, up and down again."""
+CASES: dict[str, dict[str, Any]] = {
+    "0.3 m/s": {"plan": {"speed": 0.3}},
+    "0.6 m/s": {"plan": {"speed": 0.6}},
+    "0.2 m/s, 0.4 rad/s": {"plan": {"speed": 0.2, "turn": 0.4}},
+    "0.2 m/s sideways": {"plan": {"sideways": 0.2}},
+    "0.3 m/s, friction 0.4": {"plan": {"speed": 0.3}, "friction": 0.4},
+    "0.3 m/s, steps of 2 cm": {"plan": {"speed": 0.3}, "solids": {"steps": STEPS}},
+    "crawl, 0.06 m/s": {"plan": {"type": "crawl", "speed": 0.06}, "duration": 9.0},
+}
+"""What is different in each case."""
+NOISE = {"position_noise": 1e-4, "velocity_noise": 0.01}
+"""Noise of the encoders [rad, rad/s]; that of the unit is an ADIS16448's."""
 UNTIL, DURATION = 4.0, 6.0
 """When they slow down, and when the run ends [s]."""
 
 
-def configuration(robot: str, speed: float, turn: float) -> dict[str, Any]:
-    """Return the configuration of a robot that trots."""
-    feet, radius = FEET[robot]
+def configuration(
+    robot: str, case: dict[str, Any], *, estimated: bool
+) -> dict[str, Any]:
+    """Return the configuration of a robot in a case."""
+    friction = case.get("friction", 0.7)
+    feet, radius, trunk = FEET[robot]
     frames, shape = feet.split(), {"type": "sphere", "radius": radius}
     return {
         "robot": {"name": robot},
         "start": {"ground": 0},
         "contacts": {
-            f: {"type": "ball", "frame": f, "radius": radius, "friction": 0.65}
+            f: {
+                "type": "ball",
+                "frame": f,
+                "radius": radius,
+                "friction": friction - 0.03,
+            }
             for f in frames
         },
-        "plan": {"type": "trot", "speed": speed, "turn": turn, "until": UNTIL},
+        "plan": {"type": "trot", "until": UNTIL, **case["plan"]},
         "null_space": {"fields": [{"type": "target_posture", "target": "start"}]},
         "limits": {"velocity": "none", "position": "none"},
         "simulation": {
-            "duration": DURATION,
+            "duration": case.get("duration", DURATION),
             "control_period": 0.001,
             "integrator": {"type": "rk4", "step": 0.001},
         },
         "plant": {
             "type": "mujoco",
             "contacts": {f: {"shape": shape} for f in frames},
-            "ground": {"friction": 0.7},
+            "ground": {"friction": friction},
+            "solids": case.get("solids", {}),
+            "sensors": {"imu": trunk, **(NOISE if estimated else {})},
         },
+        **({"estimators": {"base": True}} if estimated else {}),
     }
 
 
-def said(robot: str, speed: float, turn: float) -> str:
+def said(robot: str, case: dict[str, Any], *, estimated: bool) -> str:
     """Return how a run went."""
+    given = configuration(robot, case, estimated=estimated)
     try:
-        run = load_experiment(configuration(robot, speed, turn)).run()
+        run = load_experiment(given).run()
     except SimulationError as error:
         return str(error)
     if run.status != "completed":
@@ -72,20 +102,34 @@ def said(robot: str, speed: float, turn: float) -> str:
     return (
         f"{'stands' if stands else 'does not stand'} | {mean:.2f} m/s | "
         f"{run['plan.steps'][-1]:.0f} swings | limited {100 * limited:.0f} %, relaxed "
-        f"{100 * relaxed:.1f} %"
+        f"{100 * relaxed:.1f} %" + (_errors(run) if estimated else "")
     )
 
 
-def main(robots: list[str]) -> None:
-    """Run all speeds of some robots, or of all."""
-    for robot in robots or FEET:
-        for speed, turn in SPEEDS:
-            print(
-                f"{robot:8} {speed:.1f} m/s {turn:.1f} rad/s | "
-                f"{said(robot, speed, turn)}",
-                flush=True,
-            )
+def _errors(run: Rollout) -> str:
+    away = [
+        np.linalg.norm(run[f"estimate.{what}_error"], axis=1)
+        for what in ("position", "velocity")
+    ]
+    return (
+        f" | estimate {1e3 * away[0].max():.0f} mm, "
+        f"{1e3 * np.sqrt((away[1] ** 2).mean()):.0f} mm/s rms"
+    )
+
+
+def main() -> None:
+    """Run the cases of some robots, or of all."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("robots", nargs="*", help="names; all by default")
+    parser.add_argument("--case", default="", help="part of the names of cases")
+    parser.add_argument("--estimated", action="store_true", help="estimate the base")
+    options = parser.parse_args()
+    for robot in options.robots or FEET:
+        for name, case in CASES.items():
+            if options.case in name:
+                result = said(robot, case, estimated=options.estimated)
+                print(f"{robot:8} {name:24} | {result}", flush=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -1,12 +1,14 @@
 """Talos walks on MuJoCo: far, fast, turning, pushed, with other masses and friction.
 
-    .venv/bin/python benchmarks/walking.py [part of a case's name ...]
+    .venv/bin/python benchmarks/walking.py [--estimated] [part of a case's name ...]
 
 Prints one line for each case: whether it stood at the end, how far it came, and how
-well the plan was followed. Each case is ``whole_body/talos_walk`` with other values.
+well the plan was followed. Each case is ``whole_body/talos_walk`` with other values;
+``--estimated`` with an estimated base, from a noisy inertial measurement unit and noisy
+encoders.
 """
 
-import sys
+import argparse
 from collections.abc import Iterator
 from math import cos, pi, sin
 from typing import Any
@@ -19,6 +21,11 @@ from hsp_control.common.exceptions import SimulationError
 WALK = "whole_body/talos_walk"
 PUSH = 200.0
 """Force of a push [N], for a tenth of a second."""
+ESTIMATED = {
+    "estimators": "{base: true}",
+    "plant.sensors": "{imu: imu_link, position_noise: 1.0e-4, velocity_noise: 0.01}",
+}
+"""An ADIS16448's noise, and that of encoders: 0.1 mrad, 0.01 rad/s."""
 
 
 def cases() -> Iterator[tuple[str, dict[str, Any]]]:
@@ -67,18 +74,34 @@ def summary(run: Rollout) -> str:
     ends = "stands" if stands and run.status == "completed" else run.meta["message"]
     limited = (run["status"] == 2).mean()
     relaxed = (run["status"] == 3).mean()
+    estimate = ""
+    if "estimate.velocity_error" in run.columns:
+        away = [
+            np.linalg.norm(run[f"estimate.{what}_error"], axis=1)
+            for what in ("position", "velocity")
+        ]
+        estimate = (
+            f" | estimate {1e3 * away[0].max():.0f} mm, "
+            f"{1e3 * np.sqrt((away[1] ** 2).mean()):.0f} mm/s rms"
+        )
     return (
         f"{ends or 'still walks'} | {came:.2f} m, {run['plan.steps'][-1]:.0f} steps | "
         f"DCM {rms:.1f} mm rms | limited {100 * limited:.0f} %, relaxed "
-        f"{100 * relaxed:.1f} %"
+        f"{100 * relaxed:.1f} %{estimate}"
     )
 
 
-def main(wanted: list[str]) -> None:
+def main() -> None:
     """Run the cases whose names contain one of the words, or all."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("words", nargs="*", help="parts of names of cases")
+    parser.add_argument("--estimated", action="store_true", help="estimate the base")
+    options = parser.parse_args()
     for name, values in cases():
-        if wanted and not any(word in name for word in wanted):
+        if options.words and not any(word in name for word in options.words):
             continue
+        if options.estimated:
+            values = values | ESTIMATED
         overrides = [f"{key}={value}" for key, value in values.items()]
         try:
             said = summary(load_experiment(WALK, *overrides).run())
@@ -88,4 +111,4 @@ def main(wanted: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -1,6 +1,7 @@
 """Draw the figures of the documents: `make figures` (they are committed)."""
 
 import json
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -99,6 +100,10 @@ def main() -> None:
         draw_null_space_under_a_force(left)
         draw_observed_force(right)
         figure.savefig(FOLDER / "compliance.png", dpi=110)
+        figure = new_figure(11.0, 3.6)
+        left, right = figure.subplots(1, 2)
+        draw_walk(left, right)
+        figure.savefig(FOLDER / "walking.png", dpi=110)
     draw_sweep()
     for file in sorted(FOLDER.glob("*.png")):
         print(f"Figure: {file.relative_to(FOLDER.parents[1])}")
@@ -121,6 +126,61 @@ def draw_sweep() -> None:
     )
     with styled():
         sweep_figure(found).savefig(FOLDER / "sweep_panda_obstacle.png", dpi=85)
+
+
+def draw_walk(left: Axes, right: Axes) -> None:
+    """Draw arms that swing by a field while Talos walks, and e_N in each phase."""
+    plain = hsp.load_experiment("whole_body/talos_walk")
+    joints = [plain.robot.velocity_index(f"arm_{s}_4_joint") for s in ("left", "right")]
+    nv, rate, follows = plain.robot.nv, 2.0 * np.pi / 1.5, 6.0
+    amplitudes, weights = np.zeros(nv), np.ones(nv)
+    for joint, amplitude in zip(joints, (0.25, -0.25), strict=True):
+        amplitudes[joint], weights[joint] = amplitude, follows
+    swing = {
+        "type": "lissajous",
+        "center": [0.0] * nv,
+        "amplitudes": amplitudes.tolist(),
+        "rates": [rate] * nv,
+    }
+    run = hsp.load_experiment(
+        "whole_body/talos_walk",
+        f"null_space.fields.0.displacement={json.dumps(swing)}",
+        f"null_space.fields.0.weights={weights.tolist()}",
+        "simulation.log_period=0.002",
+    ).run()
+    t, phase = run.t, run["plan.phase"]
+    share = follows / (follows + 1j * rate)
+    for joint, side, color in zip(joints, ("left", "right"), SERIES, strict=False):
+        angle = run["joint_positions"][:, joint][:, 0]
+        left.plot(t, angle - angle[0], color=color, label=f"{side} elbow")
+        predicted = (share * np.exp(1j * rate * t)).imag * amplitudes[joint]
+        left.plot(t, predicted, color=INK, lw=1.0, ls="--")
+    left.plot([], [], color=INK, lw=1.0, ls="--", label="predicted by the field")
+    left.set(
+        title="(a)  Arms that swing by a field", ylabel="angle [rad]", ylim=(-0.25, 0.4)
+    )
+    norm = run["null_space_norm"]
+    right.semilogy(t, norm, color=SERIES[0], label="‖e_N‖")
+    limited = run["status"] > 1
+    begins = (np.diff(phase) != 0) | (np.diff(limited.astype(int)) != 0)
+    for first, last in pairwise([0, *(np.flatnonzero(begins) + 1), len(t)]):
+        if limited[first]:
+            continue
+        part = slice(first, last)
+        decay = norm[first] * np.exp(-6.0 * (t[part] - t[first]))
+        right.semilogy(t[part], decay, color=INK, lw=1.0, ls="--")
+    right.semilogy([], [], color=INK, lw=1.0, ls="--", label="exp(-K_N t), each phase")
+    right.fill_between(
+        t, 1e-4, 10.0, where=limited, color=DESIRED, alpha=0.25, lw=0, label="limited"
+    )
+    right.set(
+        title="(b)  Null-space error, phase by phase",
+        ylabel="‖e_N‖ [rad/s]",
+        ylim=(1e-4, 10.0),
+    )
+    for axes in (left, right):
+        axes.set(xlabel="time [s]")
+        axes.legend(loc="upper left")
 
 
 def draw_propositions(left: Axes, middle: Axes) -> None:

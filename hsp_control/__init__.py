@@ -7,8 +7,9 @@ of a field that may move in time.
 The names that most programs need are here. All others are in namespaces:
 ``hsp.trajectories``, ``hsp.tasks``, ``hsp.fields``, ``hsp.metrics``, ``hsp.contacts``,
 ``hsp.limits``, ``hsp.shapes``, ``hsp.changes``, ``hsp.compensation``,
-``hsp.integrators``, ``hsp.robot``, ``hsp.plans``, ``hsp.plants``, ``hsp.simulation``,
-``hsp.live``, ``hsp.config``, ``hsp.sweeps``, ``hsp.viewer`` and ``hsp.errors``.
+``hsp.integrators``, ``hsp.robot``, ``hsp.plans``, ``hsp.estimation``, ``hsp.plants``,
+``hsp.simulation``, ``hsp.live``, ``hsp.config``, ``hsp.sweeps``, ``hsp.viewer`` and
+``hsp.errors``.
 """
 
 from importlib import import_module
@@ -18,6 +19,7 @@ from hsp_control.common.version import __version__ as __version__
 
 if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from . import config as config
+    from . import estimation as estimation
     from . import live as live
     from . import plans as plans
     from . import robot as robot
@@ -106,6 +108,7 @@ _NAMESPACES = {
     "config": "config",
     "contacts": "constraints.contacts",
     "errors": "common.exceptions",
+    "estimation": "estimation",
     "fields": "null_space.fields",
     "integrators": "robot.integrators",
     "limits": "constraints.limits",

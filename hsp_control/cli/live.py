@@ -48,6 +48,8 @@ def live(options: argparse.Namespace) -> int:
     check_fixed(experiment.robot)
     if experiment.scenario.plan is not None:
         raise LiveError("plan: a live loop follows none; use hsp run or hsp play")
+    if experiment.scenario.estimators:
+        raise LiveError("estimators: a live loop runs none; use hsp run or hsp play")
     simulation = experiment.scenario.simulation
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:

@@ -127,6 +127,10 @@ class PlanError(HspControlError, ValueError):
     """A plan is invalid, or does not fit the robot, its contacts or its tasks."""
 
 
+class EstimationError(HspControlError, ValueError):
+    """An estimator does not fit the robot, or what it needs is not measured."""
+
+
 class FallError(HspControlError, RuntimeError):
     """The robot falls: no plan can go on."""
 

@@ -32,6 +32,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.declaration.named import keyed
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.plain_data import plain_data
+from hsp_control.estimation import Estimator, begun
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.live.settings import LiveSettings
 from hsp_control.null_space.fields import NullSpaceField
@@ -100,6 +101,7 @@ class Experiment:
         start: InitialState | Literal["auto"] | None = None,
         plant: PlantPart | str = "rigid_body",
         compensation: Compensation | None = None,
+        estimators: Sequence[Estimator] = (),
         simulation: SimulationSettings | None = None,
         live: LiveSettings | None = None,
         view: ViewSettings | None = None,
@@ -127,6 +129,7 @@ class Experiment:
                 good configuration that is found.
             plant: What the efforts act on; the controller's own model by default.
             compensation: Compensators for what the model lacks.
+            estimators: What completes each measurement.
             simulation: Duration, periods and integrator.
             live: Settings of a live run.
             view: Settings of the 3-D view.
@@ -166,6 +169,7 @@ class Experiment:
             "contacts": keyed(contacts),
             "base": base,
             "plan": plan,
+            "estimators": estimators,
             "scene": scene,
             "changes": changes,
             "plant": plant,
@@ -242,6 +246,7 @@ class Experiment:
             plant=self.plant,
             compensation=self.compensation,
             plan=self.scenario.plan,
+            estimators=self.scenario.estimators,
             scene=self.scene,
             on_progress=on_progress,
             on_row=on_row,
@@ -416,6 +421,8 @@ def build(document: Document) -> Experiment:
             scenario.plan.begin(controller).start(robot.state(0.0, q0, v0))
     scenario = replace(scenario, plant=scenario.plant.located(folder))
     plant = _plant(document, scenario, robot)
+    with document.at():
+        begun(scenario.estimators, controller, plant.inertial())
     check_compensation(document, scenario, controller)
     rates = check_rates(document, scenario, controller, q0, plant.robot)
     return _experiment(

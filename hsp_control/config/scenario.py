@@ -21,6 +21,7 @@ from hsp_control.declaration import Part
 from hsp_control.declaration.named import BY_NAME
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.declaration.quantities import READ_ONLY, Name, ReadOnlyDict
+from hsp_control.estimation import Estimators
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.settings import LiveSettings
 from hsp_control.null_space.settings import NullSpaceSettings
@@ -73,6 +74,9 @@ class Scenario(Part, error=ConfigError):
     controller's model."""
     compensation: Compensation = Compensation()
     """Compensators for the differences between the plant and the model."""
+    estimators: Estimators = ()
+    """What completes each measurement, by type: the base of a robot, or forces of
+    contacts; by default what is measured counts."""
     simulation: SimulationSettings = SimulationSettings()
     """Settings of the simulation."""
     live: LiveSettings = LiveSettings()

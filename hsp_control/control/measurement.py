@@ -10,22 +10,60 @@ NO_WRENCHES: Mapping[str, Array] = MappingProxyType({})
 """Of a robot that measures no contact."""
 
 
-class Measurement(NamedTuple):
-    """What is measured at one time: all that a plan knows of the robot.
+class Inertial(NamedTuple):
+    """What an inertial measurement unit reports: means over the period that ends.
 
-    The pose and the twist of a floating base are the first entries of q and v.
+    Both are in the axes that the frame had when the period began, so that an
+    orientation R and a velocity v go on as R exp(ω h) and v + (R f + g) h, exactly.
+
+    Attributes:
+        frame: The frame that it is fixed to, and whose axes it has.
+        angular_velocity: ω, of the gyroscope, shape (3,) [rad/s].
+        specific_force: f, of the accelerometer: the acceleration of the frame's origin
+            minus that of gravity, shape (3,) [m/s²].
     """
 
+    frame: str
+    angular_velocity: Array
+    specific_force: Array
+
+
+class Measurement(NamedTuple):
+    """What is measured of a robot at one time, simulated or real.
+
+    The pose and the twist of a floating base are the first entries of q and v: true
+    ones in a simulation, or those of an estimator.
+
+    Attributes:
+        sequence: Number of the measurement; the robot increments it by one. A jump is
+            the number of lost states; the same number again is an old state.
+        t: Time of the measurement on the robot's own clock [s]; trajectories use it.
+        q: Configuration, shape (nq,) [rad or m].
+        v: Velocity, shape (nv,) [rad/s or m/s].
+        age: State age, as far as the hardware knows it [s].
+        halted: Whether the robot has stopped by itself and ignores efforts.
+        applied: Effort the robot had when it measured, in the terms of
+            `Hardware.write` (libfranka's ``tau_J_d``), shape (nv,), where the hardware
+            knows it; None: what was sent last counts.
+        fault: Why the robot must be stopped safely, if hardware knows a reason.
+        wrenches: What the world exerts on the robot at each contact, by the name of
+            its frame: force and moment about the frame's origin, world axes, shape (6,)
+            [N, N·m]; of the period that ends now. Frames without one are missing.
+        estimated: The frames whose wrench was not measured, but estimated.
+        inertial: What an inertial measurement unit reports; None: there is none.
+    """
+
+    sequence: int
     t: float
-    """Time [s]."""
     q: Array
-    """Configuration, shape (nq,) [rad or m]."""
     v: Array
-    """Velocity, shape (nv,) [rad/s or m/s]."""
+    age: float = 0.0
+    halted: bool = False
+    applied: Array | None = None
+    fault: str = ""
     wrenches: Mapping[str, Array] = NO_WRENCHES
-    """What the world exerts on the robot at each contact, by the name of its frame:
-    force and moment about the frame's origin, world axes, shape (6,) [N, N·m]; of the
-    period that ends now. Frames without a sensor are missing."""
+    estimated: frozenset[str] = frozenset()
+    inertial: Inertial | None = None
 
     def normal_force(self, frame: str, normal: Array) -> float | None:
         """Return how hard the world pushes on a frame along a normal [N].

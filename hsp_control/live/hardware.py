@@ -1,35 +1,9 @@
 """The interface between a live loop and a robot: states, efforts, period."""
 
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 from hsp_control.common.arrays import Array
-
-
-class Measurement(NamedTuple):
-    """A measured state of the robot.
-
-    Attributes:
-        sequence: Number of the measurement; the robot increments it by one. A jump is
-            the number of lost states; the same number again is an old state.
-        t: Time of the measurement on the robot's own clock [s]; trajectories use it.
-        q: Configuration, shape (nq,).
-        v: Velocity, shape (nv,).
-        age: State age, as far as the hardware knows it [s].
-        halted: Whether the robot has stopped by itself and ignores efforts.
-        applied: Effort the robot had when it measured, in the terms of
-            `Hardware.write` (libfranka's ``tau_J_d``), shape (nv,), where the hardware
-            knows it; None: what was sent last counts.
-        fault: Why the robot must be stopped safely, if hardware knows a reason.
-    """
-
-    sequence: int
-    t: float
-    q: Array
-    v: Array
-    age: float = 0.0
-    halted: bool = False
-    applied: Array | None = None
-    fault: str = ""
+from hsp_control.control.measurement import Measurement as Measurement
 
 
 @runtime_checkable

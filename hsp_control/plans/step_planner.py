@@ -43,6 +43,18 @@ class Preview(NamedTuple):
     target: Footstep | None
 
 
+class Next(NamedTuple):
+    """The next step.
+
+    Attributes:
+        velocity: The velocity of the body.
+        target: Where the foot goes; None if the robot is to stand.
+    """
+
+    velocity: Velocity
+    target: Footstep | None
+
+
 class StepPlanner:
     """Plans steps from the velocity that is wanted."""
 
@@ -97,16 +109,14 @@ class StepPlanner:
         """
         walk, places = self._walk, dict(places)
         phases, swings = list[Phase](), list[bool]()
-        first: tuple[Velocity, Footstep | None] | None = None
+        first: Next | None = None
         for k in range(PREVIEW):
-            velocity = self._next_velocity(velocity, t, taken + k)
-            standing = places[-side]
-            target = self._stance.next(standing, side, velocity, self.period)
-            stands = velocity.is_zero and _beside(places[side], target)
-            first = first or (velocity, None if stands else target)
-            if stands:
+            step = self._next(velocity, t, taken + k, side, places)
+            velocity, target = step
+            first = first or step
+            if target is None:
                 break
-            center = standing.point
+            center = places[-side].point
             phases += [Phase(shift, point, center), Phase(walk.swing, center, center)]
             swings += [False, True]
             places[side] = target
@@ -118,6 +128,37 @@ class StepPlanner:
             Phase(1.0, middle, middle),
         ]
         return Preview(phases, [*swings, False, False], *first)
+
+    def sets_out(self, t: float, taken: int) -> bool:
+        """Return whether a robot that stands is to walk."""
+        return not self.wanted(t, taken).is_zero
+
+    def first_side(self, t: float, taken: int) -> float:
+        """Return the foot that swings first: 1 is the left one, -1 the right one."""
+        wanted = self.wanted(t, taken)
+        return -1.0 if wanted.left < 0.0 or wanted.turn < 0.0 else 1.0
+
+    def _next(
+        self,
+        velocity: Velocity,
+        t: float,
+        taken: int,
+        side: float,
+        places: Mapping[float, Footstep],
+    ) -> Next:
+        """Return the next step.
+
+        Args:
+            velocity: The velocity of the step before.
+            t: The present time [s].
+            taken: How many steps were taken before it.
+            side: 1 if the left foot swings, -1 for the right one.
+            places: Where the feet stand, by side.
+        """
+        velocity = self._next_velocity(velocity, t, taken)
+        target = self._stance.next(places[-side], side, velocity, self.period)
+        stands = velocity.is_zero and _beside(places[side], target)
+        return Next(velocity, None if stands else target)
 
     def _next_velocity(self, now: Velocity, t: float, taken: int) -> Velocity:
         """Return the velocity of a step, as near to what is wanted as it may be.

@@ -38,6 +38,7 @@ class Swing:
         goal: Array,
         height: float,
         lift: float,
+        descent: float = DESCENT,
     ) -> None:
         """Plan the motion.
 
@@ -50,7 +51,9 @@ class Swing:
             goal: Its orientation there, flat on the ground, shape (3, 3).
             height: The height of its frame when it stands [m].
             lift: How high it is lifted [m].
+            descent: How fast it goes on down without ground [m/s].
         """
+        self._descent = descent
         self.start, self.end, self.target = t, t + duration, target
         self._rotation, self._axis = rotation.copy(), np.zeros(3)
         log3(goal @ rotation.T, self._axis)  # in world axes
@@ -118,9 +121,9 @@ class Swing:
         # The integral of the smooth step.
         fallen = u**4 * (2.5 + u * (u - 3.0)) * _SETTLING + max(late - _SETTLING, 0.0)
         return Motion(
-            np.array([self._height - DESCENT * fallen]),
-            np.array([-DESCENT * s]),
-            np.array([-DESCENT * s_dot]),
+            np.array([self._height - self._descent * fallen]),
+            np.array([-self._descent * s]),
+            np.array([-self._descent * s_dot]),
         )
 
 

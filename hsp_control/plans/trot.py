@@ -1,117 +1,26 @@
-"""A quadruped that trots: what YAML and Python say, and the tasks that it needs."""
+"""A quadruped that trots: what YAML and Python say."""
 
-from collections.abc import Sequence
-from dataclasses import KW_ONLY
+from typing import ClassVar
 
-from hsp_control.common.exceptions import PlanError
-from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.constraints.contacts import Contact
 from hsp_control.control.controller import Controller
-from hsp_control.declaration import within
-from hsp_control.declaration.quantities import Names, Positive
-from hsp_control.plans.composing import composed
-from hsp_control.plans.footsteps import Velocity
-from hsp_control.plans.legs import root_frame
-from hsp_control.plans.moving import MovingPlan
-from hsp_control.plans.plan import PlanParts
+from hsp_control.plans.quadruped import QuadrupedPlan
 from hsp_control.plans.trotting import RunningTrot
-from hsp_control.robot import Robot
-from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePosition, Gains, Task
-from hsp_control.tasks.frame_task import TrackingTask
+from hsp_control.tasks import Gains
 
 
-class Trot(MovingPlan, type="trot"):
-    """A quadruped trots on flat ground: two diagonal feet swing while two bear.
+class Trot(QuadrupedPlan, type="trot"):
+    """A quadruped trots: two diagonal feet swing while two bear.
 
     It stands, trots with the given velocity, and stands again when that is zero. A
     foot lands where the body will be, farther by what the body is too fast (the capture
     point; Raibert 1986, Pratt et al. 2006). It starts from where it is and becomes a
-    contact when it is felt on the ground, early or late.
-
-    It has the tasks ``trunk``, ``height`` and ``center_of_mass``, and one for each foot
-    with the name of its contact.
+    contact when it is felt on the ground, early or late, higher or lower.
     """
 
-    _: KW_ONLY
-    until: Positive | None = None
-    """When it slows down and stands [s]; by default it trots until the end."""
-    feet: Names | None = None
-    """Names of the four contacts that trot [-]; all of them by default."""
-    trunk: str | None = None
-    """Frame of the trunk that stays upright [-]; by default that of the root."""
-    swing: Positive = 0.25
-    """Duration of a swing, on two feet [s]."""
-    stance: Positive = 0.05
-    """Duration of the time on four feet between two swings [s]."""
-    lift: Positive = 0.05
-    """How high a foot is lifted [m]."""
-    acceleration: Positive = 0.5
-    """How fast the velocity changes [m/s²]."""
-    contact_force: Positive = 0.01
-    """Normal force at which a swing foot counts as landed, in robot weights [-]."""
-
-    def velocity_at(self, t: float) -> Velocity:
-        """Return the velocity that is wanted at time t [s]; zero at the end."""
-        if self.until is not None and t >= self.until:
-            return Velocity(0.0, 0.0, 0.0)
-        return super().velocity_at(t)
-
-    def parts(
-        self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact]
-    ) -> PlanParts:
-        """Return the parts of a controller that trots; see `Plan.parts`."""
-        with within("plan"):
-            if not robot.unactuated:
-                raise PlanError(
-                    f"{robot.name} cannot trot: it has no free-flyer root, it is fixed "
-                    "to the world"
-                )
-            names = self._feet(contacts)
-        frames = {each.name: each.frame for each in contacts}
-        trunk = root_frame(robot) if self.trunk is None else self.trunk
-        with within("plan", "trunk"):
-            robot.frame_id(trunk)
-        own: list[TrackingTask] = [
-            FrameOrientation(
-                trunk, gains=Gains(natural_frequency=15.0), name="trunk", priority=1
-            ),
-            CenterOfMass(
-                axes="z", gains=Gains(natural_frequency=15.0), name="height", priority=1
-            ),
-            CenterOfMass(axes="xy", gains=Gains(6.0, 5.0), priority=2),
-        ]
-        for name in names:
-            gains = Gains(natural_frequency=40.0)
-            own.append(FramePosition(frames[name], gains=gains, name=name, priority=1))
-        return composed(own, tasks, contacts, names)
+    gait: ClassVar[str] = "trot"
+    center_priority: ClassVar[int] = 2
+    center_gains: ClassVar[Gains] = Gains(6.0, 5.0)
 
     def begin(self, controller: Controller) -> RunningTrot:
         """Return what trots; see `Plan.begin`."""
-        return RunningTrot(self.begun(), controller, self._feet(controller.contacts))
-
-    def _feet(self, contacts: Sequence[Contact]) -> tuple[str, ...]:
-        """Return the names of the four contacts that trot.
-
-        Raises:
-            PlanError: If they are not four points.
-        """
-        there = {each.name: each for each in contacts}
-        names = tuple(there) if self.feet is None else tuple(self.feet)
-        for name in names:
-            if name not in there:
-                raise PlanError(
-                    f"there is no contact {name!r}{did_you_mean(name, there)} to trot "
-                    f"on (there are {listing(there) or 'none'})"
-                )
-            if there[name].rows != 3:
-                raise PlanError(
-                    f"contact {name!r} is a {there[name].yaml_type}; a quadruped trots "
-                    "on feet of type ball or point"
-                )
-        if len(set(names)) != 4:
-            raise PlanError(
-                f"a quadruped trots on four feet; there are {len(set(names))} "
-                f"({listing(names) or 'declare contacts'})"
-                + ("; name four with feet" if len(names) > 4 else "")
-            )
-        return names
+        return RunningTrot(self.begun(), controller)

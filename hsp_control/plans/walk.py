@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY
+from typing import Literal
 
 from hsp_control.common.exceptions import PlanError
 from hsp_control.common.suggestions import did_you_mean, listing
@@ -13,6 +14,7 @@ from hsp_control.declaration.quantities import (
     Fraction,
     Names,
     NonNegative,
+    Points,
     Positive,
     PositiveCount,
 )
@@ -46,6 +48,11 @@ class Walk(MovingPlan, type="walk"):
     steps: PositiveCount | None = None
     """How many steps it takes before it slows down and stands [-]; by default it walks
     until the end."""
+    footsteps: Points | None = None
+    """Instead of a velocity: where the feet go, one after the other; x, y and yaw from
+    the middle between the feet at the start, x forward [m, m, rad]."""
+    first: Literal["left", "right"] = "left"
+    """The foot that takes the first of the footsteps [-]."""
     feet: Names | None = None
     """Names of the two contacts that walk [-]; all of them by default."""
     trunk: str | None = None
@@ -68,6 +75,14 @@ class Walk(MovingPlan, type="walk"):
     """Whether a push moves the next step [-]."""
     contact_force: Positive = 0.03
     """Normal force at which a swing foot counts as landed, in robot weights [-]."""
+
+    def _complete(self) -> None:
+        super()._complete()
+        if self.footsteps is None:
+            return
+        for name in ("speed", "sideways", "turn", "velocity", "steps"):
+            if getattr(self, name):
+                raise PlanError(f"give either footsteps or {name}, not both")
 
     def parts(
         self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact]

@@ -12,7 +12,8 @@ from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Measurement
 from hsp_control.plans.falling import FallDetector
 from hsp_control.plans.foot import Foot
-from hsp_control.plans.footsteps import Velocity, between
+from hsp_control.plans.footsteps import Footstep, Velocity, between
+from hsp_control.plans.given_steps import GivenSteps
 from hsp_control.plans.pendulum import (
     GRAVITY,
     Phase,
@@ -110,7 +111,7 @@ class RunningWalk(RunningPlan):
     def update(self, measured: Measurement) -> None:
         """Write references and switch contacts; see `RunningPlan.update`."""
         t, state = measured.t, self._state
-        state.update(*measured[:3])
+        state.update(t, measured.q, measured.v)
         if not self._begun:
             self.start(state)
         self._falling.check(state)
@@ -167,7 +168,11 @@ class RunningWalk(RunningPlan):
             )
         self._frequency = float(np.sqrt(GRAVITY / pendulum))
         self._stance = stance_of(self._feet, state, walk.crouch)
-        self._planner = StepPlanner(walk, self._stance, state.robot.name)
+        robot, places = state.robot.name, self._places
+        if walk.footsteps is None:
+            self._planner = StepPlanner(walk, self._stance, robot)
+        else:
+            self._planner = GivenSteps(walk, self._stance, robot, places)
         self._trunk_rotation = trunk.copy()
         self._first_yaw = between(feet[0].place, feet[1].place).yaw
         self._yaw = to_rest(at_rest([self._first_yaw]), [self._first_yaw], t, 1.0)
@@ -203,7 +208,7 @@ class RunningWalk(RunningPlan):
             if self._has_landed(measured):
                 self._land(t)
         elif self._mode == "standing":
-            if not self._planner.wanted(t, self._taken).is_zero:
+            if self._planner.sets_out(t, self._taken):
                 self._set_out(t)
         elif self._index + 1 == len(self._phases):
             self._mode = "standing"
@@ -215,8 +220,7 @@ class RunningWalk(RunningPlan):
 
     def _set_out(self, t: float) -> None:
         """Shift the weight for the first step."""
-        wanted = self._planner.wanted(t, self._taken)
-        self._side = -1.0 if wanted.left < 0.0 or wanted.turn < 0.0 else 1.0
+        self._side = self._planner.first_side(t, self._taken)
         ready, shift = FIRST_SHIFT
         middle = self._middle()
         self._mode = "double"
@@ -279,9 +283,8 @@ class RunningWalk(RunningPlan):
             shift: How long the weight takes to shift to the standing foot [s].
             point: Where the repellent point is, shape (2,) [m].
         """
-        places = {side: foot.place for side, foot in self._feet.items()}
         preview = self._planner.look_ahead(
-            t, self._taken, self._now, self._side, places, shift, point
+            t, self._taken, self._now, self._side, self._places, shift, point
         )
         self._now = preview.velocity
         if preview.target is not None:
@@ -380,6 +383,11 @@ class RunningWalk(RunningPlan):
     def _soles(self) -> Array:
         corners = [each.corners(self.walk.margin) for each in self._feet.values()]
         return convex_hull(np.vstack(corners))
+
+    @property
+    def _places(self) -> dict[float, Footstep]:
+        """Where the feet stand, by side."""
+        return {side: foot.place for side, foot in self._feet.items()}
 
     def _middle(self) -> Array:
         return np.asarray(

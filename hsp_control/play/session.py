@@ -13,6 +13,7 @@ from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.config import Experiment
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
+from hsp_control.estimation import begun
 from hsp_control.live.simulated_robot import sampled
 from hsp_control.play.handles import Handles
 from hsp_control.play.knobs import Knob
@@ -95,9 +96,12 @@ class Session:
         rows, plan = self._rows(), experiment.scenario.plan
         times = [k * self.row for k in range(rows)]
         running = None if plan is None else plan.begin(self.controller)
+        estimating = begun(
+            experiment.scenario.estimators, self.controller, self._plant.inertial()
+        )
         self._loop: Iterator[Instant] = sampled_loop(
             self._command, self._plant, round(self.row / self.period), times,
-            experiment.q0, experiment.v0, running,
+            experiment.q0, experiment.v0, running, estimating,
         )  # fmt: skip
         self.recorder = Recorder(self.controller, self.controller.scene, rows, running)
         self.over = ""

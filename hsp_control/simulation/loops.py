@@ -11,8 +11,9 @@ from hsp_control.common.kernels import kernel
 from hsp_control.control.compensation import Command
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import NO_WRENCHES, Measurement
+from hsp_control.control.measurement import Measurement
 from hsp_control.control.output import ControlOutput
+from hsp_control.estimation import RunningEstimator
 from hsp_control.plans import RunningPlan
 from hsp_control.robot import RobotState
 from hsp_control.robot.integrators import Integrator, bound
@@ -83,6 +84,7 @@ def sampled_loop(
     q: Array,
     v: Array,
     plan: RunningPlan | None = None,
+    estimators: Sequence[RunningEstimator] = (),
 ) -> Iterator[Instant]:
     """Yield the instants of a loop that holds each effort for a control period.
 
@@ -94,27 +96,37 @@ def sampled_loop(
         q: Start configuration, shape (nq,).
         v: Start velocity, shape (nv,).
         plan: Writes references and switches contacts, before each effort.
+        estimators: Estimate what is not measured, for the plan and for the command.
 
     Raises:
+        EstimationError: If what an estimator needs is not measured.
         FallError: If the plan finds that the robot falls.
         SimulationError: If the motion diverges.
     """
     plant.reset(times[0], q, v)
     command.restart()
     period = (times[1] - times[0]) / periods
-    tau = np.zeros(plant.robot.nv)
+    tau, count = np.zeros(plant.robot.nv), 0
     for start, end in zip(times, (*times[1:], times[-1]), strict=True):
         if end > start:
             period = (end - start) / periods
         for k in range(periods):
             t = start + k * (end - start) / periods
-            measured = plant.measure(t, q, v)
-            wrenches = NO_WRENCHES
-            if plan is not None or command.feels_contacts:
-                wrenches = plant.contact_wrenches(t, q, v, tau)
+            measured = Measurement(count, t, *plant.measure(t, q, v))
+            count += 1
+            if plan is not None or estimators or command.feels_contacts:
+                measured = measured._replace(
+                    applied=tau,
+                    wrenches=plant.contact_wrenches(t, q, v, tau),
+                    inertial=plant.inertial(),
+                )
+            for each in estimators:
+                measured = each.update(measured)
             if plan is not None:
-                plan.update(Measurement(t, *measured, wrenches))
-            tau = command.effort(t, *measured, period, wrenches).copy()
+                plan.update(measured)
+            tau = command.effort(
+                t, measured.q, measured.v, period, measured.wrenches
+            ).copy()
             if k == 0:
                 output, state = command.output, command.state
                 if not (t == state.t and _equal(state.q, q) and _equal(state.v, v)):
@@ -122,6 +134,8 @@ def sampled_loop(
                 channels = command.log_channels()
                 if plan is not None:
                     channels = {**channels, **plan.log_channels()}
+                for each in estimators:
+                    channels = {**channels, **each.log_channels(q, v)}
                 yield Instant(state, output, tau, channels)
             if end == start:  # the last row
                 return

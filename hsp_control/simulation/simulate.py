@@ -1,6 +1,6 @@
 """Simulates the closed loop of a controller and a plant."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from hsp_control.common.exceptions import (
 from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
+from hsp_control.estimation import Estimator, begun
 from hsp_control.geometry.scene import Scene
 from hsp_control.plans import Plan
 from hsp_control.robot.integrators import Dop853, Integrator
@@ -48,6 +49,7 @@ def simulate(
     plant: Plant | PlantPart | None = None,
     compensation: Compensation | None = None,
     plan: Plan | None = None,
+    estimators: Sequence[Estimator] = (),
     scene: Scene | None = None,
     start_time: float = 0.0,
     on_progress: Callable[[float], None] | None = None,
@@ -73,6 +75,8 @@ def simulate(
             period.
         plan: What writes references and switches contacts; the controller is made of
             its `Plan.parts`. It needs a control period.
+        estimators: What completes each measurement, for the plan and the controller;
+            they need a control period.
         scene: Obstacles to log; None: those of the controller.
         start_time: Time of the first row [s].
         on_progress: Called at every row with the fraction of the run that is done.
@@ -113,12 +117,18 @@ def simulate(
             "a plan decides once a period: it needs a control_period [s], for example "
             "0.001"
         )
+    if estimators and not periods:
+        raise SimulationError(
+            "estimators estimate once a period: they need a control_period [s], for "
+            "example 0.001"
+        )
     running = None if plan is None else plan.begin(controller)
+    estimating = begun(estimators, controller, plant.inertial())
     if isinstance(plant, ContinuousPlant):
         loop = continuous_loop(controller, plant, integrator, times, q, v)
     elif isinstance(plant, SampledPlant) and periods:
         command = Command(controller, compensation)
-        loop = sampled_loop(command, plant, periods, times, q, v, running)
+        loop = sampled_loop(command, plant, periods, times, q, v, running, estimating)
     else:
         raise SimulationError(
             f"{type(plant).__name__} holds the effort during a period: it needs a "

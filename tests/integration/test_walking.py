@@ -11,18 +11,31 @@ from places import ROOT
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.plans import Walk
+from hsp_control.plans import Sensed, Walk
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
 pytestmark = pytest.mark.slow
+SWINGING = {23: 0.25, 30: -0.25}  # the elbows, in v [rad]
+RATE, FOLLOWS = 2.0 * np.pi / 1.5, 6.0  # once in two steps [rad/s]; how fast [1/s]
 FEET = {"left_foot": "left_sole_link", "right_foot": "right_sole_link"}
 
 
 @cache
 def walk() -> Rollout:
-    """Return a walk of one step, the step that closes, and a second of standing."""
+    """Return a walk of one step, the step that closes, and a second of standing.
+
+    The arms swing by a field, so that the law's theorem has something to do.
+    """
+    amplitudes, weights = np.zeros(36), np.ones(36)
+    amplitudes[[*SWINGING]], weights[[*SWINGING]] = [*SWINGING.values()], FOLLOWS
+    swings = (
+        f"{{type: lissajous, center: {np.zeros(36).tolist()}, "
+        f"amplitudes: {amplitudes.tolist()}, rates: {np.full(36, RATE).tolist()}}}"
+    )
     settings = (
+        f"null_space.fields.0.displacement={swings}",
+        f"null_space.fields.0.weights={weights.tolist()}",
         "plan.steps=1",
         "simulation.duration=4.2",
         "simulation.log_period=0.002",
@@ -37,7 +50,7 @@ def test_it_walks_and_stands_again():
     assert run["plan.phase"][-1] == 0
     # One step of 0.75 s, at what 0.4 m/s² give in this time.
     assert run.q[-1, 0] == pytest.approx(0.4 * 0.75**2, abs=0.02)
-    assert np.abs(run.v[-1]).max() < 0.05
+    assert np.abs(np.delete(run.v[-1], [*SWINGING])).max() < 0.05
     error = run["plan.dcm"] - run["plan.dcm_reference"]
     assert np.sqrt((error**2).sum(axis=1).mean()) < 0.01
 
@@ -103,6 +116,20 @@ def test_the_null_space_error_decays_within_each_phase():
     assert compared >= 2
 
 
+def test_arms_swing_by_a_field():
+    """Two elbows, in opposite directions, once in two steps."""
+    run = walk()
+    joints = run["joint_positions"][:, list(SWINGING)]
+    swing = joints - joints[0]
+    # The field is a velocity, towards where the arm is to be: it follows with a lag.
+    share = FOLLOWS / (FOLLOWS + 1j * RATE)
+    phase = np.exp(1j * RATE * run.t)
+    wanted = np.outer((share * phase).imag, [*SWINGING.values()])
+    later = run.t > 1.5
+    assert np.abs(swing - wanted)[later].max() < 0.25 * np.abs(wanted).max()
+    assert np.corrcoef(swing[later].T)[0, 1] < -0.9
+
+
 def test_a_switch_compiles_nothing():
     """All combinations of contacts are compiled before the run, as they are known."""
     experiment = load_experiment("whole_body/talos_walk", "simulation.duration=1.2")
@@ -130,14 +157,36 @@ def test_a_push_that_fells_is_said():
 
 def test_the_page_s_yaml_and_python_run():
     text = (ROOT / "docs" / "plans.md").read_text(encoding="utf-8")
-    (yaml_text,) = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    yaml_text, felt = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     (snippet,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     assert len(yaml_text.splitlines()) <= 10
     data = yaml.safe_load(yaml_text)
     data["simulation"]["duration"] = 0.05
     assert load_experiment(data).run().status == "completed"
+    without = "contacts.front_left.schedule=null", "tasks.foot.schedule=null"
+    plan = f"plan={yaml.safe_load(felt)['plan']}".replace("None", "null")
+    sensed = load_experiment("whole_body/solo12_swing", *without, plan)
+    assert isinstance(sensed.scenario.plan, Sensed)
     space: dict = {}
     exec(compile(snippet, "plans.md", "exec"), space)
     made = space["walk"].scenario
     assert made.plan == Walk(speed=0.3, steps=4)
     assert load_experiment(yaml.safe_load(space["walk"].to_yaml())).scenario == made
+
+
+def test_it_walks_on_footsteps_that_are_given():
+    """A step to the left ahead, and the other foot beside it."""
+    rows = "[[0.15, 0.1, 0.1], [0.15, -0.08, 0.1]]"
+    plan = f"plan={{type: walk, footsteps: {rows}}}"
+    run = load_experiment(
+        "whole_body/talos_walk", plan, "simulation.duration=4.2"
+    ).run()
+    assert run.status == "completed"
+    assert run["plan.steps"][-1] == 2
+    assert run["plan.phase"][-1] == 0
+    assert np.abs(run.v[-1]).max() < 0.05
+    first = run["task.left_foot.actual"][0], run["task.right_foot.actual"][0]
+    middle = 0.5 * (first[0][:2] + first[1][:2])
+    for name, place in (("left_foot", (0.15, 0.1)), ("right_foot", (0.15, -0.08))):
+        there = run[f"task.{name}.actual"][-1][:2] - middle
+        assert there == pytest.approx(place, abs=0.02), name

@@ -35,6 +35,7 @@ from .rigid_contact import RigidContact as RigidContact
 from .rigid_contacts import RigidContacts as RigidContacts
 from .sensors import DifferencedVelocity as DifferencedVelocity
 from .sensors import Encoder as Encoder
+from .sensors import Imu as Imu
 from .sensors import PositionNoise as PositionNoise
 from .sensors import Sensor as Sensor
 from .sensors import SensorDelay as SensorDelay

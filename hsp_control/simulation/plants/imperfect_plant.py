@@ -7,12 +7,13 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import Inertial
 from hsp_control.declaration import within
 from hsp_control.simulation.plants.drives import Drive, Driving
 from hsp_control.simulation.plants.json_data import to_json_data
 from hsp_control.simulation.plants.plant import SampledPlant
 from hsp_control.simulation.plants.random_numbers import seeded_generator
-from hsp_control.simulation.plants.sensors import Sensing, Sensor
+from hsp_control.simulation.plants.sensors import RunningImu, Sensing, Sensor
 
 
 class ImperfectPlant(SampledPlant):
@@ -109,6 +110,13 @@ class ImperfectPlant(SampledPlant):
         """Return the plant's, under the effort that acted; these are exact."""
         applied = tau if self._applied is None else self._applied
         return self.plant.contact_wrenches(t, q, v, applied)
+
+    def inertial(self) -> Inertial | None:
+        """Return the reading of its own unit, or of the plant's."""
+        for sense in self._sensing:
+            if isinstance(sense, RunningImu):
+                return sense.reading
+        return self.plant.inertial()
 
     def describe(self) -> dict[str, Any]:
         """Return the plant's description, and its sensors and drives."""

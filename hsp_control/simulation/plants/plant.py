@@ -9,7 +9,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.log_channel import LogChannel
-from hsp_control.control.measurement import NO_WRENCHES
+from hsp_control.control.measurement import NO_WRENCHES, Inertial
 from hsp_control.robot import Robot
 
 
@@ -61,6 +61,13 @@ class Plant:
             tau: Effort of the period that ends, shape (nv,).
         """
         return NO_WRENCHES
+
+    def inertial(self) -> Inertial | None:
+        """Return what an inertial measurement unit reported in the last measurement.
+
+        None if there is no such unit.
+        """
+        return None
 
 
 class ContinuousPlant(Plant, ABC):

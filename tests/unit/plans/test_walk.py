@@ -179,7 +179,7 @@ def test_a_walk_may_begin_in_any_direction(talos, heading):
     robot = experiment.robot
     state = robot.state(0.0, robot.integrate(experiment.q0, step), np.zeros(robot.nv))
     running = experiment.scenario.plan.begin(experiment.controller)
-    running.update(Measurement(0.0, state.q, state.v))
+    running.update(Measurement(0, 0.0, state.q, state.v))
     trunk = {task.name: task for task in experiment.controller.tasks}["trunk"]
     frame = state.frame("base_link")
     assert trunk.followed.sample(0.0).rotation == pytest.approx(frame.rotation)
@@ -187,3 +187,42 @@ def test_a_walk_may_begin_in_any_direction(talos, heading):
     ahead = frame.rotation.T @ (np.array([*target[:2], 0.0]) - state.q[:3])
     assert ahead[0] > 0.1
     assert abs(target[2] - heading) % (2 * np.pi) == pytest.approx(0.0, abs=1e-3)
+
+
+GIVEN = "plan={type: walk, footsteps: %s}"
+
+
+def test_footsteps_are_taken_from_the_middle_between_the_feet():
+    rows = [[0.2, 0.085, 0.0], [0.4, -0.085, 0.2], [0.4, 0.085, 0.2]]
+    experiment = load_experiment(WALK, GIVEN % rows)
+    running = experiment.scenario.plan.begin(experiment.controller)
+    running.start(experiment.robot.state(0.0, experiment.q0, experiment.v0))
+    planner, places = running._planner, running._places
+    assert planner.first_side(0.0, 0) == 1.0
+    assert planner.sets_out(0.0, 2)
+    assert not planner.sets_out(0.0, 3)
+    middle = running._middle()
+    point = places[1.0].point
+    given = (0.0, 0, running._now, 1.0, places, 0.5, point)
+    preview = planner.look_ahead(*given)
+    assert preview.target.point - middle == pytest.approx([0.2, 0.085], abs=1e-6)
+    assert preview.swings.count(True) == 3
+    # The weight ends between the last two steps.
+    assert preview.phases[-1].end - middle == pytest.approx([0.4, 0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (
+            "[[0.2, 0.085, 0], [1.2, -0.085, 0]]",
+            r"footsteps\[1\] is 1 m ahead and 0.17 m beside the standing foot; talos r",
+        ),
+        ("[[0.2, -0.085, 0]]", r"footsteps\[0\] is 0.2 m ahead and -?0(.0\d+)? m besi"),
+        ("[[0.2, 0.085]]", "footsteps"),
+        ("[[0.2, 0.085, 0]], speed: 0.2", "give either footsteps or speed, not both"),
+    ],
+)
+def test_footsteps_that_legs_do_not_reach_are_said(rows, message):
+    with pytest.raises(HspControlError, match=message):
+        load_experiment(WALK, GIVEN % rows)

@@ -2,6 +2,8 @@
 
 from .differenced_velocity import DifferencedVelocity as DifferencedVelocity
 from .encoder import Encoder as Encoder
+from .imu import Imu as Imu
+from .imu import RunningImu as RunningImu
 from .position_noise import PositionNoise as PositionNoise
 from .sensor import Sensing as Sensing
 from .sensor import Sensor as Sensor

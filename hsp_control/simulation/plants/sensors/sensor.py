@@ -24,7 +24,7 @@ class Sensor(Part, ABC, family="sensors", error=SimulationError):
     A sensor knows no robot and has no memory: `begin` makes what runs.
 
     A plant applies its sensors in the order of their stages, whatever the order in
-    which they are given: `SensorDelay` 10, `PositionNoise` 20, `Encoder` 30,
+    which they are given: `SensorDelay` 10, `Imu` 15, `PositionNoise` 20, `Encoder` 30,
     `DifferencedVelocity` 40, `VelocityNoise` 50. A new sensor chooses a number between
     its neighbours; the default is behind all of these.
 

@@ -1,0 +1,93 @@
+"""The base class of estimators: what is not measured, from what is."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Annotated, ClassVar
+
+from pydantic import AfterValidator
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import EstimationError
+from hsp_control.control.controller import Controller
+from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import Inertial, Measurement
+from hsp_control.declaration import Part, within
+from hsp_control.declaration.by_type import ByType
+
+
+class Estimator(Part, ABC, family="estimators", error=EstimationError):
+    """What completes or replaces a part of each measurement.
+
+    It stands between the sensors, and the plan and the controller. A subclass declares
+    its parameters as fields (see `Part`) and implements `begin`; what remembers
+    something is what that returns. Several run in the order of their stages.
+
+    Attributes:
+        stage: The place in the chain: `BaseEstimator` 10, `ContactForces` 20.
+    """
+
+    stage: ClassVar[float] = 100.0
+
+    @abstractmethod
+    def begin(
+        self, controller: Controller, inertial: Inertial | None
+    ) -> "RunningEstimator":
+        """Return what estimates, for one run.
+
+        Args:
+            controller: The controller, whose contacts bear the robot.
+            inertial: A reading of the robot's inertial measurement unit, which says
+                where that is; None: there is no unit.
+
+        Raises:
+            EstimationError: If it does not fit the robot, or what it needs is missing.
+            FrameNotFoundError: If the robot has no such frame.
+        """
+
+
+class RunningEstimator(ABC):
+    """What an `Estimator` became for one run."""
+
+    @abstractmethod
+    def update(self, measured: Measurement) -> Measurement:
+        """Return the measurement with what is estimated; once a period, in order.
+
+        Raises:
+            EstimationError: If what it needs was not measured.
+        """
+
+    @abstractmethod
+    def log_channels(self, q: Array, v: Array) -> Mapping[str, LogChannel]:
+        """Return what to log of the last update, by name: ``estimate.<...>``.
+
+        Args:
+            q: The true configuration at that time, shape (nq,), for errors.
+            v: The true velocity, shape (nv,).
+        """
+
+
+def begun(
+    estimators: Sequence[Estimator],
+    controller: Controller,
+    inertial: Inertial | None,
+) -> list[RunningEstimator]:
+    """Return what runs, in order; see `Estimator.begin`.
+
+    Raises:
+        EstimationError: If one does not fit; with its type.
+    """
+    running = []
+    for each in estimators:
+        with within("estimators", each.yaml_type or type(each).__name__):
+            running.append(each.begin(controller, inertial))
+    return running
+
+
+def _in_order(estimators: tuple[Estimator, ...]) -> tuple[Estimator, ...]:
+    return tuple(sorted(estimators, key=lambda each: each.stage))
+
+
+Estimators = Annotated[
+    Sequence[Estimator], ByType(Estimator), AfterValidator(_in_order)
+]
+"""A chain: a sequence in Python, a mapping by type in YAML; stored by stage."""

@@ -1,0 +1,294 @@
+"""A quadruped that walks: what every gait has in one run."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import PlanError
+from hsp_control.control.controller import Controller
+from hsp_control.control.measurement import Measurement
+from hsp_control.plans.falling import FallDetector
+from hsp_control.plans.footsteps import Footstep, Velocity
+from hsp_control.plans.legs import hip_height, leg_length
+from hsp_control.plans.pendulum import GRAVITY
+from hsp_control.plans.plan import RunningPlan
+from hsp_control.plans.quadruped import QuadrupedPlan
+from hsp_control.plans.quintic import at_rest, to_rest
+from hsp_control.plans.swing import Swing, turned
+from hsp_control.robot import RobotState
+from hsp_control.trajectories.fed import Fed, FedOrientation
+from hsp_control.trajectories.switch import Switch
+
+LATE = 0.12
+"""How long a foot without ground under it is waited for [s]."""
+EARLY = 0.6
+"""Share of a swing before which no force counts as touchdown."""
+DESCENT = 0.3
+"""How fast a foot goes on down that has not touched the ground in time [m/s]."""
+RISE = 0.3
+"""How long the trunk takes to rise or sink with the ground [s]."""
+_PRESS = 0.002
+"""How far below the ground a swing foot aims, so that it does not miss it [m]."""
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+class PointFoot:
+    """A foot that touches the ground in a point.
+
+    Attributes:
+        name: The name of its contact and of its task.
+        frame: Its frame.
+        normal: The normal of the ground, shape (3,) [-].
+        contact: Switches the contact.
+        task: Switches the task that moves it.
+        position: The reference of its frame's origin.
+        swing: Its motion while it swings; None while it bears.
+        height: The height of its frame where it stands, or stood last [m].
+        offset: Where it stands beside the middle of the feet at the start, in axes of
+            the trunk, shape (2,) [m].
+    """
+
+    def __init__(self, name: str, controller: Controller) -> None:
+        """Find its parts in a controller.
+
+        Raises:
+            PlanError: If the controller is not made of the plan's parts.
+        """
+        self.name = name
+        contact = {each.name: each for each in controller.contacts}[name]
+        task = {each.name: each for each in controller.tasks}.get(name)
+        if not (
+            task is not None
+            and isinstance(contact.schedule, Switch)
+            and isinstance(task.schedule, Switch)
+            and isinstance(task.followed, Fed)
+        ):
+            raise PlanError(
+                f"the foot {name!r} does not follow the plan: make the controller of "
+                "the plan's parts"
+            )
+        self.frame, self.normal = contact.frame, contact.axes[:, 2]
+        self.contact, self.task = contact.schedule, task.schedule
+        self.position = task.followed
+        self.swing: Swing | None = None
+
+    def start(self, state: RobotState, middle: Footstep) -> None:
+        """Stand where the robot is; ``middle`` is below its centre of mass."""
+        self.contact.reset()
+        self.task.reset()
+        self.swing = None
+        here = state.position(self.frame)
+        self.height = float(here[2])
+        self.offset: Array = middle.local(here)
+
+
+class RunningQuadruped(RunningPlan):
+    """What a plan of four feet became for one run."""
+
+    def __init__(self, plan: QuadrupedPlan, controller: Controller) -> None:
+        """Find the references and the switches.
+
+        Args:
+            plan: The plan.
+            controller: A controller that is made of its parts.
+
+        Raises:
+            PlanError: If the controller is made of other parts.
+        """
+        super().__init__(plan)
+        self.gait = plan
+        self._controller = controller
+        self._state = RobotState(controller.robot)
+        tasks = {task.name: task for task in controller.tasks}
+        fed = [
+            task.followed if (task := tasks.get(name)) is not None else None
+            for name in ("trunk", "height", "center_of_mass")
+        ]
+        trunk, height, body = fed
+        if not (
+            isinstance(trunk, FedOrientation)
+            and isinstance(height, Fed)
+            and isinstance(body, Fed)
+        ):
+            raise PlanError(
+                "the tasks 'trunk', 'height' and 'center_of_mass' do not follow the "
+                "plan: make the controller of the plan's parts"
+            )
+        self._trunk, self._height, self._body = trunk, height, body
+        self._trunk_frame: str = tasks["trunk"].frame  # type: ignore[attr-defined]
+        names = plan.feet_of(controller.contacts)
+        self._feet = [PointFoot(name, controller) for name in names]
+        mass = sum(inertia.mass for inertia in controller.robot.model.inertias)
+        self._touch = plan.contact_force * mass * GRAVITY
+        self._begun = False
+
+    def start(self, state: RobotState) -> None:
+        """Stand where the robot is; see `RunningPlan.start`."""
+        frame = state.frame(self._trunk_frame)
+        mass = state.centroidal.position
+        yaw = float(np.arctan2(frame.rotation[1, 0], frame.rotation[0, 0]))
+        middle = Footstep(float(mass[0]), float(mass[1]), yaw)
+        for foot in self._feet:
+            foot.start(state, middle)
+        # The offsets are from the middle of the feet, below which the mass is to be.
+        center = np.mean([foot.offset for foot in self._feet], axis=0)
+        for foot in self._feet:
+            foot.offset = foot.offset - center
+        self._first_yaw = self._yaw = yaw
+        self._rotation = frame.rotation.copy()
+        self._above = float(mass[2]) - self._ground()
+        self._rise = to_rest(at_rest(mass[2:]), mass[2:], state.t, RISE)
+        frames = tuple(foot.frame for foot in self._feet)
+        self._falling = FallDetector(self._trunk_frame, frames, state)
+        self._velocity = Velocity(0.0, 0.0, 0.0)
+        self._last = state.t
+        self._controller.prepare(state, without=[foot.name for foot in self._feet])
+        self._start_gait(state)
+        for lifted in self._combinations():
+            down = [foot.name for foot in self._feet if foot not in lifted]
+            aloft = [foot.name for foot in lifted]
+            self._controller.prepare(state, lifted=aloft, without=down)
+        self._begun = True
+
+    def _corners(self) -> tuple[PointFoot, PointFoot, PointFoot, PointFoot]:
+        """Return the feet: front left and right, hind left and right.
+
+        Raises:
+            PlanError: If the feet do not stand at the corners of a body.
+        """
+        corners: dict[tuple[bool, bool], PointFoot] = {}
+        for foot in self._feet:
+            corners[bool(foot.offset[0] > 0.0), bool(foot.offset[1] > 0.0)] = foot
+        if len(corners) < 4:
+            raise PlanError(
+                "the feet do not stand at the four corners of the body, so that there "
+                f"are no diagonals to {self.gait.gait} with"
+            )
+        return (
+            corners[True, True],
+            corners[True, False],
+            corners[False, True],
+            corners[False, False],
+        )
+
+    def _check_stride(self, state: RobotState, time: float) -> None:
+        """Check that the legs are long enough for the speed.
+
+        Args:
+            state: The state in which the robot stands.
+            time: How long a foot moves to one side of its hip [s].
+
+        Raises:
+            PlanError: If they are not.
+        """
+        speed = float(np.hypot(self.gait.speed, self.gait.sideways))
+        excursion = speed * time
+        for foot in self._feet:
+            square = (
+                leg_length(state.robot, foot.frame) ** 2
+                - hip_height(state, foot.frame) ** 2
+            )
+            reach = 0.9 * float(np.sqrt(max(square, 0.0)))
+            if excursion > reach:
+                raise PlanError(
+                    f"at {speed:.3g} m/s a foot is {excursion:.3g} m before and behind "
+                    f"its hip; the leg of {foot.name!r} reaches {reach:.3g} m. "
+                    f"{self.gait.gait.capitalize()} slower, or with a shorter swing"
+                )
+
+    @abstractmethod
+    def _start_gait(self, state: RobotState) -> None:
+        """Begin the gait, after all else.
+
+        Raises:
+            PlanError: If the robot cannot follow it.
+        """
+
+    @abstractmethod
+    def _combinations(self) -> Sequence[Sequence[PointFoot]]:
+        """Return which feet may be in the air together."""
+
+    @abstractmethod
+    def _step(self, t: float, measured: Measurement) -> None:
+        """Go on with the gait, and write the reference of the centre of mass."""
+
+    def update(self, measured: Measurement) -> None:
+        """Write references and switch contacts; see `RunningPlan.update`."""
+        t, state = measured.t, self._state
+        state.update(t, measured.q, measured.v)
+        if not self._begun:
+            self.start(state)
+        self._falling.check(state)
+        self._step(t, measured)
+        self._height.write(t, *self._rise.sample(t))
+        rotation = turned(self._yaw - self._first_yaw, self._rotation)
+        self._trunk.write(t, rotation, self._velocity.turn * _UP)
+        for foot in self._feet:
+            if foot.swing is not None:
+                foot.position.write(t, *foot.swing.position(t))
+        self._last = t
+
+    # -- the body ---------------------------------------------------------------------
+
+    def _accelerate(self, t: float) -> None:
+        """Bring the velocity nearer to what is wanted, and turn with it."""
+        h = t - self._last
+        most = self.gait.acceleration * h
+        # A metre per second and a radian per second change equally fast.
+        self._velocity = Velocity(
+            *(
+                a + min(max(b - a, -most), most)
+                for a, b in zip(self._velocity, self.gait.velocity_at(t), strict=True)
+            )
+        )
+        self._yaw += h * self._velocity.turn
+
+    def _world_velocity(self) -> Array:
+        axes = Footstep(0.0, 0.0, self._yaw)
+        return axes.world(np.array([self._velocity.forward, self._velocity.left]))
+
+    def _ground(self) -> float:
+        """Return the mean height of the feet where they stand, or stood last [m]."""
+        return sum(foot.height for foot in self._feet) / len(self._feet)
+
+    # -- a foot -----------------------------------------------------------------------
+
+    def _lift_off(self, foot: PointFoot, t: float) -> None:
+        """Let a foot swing that bears no more, for the time being upwards."""
+        foot.contact.throw(False, t)
+        foot.task.throw(True, t)
+        here = self._state.position(foot.frame)
+        foot.swing = Swing(
+            t,
+            self.gait.swing,
+            here,
+            np.eye(3),
+            Footstep(float(here[0]), float(here[1]), 0.0),
+            np.eye(3),
+            foot.height - _PRESS,
+            self.gait.lift,
+            DESCENT,
+        )
+
+    def _has_landed(self, foot: PointFoot, measured: Measurement) -> bool:
+        """Return whether a foot bears, perhaps since now."""
+        t, swing = measured.t, foot.swing
+        if swing is None:
+            return True
+        force = measured.normal_force(foot.frame, foot.normal)
+        if force is None:
+            lands = t >= swing.end
+        else:
+            felt = swing.share(t) > EARLY and force > self._touch
+            lands = felt or t > swing.end + LATE
+        if lands:
+            foot.contact.throw(True, t, 0.5 * self.gait.stance)
+            foot.task.throw(False, t)
+            foot.swing = None
+            foot.height = float(self._state.position(foot.frame)[2])
+            # The trunk follows the ground.
+            target = [self._ground() + self._above]
+            self._rise = to_rest(self._rise.sample(t), target, t, RISE)
+        return lands
