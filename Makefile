@@ -123,10 +123,12 @@ animations: $(STAMP) ## film the README's animations anew, into docs/figures (ne
 	@$(BIN)/python docs/make_animations.py
 	@$(BIN)/python docs/make_play_picture.py
 
-format: $(STAMP) ## let ruff format the code and fix what it can, strip the notebooks
+notebooks: $(STAMP) ## run the notebooks and keep what they print and draw
+	@$(BIN)/python tools/notebooks.py
+
+format: $(STAMP) ## let ruff format the code and fix what it can
 	@$(BIN)/ruff check --fix --quiet || true
 	@$(BIN)/ruff format
-	@$(BIN)/nbstripout notebooks/*.ipynb
 
 constraints: ## refresh constraints.txt with the newest version of everything
 	@$(find-python); dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; \
@@ -143,7 +145,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist machine_code docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help docs figures screenshots animations demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test format constraints clean
+.PHONY: help docs figures screenshots animations notebooks demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

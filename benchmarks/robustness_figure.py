@@ -10,6 +10,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.image import AxesImage
 from robustness import COLUMNS, ROWS, means
 
+from hsp_control.visualization.palette import INK
 from hsp_control.visualization.plots import new_figure, styled
 
 FILE = DOCS / "figures" / "robustness.png"
@@ -22,16 +23,18 @@ def main() -> None:
     """Draw and save the figure."""
     cells = means()
     with styled():
-        figure = new_figure(15.0, 13.0)
+        figure = new_figure(13.0, 11.5)
         panels = figure.subplots(2, 2)
         for row, (robot, title) in zip(panels, ROBOTS.items(), strict=True):
             for axes, measure in zip(row, SHOWN, strict=True):
                 image = draw(axes, cells, robot, measure)
                 axes.set_title(f"{title}: {SHOWN[measure]}")
-                figure.colorbar(image, ax=axes, label=SHOWN[measure], shrink=0.8)
+                figure.colorbar(image, ax=axes, shrink=0.8)
         for axes in panels[:, 1]:
             axes.set_yticklabels([])
-        figure.savefig(FILE, dpi=80)
+        for axes in panels[0]:
+            axes.set_xticklabels([])
+        figure.savefig(FILE, dpi=95)
     print(f"Wrote {FILE}")
 
 
@@ -52,14 +55,15 @@ def draw(
     low, high = RANGES[measure]
     image = axes.imshow(
         np.clip(values, low, high),
-        cmap="RdYlGn_r",
-        norm=LogNorm(low, high),
+        cmap="Blues",  # dark is large, in grey too
+        norm=LogNorm(0.3 * low, high),  # no cell as pale as the paper
         aspect="auto",
-        alpha=0.85,
     )
     for (i, j), value in np.ndenumerate(values):
         if np.isfinite(value):
-            axes.text(j, i, f"{value:.2g}", ha="center", va="center", fontsize=8)
+            color = "white" if image.norm(value) > 0.65 else INK
+            text = f"{value:.2g}".removeprefix("0")
+            axes.text(j, i, text, ha="center", va="center", fontsize=9, color=color)
     axes.set_xticks(range(len(COLUMNS)), [*COLUMNS], rotation=35, ha="right")
     axes.set_yticks(range(len(rows)), rows)
     axes.grid(visible=False)

@@ -21,8 +21,9 @@ extensions = [
     "mathml",
     "reference",
     "replays",
+    "lecture",
 ]
-exclude_patterns = ["_build", "_site"]
+exclude_patterns = ["_build", "_site", "lecture"]
 smartquotes = False  # a prime is a rate
 default_role = "py:obj"  # a name in backticks is a link wherever it is one of ours
 

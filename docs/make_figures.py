@@ -25,6 +25,7 @@ from hsp_control.visualization.plots import (
 
 FOLDER = Path(__file__).parent / "figures"
 GAIN, FREQUENCY = 4.0, 6.0
+RELATIVE = r"$\|e_N\|_W$ relative to start [-]"
 
 TURN = 2.0 * np.pi / 3.0  # of the paper's circle [s]
 WHOLE_RUN = tuple(10.0 * k / 7.0 for k in range(8))
@@ -207,11 +208,12 @@ def draw_propositions(left: Axes, middle: Axes) -> None:
     left.set(title="(a)  The task: pose of an iiwa", ylabel="pose error ‖e‖ [m, rad]")
     middle.set(
         title="(b)  Its null space, field moving",
-        ylabel="‖e_N‖_W relative to start [-]",
+        ylabel=RELATIVE,
     )
     for axes in (left, middle):
         axes.set(xlabel="time [s]", ylim=(1e-7, 3.0))
-        axes.legend()
+        for line in axes.legend().get_lines():
+            line.set_linewidth(min(line.get_linewidth(), 3.0))  # beside its name
 
 
 def moving_iiwa(robot: hsp.Robot, metric: metrics.Metric) -> hsp.Rollout:
@@ -271,7 +273,7 @@ def draw_null_space_under_a_force(axes: Axes) -> None:
     axes.set(
         title="(a)  33 N at the hand, which nobody expects",
         xlabel="time [s]",
-        ylabel="‖e_N‖_W relative to start [-]",
+        ylabel=RELATIVE,
     )
     axes.legend()
 
@@ -288,22 +290,25 @@ def draw_observed_force(axes: Axes) -> None:
     soft = np.clip((t - 5.0) / 0.5, 0.0, 1.0)
     soft = soft**3 * (10.0 - 15.0 * soft + 6.0 * soft**2)
     spring = -(600.0 - 450.0 * soft) * rollout["task.hand.error"][:, 1]
-    axes.plot(t, spring, color=SERIES[1], lw=2.0, label="K (x - x_d), the spring")
+    axes.plot(t, spring, color=SERIES[1], lw=2.0, label="spring, K (x - x_d)")
     observed = rollout["observer.wrench.hand"][:, 1]
-    axes.plot(t, observed, color=SERIES[0], lw=2.0, label="observed, in the log")
-    axes.plot(t, true, color=INK, lw=1.0, ls="--", label="true, at the hand")
+    axes.plot(t, observed, color=SERIES[0], lw=2.0, label="observed")
+    axes.plot(t, true, color=INK, lw=1.0, ls="--", label="true")
     axes.set(
         title="(b)  The force along y; from 5 s on the springs are softer",
         xlabel="time [s]",
         ylabel="force along y [N]",
     )
-    axes.legend()
+    axes.legend(loc="center left", bbox_to_anchor=(0.29, 0.5))
 
 
 def draw_chaos(axes: Axes) -> None:
     """Draw how far two starts 1e-9 rad apart get, with and without control."""
-    shown = (("1_uncontrolled", "φ_N = 0"), ("3_equal_angles", "g = -∇f"))
-    for color, (name, label) in zip((DESIRED, SERIES[0]), shown, strict=True):
+    shown = {
+        "1_uncontrolled": (DESIRED, r"$\varphi_N = 0$"),
+        "3_equal_angles": (SERIES[0], r"$g = -\nabla f$"),
+    }
+    for name, (color, label) in shown.items():
         runs = []
         for nudge in (0.0, 1e-9):
             experiment = hsp.load_experiment(f"paper/{name}")

@@ -1,60 +1,48 @@
-"""The notebooks run, say what they say without a warning, and are kept without output.
+"""The notebooks run, say what they say without a warning, and are kept as they run.
 
-Each is executed once, in a kernel of its own as Jupyter would, in a folder of its own.
+Each is executed once, with the code of its answers, in a kernel of its own as Jupyter
+would, in a folder of its own. What is kept of the outputs is text and small pictures.
 """
 
 import base64
+import copy
+import importlib.util
 import json
-import os
 import re
-import sys
-import tempfile
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import nbformat
 import pytest
-from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError
 from places import ROOT
-from traitlets.config import Config
 
 pytestmark = pytest.mark.process
 
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
 NAMES = [path.stem for path in NOTEBOOKS]
-CELL_TIME = 120  # [s]: kernels may have to be compiled
+NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
+ANSWER = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
-ANSI = re.compile(r"\x1b\[[0-9;]*m")
+
+def _load_tool() -> ModuleType:
+    """Return tools/notebooks.py, which is a script."""
+    path = ROOT / "tools" / "notebooks.py"
+    spec = importlib.util.spec_from_file_location("notebooks_tool", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+tool = _load_tool()
 
 
 def read(name: str) -> Any:
     return nbformat.read(ROOT / "notebooks" / f"{name}.ipynb", as_version=4)
-
-
-def execute(notebook: Any, folder: Path) -> None:
-    """Run all cells; the kernel listens on files, so that no port is opened."""
-    beside = str(Path(sys.executable).parent)  # where `hsp` is
-    environment = os.environ | {
-        "PATH": os.pathsep.join([beside, os.environ["PATH"]]),
-        "PYTHONPATH": str(ROOT),
-        "MPLBACKEND": "module://matplotlib_inline.backend_inline",
-        "IPYTHONDIR": str(folder / "ipython"),
-    }
-    environment.pop("NUMBA_DISABLE_JIT", None)  # no coverage comes from a kernel
-    with tempfile.TemporaryDirectory() as sockets:  # whose names may not be long
-        config = Config()
-        config.KernelManager.transport = "ipc"
-        config.KernelManager.ip = str(Path(sockets) / "kernel")
-        NotebookClient(
-            notebook,
-            timeout=CELL_TIME,
-            startup_timeout=60,
-            kernel_name="python3",
-            resources={"metadata": {"path": str(folder)}},
-            config=config,
-        ).execute(env=environment)
 
 
 def outputs(notebook: Any) -> list[Any]:
@@ -63,7 +51,22 @@ def outputs(notebook: Any) -> list[Any]:
 
 def printed(notebook: Any) -> str:
     streams = (o for o in outputs(notebook) if o.output_type == "stream")
-    return ANSI.sub("", "".join(o.text for o in streams if o.name == "stdout"))
+    return "".join(o.text for o in streams if o.name == "stdout")
+
+
+def with_answers(notebook: Any) -> Any:
+    """Return a copy in which the code of the answers is a cell of its own."""
+    answered = copy.deepcopy(notebook)
+    for code in ANSWER.findall(notebook.cells[-1].source):
+        answered.cells.append(nbformat.v4.new_code_cell(code))
+    return answered
+
+
+def words(cell: Any) -> tuple[list[str], int]:
+    """Return what a cell says, without its numbers, and how many pictures it has."""
+    kept = cell.get("outputs", [])
+    said = "".join(out.text for out in kept if out.output_type == "stream")
+    return NUMBER.sub("", said).split(), sum("data" in out for out in kept)
 
 
 def pictures(notebook: Any) -> list[bytes]:
@@ -116,6 +119,17 @@ def command_it_now(said: str) -> None:
     assert float(largest) < 20.0
 
 
+def walking(said: str) -> None:
+    assert "completed: 0.5" in said
+    (away,) = re.findall(r"at most (\d+) mm from the plan", said)
+    assert float(away) < 30.0
+    (median,) = re.findall(r"median ‖e_N‖ (\S+) rad/s", said)
+    assert float(median) < 0.1
+    assert "completed, at the end 0.0" in said
+    rates = re.findall(r"measured (\S+) 1/s", said)
+    assert abs(float(rates[0]) - 6.0) < 0.6
+
+
 def a_field_keeps_clear(said: str) -> None:
     without, with_field = (float(x) for x in re.findall(r"nearest (\S+) mm", said))
     assert without < -20.0
@@ -127,6 +141,7 @@ PROMISES = {
     "02_panda_fields": panda_fields,
     "03_your_robot": your_robot,
     "04_command_it_now": command_it_now,
+    "05_walking": walking,
 }
 
 
@@ -137,8 +152,9 @@ def test_a_notebook_runs_and_keeps_its_promises(name: str, tmp_path: Path) -> No
 
     One test, so that two workers do not run the same notebook.
     """
-    notebook = read(name)
-    execute(notebook, tmp_path)
+    stored = read(name)
+    notebook = with_answers(stored)
+    tool.execute(notebook, tmp_path)
     for out in outputs(notebook):
         if out.output_type == "stream":
             assert out.name == "stdout", f"{name} wrote to stderr: {out.text}"
@@ -153,6 +169,9 @@ def test_a_notebook_runs_and_keeps_its_promises(name: str, tmp_path: Path) -> No
     assert len(shown) >= 3
     assert all(picture.startswith(b"\x89PNG") for picture in shown)
     assert sum(map(len, shown)) < 1_500_000
+    tool.keep_small(notebook, str(tmp_path))
+    for kept, made in zip(stored.cells, notebook.cells, strict=False):
+        assert words(kept) == words(made), "`make notebooks` writes the outputs anew"
     PROMISES[name](printed(notebook))
 
 
@@ -160,13 +179,13 @@ def test_a_cell_that_fails_fails_the_test(tmp_path: Path) -> None:
     notebook = nbformat.v4.new_notebook()
     notebook.cells = [nbformat.v4.new_code_cell("import hsp_control\n1 / 0")]
     with pytest.raises(CellExecutionError, match="ZeroDivisionError"):
-        execute(notebook, tmp_path)
+        tool.execute(notebook, tmp_path)
 
 
 # ----------------------------------------------------------------------- as they stand
 
 
-def test_there_are_four_and_documents_lead_to_them() -> None:
+def test_there_are_five_and_documents_lead_to_them() -> None:
     assert list(PROMISES) == NAMES
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     for name in NAMES:
@@ -174,7 +193,7 @@ def test_there_are_four_and_documents_lead_to_them() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_notebook_is_kept_without_outputs(name: str) -> None:
+def test_a_notebook_is_kept_with_text_and_small_pictures_only(name: str) -> None:
     path = ROOT / "notebooks" / f"{name}.ipynb"
     text = path.read_text(encoding="utf-8")
     kept = json.loads(text)
@@ -182,9 +201,19 @@ def test_a_notebook_is_kept_without_outputs(name: str) -> None:
     assert text == json.dumps(kept, indent=1, ensure_ascii=False) + "\n"
     assert set(kept["metadata"]) == {"kernelspec", "language_info"}
     for cell in kept["cells"]:
-        assert cell.get("outputs", []) == []
         assert cell.get("execution_count") is None
         assert cell["metadata"] == {}
+    notebook = read(name)
+    for out in outputs(notebook):
+        if out.output_type == "stream":
+            assert out.name == "stdout"
+            assert not re.search(r"\x1b|\r|/tmp/|/home/|/Users/", out.text)
+        else:
+            assert out.output_type == "display_data"
+            assert set(out.data) == {"image/png"}
+    shown = pictures(notebook)
+    assert len(shown) >= 3
+    assert max(map(len, shown)) <= 60_000
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -192,9 +221,14 @@ def test_a_notebook_tells_a_story_and_ends_in_exercises(name: str) -> None:
     cells = read(name).cells
     assert cells[0].cell_type == "markdown"
     assert cells[0].source.startswith("# ")
-    assert cells[-1].cell_type == "markdown"
-    assert cells[-1].source.startswith("## Exercises")
-    assert len(re.findall(r"^\d\. ", cells[-1].source, re.MULTILINE)) >= 5
+    exercises, answers = cells[-2:]
+    assert exercises.cell_type == answers.cell_type == "markdown"
+    assert exercises.source.startswith("## Exercises")
+    numbers = re.findall(r"^(\d)\. ", exercises.source, re.MULTILINE)
+    assert len(numbers) >= 5
+    assert answers.source.startswith("## Answers")
+    folded = re.findall(r"^<details><summary>(\d)\. ", answers.source, re.MULTILINE)
+    assert folded == numbers
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,0 +1,110 @@
+"""Run the notebooks and keep what they print and draw: `make notebooks`.
+
+    .venv/bin/python tools/notebooks.py [NAME ...]
+
+Kept are text and small pictures, so that a notebook reads well where nobody has run it.
+Views, numbers of executions, paths of this machine and colours of a terminal are not.
+"""
+
+import base64
+import os
+import re
+import sys
+import tempfile
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbclient import NotebookClient
+from PIL import Image
+from traitlets.config import Config
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDER = ROOT / "notebooks"
+
+CELL_TIME = 240  # [s]: kernels may have to be compiled
+COLORS = 64
+"""How many colours a picture keeps: enough for lines and their smooth edges."""
+
+_ANSI = re.compile(r"\x1b\[[0-9;]*m")
+
+
+def main() -> None:
+    """Run the notebooks that are named, or all, and write them back."""
+    for path in sorted(FOLDER.glob("*.ipynb")):
+        if len(sys.argv) == 1 or path.stem in sys.argv[1:]:
+            print(f"{path.name} ...", flush=True)
+            notebook = nbformat.read(path, as_version=4)
+            with tempfile.TemporaryDirectory() as folder:
+                execute(notebook, Path(folder))
+                keep_small(notebook, folder)
+            nbformat.write(notebook, path)
+
+
+def execute(notebook: Any, folder: Path) -> None:
+    """Run all cells in a folder; the kernel listens on files, no port is opened."""
+    beside = str(Path(sys.executable).parent)  # where `hsp` is
+    environment = os.environ | {
+        "PATH": os.pathsep.join([beside, os.environ["PATH"]]),
+        "PYTHONPATH": str(ROOT),
+        "MPLBACKEND": "module://matplotlib_inline.backend_inline",
+        "IPYTHONDIR": str(folder / "ipython"),
+    }
+    environment.pop("NUMBA_DISABLE_JIT", None)  # no coverage comes from a kernel
+    with tempfile.TemporaryDirectory() as sockets:  # whose names may not be long
+        config = Config()
+        config.KernelManager.transport = "ipc"
+        config.KernelManager.ip = str(Path(sockets) / "kernel")
+        NotebookClient(
+            notebook,
+            timeout=CELL_TIME,
+            startup_timeout=60,
+            kernel_name="python3",
+            resources={"metadata": {"path": str(folder)}},
+            config=config,
+        ).execute(env=environment)
+
+
+def keep_small(notebook: Any, folder: str) -> None:
+    """Keep of the outputs what a reader sees on any machine: text and pictures."""
+    notebook.metadata = {
+        "kernelspec": {
+            "display_name": "Python 3",
+            "language": "python",
+            "name": "python3",
+        },
+        "language_info": {"name": "python"},
+    }
+    for cell in notebook.cells:
+        cell.metadata = {}
+        if cell.cell_type == "code":
+            cell.execution_count = None
+            cell.outputs = list(_kept(cell.outputs, folder))
+
+
+def _kept(outputs: list[Any], folder: str) -> list[Any]:
+    texts = [out.text for out in outputs if out.output_type == "stream"]
+    text = _ANSI.sub("", "".join(texts)).replace("\r\n", "\n")
+    text = text.replace(f"{folder}/", "").replace(folder, "")
+    kept = [nbformat.v4.new_output("stream", name="stdout", text=text)] if text else []
+    pictures = (out.data.get("image/png") for out in outputs if "data" in out)
+    for picture in filter(None, pictures):
+        data = {"image/png": smaller(picture)}
+        kept.append(nbformat.v4.new_output("display_data", data=data))
+    return kept
+
+
+def smaller(picture: str) -> str:
+    """Return a PNG, as base64, with few colours."""
+    image = Image.open(BytesIO(base64.b64decode(picture))).convert("RGB")
+    few = image.quantize(
+        COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
+    )
+    written = BytesIO()
+    few.save(written, format="png", optimize=True)
+    return base64.b64encode(written.getvalue()).decode()
+
+
+if __name__ == "__main__":
+    main()
