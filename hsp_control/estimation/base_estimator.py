@@ -63,8 +63,8 @@ class BaseEstimator(Estimator, type="base"):
     """What is uncertain of a point of contact besides: the links bend, and the ground
     is soft [m]."""
     contacts: Names | None = None
-    """Names of the contacts that stand still when they are pressed [-], not of those
-    that slide; all of them by default."""
+    """Names of the contacts that stand still while they are pressed [-]; all that do
+    not slide by default."""
     contact_force: Positive = 0.1
     """Normal force from which a contact counts, in robot weights [-]."""
     start_tilt: NonNegative = 0.02
@@ -120,7 +120,8 @@ class RunningBaseEstimator(RunningEstimator):
                 "declare contacts, or remove the estimator"
             )
         there = {each.name: each for each in controller.contacts}
-        names = estimator.contacts or tuple(there)
+        still = [name for name, each in there.items() if not each.slides]
+        names = estimator.contacts or tuple(still)
         for name in names:
             if name not in there:
                 raise EstimationError(
