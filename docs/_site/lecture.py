@@ -1,8 +1,8 @@
 """The lecture: slides in one page, made of ``docs/lecture/lecture.md``.
 
 A line ``---`` ends a slide, a line ``+++`` begins its right half. Pictures are within
-the page; replays are frames, written as on the other pages. Formulas are MathML. Without
-its script the page is still a page that scrolls.
+the page, replays are frames, written as on the other pages, and formulas are MathML. If
+its script does not run, the page still scrolls.
 """
 
 import base64
