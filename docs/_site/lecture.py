@@ -1,8 +1,8 @@
 """The lecture: slides in one page, made of ``docs/lecture/lecture.md``.
 
-A line ``---`` ends a slide, a line ``+++`` begins its right half. Pictures are in the
-page; ``![title](replay:NAME)`` is a frame with a replay that `tools/replays.py` wrote.
-Formulas are MathML. Without its script the page is still a page that scrolls.
+A line ``---`` ends a slide, a line ``+++`` begins its right half. Pictures are within
+the page, replays are frames, written as on the other pages, and formulas are MathML. If
+its script does not run, the page still scrolls.
 """
 
 import base64
@@ -19,6 +19,7 @@ from sphinx.errors import ExtensionError
 
 TYPES = {".png": "image/png", ".webp": "image/webp"}
 PICTURE = re.compile(r"!\[([^\]]+)\]\(([^)]+)\)")
+REPLAY = re.compile(r"^```\{replay\} (\S+)\n:title: (.+)\n```$", re.MULTILINE)
 
 
 def page(source: Path, replays: str, folder: Path) -> str:
@@ -33,26 +34,24 @@ def page(source: Path, replays: str, folder: Path) -> str:
         ExtensionError: If a picture or a replay does not exist.
     """
 
-    def embedded(match: re.Match[str]) -> str:
-        title, target = match.groups()
-        if target.startswith("replay:"):
-            name = target.removeprefix("replay:").replace("/", "-") + ".html"
-            if not (folder / name).is_file():
-                raise ExtensionError(
-                    f"there is no {folder / name}; `make docs` writes it"
-                )
-            address = f"{replays}/{name}"
-            return (
-                f'<figure><iframe src="{address}" loading="lazy" '
-                f'title="{escape(title)}" allow="fullscreen"></iframe><figcaption>'
-                f'{escape(title)} <a href="{address}">Alone</a></figcaption></figure>'
-            )
-        file = source.parent / target
+    def frame(match: re.Match[str]) -> str:
+        name, title = match[1].replace("/", "-") + ".html", escape(match[2])
+        if not (folder / name).is_file():
+            raise ExtensionError(f"there is no {folder / name}; `make docs` writes it")
+        address = f"{replays}/{name}"
+        return (
+            f'<figure><iframe src="{address}" loading="lazy" title="{title}" '
+            f'allow="fullscreen"></iframe><figcaption>{title} '
+            f'<a href="{address}">Alone</a></figcaption></figure>'
+        )
+
+    def picture(match: re.Match[str]) -> str:
+        file = source.parent / match[2]
         if not file.is_file():
-            raise ExtensionError(f"{source.name}: there is no picture {target}")
+            raise ExtensionError(f"{source.name}: there is no picture {match[2]}")
         data = base64.b64encode(file.read_bytes()).decode()
         address = f"data:{TYPES[file.suffix]};base64,{data}"
-        return f'<img src="{address}" alt="{escape(title)}">'
+        return f'<img src="{address}" alt="{escape(match[1])}">'
 
     markdown = MarkdownIt("commonmark", {"html": True}).enable("table")
     dollarmath_plugin(markdown, double_inline=True, renderer=_formula)
@@ -62,10 +61,9 @@ def page(source: Path, replays: str, folder: Path) -> str:
         raise ExtensionError(f"{source.name} does not begin with its title")
     shown = [
         "".join(
-            f"<div>{markdown.render(PICTURE.sub(embedded, half))}</div>"
-            for half in slide.split("\n+++\n")
+            f"<div>{markdown.render(half)}</div>" for half in slide.split("\n+++\n")
         )
-        for slide in slides(text)
+        for slide in PICTURE.sub(picture, REPLAY.sub(frame, text)).split("\n---\n")
     ]
     template = source.with_name("page.html").read_text(encoding="utf-8")
     sections = "\n".join(
@@ -74,11 +72,6 @@ def page(source: Path, replays: str, folder: Path) -> str:
         for number, slide in enumerate(shown, 1)
     )
     return template.replace("$title", escape(title[1])).replace("$slides", sections)
-
-
-def slides(text: str) -> list[str]:
-    """Return the slides of the Markdown text."""
-    return text.split("\n---\n")
 
 
 def _formula(content: str, options: dict[str, Any]) -> str:

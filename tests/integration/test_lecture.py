@@ -66,7 +66,10 @@ def test_every_formula_is_drawn(replays: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("![A run](replay:nobody)", "nobody.html; `make docs` writes it"),
+        (
+            "```{replay} nobody\n:title: A run\n```",
+            "nobody.html; `make docs` writes it",
+        ),
         ("![A figure](nobody.png)", "there is no picture nobody.png"),
     ],
 )
