@@ -10,7 +10,7 @@
 "use strict";
 
 class Layers {
-  static SMALL = "(max-width: 620px), (max-height: 480px), "
+  static SMALL = "(max-width: 760px), (max-height: 480px), "
     + "(max-width: 860px) and (max-aspect-ratio: 6/5)";
 
   constructor(viewer, caption) {
