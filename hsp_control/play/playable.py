@@ -8,6 +8,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.common.resources import bundled_configs
+from hsp_control.common.suggestions import listing
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build, read_document
@@ -69,7 +70,7 @@ def _for_robot(name: str) -> dict[str, Any]:
             for config, path in bundled_configs().items()
             if f"name: {name}" in path.read_text()
         ]
-        listed = f", for example {known[0]}" if known else ""
+        listed = f", for example {listing(known, limit=3)}" if known else ""
         raise ConfigError(
             f"{name} has a free-flyer root, which needs contacts: give a "
             f"configuration{listed}"

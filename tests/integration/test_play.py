@@ -444,7 +444,7 @@ def test_a_configuration_without_a_period_gets_one() -> None:
     ("source", "message"),
     [
         ("talos", "talos has a free-flyer root, which needs contacts: give a "
-                  "configuration, for example whole_body/"),
+                  "configuration, for example .*, whole_body/"),
         ("pandaa", "no configuration 'pandaa'"),
     ],
 )  # fmt: skip
