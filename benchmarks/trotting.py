@@ -96,7 +96,8 @@ def said(robot: str, case: dict[str, Any], *, estimated: bool) -> str:
         return str(run.meta["message"])
     fast = (run.t > 2.0) & (run.t < UNTIL)
     points = run.q[fast][::30, :2]  # of whole cycles, so that swaying does not count
-    mean = np.hypot(*np.diff(points, axis=0).T).sum() / (0.3 * (len(points) - 1))
+    ways = np.diff(points if case["plan"].get("turn") else points[[0, -1]], axis=0)
+    mean = np.hypot(*ways.T).sum() / (0.3 * (len(points) - 1))
     stands = run["plan.phase"][-1] == 0 and np.abs(run.v[-1]).max() < 0.3
     limited, relaxed = ((run["status"] == s).mean() for s in (2, 3))
     return (

@@ -287,7 +287,9 @@ class RunningQuadruped(RunningPlan):
             foot.contact.throw(True, t, 0.5 * self.gait.stance)
             foot.task.throw(False, t)
             foot.swing = None
-            foot.height = float(self._state.position(foot.frame)[2])
+            here = self._state.position(foot.frame)
+            foot.position.write(t, here)  # its reference rests
+            foot.height = float(here[2])
             # The trunk follows the ground.
             target = [self._ground() + self._above]
             self._rise = to_rest(self._rise.sample(t), target, t, RISE)

@@ -48,6 +48,13 @@ def test_feet_follow_each_other_hind_ones_first():
     assert (first[1:-1] == 0.0).all()
 
 
+def test_references_of_feet_that_bear_rest_where_they_stand():
+    run = crawl()
+    for name in FEET:
+        away = run[f"task.{name}.reference"] - run[f"task.{name}.actual"]
+        assert np.abs(away).max() < 0.02, name
+
+
 def test_it_could_stop_at_any_time():
     """The centre of mass is above the triangle of the feet that bear."""
     run = crawl()
