@@ -32,10 +32,12 @@ demo: $(USE) ## the paper's run, and a Panda under a ball, with and without its 
 	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo --no-view
 	@$(BIN)/hsp plot out/demo/4_moving_obstacle.npz --out out/demo
 	@echo "Running panda_obstacle, with its field and without ..."
-	@$(BIN)/hsp run panda_obstacle --out out/demo/with --no-view
-	@$(BIN)/hsp run panda_obstacle --out out/demo/without --no-view \
+	@$(BIN)/hsp run panda_obstacle --out out/demo --no-view
+	@mv out/demo/panda_obstacle.npz 'out/demo/with the field.npz'
+	@$(BIN)/hsp run panda_obstacle --out out/demo --no-view \
 	  --set 'null_space.fields=[{type: rest}]'
-	@$(BIN)/hsp export out/demo/with/panda_obstacle.npz out/demo/without/panda_obstacle.npz \
+	@mv out/demo/panda_obstacle.npz out/demo/without.npz
+	@$(BIN)/hsp export 'out/demo/with the field.npz' out/demo/without.npz \
 	  --html out/demo/panda.html
 	@echo
 	@echo "Open out/demo/panda.html in a browser; the switch (or w) shows it with and without."
@@ -153,8 +155,8 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 # anew where it is missing or broken, brought up to date where pyproject.toml or
 # constraints.txt is newer than the stamp.
 $(USE): pyproject.toml constraints.txt
-	@echo "Installing hsp_control into .venv (0.9 GB, once) ..."
-	@$(find-python); "$$python" tools/install.py .venv --editable ".[export]"
+	@echo "Installing hsp_control and robots' meshes into .venv (1.3 GB, once) ..."
+	@$(find-python); "$$python" tools/install.py .venv --editable '.[export,robots]'
 	@touch $@
 
 $(STAMP): pyproject.toml constraints.txt
