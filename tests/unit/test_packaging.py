@@ -1,0 +1,152 @@
+"""Whatever says again what pyproject.toml says agrees with it."""
+
+import re
+import shlex
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from packaging.requirements import Requirement
+from places import ROOT
+
+from hsp_control import __version__
+
+if not (ROOT / "pyproject.toml").is_file():
+    pytest.skip("not in a checkout", allow_module_level=True)
+
+PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())
+
+IN_CONDA = {
+    "pin": "pinocchio",
+    "matplotlib": "matplotlib-base",
+    "meshcat": "meshcat-python",
+}
+"""What conda-forge calls packages that have another name on PyPI."""
+
+
+def conda_form(text: str) -> str:
+    """Return a requirement of pip as conda writes it, its bounds in order."""
+    requirement = Requirement(text)
+    bounds = ",".join(sorted(map(str, requirement.specifier), reverse=True))
+    return f"{IN_CONDA.get(requirement.name, requirement.name)} {bounds}".strip()
+
+
+def test_conda_requires_what_pip_does() -> None:
+    recipe = yaml.safe_load((ROOT / "packaging/conda/recipe.yaml").read_text())
+    python = f"python {PROJECT['project']['requires-python']}"
+    expected = ["__linux", python, *map(conda_form, PROJECT["project"]["dependencies"])]
+    assert recipe["requirements"]["run"] == expected
+    build = [conda_form(each) for each in PROJECT["build-system"]["requires"]]
+    assert recipe["requirements"]["host"] == [python, "pip", *build]
+    scripts = PROJECT["project"]["scripts"].items()
+    points = recipe["build"]["python"]["entry_points"]
+    assert points == [f"{name} = {target}" for name, target in scripts]
+    assert recipe["about"]["summary"] == PROJECT["project"]["description"]
+    assert recipe["about"]["license"] == PROJECT["project"]["license"]
+    licenses = {
+        file.relative_to(ROOT).as_posix()
+        for pattern in PROJECT["project"]["license-files"]
+        for file in ROOT.glob(pattern)
+    }
+    assert set(recipe["about"]["license_file"]) == licenses
+
+
+def test_every_file_has_the_package_s_version() -> None:
+    recipe = yaml.safe_load((ROOT / "packaging/conda/recipe.yaml").read_text())
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    changes = (ROOT / "CHANGELOG.md").read_text()
+    newest = re.search(r"^## \[(\d[^]]*)\] - (.*)$", changes, re.MULTILINE)
+    assert newest is not None
+    assert recipe["context"]["version"] == __version__
+    assert citation["version"] == __version__
+    assert newest.groups() == (__version__, str(citation["date-released"]))
+
+
+def included() -> set[str]:
+    """Return what the source distribution has, at the top."""
+    listed = PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
+    always = {"README.md", "LICENSE", "pyproject.toml"}
+    return {name.lstrip("/") for name in listed} | always
+
+
+def test_the_source_distribution_has_what_tests_read() -> None:
+    read = {
+        name
+        for file in (ROOT / "tests").rglob("*.py")
+        for name in re.findall(r'\bROOT / "([^"/]+)', file.read_text(encoding="utf-8"))
+    }
+    assert {"docs", "examples", "configs"} <= read
+    assert read - {"out"} <= included()  # out is written
+
+
+def containerfile() -> list[list[str]]:
+    """Return the words of each instruction."""
+    text = (ROOT / "Containerfile").read_text(encoding="utf-8")
+    text = re.sub(r"^#.*\n", "", text, flags=re.MULTILINE).replace("\\\n", " ")
+    return [shlex.split(line) for line in text.splitlines() if line.strip()]
+
+
+def test_the_container_has_what_the_wheel_is_built_of() -> None:
+    copied = {
+        name
+        for word, *names in containerfile()
+        if word == "COPY" and not names[0].startswith("--from")
+        for name in names[:-1]
+    }
+    targets = PROJECT["tool"]["hatch"]["build"]["targets"]
+    made = {"machine_code"}  # in the container itself
+    needed = {
+        "pyproject.toml",
+        "constraints.txt",
+        "tools",
+        PROJECT["project"]["readme"],
+    }
+    assert copied >= needed | set(targets["wheel"]["only-include"]) - made
+    assert {
+        file.relative_to(ROOT).parts[0]
+        for pattern in PROJECT["project"]["license-files"]
+        for file in ROOT.glob(pattern)
+    } <= copied
+    assert all((ROOT / name).exists() for name in copied)
+    admitted = (ROOT / ".dockerignore").read_text().split()
+    assert {f"!{name}" for name in copied} <= set(admitted)
+    assert copied <= included()
+
+
+def test_the_container_s_python_is_one_that_the_package_takes() -> None:
+    first, *others = [words[1] for words in containerfile() if words[0] == "FROM"]
+    assert others == ["base", "base"]  # an environment is copied from one to the other
+    version = re.fullmatch(r"docker\.io/library/python:([\d.]+)-slim", first)
+    assert version is not None
+    takes = Requirement(f"python{PROJECT['project']['requires-python']}").specifier
+    assert takes.contains(version[1])
+
+
+def test_the_container_s_choices_exist() -> None:
+    """Its extras and configurations, and those of its page."""
+    text = (ROOT / "Containerfile").read_text() + (ROOT / "docs/install.md").read_text()
+    extras = re.findall(r"EXTRAS=\"?([\w,]+)", text)
+    configs = re.findall(r'CONFIGS="([^"]+)"', text)
+    assert len(extras) == len(configs) == 2
+    assert set(",".join(extras).split(",")) <= set(
+        PROJECT["project"]["optional-dependencies"]
+    )
+    for name in " ".join(configs).split():
+        assert (ROOT / "configs" / f"{name}.yaml").is_file()
+
+
+def test_the_page_names_every_extra_of_users() -> None:
+    page = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+    table = page.split("## Extras")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| (`.*?) \|", table, re.MULTILINE)
+    named = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+    ours = {"test", "docs", "dev"}
+    assert named == set(PROJECT["project"]["optional-dependencies"]) - ours
+
+
+def test_installing_is_told_where_a_user_looks() -> None:
+    """The page is a link of the README, and on the site."""
+    assert "(docs/install.md)" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert "../install" in Path(ROOT / "docs/how_to/index.md").read_text()
