@@ -114,6 +114,9 @@ docs: $(STAMP) ## build the site into docs/_build/html, with its replays; warnin
 	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
 	@echo "The site is docs/_build/html/index.html"
 
+links: $(STAMP) ## ask every other site that the documents link to (needs a network)
+	@$(BIN)/python tools/links.py
+
 ##@ Keep
 figures: $(STAMP) ## draw the documents' figures anew, into docs/figures
 	@$(BIN)/python docs/make_figures.py
@@ -147,7 +150,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist machine_code docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help docs figures screenshots animations notebooks demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test format constraints clean
+.PHONY: help docs links figures screenshots animations notebooks demo quick sims test thorough lint coverage fuzz mutants wheel wheel-test format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

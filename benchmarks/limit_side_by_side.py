@@ -3,9 +3,11 @@
     .venv-peers/bin/python benchmarks/limit_side_by_side.py
 
 The configurations of configs/limits on rigid bodies at 1 kHz. Without TSID its rows are
-omitted. Writes a table into docs/limits.md and draws docs/figures/limits.png.
+omitted. Writes a table into docs/limits.md and draws docs/figures/limits.png;
+``--draw`` only draws, which needs no TSID.
 """
 
+import argparse
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -26,7 +28,7 @@ from hsp_control.visualization.plots import new_figure, styled
 
 PERIOD = 1e-3  # [s]
 NAMES = ("panda_half_strength", "panda_towards_limit")
-SHOWN = ("this law, limits", "this law, no limits", "TSID, posture 1e-03")
+SHOWN = ("this law, limits", "this law, no limits")
 Compute = Callable[[float, Array, Array], Array]
 
 
@@ -178,8 +180,15 @@ def close_loop(experiment: Experiment, compute: Compute) -> Run:
     return Run(*(np.array(column) for column in zip(*rows, strict=True)), end)
 
 
-def runs_of(name: str) -> tuple[dict[str, Run], RobotLimits]:
-    """Return the runs of a configuration by controller, and its limits."""
+def runs_of(
+    name: str, chosen: tuple[str, ...] | None = None
+) -> tuple[dict[str, Run], RobotLimits]:
+    """Return the runs of a configuration by controller, and its limits.
+
+    Args:
+        name: The configuration.
+        chosen: Names of controllers; None: all of them.
+    """
     load = lambda *changes: hsp.load_experiment(f"limits/{name}", *changes)  # noqa: E731
     limits = load().controller.limits
     assert limits is not None
@@ -199,7 +208,8 @@ def runs_of(name: str) -> tuple[dict[str, Run], RobotLimits]:
                 load(free), limits, weight
             )
     return {
-        label: close_loop(load(free), make()) for label, make in controllers.items()
+        label: close_loop(load(free), controllers[label]())
+        for label in chosen or controllers
     }, limits
 
 
@@ -250,41 +260,43 @@ def cost(name: str, run: Run, limits: RobotLimits) -> str:
 
 def figure(found: dict[str, tuple[dict[str, Run], RobotLimits]]) -> Figure:
     """Draw limited quantities, tracking error and null-space error."""
-    drawn = new_figure(10.0, 7.2)
+    drawn = new_figure(8.4, 6.4)
     axes = drawn.subplots(3, 2, sharex="col")
     half, towards = NAMES
+    styles = {
+        SHOWN[0]: {"color": SERIES[0], "lw": 2.0, "label": "with limits"},
+        SHOWN[1]: {"color": SERIES[1], "lw": 1.5, "ls": "--", "label": "without"},
+    }
     for column, name in enumerate((half, towards)):
         runs, limits = found[name]
         top, middle, bottom = axes[:, column]
-        labels = [label for label in SHOWN if label in runs]
-        for color, label in zip(SERIES, labels, strict=False):
+        for label, style in styles.items():
             run = runs[label]
-            style = {"color": color, "lw": 1.3, "label": label}
             shown = run.tau[:, 1] if name == half else np.rad2deg(run.q[:, 3])
             top.plot(run.t, shown, **style)
             middle.semilogy(run.t, 1e3 * run.error + 1e-6, **style)
             bottom.semilogy(run.t, run.null_space + 1e-6, **style)
-        bounds = (
-            (-limits.effort[1], limits.effort[1])
-            if name == half
-            else (np.rad2deg(limits.upper[3]),)
-        )
-        for bound in bounds:
-            top.axhline(bound, color=INK, lw=1.0, ls="--")
-        label = "effort of joint 2 [N·m]" if name == half else "joint 4 [°]"
-        top.set_ylabel(label)
-        middle.set_ylabel("hand error [mm]")
-        bottom.set_ylabel("‖P(g − v)‖ [rad/s]")
-        middle.set_ylim(1e-3, 3e2)
+        bound = -limits.effort[1] if name == half else np.rad2deg(limits.upper[3])
+        top.axhline(bound, color=INK, lw=1.0, ls=":", label="limit")
+        top.set_ylabel("effort of joint 2 [N·m]" if name == half else "joint 4 [°]")
+        middle.set_ylim(1e-3, 1e2)
         bottom.set_ylim(1e-4, 1e2)
-        bottom.set_xlabel("t [s]")
-        top.set_title(name)
-    axes[0, 1].legend(loc="lower center", fontsize=8)
+        bottom.set_xlabel("time [s]")
+        top.set_title(f"({'ab'[column]})  limits/{name}")
+    axes[1, 0].set_ylabel("hand error [mm]")
+    axes[2, 0].set_ylabel("null-space error\n‖P(g − v)‖ [rad/s]")
+    handles, labels = axes[0, 1].get_legend_handles_labels()
+    drawn.legend(handles, labels, loc="outside lower center", ncols=3)
     return drawn
 
 
 def main() -> None:
     """Run, write the table, draw."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--draw", action="store_true", help="only draw the figure")
+    if parser.parse_args().draw:
+        draw({name: runs_of(name, SHOWN) for name in NAMES})
+        return
     found = {name: runs_of(name) for name in NAMES}
     table = HEADER + "".join(
         row(name, label, run, limits)
@@ -300,8 +312,13 @@ def main() -> None:
         replace_section(DOCS / "step_cost.md", "make bench, limits", costs)
     print(table)
     replace_section(DOCS / "limits.md", "limit_side_by_side", "\n" + table + "\n")
+    draw(found)
+
+
+def draw(found: dict[str, tuple[dict[str, Run], RobotLimits]]) -> None:
+    """Save the figure."""
     with styled():
-        figure(found).savefig(DOCS / "figures" / "limits.png", dpi=110)
+        figure(found).savefig(DOCS / "figures" / "limits.png", dpi=120)
 
 
 if __name__ == "__main__":

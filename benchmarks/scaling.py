@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 from scipy.optimize import curve_fit
 from timing import Compute, State, step_times
 
@@ -33,6 +34,7 @@ from hsp_control.null_space.fields import (
     Transmission,
 )
 from hsp_control.trajectories import ComposedPose, HoldOrientation, TrajectorySample
+from hsp_control.visualization.palette import SERIES as SERIES_COLORS
 from hsp_control.visualization.plots import new_figure, styled
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -358,29 +360,55 @@ def table(what: str, found: dict[str, Array]) -> str:
 
 
 def draw(everything: dict[str, dict[str, Array]]) -> None:
-    """Draw the figure with one panel for each series."""
+    """Draw the figure with one panel for each series, of rows that begin with n, t."""
+    styles = {
+        "this law": (SERIES_COLORS[0], "-", "o"),
+        "TSID": (SERIES_COLORS[1], "--", "s"),
+        "in conflict": (SERIES_COLORS[2], ":", "^"),
+    }
     with styled():
-        figure = new_figure(2.6 * len(everything), 2.6)
-        panels = figure.subplots(1, len(everything), squeeze=False)[0]
-        for axes, (what, found) in zip(panels, everything.items(), strict=True):
+        figure = new_figure(8.4, 5.0)
+        panels = figure.subplots(2, 3).ravel()
+        for axes, (what, found) in zip(panels, everything.items(), strict=False):
             for name, rows in found.items():
-                (line,) = axes.plot(rows[:, 0], rows[:, 1], "o", ms=3.5)
+                color, dashes, marker = styles[name]
+                axes.plot(rows[:, 0], rows[:, 1], marker, color=color, ms=4.5)
                 n = np.linspace(max(rows[0, 0], 1.0), rows[-1, 0], 100)
                 a, b, p = growth(rows)
-                label = f"{name}: ∝ n$^{{{p:.1f}}}$"
-                curve = a + b * n**p
-                axes.plot(n, curve, color=line.get_color(), lw=1.2, label=label)
-                axes.fill_between(
-                    rows[:, 0],
-                    rows[:, 2],
-                    rows[:, 3],
-                    color=line.get_color(),
-                    alpha=0.2,
-                )
-            axes.set(xlabel=what, ylim=(0.0, None))
+                label = f"{name}: as n$^{{{p:.1f}}}$"
+                axes.plot(n, a + b * n**p, dashes, color=color, lw=1.5, label=label)
+            top = max(rows[:, 1].max() for rows in found.values())
+            axes.set(xlabel=what, ylim=(0.0, (1.15 + 0.13 * len(found)) * top))
+            axes.xaxis.set_major_locator(
+                MaxNLocator(6, steps=[1, 2, 5, 10], integer=True)
+            )
             axes.legend(loc="upper left")
-        panels[0].set_ylabel("one step [µs]")
+        for axes in panels[::3]:
+            axes.set_ylabel("one step [µs]")
+        for axes in panels[len(everything) :]:
+            axes.set_axis_off()
+            for name, (color, dashes, marker) in styles.items():
+                axes.plot([], [], dashes, marker=marker, color=color, label=name)
+            axes.legend(loc="center", title="medians, and their fit t = a + b nᵖ")
         figure.savefig(FIGURE, dpi=130)
+
+
+def written() -> dict[str, dict[str, Array]]:
+    """Return the medians in the page's tables: rows (n, t) of each controller."""
+    found: dict[str, dict[str, Array]] = {}
+    for section in DOCUMENT.read_text(encoding="utf-8").split("\n## ")[1:]:
+        table = [
+            [cell.strip() for cell in line.strip("|").split("|")]
+            for line in section.splitlines()
+            if line.startswith("| ")
+        ]
+        counts = np.array(table[0][1:-1], dtype=float)
+        found[section.splitlines()[0].lower()] = {
+            name: np.column_stack([counts, np.array(times[:-1], dtype=float)])
+            for name, *times in table[1:]
+            if name != "ratio"
+        }
+    return found
 
 
 def main() -> None:
@@ -388,7 +416,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=21, help="rounds of timing")
     parser.add_argument("--block", type=int, default=100, help="steps in a round")
+    parser.add_argument(
+        "--draw",
+        action="store_true",
+        help="only draw what the page has, measure nothing",
+    )
     options = parser.parse_args()
+    if options.draw:
+        draw(written())
+        return
     everything = {}
     for what, series in SERIES.items():
         print(what, flush=True)

@@ -4,9 +4,10 @@
 
 configs/whole_body/talos_weak_arm.yaml on MuJoCo and on ideal contacts, with two limits
 of the null space, with one and with none of them. Writes a table into
-docs/whole_body.md and draws docs/figures/weak_arm.png.
+docs/whole_body.md and draws docs/figures/weak_arm.png; ``--draw`` only draws.
 """
 
+import argparse
 from concurrent.futures import ProcessPoolExecutor
 from typing import NamedTuple
 
@@ -116,47 +117,65 @@ def table(found: dict[str, RunData]) -> str:
 
 def figure(found: dict[str, RunData]) -> Figure:
     """Draw efforts of the arm, errors of hand and centre of mass, speeds, status."""
-    drawn = new_figure(9.0, 9.0)
-    efforts, hand, mass, speed, status = drawn.subplots(5, 1, sharex=True)
+    drawn = new_figure(8.4, 7.6)
+    efforts, hand, mass, speed, status = drawn.subplots(
+        5, 1, sharex=True, height_ratios=(1.0, 1.0, 1.0, 1.0, 0.18)
+    )
     shown = found[BOTH]
-    for color, joint in zip(SERIES, (1, 3, 4), strict=False):
+    dashes = ("-", "--", ":")
+    for color, dash, joint in zip(SERIES, dashes, (1, 3, 4), strict=False):
         efforts.plot(
             shown.t,
             100 * shown.effort_ratio[:, joint],
+            dash,
             color=color,
-            lw=1.2,
+            lw=1.6,
             label=f"arm_right_{joint + 1}",
         )
-    efforts.axhline(100, color=INK, lw=1.0, ls="--")
-    efforts.set_ylabel("effort\n[% of its limit]")
+    efforts.axhline(100, color=INK, lw=1.0, label="limit")
+    efforts.set_ylabel("effort\n[% of limit]")
     efforts.set_ylim(0.0, 108.0)
-    efforts.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8, ncols=3)
-    for color, label in zip(SERIES, (BOTH, NEITHER), strict=False):
+    efforts.set_title("(a)  Efforts of the weak arm, with both limits")
+    hand.set_title("(b)  With both limits of the null space, and with neither")
+    named = {BOTH: "both limits", NEITHER: "neither"}
+    for color, dash, label in zip(SERIES, dashes, (BOTH, NEITHER), strict=False):
         data = found[label]
-        style = {"color": color, "lw": 1.2, "label": label}
+        style = {"color": color, "ls": dash, "lw": 1.6, "label": named[label]}
         hand.semilogy(data.t, data.hand + 1e-3, **style)
         mass.semilogy(data.t, data.mass + 1e-3, **style)
         speed.plot(data.t, data.fastest, **style)
     hand.set_ylabel("hand error\n[mm]")
     mass.set_ylabel("centre of mass\nerror [mm]")
     speed.set_ylabel("fastest joint\n[rad/s]")
-    hand.legend(loc="lower right", fontsize=8, ncols=2)
-    status.step(shown.t, shown.status, color=SERIES[0], lw=0.8)
-    status.set_yticks([0, 1, 2, 3], ["exact", "other forces", "limited", "relaxed"])
-    status.set_ylim(-0.4, 3.4)
-    status.set_xlabel("t [s]")
+    for axes in (hand, mass):
+        axes.set_ylim(1e-2, None)
+    for axes, columns in ((efforts, 4), (hand, 2)):
+        above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.02)}
+        axes.legend(**above, ncols=columns)
+    limited = shown.status >= Status.LIMITED
+    status.fill_between(shown.t, 0.0, 1.0, where=limited, color=INK, alpha=0.45, lw=0)
+    status.set(ylim=(0.0, 1.0), yticks=[], xlabel="time [s]")
+    status.set_ylabel("limited", rotation=0, ha="right", va="center")
+    status.grid(visible=False)
+    drawn.align_ylabels([efforts, hand, mass, speed])
     return drawn
 
 
 def main() -> None:
     """Run, write the table, and draw the figure."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--draw", action="store_true", help="only draw the figure")
+    drawn_only = parser.parse_args().draw
+    chosen = [BOTH, NEITHER] if drawn_only else [*RUNS]
     with ProcessPoolExecutor(2) as pool:
-        found = dict(zip(RUNS, pool.map(run_all, RUNS.values()), strict=True))
-    text = table(found)
-    print(text)
-    replace_section(DOCS / "whole_body.md", "weak_arm", "\n" + text + "\n")
+        runs = pool.map(run_all, [RUNS[name] for name in chosen])
+        found = dict(zip(chosen, runs, strict=True))
+    if not drawn_only:
+        text = table(found)
+        print(text)
+        replace_section(DOCS / "whole_body.md", "weak_arm", "\n" + text + "\n")
     with styled():
-        figure(found).savefig(DOCS / "figures" / "weak_arm.png", dpi=110)
+        figure(found).savefig(DOCS / "figures" / "weak_arm.png", dpi=120)
 
 
 if __name__ == "__main__":

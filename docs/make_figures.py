@@ -126,7 +126,15 @@ def draw_sweep() -> None:
         overrides=["simulation.duration=6"],
     )
     with styled():
-        sweep_figure(found).savefig(FOLDER / "sweep_panda_obstacle.png", dpi=85)
+        outcomes = (
+            "tracking.hand.position.rms",
+            "null_space_error.rms",
+            "manipulability.min",
+            "distance.obstacle_clearance.min",
+        )
+        sweep_figure(found, outcomes).savefig(
+            FOLDER / "sweep_panda_obstacle.png", dpi=110
+        )
 
 
 def draw_walk(left: Axes, right: Axes) -> None:

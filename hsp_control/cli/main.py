@@ -11,6 +11,8 @@ from hsp_control.common.exceptions import HspControlError
 
 _OWN_INTERRUPTS = {"bench", "export", "play", "sweep", "view"}
 """Commands that must close processes and pages, or save rows, at Ctrl-C."""
+_PACKAGES = {"libgomp.so.1": "libgomp1 (Debian, Ubuntu) or libgomp (Fedora)"}
+"""What has a library that the wheels of our dependencies expect."""
 FAILURE = 2
 """Exit status after any error."""
 
@@ -34,11 +36,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     if plain:
         os.environ["NUMBA_DISABLE_JIT"] = "1"
-    # Commands are imported only when needed, so that `hsp --help` answers at once.
-    from hsp_control.cli import commands, consoles
-    from hsp_control.cli.compiling import compiling_shown
-
     try:
+        # Commands are imported only when needed, so that `hsp --help` answers at once.
+        from hsp_control.cli import commands, consoles
+        from hsp_control.cli.compiling import compiling_shown
+
         # With other commands Ctrl-C ends the process at once, as during start-up: there
         # is nothing to save, and an exception may get lost in callbacks of libraries.
         if (
@@ -50,6 +52,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return int(getattr(commands, command)(options))
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
+    except ImportError as error:  # Pinocchio's wheel links what slim systems lack
+        library, _, reason = str(error).partition(": ")
+        if "shared object file" not in reason:
+            raise
+        advice = _PACKAGES.get(library, "the package of your system that has it")
+        missing = f"hsp: {library} is missing on this system: install {advice}"
+        print(missing, file=sys.stderr)
     except ArithmeticError:
         if not plain:
             raise

@@ -3,16 +3,30 @@
 They are here, below the view itself, because a configuration contains them.
 """
 
+import re
 from dataclasses import KW_ONLY
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Flag, Positive, Vector3
 
-Color = Annotated[str, Field(pattern="^#[0-9A-Fa-f]{6}$")]
+_COLOR = "^#[0-9A-Fa-f]{6}$"
+
+
+def _color(value: object) -> object:
+    if value is None:
+        raise ValueError(
+            "nothing given; write a colour in quotes, \"#14202B\": # begins a comment"
+        )
+    if isinstance(value, str) and not re.match(_COLOR, value):
+        raise ValueError(f"{value!r} is not a colour, such as '#14202B'")
+    return value
+
+
+Color = Annotated[str, Field(pattern=_COLOR), BeforeValidator(_color)]
 """A colour as ``#RRGGBB``."""
 
 

@@ -96,19 +96,29 @@ def test_hsp_answers_without_the_engine(words: list[str]) -> None:
     assert not imported(code) & HEAVY
 
 
+FISH = {
+    "_ARGCOMPLETE_SHELL": "fish",
+    "_ARGCOMPLETE_DFS": "\t",
+    "_ARGCOMPLETE_SUPPRESS_SPACE": "1",
+}
+"""What fish tells a command: it shows what is told of each choice beside it."""
+
+
 @pytest.mark.process
 @pytest.mark.parametrize(
-    ("line", "offered"),
+    ("line", "offered", "shell"),
     [
-        ("hsp ch", "check "),
-        ("hsp check panda_ob", "panda_obstacle "),
-        ("hsp run paper/4", "paper/4_moving_obstacle "),
-        ("hsp robots pl", "planar3r "),
-        ("hsp sweep --sch", "--scheduler "),
+        ("hsp ch", "check ", {}),
+        ("hsp check panda_ob", "panda_obstacle ", {}),
+        ("hsp run paper/4", "paper/4_moving_obstacle ", {}),
+        ("hsp robots pl", "planar3r ", {}),
+        ("hsp sweep --sch", "--scheduler ", {}),
+        ("hsp ch", "check\tcheck a configuration without running it", FISH),
+        ("hsp check panda_ob", "panda_obstacle\t", FISH),
     ],
 )
 def test_a_shell_completes_without_the_engine(
-    line: str, offered: str, tmp_path: Path
+    line: str, offered: str, shell: dict[str, str], tmp_path: Path
 ) -> None:
     answer = tmp_path / "answer"
     code = (
@@ -127,6 +137,7 @@ def test_a_shell_completes_without_the_engine(
         COMP_LINE=line,
         COMP_POINT=str(len(line)),
         _ARGCOMPLETE_STDOUT_FILENAME=str(answer),
+        **shell,
     )
     assert answer.read_text().strip("\013") == offered
     assert not found & HEAVY

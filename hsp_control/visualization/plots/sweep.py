@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import PlotError
@@ -72,7 +72,7 @@ def sweep_figure(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Figure:
     if not columns or not rows:
         raise PlotError("no parameter of this sweep varies: there is nothing to draw")
     with styled():
-        figure = new_figure(1.6 + 2.2 * len(columns), 1.1 + 1.65 * len(rows))
+        figure = new_figure(1.5 + 1.75 * len(columns), 1.1 + 1.5 * len(rows))
         _add_title(figure, sweep, found)
         grid = figure.subplots(
             len(rows), len(columns), squeeze=False, sharex="col", sharey="row"
@@ -83,7 +83,7 @@ def sweep_figure(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Figure:
             metric = sweep.meta["metrics"][found.outcomes[j]]
             label = textwrap.fill(f"{metric['meaning']} [{metric['unit']}]", 22)
             grid[j, 0].set_ylabel(literal_text(label))
-            grid[j, 0].yaxis.set_label_coords(-0.32, 0.5)
+            grid[j, 0].yaxis.set_label_coords(-0.36, 0.5)
         for k, i in enumerate(columns):
             grid[-1, k].set_xlabel(literal_text(_wrapped(found.parameters[i])))
     return figure
@@ -138,7 +138,7 @@ def _tint(axes: Axes, correlation: float, share: float, noise: float) -> None:
     words += [f"{share:.0%}"] if share >= 0.005 else []
     axes.set_title(
         "  ".join(words) or "no influence",
-        fontsize=8.0,
+        fontsize=9.0,
         fontweight="normal" if share < 0.1 else "bold",
         color=palette.INK if words else palette.MUTED,
         pad=3.0,
@@ -153,6 +153,8 @@ def _axis_positions(axes: Axes, sweep: Sweep, parameter: str) -> Array:
         if _is_logarithmic(sweep, parameter):
             axes.set_xscale("log")
             _label_decades(axes.xaxis, numbers)
+        else:
+            axes.xaxis.set_major_locator(MaxNLocator(4))
         return np.asarray(numbers)
     names, places = np.unique(values.astype(str), return_inverse=True)
     axes.set_xticks(range(len(names)), [literal_text(name[:14]) for name in names])
@@ -219,14 +221,14 @@ def _add_title(figure: Figure, sweep: Sweep, found: Sensitivity) -> None:
         literal_text(
             textwrap.fill("  ·  ".join(parts), 30 + 42 * len(found.parameters))
         ),
-        fontsize=7.5,
+        fontsize=8.0,
         color=palette.MUTED,
         x=0.01,
         ha="left",
     )
 
 
-def _wrapped(key: str, width: int = 26) -> str:
+def _wrapped(key: str, width: int = 22) -> str:
     """Return a key path, wrapped after dots."""
     lines = [""]
     for part in key.replace(".", ".\0").split("\0"):

@@ -174,6 +174,30 @@ def test_each_mistake_gets_one_message_and_status_2(
     assert "Traceback" not in captured.err
 
 
+def test_a_library_that_a_slim_system_lacks_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def lacks(library: str, reason: str) -> None:
+        def load(_: object) -> int:
+            raise ImportError(f"{library}: {reason}")
+
+        monkeypatch.setattr("hsp_control.cli.commands.check", load)
+
+    reason = "cannot open shared object file: No such file or directory"
+    lacks("libgomp.so.1", reason)
+    assert main(["check", MOVING]) == 2
+    assert capsys.readouterr().err == (
+        "hsp: libgomp.so.1 is missing on this system: "
+        "install libgomp1 (Debian, Ubuntu) or libgomp (Fedora)\n"
+    )
+    lacks("libother.so", reason)
+    assert main(["check", MOVING]) == 2
+    assert "libother.so is missing on this system" in capsys.readouterr().err
+    lacks("no module", "a mistake of ours")
+    with pytest.raises(ImportError, match="a mistake of ours"):
+        main(["check", MOVING])
+
+
 def test_bad_usage_ends_with_status_2() -> None:
     with pytest.raises(SystemExit) as caught:
         main(["run"])

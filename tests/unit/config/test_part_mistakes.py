@@ -56,6 +56,12 @@ def change(**keys: Any) -> dict[str, Any]:
 
 # Each row: the sections that are replaced, the class of the error, and its message.
 MISTAKES: list[tuple[dict[str, Any], str, str]] = [
+    # colours: # begins a comment
+    ({"view": {"background": None}}, "ConfigError",
+     "view.background: nothing given; write a colour in quotes, \"#14202B\": "
+     "# begins a comment"),
+    ({"view": {"background": "blue"}}, "ConfigError",
+     "view.background: 'blue' is not a colour, such as '#14202B'"),
     # types
     ({"tasks": {"hand": {"frame": "panda_hand"}}}, "ConfigError",
      f"tasks.hand: missing key 'type'; type is one of: {TASKS}"),
