@@ -21,6 +21,7 @@ extensions = [
     "mathml",
     "reference",
     "replays",
+    "search_words",
     "lecture",
 ]
 exclude_patterns = ["_build", "_site", "lecture"]

@@ -1,5 +1,6 @@
 """The pages of all public names; autodoc writes what is in their docstrings."""
 
+import re
 from collections.abc import Iterable
 from importlib import import_module
 from inspect import getdoc, isclass, isfunction
@@ -17,10 +18,10 @@ _SPACES = {**hsp_control._NAMESPACES, "control": "control", "geometry": "geometr
 
 def names_page() -> str:
     """Return the page of the names at the top, each a link to its namespace's page."""
-    rows = []
+    rows, homes = [], _homes()
     for name, room in hsp_control._HOMES.items():
         value = getattr(hsp_control, name)
-        path = f"hsp_control.{room}.{name}"
+        path = homes.get(_home(value), f"hsp_control.{room}.{name}")
         rows.append(f"| {{py:obj}}`hsp.{name} <{path}>` | {_summary(value)} |")
     spaces = [f"hsp.{name}" for name in sorted(_SPACES)]
     tree = "\n".join(spaces)
@@ -33,16 +34,33 @@ def names_page() -> str:
 
 
 def _summary(value: Any) -> str:
-    text = (getdoc(value) or "").split("\n\n")[0].replace("\n", " ")
-    return text.replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")
+    text = (getdoc(value) or "").split("\n\n")[0].replace("\n", " ").replace("|", "\\|")
+    parts = text.split("`")  # every second one is code, in which nothing is escaped
+    parts[::2] = [re.sub(r"([*_])", r"\\\1", part) for part in parts[::2]]
+    return "`".join(parts)
 
 
 def namespace_pages() -> Iterable[tuple[str, str]]:
     """Return the page of each namespace, with its name."""
-    written: dict[str, str] = {}
+    homes = _homes()
     for name, room in _SPACES.items():
         module = import_module(f"hsp_control.{room}")
-        yield name, _namespace(name, module, written)
+        yield name, _namespace(name, module, homes)
+
+
+def _homes() -> dict[str, str]:
+    """Return under which name each class and function is described, once."""
+    found: dict[str, str] = {}
+    for room in _SPACES.values():
+        module = import_module(f"hsp_control.{room}")
+        for name, value in _public(module).items():
+            found.setdefault(_home(value), f"{module.__name__}.{name}")
+    return found
+
+
+def _home(value: Any) -> str:
+    names = (getattr(value, name, "") for name in ("__module__", "__qualname__"))
+    return ".".join(names)
 
 
 def _public(module: ModuleType) -> dict[str, Any]:
@@ -58,13 +76,13 @@ def _public(module: ModuleType) -> dict[str, Any]:
     return found
 
 
-def _namespace(name: str, module: ModuleType, written: dict[str, str]) -> str:
+def _namespace(name: str, module: ModuleType, homes: dict[str, str]) -> str:
     lines = [f"# hsp.{name}", "", plain((getdoc(module) or "").split("\n\n")[0]), ""]
     for each, value in _public(module).items():
         path = f"{module.__name__}.{each}"
-        home = f"{value.__module__}.{value.__qualname__}"
-        if written.setdefault(home, path) != path:
-            lines += [f"{{py:obj}}`{each} <{written[home]}>`: {_summary(value)}", ""]
+        home = homes[_home(value)]
+        if home != path:
+            lines += [f"{{py:obj}}`{each} <{home}>`: {_summary(value)}", ""]
             continue
         kind = "class" if isclass(value) else "function"
         lines += ["```{eval-rst}", f".. auto{kind}:: {path}"]

@@ -154,7 +154,7 @@ def _axis_positions(axes: Axes, sweep: Sweep, parameter: str) -> Array:
             axes.set_xscale("log")
             _label_decades(axes.xaxis, numbers)
         else:
-            axes.xaxis.set_major_locator(MaxNLocator(4))
+            axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         return np.asarray(numbers)
     names, places = np.unique(values.astype(str), return_inverse=True)
     axes.set_xticks(range(len(names)), [literal_text(name[:14]) for name in names])
