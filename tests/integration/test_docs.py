@@ -12,6 +12,7 @@ from places import ROOT
 import hsp_control
 from hsp_control import load_experiment
 from hsp_control.cli.options.command_line import command_line
+from hsp_control.common.resources import bundled_configs, bundled_robots
 from hsp_control.live import LiveSettings
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.robot import RobotDescription
@@ -100,6 +101,44 @@ def test_the_guides_can_be_followed(
     for line in "".join(blocks(text, "sh")).splitlines():
         if line.startswith("hsp "):
             command_line().parse_args(shlex.split(line.split("#")[0])[1:])
+
+
+def commands(text: str) -> list[list[str]]:
+    """Return the words behind `hsp` of each command in a page's shell blocks."""
+    shell = "".join(blocks(text, "sh") + blocks(text, "text")).replace("\\\n", " ")
+    found = (
+        re.match(r"(?:\$ |\.venv/bin/)?hsp ((?:[^#>&|]|\S[#>&|])*)", line.strip())
+        for line in shell.splitlines()
+    )
+    return [shlex.split(command[1]) for command in found if command]
+
+
+PAGES = sorted(
+    page.relative_to(ROOT).as_posix()
+    for folder in ("docs", "robots", "examples")
+    for page in (ROOT / folder).rglob("*.md")
+    if commands(page.read_text(encoding="utf-8")) and "_build" not in page.parts
+)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_command_of_a_page_can_be_given(page: str) -> None:
+    bundled = {*bundled_configs(), *bundled_robots()}
+    for words in commands((ROOT / page).read_text(encoding="utf-8")):
+        options = command_line().parse_args(words)
+        name = str(getattr(options, "config", None) or "CONFIG")
+        a_reader_s_own = name == "CONFIG" or Path(name).suffix
+        assert a_reader_s_own or name in bundled, words
+
+
+def test_pages_have_commands() -> None:
+    """The test above looks at what a reader would type."""
+    assert {"docs/view.md", "docs/franka.md", "docs/tutorial/ten_minutes.md"} <= set(
+        PAGES
+    )
+    assert commands("```sh\nhsp run a.yaml --set x='[1, 2]'  # why\n```") == [
+        ["run", "a.yaml", "--set", "x=[1, 2]"]
+    ]
 
 
 def test_the_tutorial_s_field_does_what_it_says(

@@ -38,16 +38,14 @@ def _draw_exceedance(axes: Axes, latency: Latency) -> None:
             palette.ACTUAL,
             ":",
         ),
-        ("start of period to effort", latency.response, palette.OBSTACLE, "-"),
-        ("wake-up, empty loop", latency.empty, palette.MUTED, "-"),
+        ("start of period to effort", latency.response, palette.OBSTACLE, "--"),
+        ("wake-up, empty loop", latency.empty, palette.MUTED, "-."),
     ]
     for name, times, color, dashes in curves:
         ordered = np.sort(times)[::-1] * 1e6
         share = np.arange(1, len(ordered) + 1) / len(ordered)
         axes.plot(ordered, share, dashes, color=color, label=name)
-    axes.axvline(
-        latency.period * 1e6, color=palette.WARNING, linestyle="--", label="period"
-    )
+    axes.axvline(latency.period * 1e6, color=palette.INK, linewidth=1.0, label="period")
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("time [µs]")
@@ -57,25 +55,24 @@ def _draw_exceedance(axes: Axes, latency: Latency) -> None:
 
 
 def _draw_course(axes: Axes, latency: Latency) -> None:
-    for name, times, color in (
-        ("start of period to effort", latency.response, palette.OBSTACLE),
-        ("wake-up, empty loop", latency.empty, palette.MUTED),
+    for name, times, color, marker in (
+        ("start of period to effort", latency.response, palette.OBSTACLE, "o"),
+        ("wake-up, empty loop", latency.empty, palette.MUTED, "x"),
     ):
-        _draw_groups(axes, times, latency.period, color, name)
-    axes.axhline(
-        latency.period * 1e6, color=palette.WARNING, linestyle="--", label="period"
-    )
+        _draw_groups(axes, times, latency.period, (color, marker), name)
+    axes.axhline(latency.period * 1e6, color=palette.INK, linewidth=1.0, label="period")
     axes.set_yscale("log")
     axes.set_xlabel("time in the loop [s]")
     axes.set_ylabel("time [µs]")
-    axes.set_title("(b)  Over time: median and maximum of groups")
+    axes.set_title("(b)  Over time: medians (lines) and maxima of groups")
     legend_below(axes)
 
 
 def _draw_groups(
-    axes: Axes, times: Array, period: float, color: str, name: str
+    axes: Axes, times: Array, period: float, style: tuple[str, str], name: str
 ) -> None:
     """Draw median and maximum of groups of periods; all values would overlap."""
+    color, marker = style
     groups = np.array_split(times * 1e6, min(len(times), 200))
     ends = np.cumsum([len(group) for group in groups]) * period
     axes.plot(ends, [np.median(group) for group in groups], color=color, label=name)
@@ -84,7 +81,7 @@ def _draw_groups(
         [group.max() for group in groups],
         color=color,
         linestyle="none",
-        marker=".",
+        marker=marker,
         markersize=3.0,
         alpha=0.6,
     )
