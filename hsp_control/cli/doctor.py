@@ -14,6 +14,7 @@ from packaging.requirements import Requirement
 
 from hsp_control.cli.consoles import out
 from hsp_control.common import kernel_cache
+from hsp_control.common.version import __version__
 from hsp_control.visualization.viewer.export.chromium import find_browser
 
 _PACKAGE = "hsp_control"
@@ -63,7 +64,17 @@ def doctor(options: argparse.Namespace) -> int:
 def _versions() -> Iterator[Check]:
     python = f"{platform.python_version()} on {platform.system()} {platform.machine()}"
     yield Check("Python", "ok", python)
-    yield Check(_PACKAGE, "ok", metadata.version(_PACKAGE))
+    installed = metadata.version(_PACKAGE)
+    yield (
+        Check(_PACKAGE, "ok", __version__)
+        if installed == __version__
+        else Check(
+            _PACKAGE,
+            "note",
+            f"{__version__}, installed as {installed}",
+            "install the checkout again: extras and plugins are those of the installation",
+        )
+    )
     found = ", ".join(f"{name} {metadata.version(name)}" for name in _SHOWN)
     yield Check("with", "ok", found)
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from mjcf_texts import CELL
 
-from hsp_control import Rollout
+from hsp_control import Rollout, __version__
 from hsp_control.cli import doctor, main
 from hsp_control.cli.interrupts import PATIENCE, DeferredInterrupt
 
@@ -113,6 +113,25 @@ def test_doctor_says_what_this_machine_lacks(
     assert "not installed: pyarrow" in text
     assert "pip install 'hsp_control[sweeps]'" in text
     assert "not set" not in text
+
+
+def test_doctor_tells_an_installation_of_another_version(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    version = metadata.version
+    for installed, told in (
+        (__version__, ("ok", __version__)),
+        ("0.0.1", ("note", f"{__version__}, installed as 0.0.1")),
+    ):
+
+        def found(name: str, installed: str = installed) -> str:
+            return installed if name == "hsp_control" else version(name)
+
+        monkeypatch.setattr(doctor.metadata, "version", found)
+        assert main(["doctor", "--json"]) == 0
+        checks = {each["topic"]: each for each in json.loads(capsys.readouterr().out)}
+        ours = checks["hsp_control"]
+        assert (ours["state"], ours["found"]) == told
 
 
 def versions_without(package: str) -> Callable[[str], str]:
