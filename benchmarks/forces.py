@@ -153,7 +153,7 @@ def head(task: str) -> str:
     """Return the head of a table."""
     return (
         f"| | force, rms / max error [N] | contact lost | {task}, rms / max [mm] | "
-        "‖e_N‖, rms [rad/s] | command gave way, max [N] | limited steps | |\n"
+        "‖e_N‖, rms [rad/s] | planned off the command, max [N] | limited steps | |\n"
         "|---|--:|--:|--:|--:|--:|--:|---|\n"
     )
 
