@@ -19,7 +19,7 @@ _COLOR = "^#[0-9A-Fa-f]{6}$"
 def _color(value: object) -> object:
     if value is None:
         raise ValueError(
-            "nothing given; write a colour in quotes, \"#14202B\": # begins a comment"
+            'nothing given; write a colour in quotes, "#14202B": # begins a comment'
         )
     if isinstance(value, str) and not re.match(_COLOR, value):
         raise ValueError(f"{value!r} is not a colour, such as '#14202B'")
