@@ -64,17 +64,15 @@ def doctor(options: argparse.Namespace) -> int:
 def _versions() -> Iterator[Check]:
     python = f"{platform.python_version()} on {platform.system()} {platform.machine()}"
     yield Check("Python", "ok", python)
-    installed = metadata.version(_PACKAGE)
-    yield (
-        Check(_PACKAGE, "ok", __version__)
-        if installed == __version__
-        else Check(
+    if (installed := metadata.version(_PACKAGE)) == __version__:
+        yield Check(_PACKAGE, "ok", __version__)
+    else:
+        yield Check(
             _PACKAGE,
             "note",
             f"{__version__}, installed as {installed}",
-            "install the checkout again: extras and plugins are those of the installation",
+            "install it again: its extras and plugins are those of the old version",
         )
-    )
     found = ", ".join(f"{name} {metadata.version(name)}" for name in _SHOWN)
     yield Check("with", "ok", found)
 
