@@ -23,7 +23,7 @@ from rich.table import Table
 from hsp_control.cli import robot_table
 from hsp_control.cli.advice import robot_advice, start_advice
 from hsp_control.cli.consoles import errors as _errors
-from hsp_control.cli.consoles import message_of, renamed_keys_printed
+from hsp_control.cli.consoles import message_of, renamed_keys_printed, working
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import DeferredInterrupt
 from hsp_control.cli.loading import load
@@ -201,13 +201,15 @@ def plot(options: argparse.Namespace) -> int:
 
     rollout = Rollout.load(options.log)
     folder = options.out or options.log.parent
-    for file in save_figures(
-        rollout,
-        folder,
-        options.log.stem,
-        formats=options.formats or ["png"],
-        absolute=not options.relative,
-    ):
+    with working("Drawing"):
+        files = save_figures(
+            rollout,
+            folder,
+            options.log.stem,
+            formats=options.formats or ["png"],
+            absolute=not options.relative,
+        )
+    for file in files:
         _out.print(f"Figure: {file}")
     return 0
 
@@ -289,7 +291,15 @@ def robots(options: argparse.Namespace) -> int:
     if options.markdown:
         print(robot_table.markdown(), end="")
         return 0
-    found = list(track(robot_table.rows(), "robots", console=_errors, transient=True))
+    found = list(
+        track(
+            robot_table.rows(),
+            "robots",
+            total=robot_table.count(),
+            console=_errors,
+            transient=True,
+        )
+    )
     if options.json:
         rows = [asdict(row) for row in found]
         print(json.dumps(rows, indent=2, ensure_ascii=False))

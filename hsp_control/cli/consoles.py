@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from typing import TextIO
 
 from rich.console import Console
+from rich.markup import escape
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from hsp_control.config.renamed import RenamedKeyWarning
 
@@ -24,6 +26,25 @@ out = Console(
     highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160
 )
 errors = Console(stderr=True, highlight=False)
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """Show on a terminal what is being done, and for how long, as long as it takes.
+
+    Args:
+        what: What is being done, as in "drawing". Within it nothing may be printed.
+    """
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(
+        *columns,
+        console=errors,
+        transient=True,
+        disable=not errors.is_terminal,
+        redirect_stdout=False,
+    ) as progress:
+        progress.add_task(f"{escape(what)} ...", total=None)
+        yield
 
 
 @contextmanager

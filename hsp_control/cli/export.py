@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from hsp_control.cli.consoles import errors, out
+from hsp_control.cli.consoles import errors, out, working
 from hsp_control.common.exceptions import ExportError
 
 if TYPE_CHECKING:
@@ -56,7 +56,8 @@ def export(options: argparse.Namespace) -> int:
     )
 
     def page(path: Path) -> Path:
-        return export_html(runs, path)
+        with working(f"Writing {path.name}"):
+            return export_html(runs, path)
 
     def film(path: Path) -> Path:
         with _Bar(path.name) as bar:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from hsp_control.cli.consoles import out
+from hsp_control.cli.consoles import out, working
 from hsp_control.cli.loading import robot_access
 from hsp_control.common.exceptions import ExportError, ModelError
 from hsp_control.inspection import Inspection
@@ -25,7 +25,7 @@ def inspect(options: argparse.Namespace) -> int:
     """Print what is odd about a robot; return 2 if it does not load."""
     description = RobotDescription(options.robot, xacro_args=_arguments(options.args))
     source = description.find(robot_access(str(options.robot), options))
-    with _no_warnings():
+    with _no_warnings(), working(f"Inspecting {options.robot}"):
         inspection = inspect_robot(source, description)
     if options.json:
         print(json.dumps(inspection.to_dict(), indent=2, ensure_ascii=False))

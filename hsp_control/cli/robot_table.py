@@ -53,7 +53,7 @@ _PREFACE = """\
 
 The robots that `Robot.load` finds by name, as printed by `hsp robots` and `hsp robots
 --markdown`. Any other robot is loaded by the path of its URDF:
-[own_robot.md](own_robot.md), or out of an MJCF: [mujoco.md](mujoco.md).
+[own_robot.md](own_robot.md), or from an MJCF: [mujoco.md](mujoco.md).
 
 The end effector is the frame that the robot's source names; if it names none, it is the
 most likely frame in the tree of joints (`Robot.end_effector`). *Position* and *pose*
@@ -100,10 +100,19 @@ class Row:
         return self.nv is not None and self.root != "free_flyer"
 
 
+def count() -> int:
+    """Return how many rows there are, without loading a robot."""
+    return len(_sources()) + len(list(examples_without_urdf()))
+
+
+def _sources() -> dict[str, RobotSource]:
+    sources = {name: find_robot(name) for name in bundled_robots()}
+    return sources | {k: v for k, v in example_robots().items() if k not in sources}
+
+
 def rows() -> Iterator[Row]:
     """Yield every robot: bundled ones, usable ones, then the others."""
-    sources = {name: find_robot(name) for name in bundled_robots()}
-    sources |= {k: v for k, v in example_robots().items() if k not in sources}
+    sources = _sources()
     for floating in (False, True):
         for name, source in sources.items():
             if (source.root == "free_flyer") == floating:

@@ -1,0 +1,28 @@
+"""What a terminal shows while a command works, and what a pipe does not get."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from hsp_control.cli import consoles, robot_table
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_only_a_terminal_shows_what_is_being_done(
+    terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = io.StringIO()
+    console = Console(file=text, force_terminal=terminal, width=80, color_system=None)
+    monkeypatch.setattr(consoles, "errors", console)
+    with consoles.working("Drawing [a]"):
+        print("a result")
+    assert ("Drawing [a] ... 0:00:00" in text.getvalue()) is terminal
+    assert capsys.readouterr().out == "a result\n"  # a pipe gets it untouched
+
+
+def test_as_many_robots_are_announced_as_are_listed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(robot_table, "_row", lambda name, source: name)
+    assert robot_table.count() == len(list(robot_table.rows()))
