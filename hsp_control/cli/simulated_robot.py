@@ -146,12 +146,17 @@ def _warm_up(robot: SimulatedRobot, experiment: Experiment) -> None:
     """Execute each real-time operation once, so that none is compiled later."""
     experiment.controller.compute(0.0, experiment.q0, experiment.v0)
     trial = SimulatedRobot(
-        robot.plant, robot.q, robot.v, robot.period, settings=LiveSettings(watchdog=1)
+        robot.plant,
+        robot.q,
+        robot.v,
+        robot.period,
+        settings=LiveSettings(watchdog=1),
+        contacts=experiment.controller.contacts,
     )
     trial.advance([robot.tau])
     for _ in range(10):
         trial.advance([])
-        trial.measure()
+        trial.measured()
     robot.plant.reset(0.0, robot.q, robot.v)
 
 

@@ -13,11 +13,12 @@ from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.effort_limiter import EffortLimiter
-from hsp_control.live.effort_source import EffortSource
 from hsp_control.live.report import LoopReport
 from hsp_control.live.safe_stop import Phase
 from hsp_control.live.state_reader import StateReader
+from hsp_control.plans import RunningPlan
 from hsp_control.robot import RobotState
+from hsp_control.simulation.control_chain import ControlChain, EffortSource
 from hsp_control.simulation.journal import JournalWriter
 from hsp_control.simulation.recorder import Recorder
 
@@ -86,6 +87,10 @@ class LiveLog:
             self._recorder.clear()
         self._head()
 
+    def follow(self, plan: RunningPlan | None) -> None:
+        """Set the plan of the run that begins; its streams are recorded."""
+        self._recorder.plan = plan
+
     def add(self, row: Row) -> None:
         """Write a row if it is later than the last one.
 
@@ -140,7 +145,7 @@ class LoopLog:
         self,
         path: str | Path | None,
         period: float,
-        effort_source: EffortSource,
+        chain: ControlChain[EffortSource],
         scene: Scene | None,
         meta: Mapping[str, Any],
     ) -> None:
@@ -149,21 +154,21 @@ class LoopLog:
         Args:
             path: The journal; None: no log.
             period: Time between two rows [s].
-            effort_source: Computes the efforts that are logged.
+            chain: Computes the efforts that are logged.
             scene: Obstacles to log.
             meta: JSON data of the log.
 
         Raises:
             LogError: If it cannot be written.
         """
-        self._effort_source, self._period = effort_source, period
+        self._chain, self._period = chain, period
         self._log: LiveLog | None = None
         self._next, self._phase = -inf, Phase.WAITING
         self._failed = False
         self.path = None if path is None else Path(path)
         self.controller_failed = False
         if self.path is not None:
-            self._log = LiveLog(self.path, effort_source.controller, scene, meta)
+            self._log = LiveLog(self.path, chain.command.controller, scene, meta)
 
     def row(
         self,
@@ -206,6 +211,11 @@ class LoopLog:
         if self._log is not None:
             self._log.warm_up(self._row(Phase.RUNNING, reader, limiter, 0.0))
 
+    def begin(self) -> None:
+        """Begin to log a run; the chain has begun, too."""
+        if self._log is not None:
+            self._log.follow(self._chain.plan)
+
     def _row(
         self, phase: Phase, reader: StateReader, limiter: EffortLimiter, response: float
     ) -> Row:
@@ -221,7 +231,10 @@ class LoopLog:
             response=response,
         )
         if phase == Phase.RUNNING and not self.controller_failed:
-            log_channels = {**self._effort_source.log_channels(), **log_channels}
+            log_channels = {
+                **self._chain.log_channels(state.q, state.v),
+                **log_channels,
+            }
         return Row(state, self._output(phase, state), limiter.applied, log_channels)
 
     def end(self, report: LoopReport) -> None:
@@ -252,9 +265,9 @@ class LoopLog:
         if self.controller_failed:
             return None
         if phase == Phase.RUNNING:
-            return self._effort_source.output
+            return self._chain.command.output
         try:
-            return self._effort_source.controller.compute(state)
+            return self._chain.command.controller.compute(state)
         except Exception:  # its effort is not used any more: log without it
             self.controller_failed = True
             return None

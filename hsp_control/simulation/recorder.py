@@ -43,7 +43,11 @@ _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
 
 class Recorder:
-    """Columns for a known number of rows; an incomplete row is never returned."""
+    """Columns for a known number of rows; an incomplete row is never returned.
+
+    Attributes:
+        plan: What the robot follows; its streams are recorded. None: no plan.
+    """
 
     def __init__(
         self,
@@ -64,7 +68,7 @@ class Recorder:
             SimulationError: If the log would be too large to be loaded.
         """
         self._controller = controller
-        self._plan = plan
+        self.plan = plan
         self._scene = scene
         self._rows = 0
         self._capacity = rows
@@ -381,8 +385,8 @@ class Recorder:
         heard = {name: [list(s.record) for s in each] for name, each in streams.items()}
         lost = sum(s.unrecorded for each in streams.values() for s in each)
         found = _changes(self._controller) | ({"streams": heard} if heard else {})
-        if self._plan is not None:
-            planned = list(parts_within(self._plan.plan, Streamed))
+        if self.plan is not None:
+            planned = list(parts_within(self.plan.plan, Streamed))
             lost += sum(stream.unrecorded for stream in planned)
             if planned:
                 found["plan_streams"] = [list(stream.record) for stream in planned]
