@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import HardwareError
 from hsp_control.control.measurement import Inertial, Measurement
 from hsp_control.robot import Robot
 
@@ -47,28 +46,21 @@ class SensorLayout(NamedTuple):
     def unpack(self, numbers: Array, robot: Robot) -> Measurement:
         """Return a measurement from its numbers; number and time of it are 0.
 
-        Raises:
-            HardwareError: If there are too few or too many numbers.
+        With too few or too many numbers the last parts have wrong shapes, for
+        `valid_measurement` to refuse.
         """
-        nq, nv = robot.nq, robot.nv
-        own = nq + nv + _EACH * (len(self.wrenches) + (self.inertial is not None))
-        if len(numbers) not in {own, own + nv}:
-            sensors = [*self.wrenches, *([self.inertial] if self.inertial else [])]
-            raise HardwareError(
-                f"a state of the robot has {len(numbers)} numbers; needs {own}, or "
-                f"{own + nv} with its effort: {nq} of q, {nv} of v, {_EACH} of each "
-                f"sensor ({', '.join(sensors) or 'none'})"
-            )
-        rest = numbers[nq + nv : own].reshape(-1, _EACH)
+        sizes = [robot.nq, robot.nv] + [_EACH] * len(self.wrenches)
+        sizes += [3, 3] if self.inertial is not None else []
+        q, v, *rest = np.split(numbers, np.cumsum(sizes))
         inertial = None
         if self.inertial is not None:
-            inertial = Inertial(self.inertial, rest[-1, :3], rest[-1, 3:])
+            inertial = Inertial(self.inertial, rest[-3], rest[-2])
         return Measurement(
             0,
             0.0,
-            numbers[:nq],
-            numbers[nq : nq + nv],
-            applied=numbers[own:] if len(numbers) > own else None,
+            q,
+            v,
+            applied=rest[-1] if rest[-1].size else None,
             wrenches=dict(zip(self.wrenches, rest, strict=False)),
             inertial=inertial,
         )

@@ -70,11 +70,7 @@ class UdpHardware:
         return self.link.session
 
     def read(self, timeout: float) -> Measurement | None:
-        """Return the newest state; see `Hardware.read`.
-
-        Raises:
-            HardwareError: If the robot sends other sensors than were agreed.
-        """
+        """Return the newest state; see `Hardware.read`."""
         states = [p for p in self.link.receive(timeout) if p.kind is Kind.STATE]
         for packet in states:
             age = self._age_estimator.age(monotonic(), 1e-9 * packet.stamp)

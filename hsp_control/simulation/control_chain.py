@@ -62,10 +62,10 @@ class EffortSource(Protocol):
         """Return what it logs of the last effort besides the controller, by name."""
 
 
-Source = TypeVar("Source", bound=EffortSource)
+Source_co = TypeVar("Source_co", bound=EffortSource, covariant=True)
 
 
-class ControlChain(Generic[Source]):
+class ControlChain(Generic[Source_co]):
     """From a measurement to an effort, in simulations and on robots alike.
 
         measurement → estimators → plan → command → effort
@@ -77,7 +77,7 @@ class ControlChain(Generic[Source]):
 
     def __init__(
         self,
-        command: Source,
+        command: Source_co,
         plan: Plan | None = None,
         estimators: Sequence[Estimator] = (),
     ) -> None:
