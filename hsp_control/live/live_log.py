@@ -20,6 +20,7 @@ from hsp_control.plans import RunningPlan
 from hsp_control.robot import RobotState
 from hsp_control.simulation.control_chain import ControlChain, EffortSource
 from hsp_control.simulation.journal import JournalWriter
+from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.recorder import Recorder
 
 CHANNEL_INFO = {
@@ -165,6 +166,7 @@ class LoopLog:
         self._log: LiveLog | None = None
         self._next, self._phase = -inf, Phase.WAITING
         self._failed = False
+        self._excess = LimitExcess(chain.command.controller.robot)
         self.path = None if path is None else Path(path)
         self.controller_failed = False
         if self.path is not None:
@@ -194,6 +196,9 @@ class LoopLog:
         measurement, state = reader.measurement, reader.state
         if self._log is None or self._failed:
             return
+        if measurement is not None:
+            limits = self._chain.command.controller.limits
+            self._excess.see(limits, measurement.q, measurement.v)
         if measurement is None and phase == Phase.RUNNING:
             return  # no measurement, so no effort was computed
         if state.t < self._next and phase == self._phase and not last:
@@ -235,6 +240,8 @@ class LoopLog:
                 **self._chain.log_channels(state.q, state.v),
                 **log_channels,
             }
+        limits = self._chain.command.controller.limits
+        log_channels |= self._excess.take(limits)
         return Row(state, self._output(phase, state), limiter.applied, log_channels)
 
     def end(self, report: LoopReport) -> None:

@@ -16,6 +16,7 @@ from hsp_control.control.output import ControlOutput
 from hsp_control.robot import RobotState
 from hsp_control.robot.integrators import Integrator, bound
 from hsp_control.simulation.control_chain import ControlChain
+from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.plants import ContinuousPlant, SampledPlant
 
 RUNAWAY_SPEED = 1e4
@@ -99,7 +100,8 @@ def sampled_loop(
         SimulationError: If the motion diverges.
     """
     plant.reset(times[0], q, v)
-    command = chain.command
+    command, excess = chain.command, LimitExcess(plant.robot)
+    controller = command.controller
     period = (times[1] - times[0]) / periods
     tau, count = np.zeros(plant.robot.nv), 0
     for start, end in zip(times, (*times[1:], times[-1]), strict=True):
@@ -109,6 +111,7 @@ def sampled_loop(
             t = start + k * (end - start) / periods
             measured = Measurement(count, t, *plant.measure(t, q, v))
             count += 1
+            excess.see(controller.limits, q, v)
             if chain.needs_sensors:
                 measured = measured._replace(
                     applied=tau,
@@ -120,7 +123,11 @@ def sampled_loop(
                 output, state = command.output, command.state
                 if not (t == state.t and _equal(state.q, q) and _equal(state.v, v)):
                     output = command.evaluate(t, q, v)
-                yield Instant(state, output, tau, chain.log_channels(q, v))
+                channels = {
+                    **chain.log_channels(q, v),
+                    **excess.take(controller.limits),
+                }
+                yield Instant(state, output, tau, channels)
             if end == start:  # the last row
                 return
             stop = start + (k + 1) * (end - start) / periods

@@ -1,0 +1,30 @@
+"""What limits did to a run, and where the robot was beyond them."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hsp_control.simulation import Rollout
+from hsp_control.simulation.limit_excess import POSITION, VELOCITY
+
+
+def limit_rows(rollout: Rollout) -> Iterator[str]:
+    """Yield one sentence each; none where no limit was active and all were kept."""
+    if POSITION not in rollout.columns:
+        return
+    names, status = rollout.meta["robot"]["dofs"], rollout["status"]
+    limited, relaxed = (int((status == s).sum()) for s in (2, 3))
+    if limited or relaxed:
+        yield f"{limited} rows limited of {len(rollout)}" + (
+            f", {relaxed} relaxed by up to {np.nanmax(rollout['relaxation']):.3g}"
+            if relaxed
+            else ""
+        )
+    for column, of in ((POSITION, "position"), (VELOCITY, "speed")):
+        excess, unit = rollout[column], rollout.meta["columns"][column]["unit"]
+        if rows := int((excess > 0.0).any(axis=1).sum()):
+            row, dof = np.unravel_index(np.nanargmax(excess), excess.shape)
+            yield (
+                f"{names[dof]} is {excess[row, dof]:.3g} {unit} beyond its {of} limit "
+                f"at {rollout.t[row]:g} s ({rows} rows): more than the model expected"
+            )
