@@ -202,7 +202,7 @@ class Session:
     @property
     def meta(self) -> dict[str, Any]:
         """The meta data of the rows so far."""
-        return self.recorder.meta("", "")
+        return self.recorder.meta("", "", plant=self._plant.describe())
 
     def rollout(self) -> Rollout:
         """Return the log so far; `hsp run` repeats it, unless somebody pulled."""
@@ -217,6 +217,7 @@ class Session:
             name=f"{experiment.name}, played",
             title=experiment.scenario.title,
             config=config,
+            plant=self._plant.describe(),
             **lost,
         )
 
