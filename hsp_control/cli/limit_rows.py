@@ -20,10 +20,11 @@ def limit_rows(rollout: Rollout) -> Iterator[str]:
             if relaxed
             else ""
         )
-    for column, of in ((POSITION, "position"), (VELOCITY, "speed")):
-        excess, unit = rollout[column], rollout.meta["columns"][column]["unit"]
+    for column, of, per in ((POSITION, "position", ""), (VELOCITY, "speed", "/s")):
+        excess = rollout[column]
         if rows := int((excess > 0.0).any(axis=1).sum()):
             row, dof = np.unravel_index(np.nanargmax(excess), excess.shape)
+            unit = rollout.meta["robot"]["units"][dof] + per
             yield (
                 f"{names[dof]} is {excess[row, dof]:.3g} {unit} beyond its {of} limit "
                 f"at {rollout.t[row]:g} s ({rows} rows): more than the model expected"

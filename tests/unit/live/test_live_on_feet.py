@@ -131,20 +131,19 @@ def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
 
 @pytest.mark.slow
 def test_a_fall_is_found_said_and_ends_with_damped_joints() -> None:
-    shove = (
-        "plant.pushes=[{frame: base_link, force: [0, 90, 60], start: 0.3,"
-        " duration: 0.2}]"
-    )
+    push = "{frame: base_link, moment: [6, 0, 0], start: 0.3, duration: 0.3}"
+    shove = f"plant.pushes=[{push}]"
     for plan in ("plan.speed=0.3", "plan=null"):
         tasks = (
             "tasks={trunk: {type: frame_orientation, frame: base_link}, "
             "body: {type: center_of_mass}}",
         )
-        experiment = trotting(shove, plan, *(tasks if plan == "plan=null" else ()))
+        own = tasks if plan == "plan=null" else ()
+        experiment = trotting(shove, "live.velocity_margin=20", plan, *own)
         report, robot = live(experiment, duration=5.0)
         assert report.ended == "fault"
         assert "the robot falls: at t = 0." in report.reason
-        assert "base_link is tilted by 4" in report.reason
+        assert "base_link is tilted by" in report.reason
         assert "at most 45°" in report.reason
         stopped = [row for row in robot.rows if row[0] > report.t - 0.2]
         assert len(stopped) > 100
@@ -298,12 +297,11 @@ def test_the_wire_carries_what_the_robot_measures() -> None:
     assert SensorLayout.of(watched().measured()) == SensorLayout()
     before = robot.measured()
     assert not any(wrench.any() for wrench in before.wrenches.values())
-    for _ in range(30):
-        robot.advance([robot.tau])
+    robot.advance([robot.tau])
     after = robot.measured()
     assert sum(wrench[2] for wrench in after.wrenches.values()) > 0.0
     assert after.inertial is not None
-    assert after.t == pytest.approx(0.03)
+    assert after.t == 0.001
 
 
 @pytest.mark.parametrize(
