@@ -9,10 +9,10 @@ from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 
 
 def limit_rows(rollout: Rollout) -> Iterator[str]:
-    """Yield one sentence each; none where no limit was active and all were kept."""
+    """Yield one sentence each; none where no limit was active and no joint beyond."""
     if POSITION not in rollout.columns:
         return
-    names, status = rollout.meta["robot"]["dofs"], rollout["status"]
+    status = rollout["status"]
     limited, relaxed = (int((status == s).sum()) for s in (2, 3))
     if limited or relaxed:
         yield f"{limited} rows limited of {len(rollout)}" + (
@@ -20,6 +20,14 @@ def limit_rows(rollout: Rollout) -> Iterator[str]:
             if relaxed
             else ""
         )
+    yield from excess_rows(rollout)
+
+
+def excess_rows(rollout: Rollout) -> Iterator[str]:
+    """Yield where the robot was beyond its limits, a sentence each."""
+    if POSITION not in rollout.columns:
+        return
+    names = rollout.meta["robot"]["dofs"]
     for column, of, per in ((POSITION, "position", ""), (VELOCITY, "speed", "/s")):
         excess = rollout[column]
         if rows := int((excess > 0.0).any(axis=1).sum()):

@@ -13,7 +13,7 @@ from typing import Any
 from rich.table import Table
 
 from hsp_control.cli.consoles import out
-from hsp_control.cli.limit_rows import limit_rows
+from hsp_control.cli.limit_rows import excess_rows
 from hsp_control.cli.live_experiment import (
     check_live,
     live_period,
@@ -284,6 +284,6 @@ def _convert(journal: Path, **meta: Any) -> None:
         print(f"hsp: {error}", file=sys.stderr)
         return
     journal.unlink()
-    for row in limit_rows(rollout):
+    for row in excess_rows(rollout):
         out.print(f"{log.stem}: {row}", highlight=False)
     out.print(f"Log: {log}")

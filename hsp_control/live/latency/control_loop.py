@@ -88,7 +88,7 @@ class ControlLoop:
             self._measure()
         else:
             self._controller.restart()
-        self.control()
+            self.control()
 
     def control(self) -> None:
         """Update the state and compute the effort: a user's period without its I/O."""
