@@ -9,6 +9,9 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.control.measurement import Measurement
 from hsp_control.robot import Robot, RobotState
 
+_STEEPEST = 0.5
+"""Smallest upward part of the normal of what carries weight [-]: a plane of 60°.
+Steeper ones, such as a wall, may only be pushed: the joints that are held do it."""
 _SMALLEST = 1e-6
 """Singular values below this share of the largest are directions that feet cannot push
 in, such as the turning about the line between two points."""
@@ -33,9 +36,10 @@ class BearingFeet:
 
         Args:
             robot: The robot; one with a fixed base needs no feet.
-            contacts: The controller's contacts.
+            contacts: The controller's contacts; those on steep planes do not carry.
         """
-        self._robot, self._all = robot, tuple(contacts)
+        self._robot = robot
+        self._all = tuple(c for c in contacts if c.axes[2, 2] >= _STEEPEST)
         self._base = list(robot.unactuated)
         self.contacts = self._all
 

@@ -1,5 +1,6 @@
 """Robots on feet in a live loop: what is measured, how they stand, stop and fall."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -234,6 +235,8 @@ def test_feet_that_are_not_pressed_do_not_bear() -> None:
     assert len(feet.contacts) == 4
     feet.lose()
     assert not feet.hold
+    wall = replace(experiment.controller.contacts[0], normal=[1.0, 0.0, 0.5])
+    assert not BearingFeet(experiment.robot, [wall]).hold, "a wall may only be pushed"
     assert BearingFeet(panda(), ()).hold
 
 
