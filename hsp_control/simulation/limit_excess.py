@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.kernels import kernel
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.log_channel import LogChannel
@@ -72,8 +72,8 @@ class LimitExcess:
 
 @kernel
 def _see(
-    coordinates: Array,
-    dofs: Array,
+    coordinates: Indices,
+    dofs: Indices,
     q: Array,
     v: Array,
     lower: Array,
