@@ -58,6 +58,11 @@ the true state in `q` and `v`, the measured one in `measured.q` and `measured.v`
 commanded effort in `tau` and the applied one in `applied.tau`; errors are those of the
 true state. The inertias of the plant's bodies are in the log's `meta`, key `plant`.
 
+`sensors: {imu: base_link}` is an inertial measurement unit at a frame, with noise and biases that
+walk: `imu: {frame: base_link, gyroscope_noise: 1.7e-4, ...}`. It reports the mean angular velocity
+and specific force of each period, for `estimators` ([estimation.md](estimation.md)); q and v stay as
+they are.
+
 Frames named in `contacts` touch MuJoCo's ground, with a given shape or with the link's
 own collision geometry; `plant.contact.<frame>.force` and `.moment` are logged. A mesh
 with a flat sole becomes its box, another one its capsule; `plant.clearance(q)` returns
@@ -76,6 +81,11 @@ plant:
   ground: {height: 0, friction: 0.8}
 simulation: {duration: 1, control_period: 0.001}
 ```
+
+`solids` are things that these frames may touch besides: boxes, spheres, cylinders and capsules, as
+walls, tables, slopes and stairs (`copies`, `spacing`), or loose ones with a `mass`, whose poses
+`plant.solid.<name>.position` and `.quaternion` are logged ([forces.md](forces.md)). The view draws
+them.
 
 ## Effect of each imperfection
 

@@ -1,4 +1,4 @@
-"""Film the README's animations: `make animations` (they are committed)."""
+"""Film the animations of README and docs: `make animations` (they are committed)."""
 
 from math import pi
 from pathlib import Path
@@ -17,6 +17,7 @@ def main() -> None:
     """Write them into docs/figures."""
     film_paper()
     film_panda()
+    film_walking()
     for file in sorted(FOLDER.glob("*.webp")):
         size = file.stat().st_size / 1e6
         print(f"Animation: {file.relative_to(FOLDER.parents[1])}, {size:.2f} MB")
@@ -52,6 +53,26 @@ def film_panda() -> None:
             end=9.99,
         )
         export_film(rollout, FOLDER / f"panda_{name}.webp", style=style, **VIEW)
+
+
+def film_walking() -> None:
+    """Film the plans: Talos walks, Solo trots; the camera stands beside their way."""
+    feet = {"paths": False, "targets": False, "self_motion": False}
+    views = {
+        "talos_walk": ([0.9, -3.4, 1.5], [0.5, 0.0, 0.87], 5.5),
+        "solo12_trot": ([0.7, -1.25, 0.5], [0.42, 0.0, 0.12], 4.0),
+    }
+    for name, (camera, target, end) in views.items():
+        rollout = hsp.load_experiment(f"whole_body/{name}").run()
+        style = FilmStyle(
+            size=(480, 300),
+            frame_rate=FRAME_RATE,
+            plots=False,
+            caption=False,
+            end=end,
+        )
+        view = {"camera": camera, "target": target, "show": feet}
+        export_film(rollout, FOLDER / f"{name}.webp", style=style, **view)
 
 
 if __name__ == "__main__":

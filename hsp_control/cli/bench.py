@@ -12,7 +12,7 @@ from hsp_control.cli.consoles import errors, out
 from hsp_control.cli.loading import load
 from hsp_control.cli.startup import INTERRUPTED
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ConfigError, SimulationError
+from hsp_control.common.exceptions import SimulationError
 from hsp_control.live.latency import (
     ControlLoop,
     Latency,
@@ -28,24 +28,27 @@ def bench(options: argparse.Namespace) -> int:
             f"--rate {options.rate:g}; must be positive and at most 100000 Hz"
         )
     experiment = load(options)
-    if experiment.scenario.plan is not None:
-        raise ConfigError(
-            f"{options.config}: plan: bench measures the controller without a plan; "
-            "remove the plan, or time a run with hsp run"
-        )
+    scenario = experiment.scenario
     loop = ControlLoop(
         experiment.controller,
         experiment.q0,
         experiment.v0,
         1.0 / options.rate,
         experiment.plant,
+        scenario.plan,
+        scenario.estimators,
     )
     found = _measure(loop, options)
     out.print(
         f"{options.config} at {options.rate:g} Hz: {len(found.step)} periods, "
         "alternating with as many of an empty loop; times in microseconds"
     )
-    out.print(_table(found))
+    parts = [
+        *(["estimators"] if scenario.estimators else []),
+        *(["plan"] if scenario.plan is not None else []),
+        "state and law",
+    ]
+    out.print(_table(found, ", ".join(parts)))
     out.print(
         f"Missed periods: {found.missed} of {len(found.step)}; the empty loop "
         f"{found.empty_missed} of {len(found.empty)}"
@@ -80,7 +83,8 @@ def _measure(loop: ControlLoop, options: argparse.Namespace) -> Latency:
         )
 
 
-def _table(found: Latency) -> Table:
+def _table(found: Latency, step: str) -> Table:
+    """Return a table of all times; ``step`` says what the step consists of."""
     table = Table(box=None, pad_edge=False)
     table.add_column("")
     for heading in ("median", "p99", "p99.9", "worst"):
@@ -89,7 +93,7 @@ def _table(found: Latency) -> Table:
     def row(name: str, times: Array) -> None:
         table.add_row(name, *(f"{1e6 * x:.0f}" for x in Quantiles.of(times)))
 
-    row("step: state and law", found.step)
+    row(f"step: {step}", found.step)
     row("the same back to back, without waiting", found.back_to_back)
     row("wake-up", found.wake)
     row("wake-up of the empty loop", found.empty)

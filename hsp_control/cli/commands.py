@@ -4,7 +4,7 @@ import argparse
 import json
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
@@ -26,6 +26,7 @@ from hsp_control.cli.consoles import errors as _errors
 from hsp_control.cli.consoles import message_of, renamed_keys_printed, working
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import DeferredInterrupt
+from hsp_control.cli.limit_rows import limit_rows
 from hsp_control.cli.loading import load
 from hsp_control.cli.startup import INTERRUPTED
 from hsp_control.cli.stopwatch import Stopwatch
@@ -365,33 +366,11 @@ def _summary(rollout: Rollout) -> Table:
         f"smallest singular value {np.nanmin(rollout['singular_values']):.3g}",
     )
     table.add_row("effort", f"largest {np.abs(rollout.tau).max():.3g}")
-    for row in _limits(rollout):
+    for row in limit_rows(rollout):
         table.add_row("limits", row)
     if damped := int((rollout["damped"] > 0.0).sum()):
         table.add_row("singular", f"{damped} rows: the law was damped there, not exact")
     return table
-
-
-def _limits(rollout: Rollout) -> Iterator[str]:
-    """Yield what limits did to the law, and where the robot is beyond them."""
-    if "position_excess" not in rollout.columns:
-        return
-    names, status = rollout.meta["robot"]["dofs"], rollout["status"]
-    limited, relaxed = (int((status == s).sum()) for s in (2, 3))
-    if limited or relaxed:
-        yield f"{limited} rows limited of {len(rollout)}" + (
-            f", {relaxed} relaxed by up to {np.nanmax(rollout['relaxation']):.3g}"
-            if relaxed
-            else ""
-        )
-    for column, of in (("position_excess", "position"), ("velocity_excess", "speed")):
-        excess, unit = rollout[column], rollout.meta["columns"][column]["unit"]
-        if rows := int((excess > 0.0).any(axis=1).sum()):
-            row, dof = np.unravel_index(np.nanargmax(excess), excess.shape)
-            yield (
-                f"{names[dof]} is {excess[row, dof]:.3g} {unit} beyond its {of} limit "
-                f"at {rollout.t[row]:g} s ({rows} rows): more than the model expected"
-            )
 
 
 def _describe(robot: Robot) -> None:

@@ -13,7 +13,12 @@ from typing import Any
 from rich.table import Table
 
 from hsp_control.cli.consoles import out
-from hsp_control.cli.live_experiment import live_period, simulated_robot
+from hsp_control.cli.limit_rows import excess_rows
+from hsp_control.cli.live_experiment import (
+    check_live,
+    live_period,
+    simulated_robot,
+)
 from hsp_control.cli.loading import load
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.cli.robot_start import begun_where_it_is
@@ -33,23 +38,20 @@ from hsp_control.live import (
 from hsp_control.live.adapting import AdaptingHardware, LocatedHardware
 from hsp_control.live.latency import Quantiles
 from hsp_control.live.ros2 import publish
-from hsp_control.live.settings import check_fixed
 from hsp_control.live.stop_signals import stop_signals
 from hsp_control.simulation import Rollout
 
 _DRY_RUN = 0.5
 """Duration of the dry run before the real-time run [s]: it compiles the kernels."""
+_DRY_RUN_OF_A_PLAN = 3.0
+"""The same with a plan [s], which has to come to its first steps."""
 
 
 def live(options: argparse.Namespace) -> int:
     """Run a loop in real time, print its response times and why it ended."""
     faults, kill = Faults.parse(options.faults), _parse_kill(options.kill)
     experiment = load(options)
-    check_fixed(experiment.robot)
-    if experiment.scenario.plan is not None:
-        raise LiveError("plan: a live loop follows none; use hsp run or hsp play")
-    if experiment.scenario.estimators:
-        raise LiveError("estimators: a live loop runs none; use hsp run or hsp play")
+    check_live(experiment)
     simulation = experiment.scenario.simulation
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:
@@ -69,7 +71,10 @@ def live(options: argparse.Namespace) -> int:
     loop_log = options.out / f"{experiment.name}-live.journal"
     robot_log = options.out / f"{experiment.name}-robot.journal"
     requests = OperatorRequests()
+    plan = experiment.scenario.plan
     options_of_loop: dict[str, Any] = {
+        "plan": plan,
+        "estimators": experiment.scenario.estimators,
         "settings": experiment.scenario.live,
         "requests": requests,
         "scene": experiment.scene,
@@ -96,7 +101,7 @@ def live(options: argparse.Namespace) -> int:
         run_loop(
             command,
             dry_run_robot,
-            duration=min(duration, _DRY_RUN),
+            duration=min(duration, _DRY_RUN if plan is None else _DRY_RUN_OF_A_PLAN),
             **options_of_loop,
         )
         hardware: Hardware | None = None
@@ -279,4 +284,6 @@ def _convert(journal: Path, **meta: Any) -> None:
         print(f"hsp: {error}", file=sys.stderr)
         return
     journal.unlink()
+    for row in excess_rows(rollout):
+        out.print(f"{log.stem}: {row}", highlight=False)
     out.print(f"Log: {log}")

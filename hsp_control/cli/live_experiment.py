@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 from hsp_control.config import Experiment
+from hsp_control.declaration import within
 from hsp_control.live import SimulatedRobot
-from hsp_control.live.settings import check_fixed
+from hsp_control.live.settings import check_held
 from hsp_control.live.simulated_robot import sampled
 
 FINAL_HOLD = 0.5
@@ -16,14 +17,26 @@ def live_period(experiment: Experiment) -> float:
     return experiment.scenario.simulation.control_period or 0.001
 
 
+def check_live(experiment: Experiment) -> None:
+    """Check that a live loop can hold the robot.
+
+    Raises:
+        LiveError: If it has a floating base that nothing holds.
+    """
+    contacts = experiment.controller.contacts
+    with within("live"):
+        check_held(experiment.robot, contacts, experiment.scenario.live)
+
+
 def simulated_robot(experiment: Experiment) -> SimulatedRobot:
     """Return the experiment's plant as a robot with a watchdog and a safe stop.
 
     Raises:
-        LiveError: If it has a floating base, or a setting is invalid.
+        LiveError: If it has a floating base that nothing holds, or a setting is
+            invalid.
     """
-    check_fixed(experiment.robot)
     period, live = live_period(experiment), experiment.scenario.live
+    check_live(experiment)
     return SimulatedRobot(
         sampled(experiment.plant, experiment.integrator, period),
         experiment.q0,
@@ -31,4 +44,5 @@ def simulated_robot(experiment: Experiment) -> SimulatedRobot:
         period,
         settings=replace(live, stop=replace(live.stop, hold=FINAL_HOLD)),
         limits=experiment.controller.limits,
+        contacts=experiment.controller.contacts,
     )

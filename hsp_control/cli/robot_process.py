@@ -12,12 +12,16 @@ from time import monotonic
 from types import TracebackType
 from typing import Any, Self
 
-from hsp_control.cli.live_experiment import live_period
+from hsp_control.cli.live_experiment import (
+    check_live,
+    live_period,
+    simulated_robot,
+)
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.config import Experiment
 from hsp_control.config.streams import without_sources
 from hsp_control.live.faults import Faults
-from hsp_control.live.settings import check_fixed
+from hsp_control.live.sensor_layout import SensorLayout
 from hsp_control.live.udp_hardware import UdpHardware
 
 
@@ -53,12 +57,15 @@ class RobotProcess:
             log_period: Time between two rows of the log [s].
 
         Raises:
-            LiveError: If the robot has a floating base.
+            LiveError: If the robot has a floating base that nothing holds.
         """
-        check_fixed(experiment.robot)
+        check_live(experiment)
         faults = faults or Faults()
         period = live_period(experiment)
-        self.hardware = UdpHardware(experiment.robot, period, faults=faults)
+        measured = simulated_robot(experiment).measured()
+        self.hardware = UdpHardware(
+            experiment.robot, period, faults=faults, sensors=SensorLayout.of(measured)
+        )
         self._settings = {
             "config": without_sources(experiment.config),
             "meta": {

@@ -30,6 +30,7 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.live.simulated_robot import SimulatedRobot
 from hsp_control.live.udp_robot import CLOSED_BY_LOOP, serve
 from hsp_control.robot import RobotState
+from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.plants import differing_bodies
 
 READY = "ready"
@@ -109,6 +110,7 @@ class _RobotLog:
         self._every = settings["log_period"]
         self._next, self._phase = -np.inf, robot.phase
         self._state = RobotState(experiment.robot)
+        self._excess = LimitExcess(experiment.robot)
         meta = {
             **settings["meta"],
             "plant": {
@@ -124,6 +126,7 @@ class _RobotLog:
     def row(self, t: float, q: Array, v: Array, last: bool) -> None:
         """Write the row of a period, if one is due."""
         robot = self._robot
+        self._excess.see(self._controller.limits, q, v)
         if t < self._next and robot.phase == self._phase and not last:
             return
         self._next = (np.floor(t / self._every + 1e-6) + 1.0 - 1e-6) * self._every
@@ -138,6 +141,7 @@ class _RobotLog:
         log_channels = {
             **live_channels(phase=float(robot.phase)),
             **robot.plant.log_channels(t, q, v, robot.tau),
+            **self._excess.take(self._controller.limits),
         }
         return Row(state, output, robot.tau, log_channels)
 
@@ -146,12 +150,17 @@ def _warm_up(robot: SimulatedRobot, experiment: Experiment) -> None:
     """Execute each real-time operation once, so that none is compiled later."""
     experiment.controller.compute(0.0, experiment.q0, experiment.v0)
     trial = SimulatedRobot(
-        robot.plant, robot.q, robot.v, robot.period, settings=LiveSettings(watchdog=1)
+        robot.plant,
+        robot.q,
+        robot.v,
+        robot.period,
+        settings=LiveSettings(watchdog=1),
+        contacts=experiment.controller.contacts,
     )
     trial.advance([robot.tau])
     for _ in range(10):
         trial.advance([])
-        trial.measure()
+        trial.measured()
     robot.plant.reset(0.0, robot.q, robot.v)
 
 

@@ -40,6 +40,8 @@ class ShownItems(Part, error=ViewerError):
     """The present references of the tasks [-]."""
     obstacles: Flag = True
     """The obstacles [-]."""
+    solids: Flag = True
+    """The solid things of the plant, which the robot may touch [-]."""
     influence: Flag = True
     """The influence zones of the obstacles [-]."""
     distances: Flag = True

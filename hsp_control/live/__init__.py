@@ -13,6 +13,7 @@ from .operator_requests import OperatorRequests as OperatorRequests
 from .report import LoopReport as LoopReport
 from .safe_stop import Phase as Phase
 from .safe_stop import SafeStop as SafeStop
+from .sensor_layout import SensorLayout as SensorLayout
 from .settings import LiveSettings as LiveSettings
 from .settings import StopSettings as StopSettings
 from .simulated_robot import SimulatedRobot as SimulatedRobot

@@ -10,6 +10,9 @@ from hsp_control.robot import Robot, RobotState
 class DeadReckoning:
     """The last measured state, integrated with the model under the applied efforts.
 
+    Of a robot with a floating base the velocity is kept: nobody knows what its feet
+    push meanwhile, and without them the model would fall.
+
     Attributes:
         state: The state, measured or predicted.
         predicted_for: Time since the last measurement [s].
@@ -44,8 +47,9 @@ class DeadReckoning:
         """
         state, h = self.state, self._period
         self.predicted_for += h
-        a = self._robot.forward_dynamics(state.q, state.v, tau)
-        v = state.v + h * a
+        v = state.v.copy()
+        if not self._robot.unactuated:
+            v += h * self._robot.forward_dynamics(state.q, state.v, tau)
         if not np.isfinite(v).all():
             return
         try:

@@ -33,15 +33,7 @@ class InProcessRobot:
         self.robot.advance(self._efforts)
         self._efforts = []
         self._sequence += 1
-        q, v = self.robot.measure()
-        return Measurement(
-            self._sequence,
-            self.robot.t,
-            q,
-            v,
-            halted=self.robot.halted,
-            applied=self.robot.in_force,
-        )
+        return self.robot.measured()._replace(sequence=self._sequence)
 
     def write(self, effort: Array) -> None:
         """Set the effort of the next period, shape (nv,)."""

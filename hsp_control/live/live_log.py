@@ -13,12 +13,14 @@ from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.effort_limiter import EffortLimiter
-from hsp_control.live.effort_source import EffortSource
 from hsp_control.live.report import LoopReport
 from hsp_control.live.safe_stop import Phase
 from hsp_control.live.state_reader import StateReader
+from hsp_control.plans import RunningPlan
 from hsp_control.robot import RobotState
+from hsp_control.simulation.control_chain import ControlChain, EffortSource
 from hsp_control.simulation.journal import JournalWriter
+from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.recorder import Recorder
 
 CHANNEL_INFO = {
@@ -86,6 +88,10 @@ class LiveLog:
             self._recorder.clear()
         self._head()
 
+    def follow(self, plan: RunningPlan | None) -> None:
+        """Set the plan of the run that begins; its streams are recorded."""
+        self._recorder.plan = plan
+
     def add(self, row: Row) -> None:
         """Write a row if it is later than the last one.
 
@@ -140,7 +146,7 @@ class LoopLog:
         self,
         path: str | Path | None,
         period: float,
-        effort_source: EffortSource,
+        chain: ControlChain[EffortSource],
         scene: Scene | None,
         meta: Mapping[str, Any],
     ) -> None:
@@ -149,21 +155,22 @@ class LoopLog:
         Args:
             path: The journal; None: no log.
             period: Time between two rows [s].
-            effort_source: Computes the efforts that are logged.
+            chain: Computes the efforts that are logged.
             scene: Obstacles to log.
             meta: JSON data of the log.
 
         Raises:
             LogError: If it cannot be written.
         """
-        self._effort_source, self._period = effort_source, period
+        self._chain, self._period = chain, period
         self._log: LiveLog | None = None
         self._next, self._phase = -inf, Phase.WAITING
         self._failed = False
+        self._excess = LimitExcess(chain.command.controller.robot)
         self.path = None if path is None else Path(path)
         self.controller_failed = False
         if self.path is not None:
-            self._log = LiveLog(self.path, effort_source.controller, scene, meta)
+            self._log = LiveLog(self.path, chain.command.controller, scene, meta)
 
     def row(
         self,
@@ -189,6 +196,9 @@ class LoopLog:
         measurement, state = reader.measurement, reader.state
         if self._log is None or self._failed:
             return
+        if measurement is not None:
+            limits = self._chain.command.controller.limits
+            self._excess.see(limits, measurement.q, measurement.v)
         if measurement is None and phase == Phase.RUNNING:
             return  # no measurement, so no effort was computed
         if state.t < self._next and phase == self._phase and not last:
@@ -206,6 +216,11 @@ class LoopLog:
         if self._log is not None:
             self._log.warm_up(self._row(Phase.RUNNING, reader, limiter, 0.0))
 
+    def begin(self) -> None:
+        """Begin to log a run; the chain has begun, too."""
+        if self._log is not None:
+            self._log.follow(self._chain.plan)
+
     def _row(
         self, phase: Phase, reader: StateReader, limiter: EffortLimiter, response: float
     ) -> Row:
@@ -221,7 +236,12 @@ class LoopLog:
             response=response,
         )
         if phase == Phase.RUNNING and not self.controller_failed:
-            log_channels = {**self._effort_source.log_channels(), **log_channels}
+            log_channels = {
+                **self._chain.log_channels(state.q, state.v),
+                **log_channels,
+            }
+        limits = self._chain.command.controller.limits
+        log_channels |= self._excess.take(limits)
         return Row(state, self._output(phase, state), limiter.applied, log_channels)
 
     def end(self, report: LoopReport) -> None:
@@ -252,9 +272,9 @@ class LoopLog:
         if self.controller_failed:
             return None
         if phase == Phase.RUNNING:
-            return self._effort_source.output
+            return self._chain.command.output
         try:
-            return self._effort_source.controller.compute(state)
+            return self._chain.command.controller.compute(state)
         except Exception:  # its effort is not used any more: log without it
             self.controller_failed = True
             return None

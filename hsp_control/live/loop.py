@@ -1,6 +1,6 @@
 """Run a live loop: check, compile and allocate, then control the robot."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from time import monotonic
@@ -10,7 +10,10 @@ import numpy as np
 
 from hsp_control.common.exceptions import LiveError
 from hsp_control.control.controller import Controller
+from hsp_control.estimation import Estimator
 from hsp_control.geometry.scene import Scene
+from hsp_control.live.balance import balance_of
+from hsp_control.live.bearing_feet import BearingFeet
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.effort_source import EffortSource, as_effort_source
 from hsp_control.live.hardware import Hardware
@@ -20,10 +23,11 @@ from hsp_control.live.one_run import OneRun
 from hsp_control.live.operator_requests import OperatorRequests
 from hsp_control.live.report import LoopReport
 from hsp_control.live.safe_stop import SafeStop
-from hsp_control.live.settings import LiveSettings, check_fixed
+from hsp_control.live.settings import LiveSettings, check_held
 from hsp_control.live.state_reader import StateReader
 from hsp_control.live.stop_signals import stop_signals
-from hsp_control.robot import Robot
+from hsp_control.plans import Plan
+from hsp_control.simulation.control_chain import ControlChain
 
 _WARM_UP = 20
 """Steps before real-time operation: they compile kernels and touch all memory."""
@@ -34,6 +38,8 @@ def run_loop(
     hardware: Hardware,
     *,
     duration: float | None = None,
+    plan: Plan | None = None,
+    estimators: Sequence[Estimator] = (),
     settings: LiveSettings | None = None,
     requests: OperatorRequests | None = None,
     log: str | Path | None = None,
@@ -51,7 +57,8 @@ def run_loop(
     hardware is closed. Faults are: a state that is malformed, not finite, missing,
     frozen, too old, outside the limits, or further from the last one than the robot can
     be; a clock of the robot that jumps; a robot that stopped by itself or cannot be
-    reached; any exception of the hardware, the controller or a change. Once real-time
+    reached; a fall; any exception of the hardware, the controller, the plan or a
+    change. Once real-time
     operation has begun, nothing is raised; the report contains the fault.
 
     Ctrl-C and SIGTERM are the operator's stop (`stop_signals`).
@@ -61,6 +68,9 @@ def run_loop(
         hardware: The robot.
         duration: Time from the first state to the stop [s]; None: until the operator
             stops.
+        plan: What writes references and switches contacts; the controller is made of
+            its `Plan.parts`.
+        estimators: What completes each measurement, for the plan and the controller.
         settings: Which efforts the robot accepts, the faults that are tolerated, and
             how the safe stop brakes and holds; None: the defaults.
         requests: The operator's requests: stop the loop, or change the controller
@@ -78,36 +88,47 @@ def run_loop(
         How the run ended, and its response times.
 
     Raises:
-        LiveError: If the robot has a floating base, or a setting is invalid.
+        LiveError: If the robot has a floating base that nothing holds, or a setting is
+            invalid.
         HardwareError: If no first state arrives, or the robot cannot be started.
         LogError: If the journal cannot be created.
-        HspControlError: If the controller raises at the first state.
+        HspControlError: If the controller, the plan or an estimator raises at the first
+            state: what it needs may not be measured.
     """
     effort_source, settings = as_effort_source(controller), settings or LiveSettings()
-    robot, period = effort_source.controller.robot, hardware.period
+    chain = ControlChain(effort_source, plan, estimators)
+    controller = effort_source.controller
+    robot, period = controller.robot, hardware.period
     requests = requests or OperatorRequests()
     with stop_signals(requests):
         try:
-            _check(robot, period, duration, log_period)
-            limits = effort_source.controller.limits
+            _check(period, duration, log_period)
+            check_held(robot, controller.contacts, settings)
+            limits = controller.limits
             limiter = EffortLimiter(robot, settings, period, limits)
-            safe_stop = SafeStop(robot, settings.stop, limiter.effort_limits, period)
+            feet = BearingFeet(robot, controller.contacts)
+            safe_stop = SafeStop(
+                robot, settings.stop, limiter.effort_limits, period, feet
+            )
             reader = StateReader(robot, limits, hardware, settings, clock, start_time)
             first = reader.wait_for_first()
             # Compile and allocate everything now, not in real-time operation.
+            chain.begin(first.inertial)
             for _ in range(_WARM_UP):
-                effort_source.effort(start_time, first.q, first.v, period)
+                chain.effort(first._replace(t=start_time, applied=None), period)
                 safe_stop.effort(reader.state)
                 limiter.reset(first.q)
-            shown = scene or effort_source.controller.scene
-            loop_log = LoopLog(log, log_period, effort_source, shown, dict(meta or {}))
+            shown = scene or controller.scene
+            loop_log = LoopLog(log, log_period, chain, shown, dict(meta or {}))
             loop_log.warm_up(reader, limiter)
-            effort_source.restart()
-            effort_source.controller.compute(start_time, first.q, first.v)  # begins
+            chain.begin(first.inertial, robot.state(start_time, first.q, first.v))
+            controller.compute(start_time, first.q, first.v)  # begins
+            loop_log.begin()
             safe_stop.begin()
+            balance = balance_of(robot, controller.contacts, reader.state)
             end = np.inf if duration is None else start_time + duration - 0.5 * period
             loop = OneRun(
-                effort_source,
+                chain,
                 hardware,
                 reader,
                 limiter,
@@ -116,6 +137,7 @@ def run_loop(
                 requests,
                 settings,
                 end,
+                balance,
             )
             with real_time_priority(priority), no_garbage_collection():
                 loop.run(on_period)
@@ -126,10 +148,7 @@ def run_loop(
         return loop.finish()
 
 
-def _check(
-    robot: Robot, period: float, duration: float | None, log_period: float
-) -> None:
-    check_fixed(robot)
+def _check(period: float, duration: float | None, log_period: float) -> None:
     if not 0.0 < period < np.inf:
         raise LiveError(f"the hardware's period is {period} s; must be positive")
     if duration is not None and not duration > 0.0:

@@ -5,8 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import FallError
+from hsp_control.live.balance import Balance
 from hsp_control.live.effort_limiter import EffortLimiter
-from hsp_control.live.effort_source import EffortSource
 from hsp_control.live.failures import described
 from hsp_control.live.hardware import Hardware
 from hsp_control.live.live_log import LoopLog
@@ -15,6 +16,7 @@ from hsp_control.live.report import Ended, LoopReport
 from hsp_control.live.safe_stop import Phase, SafeStop
 from hsp_control.live.settings import LiveSettings
 from hsp_control.live.state_reader import StateReader
+from hsp_control.simulation.control_chain import ControlChain, EffortSource
 
 
 class OneRun:
@@ -22,6 +24,8 @@ class OneRun:
 
     Attributes:
         phase: Running, damping or holding.
+        ending: How it will end, and why, once the plan has brought the robot to rest.
+        asked_at: When that was asked for [s].
         silent: Whether it stopped sending efforts.
         abandoned: Whether the operator did not wait for the safe stop.
         later: The first fault in the safe stop, "" without one.
@@ -29,7 +33,7 @@ class OneRun:
 
     def __init__(
         self,
-        effort_source: EffortSource,
+        chain: ControlChain[EffortSource],
         hardware: Hardware,
         reader: StateReader,
         limiter: EffortLimiter,
@@ -38,11 +42,12 @@ class OneRun:
         requests: OperatorRequests,
         settings: LiveSettings,
         end: float,
+        balance: Balance | None = None,
     ) -> None:
         """Connect the parts.
 
         Args:
-            effort_source: Computes the efforts.
+            chain: Computes the efforts.
             hardware: The robot.
             reader: Reads its states; it has the first one.
             limiter: Limits the efforts.
@@ -51,8 +56,10 @@ class OneRun:
             requests: The operator's requests.
             settings: What is tolerated.
             end: The controller's time at which the run is complete [s].
+            balance: Tells whether a robot with a floating base falls.
         """
-        self.effort_source, self.hardware, self.reader = effort_source, hardware, reader
+        self.chain, self.hardware, self.reader = chain, hardware, reader
+        self.balance = balance
         self.limiter, self.safe_stop, self.log = limiter, safe_stop, log
         self.requests, self.settings, self.end = requests, settings, end
         self.period = hardware.period
@@ -60,6 +67,8 @@ class OneRun:
         self.ended: Ended = "completed"
         self.reason = ""
         self.error: Exception | None = None
+        self.ending: tuple[Ended, str] | None = None
+        self.asked_at = 0.0
         self.silent = self.done = self.abandoned = False
         self.later = ""
 
@@ -78,7 +87,11 @@ class OneRun:
                 if self.phase != Phase.RUNNING:  # the second: the robot must stop
                     self.silent = self.done = self.abandoned = True
                 name = "Ctrl-C" if isinstance(request, KeyboardInterrupt) else "exit"
-                self.stop("operator", f"stopped by the operator ({name})")
+                reason = f"stopped by the operator ({name})"
+                if self.ending is None:
+                    self.end_regularly("operator", reason)
+                else:
+                    self.stop("operator", reason)
             except Exception as error:  # nobody knows what to send now
                 self.silent = self.done = True
                 self.fail(error)
@@ -86,18 +99,21 @@ class OneRun:
     def one_period(self, on_period: Callable[[float], object] | None) -> None:
         """Read a state, send an effort, then log and make the requested changes."""
         reader, limiter = self.reader, self.limiter
-        reader.read(limiter.applied, self.effort_source.controller.limits)
+        reader.read(limiter.applied, self.chain.command.controller.limits)
         if reader.fault is not None:
             self.stop("fault", reader.fault, reader.error)
         elif self.requests.reason is not None:
-            self.stop("operator", self.requests.reason)
+            self.end_regularly("operator", self.requests.reason)
         elif reader.state.t >= self.end:
-            self.stop("completed", "the duration is over")
+            self.end_regularly("completed", "the duration is over")
+        elif self.ending is not None:
+            self.end_regularly(*self.ending)
+        self.feel_ground()
         self.hear_applied()
         tau = self.controller_effort() if self.phase == Phase.RUNNING else None
         if self.phase != Phase.RUNNING:
             tau = self.stop_effort()
-        limiter.follow(self.effort_source.controller.limits)
+        limiter.follow(self.chain.command.controller.limits)
         before = limiter.sent.copy()
         if tau is not None and not limiter.apply(tau, reader.state.q):
             self.stop("fault", f"the effort is not finite: {tau.tolist()}")
@@ -108,20 +124,42 @@ class OneRun:
         if self.phase == Phase.RUNNING:
             self.rest_of_period(on_period)
 
+    def feel_ground(self) -> None:
+        """Find which feet bear, and stop if the robot falls."""
+        measurement, state = self.reader.measurement, self.reader.state
+        if self.balance is None or measurement is None:
+            return
+        if not self.balance.lost:
+            self.safe_stop.feet.feel(measurement._replace(t=state.t))
+            fallen = self.balance.fault(state)
+            if fallen is not None:
+                self.fall(fallen)
+
+    def fall(self, reason: str, error: Exception | None = None) -> None:
+        """Stop a robot that falls: its feet hold it no more."""
+        if self.balance is not None:
+            self.balance.lost = True
+        self.safe_stop.feet.lose()
+        self.stop("fault", reason, error)
+
     def controller_effort(self) -> Array | None:
         """Return the controller's effort; None without a measurement: hold the last."""
         measurement, t = self.reader.measurement, self.reader.state.t
         if measurement is None:
             return None
         try:
-            tau = self.effort_source.effort(
-                t, measurement.q, measurement.v, self.period
-            )
-            tau = np.asarray(tau, dtype=float)
+            # What the motors have counts, with the gravity that the robot adds.
+            has = None if measurement.applied is None else self.limiter.applied.copy()
+            measured = measurement._replace(t=t, applied=has)
+            tau = np.asarray(self.chain.effort(measured, self.period), dtype=float)
             if tau.shape != measurement.v.shape:
                 raise ValueError(
                     f"the effort has shape {tau.shape}; needs {measurement.v.shape}"
                 )
+        except FallError as error:
+            self.log.controller_failed = True
+            self.fall(str(error), error)
+            return None
         except Exception as error:  # a user's task or field may raise anything
             self.log.controller_failed = True
             self.fail(error)
@@ -137,6 +175,20 @@ class OneRun:
         self.silent = unknown or not np.isfinite(tau).all()
         self.done = self.silent or self.safe_stop.done
         return tau
+
+    def end_regularly(self, ended: Ended, reason: str) -> None:
+        """Stop once the plan, if there is one, has brought the robot to rest."""
+        plan, state = self.chain.plan, self.reader.state
+        if plan is None or self.phase != Phase.RUNNING:
+            self.stop(ended, reason)
+            return
+        if self.ending is None:
+            self.ending, self.asked_at = (ended, reason), state.t
+            plan.stop()
+        still = float(np.abs(state.v).max()) <= self.settings.stop.standstill
+        waited = state.t - self.asked_at >= self.settings.stop.coming_to_rest
+        if waited or (plan.rests and still):
+            self.stop(*self.ending)
 
     def stop(self, ended: Ended, reason: str, error: Exception | None = None) -> None:
         """Start the safe stop; later calls change neither it nor the reason."""
@@ -176,7 +228,7 @@ class OneRun:
         if self.log.controller_failed:
             return
         try:
-            self.effort_source.applied(self.limiter.applied, self.period)
+            self.chain.command.applied(self.limiter.applied, self.period)
         except Exception as error:
             self.fail(error)
 

@@ -13,8 +13,9 @@ All numbers are little-endian:
     acks      8 bytes   sequence of the newest packet that the sender has received
     stamp     8 bytes   when it was sent, on the sender's monotonic clock [ns]
     t         8 bytes   time of the payload [s], a double
-    payload   8 count   doubles: q and v of a state, and the effort that the robot
-                        has, if it has one; tau of an effort
+    payload   8 count   doubles: q and v of a state, what its other sensors measure
+                        (`SensorLayout`), and the effort that the robot has, if it has
+                        one; tau of an effort
     check     4 bytes   CRC-32 of all bytes before
 """
 

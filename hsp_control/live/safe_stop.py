@@ -5,6 +5,7 @@ from enum import IntEnum
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.live.bearing_feet import BearingFeet
 from hsp_control.live.settings import StopSettings
 from hsp_control.robot import Robot, RobotState
 
@@ -32,14 +33,25 @@ class SafeStop:
     the robot came to rest: the PD control with gravity compensation of Takegaki and
     Arimoto (1981), stable for any inertia.
 
+    A robot with a floating base stands on its feet meanwhile: what these two exert on
+    its base goes through the feet that bear (`BearingFeet`). If none bears, or after a
+    fall, nothing can hold it. Then its joints are damped only, tau_j = -k M_jj v_j: the
+    robot sinks, and does not thrash.
+
     Attributes:
+        feet: What the robot stands on.
         phase: `Phase.DAMPING` or `Phase.HOLDING`.
         damped_for: Time spent damping [s].
         held_for: Time spent holding [s].
     """
 
     def __init__(
-        self, robot: Robot, settings: StopSettings, effort_limits: Array, period: float
+        self,
+        robot: Robot,
+        settings: StopSettings,
+        effort_limits: Array,
+        period: float,
+        feet: BearingFeet | None = None,
     ) -> None:
         """Check the gains for this period.
 
@@ -48,6 +60,7 @@ class SafeStop:
             settings: Gains and durations.
             effort_limits: Upper limits of the efforts, shape (nv,); they may change.
             period: Time between two calls of `effort` [s].
+            feet: What a robot with a floating base stands on; None: nothing.
 
         Raises:
             LiveError: If the period is too long for the settings.
@@ -55,6 +68,8 @@ class SafeStop:
         settings.check_period(period)
         self._robot, self._settings, self._period = robot, settings, period
         self._effort_limits = effort_limits
+        self.feet = BearingFeet(robot, ()) if feet is None else feet
+        self._base = list(robot.unactuated)
         self._rest = np.zeros(robot.nv)
         self.begin()
 
@@ -82,14 +97,29 @@ class SafeStop:
             self._held_q, self._held_mass = state.q.copy(), state.mass_matrix.copy()
         if self.phase == Phase.DAMPING:
             self.damped_for += self._period
-            braking = -settings.damping * (state.mass_matrix @ v)
         else:
             self.held_for += self._period
+        if not self.feet.hold:
+            return self._sinking(state)
+        if self.phase == Phase.DAMPING:
+            braking = -settings.damping * (state.mass_matrix @ v)
+        else:
             w = settings.natural_frequency
             displacement = self._robot.difference(self._held_q, state.q)
             braking = -(self._held_mass @ (w * w * displacement + 2.0 * w * v))
         gravity = self._robot.inverse_dynamics(state.q, self._rest, self._rest)
+        gravity, braking = (
+            self.feet.joint_effort(state, force) for force in (gravity, braking)
+        )
         return gravity + largest_scale(gravity, braking, self._effort_limits) * braking
+
+    def _sinking(self, state: RobotState) -> Array:
+        """Return the effort that only damps the joints, shape (nv,)."""
+        v = state.v.copy()
+        v[self._base] = 0.0
+        braking = -self._settings.damping * (state.mass_matrix @ v)
+        braking[self._base] = 0.0
+        return largest_scale(self._rest, braking, self._effort_limits) * braking
 
 
 def largest_scale(base: Array, direction: Array, limits: Array) -> float:

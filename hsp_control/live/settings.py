@@ -1,5 +1,6 @@
 """Settings of a live run: the robot's interface, what is tolerated, the safe stop."""
 
+from collections.abc import Sequence
 from dataclasses import KW_ONLY
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LimitError, LiveError
+from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.numbers_by_joint import Positives, by_dof
 from hsp_control.declaration import Part, within
@@ -36,6 +38,9 @@ class StopSettings(Part, error=LiveError):
     ``rest_speed``."""
     hold: NonNegative = 0.2
     """Duration of holding before the loop ends [s]."""
+    coming_to_rest: NonNegative = 4.0
+    """Maximum duration of a plan's last steps, after which it stands [s]; they precede
+    the safe stop of a run that ends without a fault."""
     standstill: Positive = 0.1
     """Largest joint speed at the end with which a run counts as completed [rad/s or
     m/s]; above ``rest_speed``, because of noise."""
@@ -109,6 +114,8 @@ class LiveSettings(Part, error=LiveError):
     def effort_limits(self, robot: Robot, limits: RobotLimits | None = None) -> Array:
         """Return the limits of the efforts, shape (nv,), inf where unlimited.
 
+        They are 0 where there is no motor: at a floating base.
+
         Args:
             robot: The model.
             limits: The controller's limits; None: without them.
@@ -117,27 +124,45 @@ class LiveSettings(Part, error=LiveError):
             LiveError: If they are neither one nor nv numbers.
         """
         if self.effort is None and limits is not None:
-            return np.array(limits.effort)
-        if self.effort is not None:
+            own = np.array(limits.effort)
+        elif self.effort is not None:
             with within("effort"):
-                return _per_dof(self.effort, robot)
-        own = np.array(robot.model.effortLimit, dtype=float)
-        # URDFs contain 0, or the largest float, where there is no limit.
-        own[(own <= 0.0) | (own >= np.finfo(np.float32).max)] = np.inf
+                own = _per_dof(self.effort, robot)
+        else:
+            own = np.array(robot.model.effortLimit, dtype=float)
+            # URDFs contain 0, or the largest float, where there is no limit.
+            own[(own <= 0.0) | (own >= np.finfo(np.float32).max)] = np.inf
+        own[list(robot.unactuated)] = 0.0  # no motor is there
         return own
 
 
-def check_fixed(robot: Robot) -> None:
-    """Check that the robot has a fixed base.
+def check_held(
+    robot: Robot, contacts: Sequence[Contact], settings: LiveSettings
+) -> None:
+    """Check that the robot can be held where it is: by its base, or on its contacts.
+
+    Args:
+        robot: The robot.
+        contacts: The controller's contacts.
+        settings: Whether the robot compensates gravity, which no floating base does.
 
     Raises:
-        LiveError: If it has a floating base.
+        LiveError: If it has a floating base and no contacts, or is said to compensate
+            gravity.
     """
-    if robot.unactuated:
+    if not robot.unactuated:
+        return
+    if not contacts:
         raise LiveError(
-            f"{robot.name} has a floating base; a live loop needs a fixed base: "
-            "damping and holding joints does not keep a robot from falling"
+            f"{robot.name} has a floating base and no contacts: a live loop could not "
+            "hold it; declare contacts"
         )
+    if settings.compensates_gravity:
+        with within("compensates_gravity"):
+            raise LiveError(
+                f"{robot.name} has a floating base: how its joints bear its weight "
+                "depends on its contacts, which it does not know; must be false"
+            )
 
 
 def _per_dof(numbers: Any, robot: Robot) -> Array:

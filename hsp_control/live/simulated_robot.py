@@ -6,9 +6,12 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, LiveError
+from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
+from hsp_control.live.bearing_feet import BearingFeet
 from hsp_control.live.effort_check import EffortCheck
 from hsp_control.live.effort_limiter import EffortLimiter
+from hsp_control.live.hardware import Measurement
 from hsp_control.live.safe_stop import Phase, SafeStop
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import RobotState
@@ -57,6 +60,7 @@ class SimulatedRobot:
         *,
         settings: LiveSettings | None = None,
         limits: RobotLimits | None = None,
+        contacts: Sequence[Contact] = (),
     ) -> None:
         """Set the robot to its start, at rest or moving.
 
@@ -69,6 +73,8 @@ class SimulatedRobot:
                 compensates gravity, with its true mass; None: the defaults.
             limits: Limits on its efforts, if the settings have none; None: the URDF's.
                 It accepts what either of them allows.
+            contacts: On which it stands, if its base is floating; its own stop needs
+                them.
 
         Raises:
             LiveError: If the settings do not fit the robot or the period.
@@ -76,7 +82,8 @@ class SimulatedRobot:
         robot, settings = plant.robot, settings or LiveSettings()
         self._limiter = EffortLimiter(robot, settings, period, limits)
         upper = self._limiter.effort_limits
-        self._stop = SafeStop(robot, settings.stop, upper, period)
+        self._feet = BearingFeet(robot, contacts)
+        self._stop = SafeStop(robot, settings.stop, upper, period, self._feet)
         self._check = EffortCheck(robot, settings, period, upper)
         self._state = RobotState(robot)
         self.plant, self.period, self.watchdog = plant, period, settings.watchdog
@@ -110,6 +117,26 @@ class SimulatedRobot:
         """Return the measured q, shape (nq,), and v, shape (nv,)."""
         return self.plant.measure(self.t, self.q, self.v)
 
+    def measured(self) -> Measurement:
+        """Return all that it measures, once a period; its number is that of periods.
+
+        Before the first effort nothing presses: its brakes hold it.
+        """
+        q, v = self.measure()
+        wrenches = self.plant.contact_wrenches(self.t, self.q, self.v, self.tau)
+        if self.phase == Phase.WAITING:
+            wrenches = {frame: np.zeros(6) for frame in wrenches}
+        return Measurement(
+            self.periods,
+            self.t,
+            q,
+            v,
+            halted=self.halted,
+            applied=self.in_force,
+            wrenches=wrenches,
+            inertial=self.plant.inertial(),
+        )
+
     def halt(self, reason: str) -> None:
         """Start the safe stop; the first reason is kept."""
         if self.phase <= Phase.RUNNING:
@@ -133,6 +160,8 @@ class SimulatedRobot:
                 self.halt(fault)
         if self.phase > Phase.RUNNING:
             state = self._state.update(self.t, self.q, self.v)
+            if self.plant.robot.unactuated:
+                self._feet.feel(self._pressed())
             self._limiter.apply(self._stop.effort(state), self.q)
             self.phase = self._stop.phase
         self.tau = self._limiter.applied
@@ -140,6 +169,12 @@ class SimulatedRobot:
         self._move(end)
         self.periods += 1
         self.t = end
+
+    def _pressed(self) -> Measurement:
+        """Return what presses on its feet, truly."""
+        q, v = self.q, self.v
+        wrenches = self.plant.contact_wrenches(self.t, q, v, self.tau)
+        return Measurement(self.periods, self.t, q, v, wrenches=wrenches)
 
     def _move(self, end: float) -> None:
         """Advance the plant; if that gives no state, the brakes hold the last one."""

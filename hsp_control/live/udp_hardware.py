@@ -9,6 +9,7 @@ from hsp_control.live.hardware import Measurement
 from hsp_control.live.link import LOOPBACK, Address, AgeEstimator, Link
 from hsp_control.live.packets import Kind
 from hsp_control.live.safe_stop import Phase
+from hsp_control.live.sensor_layout import SensorLayout
 from hsp_control.robot import Robot
 
 _BYES = 3
@@ -35,6 +36,7 @@ class UdpHardware:
         address: Address = (LOOPBACK, 0),
         session: int | None = None,
         faults: Faults | None = None,
+        sensors: SensorLayout | None = None,
     ) -> None:
         """Open the socket.
 
@@ -44,12 +46,14 @@ class UdpHardware:
             address: Where to listen; port 0: any free port.
             session: A number that the robot knows; None: a random one.
             faults: Faults to inject into the efforts sent.
+            sensors: What the robot measures besides q and v; None: nothing.
 
         Raises:
             HardwareError: If the address does not exist or is in use.
         """
         self.period = period
-        self._nq, self._nv = robot.nq, robot.nv
+        self._robot = robot
+        self._sensors = SensorLayout() if sensors is None else sensors
         session = secrets.randbits(63) if session is None else session
         self.link = Link(session, address, faults=faults, stream=1)
         self._age_estimator = AgeEstimator()
@@ -72,16 +76,12 @@ class UdpHardware:
             age = self._age_estimator.age(monotonic(), 1e-9 * packet.stamp)
         if not states:
             return None
-        numbers, nq, nv = packet.payload, self._nq, self._nv
-        q, v, applied = numbers[:nq], numbers[nq : nq + nv], numbers[nq + nv :]
-        return Measurement(
-            packet.sequence,
-            packet.t,
-            q,
-            v,
-            age,
+        measured = self._sensors.unpack(packet.payload, self._robot)
+        return measured._replace(
+            sequence=packet.sequence,
+            t=packet.t,
+            age=age,
             halted=packet.phase > Phase.RUNNING,
-            applied=applied if applied.size else None,
         )
 
     def write(self, effort: Array) -> None:

@@ -5,13 +5,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from time import monotonic, sleep
 
-import numpy as np
-
 from hsp_control.common.arrays import Array
 from hsp_control.live.latency import no_garbage_collection
 from hsp_control.live.link import Link
 from hsp_control.live.packets import Kind
 from hsp_control.live.safe_stop import Phase
+from hsp_control.live.sensor_layout import SensorLayout
 from hsp_control.live.simulated_robot import SimulatedRobot
 
 CLOSED_BY_LOOP = "the loop closed the connection"
@@ -68,6 +67,7 @@ def serve(
         The counts.
     """
     report, nv = ServerReport(), robot.plant.robot.nv
+    sensors = SensorLayout.of(robot.measured())
     state_sequence = 0
     with no_garbage_collection():
         begin = monotonic()
@@ -98,8 +98,7 @@ def serve(
                 robot.halt(reason)
             t, q, v = robot.t, robot.q, robot.v
             robot.advance(efforts)
-            has = robot.in_force
-            state = np.concatenate([*robot.measure(), [] if has is None else has])
+            state = sensors.pack(robot.measured())
             with suppress(OSError):  # a line that fails loses packets
                 link.send(Kind.STATE, state, t=robot.t, phase=int(robot.phase))
             state_sequence = link.counts["sent"]

@@ -9,6 +9,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
+from hsp_control.control.measurement import Inertial
 from hsp_control.live.hardware import Measurement
 from hsp_control.robot import Robot
 
@@ -17,7 +18,9 @@ _LARGEST_SPEED = 1e4
 _LARGEST_POSITION = 1e6
 """No joint is further away, or was turned further [rad or m]."""
 _LARGEST_EFFORT = 1e9
-"""No motor has a larger effort [N·m or N]."""
+"""No motor has a larger effort, and nothing is pressed harder [N·m or N]."""
+_LARGEST_FORCE = 1e6
+"""No specific force is larger, in an impact either [m/s²]."""
 _RESOLUTION = 1e-3
 """Coarsest step of the robot's clock [periods]; a huge time has coarser ones."""
 
@@ -76,7 +79,34 @@ def _checked(raw: Measurement, robot: Robot, period: float) -> Measurement:
             f"the state's fault is of type {type(raw.fault).__name__}; needs a text"
         )
     return Measurement(
-        int(raw.sequence), t, q, v, age, bool(raw.halted), applied, raw.fault
+        int(raw.sequence),
+        t,
+        q,
+        v,
+        age,
+        bool(raw.halted),
+        applied,
+        raw.fault,
+        {
+            frame: _vector(f"wrench at {frame}", wrench, 6, _LARGEST_EFFORT)
+            for frame, wrench in raw.wrenches.items()
+        },
+        frozenset(raw.estimated),
+        _inertial(raw.inertial),
+    )
+
+
+def _inertial(raw: Any) -> Inertial | None:
+    if raw is None:
+        return None
+    if not isinstance(raw, Inertial):
+        raise HardwareError(
+            f"the state's inertial is of type {type(raw).__name__}; needs an Inertial"
+        )
+    return Inertial(
+        raw.frame,
+        _vector("angular velocity", raw.angular_velocity, 3, _LARGEST_SPEED),
+        _vector("specific force", raw.specific_force, 3, _LARGEST_FORCE),
     )
 
 

@@ -72,6 +72,11 @@ class RunningCrawl(RunningQuadruped):
             ),
         }
 
+    @property
+    def rests(self) -> bool:
+        """Whether it stands; see `RunningPlan.rests`."""
+        return self._mode == "standing"
+
     # -- from swing to swing ----------------------------------------------------------
 
     @property
@@ -91,7 +96,7 @@ class RunningCrawl(RunningQuadruped):
 
     def _go_on(self, t: float, measured: Measurement) -> None:
         if self._mode == "standing":
-            if not self.gait.velocity_at(t).is_zero:
+            if not self._wanted(t).is_zero:
                 self._middle = self._state.centroidal.position[:2].copy()
                 self._idle = 0
                 self._move_over(t)
@@ -103,7 +108,7 @@ class RunningCrawl(RunningQuadruped):
         elif self._has_landed(self._foot, measured):
             self._swings += 1
             self._idle = self._idle + 1 if self._velocity.is_zero else 0
-            if self.gait.velocity_at(t).is_zero and self._idle >= CLOSING:
+            if self._wanted(t).is_zero and self._idle >= CLOSING:
                 self._mode = "standing"
                 places = [self._state.position(foot.frame)[:2] for foot in self._feet]
                 self._shift_to(np.mean(places, axis=0), t)

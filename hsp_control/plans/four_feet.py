@@ -232,6 +232,10 @@ class RunningQuadruped(RunningPlan):
 
     # -- the body ---------------------------------------------------------------------
 
+    def _wanted(self, t: float) -> Velocity:
+        """Return the velocity that is wanted."""
+        return Velocity(0.0, 0.0, 0.0) if self.stopping else self.gait.velocity_at(t)
+
     def _accelerate(self, t: float) -> None:
         """Bring the velocity nearer to what is wanted, and turn with it."""
         h = t - self._last
@@ -240,7 +244,7 @@ class RunningQuadruped(RunningPlan):
         self._velocity = Velocity(
             *(
                 a + min(max(b - a, -most), most)
-                for a, b in zip(self._velocity, self.gait.velocity_at(t), strict=True)
+                for a, b in zip(self._velocity, self._wanted(t), strict=True)
             )
         )
         self._yaw += h * self._velocity.turn

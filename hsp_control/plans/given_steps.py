@@ -62,7 +62,7 @@ class GivenSteps(StepPlanner):
 
     def sets_out(self, t: float, taken: int) -> bool:
         """Return whether steps are left."""
-        return taken < len(self._steps)
+        return taken < len(self._steps) and not self.stopping
 
     def first_side(self, t: float, taken: int) -> float:
         """Return the foot that swings first; they alternate after that."""
@@ -76,7 +76,7 @@ class GivenSteps(StepPlanner):
         side: float,
         places: Mapping[float, Footstep],
     ) -> Next:
-        if taken >= len(self._steps):
+        if taken >= len(self._steps) or self.stopping:
             return Next(REST, None)
         # A push may have moved the foot that stands.
         kept = self._stance.kept(places[-side], side, self._steps[taken])

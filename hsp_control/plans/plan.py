@@ -67,11 +67,22 @@ class RunningPlan(ABC):
 
     Attributes:
         plan: The plan, with the streams of this run.
+        stopping: Whether it was told to come to rest.
     """
 
     def __init__(self, plan: Plan) -> None:
         """Set the plan."""
         self.plan = plan
+        self.stopping = False
+
+    def stop(self) -> None:
+        """Come to rest as soon as the robot can stand, whatever else is planned."""
+        self.stopping = True
+
+    @property
+    def rests(self) -> bool:
+        """Whether the robot stands where it is, as far as the plan is concerned."""
+        return True
 
     @abstractmethod
     def start(self, state: RobotState) -> None:

@@ -56,7 +56,11 @@ class Next(NamedTuple):
 
 
 class StepPlanner:
-    """Plans steps from the velocity that is wanted."""
+    """Plans steps from the velocity that is wanted.
+
+    Attributes:
+        stopping: Whether the robot is to stand as soon as it can.
+    """
 
     def __init__(self, walk: "Walk", stance: Stance, robot: str) -> None:
         """Set the walk, and how the feet stand.
@@ -70,6 +74,7 @@ class StepPlanner:
             PlanError: If a stride is longer than the legs reach.
         """
         self._walk, self._stance = walk, stance
+        self.stopping = False
         self.period = walk.swing + walk.double_support
         speed = hypot(walk.speed, walk.sideways)
         if speed * self.period > stance.longest:
@@ -82,7 +87,7 @@ class StepPlanner:
     def wanted(self, t: float, taken: int) -> Velocity:
         """Return the velocity that is wanted after some steps; none if they are all."""
         steps = self._walk.steps
-        if steps is not None and taken >= steps:
+        if self.stopping or (steps is not None and taken >= steps):
             return Velocity(0.0, 0.0, 0.0)
         return self._walk.velocity_at(t)
 

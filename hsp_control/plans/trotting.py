@@ -64,6 +64,11 @@ class RunningTrot(RunningQuadruped):
             ),
         }
 
+    @property
+    def rests(self) -> bool:
+        """Whether it stands; see `RunningPlan.rests`."""
+        return self._mode == "standing"
+
     # -- from swing to swing ----------------------------------------------------------
 
     def _step(self, t: float, measured: Measurement) -> None:
@@ -90,7 +95,7 @@ class RunningTrot(RunningQuadruped):
 
     def _go_on(self, measured: Measurement) -> None:
         t, trot = measured.t, self.gait
-        wanted = trot.velocity_at(t)
+        wanted = self._wanted(t)
         if self._mode == "standing":
             if not wanted.is_zero:
                 self._mode, self._idle = "ready", 0

@@ -142,6 +142,16 @@ class RunningWalk(RunningPlan):
             ),
         }
 
+    def stop(self) -> None:
+        """Stand with the feet beside each other; see `RunningPlan.stop`."""
+        super().stop()
+        self._planner.stopping = True
+
+    @property
+    def rests(self) -> bool:
+        """Whether it stands; see `RunningPlan.rests`."""
+        return self._mode == "standing"
+
     # -- the start --------------------------------------------------------------------
 
     def start(self, state: RobotState) -> None:

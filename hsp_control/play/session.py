@@ -13,13 +13,13 @@ from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.config import Experiment
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
-from hsp_control.estimation import begun
 from hsp_control.live.simulated_robot import sampled
 from hsp_control.play.handles import Handles
 from hsp_control.play.knobs import Knob
 from hsp_control.play.operational_space import ComparedCommand
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.loops import Instant, sampled_loop
 from hsp_control.simulation.plants import Plant
 from hsp_control.simulation.plants.push import Pushes, Spring
@@ -95,15 +95,14 @@ class Session:
         self._unrepeatable = ""
         rows, plan = self._rows(), experiment.scenario.plan
         times = [k * self.row for k in range(rows)]
-        running = None if plan is None else plan.begin(self.controller)
-        estimating = begun(
-            experiment.scenario.estimators, self.controller, self._plant.inertial()
-        )
+        chain = ControlChain(self._command, plan, experiment.scenario.estimators)
+        chain.begin(self._plant.inertial())
         self._loop: Iterator[Instant] = sampled_loop(
-            self._command, self._plant, round(self.row / self.period), times,
-            experiment.q0, experiment.v0, running, estimating,
+            chain, self._plant, round(self.row / self.period), times,
+            experiment.q0, experiment.v0,
         )  # fmt: skip
-        self.recorder = Recorder(self.controller, self.controller.scene, rows, running)
+        scene = self.controller.scene
+        self.recorder = Recorder(self.controller, scene, rows, chain.plan)
         self.over = ""
         self._step()
         self.handles = Handles(self.controller, self.period)
@@ -203,7 +202,7 @@ class Session:
     @property
     def meta(self) -> dict[str, Any]:
         """The meta data of the rows so far."""
-        return self.recorder.meta("", "")
+        return self.recorder.meta("", "", plant=self._plant.describe())
 
     def rollout(self) -> Rollout:
         """Return the log so far; `hsp run` repeats it, unless somebody pulled."""
@@ -218,6 +217,7 @@ class Session:
             name=f"{experiment.name}, played",
             title=experiment.scenario.title,
             config=config,
+            plant=self._plant.describe(),
             **lost,
         )
 

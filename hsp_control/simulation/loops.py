@@ -13,10 +13,10 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.measurement import Measurement
 from hsp_control.control.output import ControlOutput
-from hsp_control.estimation import RunningEstimator
-from hsp_control.plans import RunningPlan
 from hsp_control.robot import RobotState
 from hsp_control.robot.integrators import Integrator, bound
+from hsp_control.simulation.control_chain import ControlChain
+from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.plants import ContinuousPlant, SampledPlant
 
 RUNAWAY_SPEED = 1e4
@@ -77,26 +77,22 @@ def continuous_loop(
 
 
 def sampled_loop(
-    command: Command,
+    chain: ControlChain[Command],
     plant: SampledPlant,
     periods: int,
     times: Sequence[float],
     q: Array,
     v: Array,
-    plan: RunningPlan | None = None,
-    estimators: Sequence[RunningEstimator] = (),
 ) -> Iterator[Instant]:
     """Yield the instants of a loop that holds each effort for a control period.
 
     Args:
-        command: The controller and its compensation.
+        chain: What computes the efforts; it has begun.
         plant: The plant.
         periods: How many control periods are between two of the times.
         times: When to yield an instant [s], increasing.
         q: Start configuration, shape (nq,).
         v: Start velocity, shape (nv,).
-        plan: Writes references and switches contacts, before each effort.
-        estimators: Estimate what is not measured, for the plan and for the command.
 
     Raises:
         EstimationError: If what an estimator needs is not measured.
@@ -104,7 +100,8 @@ def sampled_loop(
         SimulationError: If the motion diverges.
     """
     plant.reset(times[0], q, v)
-    command.restart()
+    command, excess = chain.command, LimitExcess(plant.robot)
+    controller = command.controller
     period = (times[1] - times[0]) / periods
     tau, count = np.zeros(plant.robot.nv), 0
     for start, end in zip(times, (*times[1:], times[-1]), strict=True):
@@ -114,28 +111,22 @@ def sampled_loop(
             t = start + k * (end - start) / periods
             measured = Measurement(count, t, *plant.measure(t, q, v))
             count += 1
-            if plan is not None or estimators or command.feels_contacts:
+            excess.see(controller.limits, q, v)
+            if chain.needs_sensors:
                 measured = measured._replace(
                     applied=tau,
                     wrenches=plant.contact_wrenches(t, q, v, tau),
                     inertial=plant.inertial(),
                 )
-            for each in estimators:
-                measured = each.update(measured)
-            if plan is not None:
-                plan.update(measured)
-            tau = command.effort(
-                t, measured.q, measured.v, period, measured.wrenches
-            ).copy()
+            tau = chain.effort(measured, period).copy()
             if k == 0:
                 output, state = command.output, command.state
                 if not (t == state.t and _equal(state.q, q) and _equal(state.v, v)):
                     output = command.evaluate(t, q, v)
-                channels = command.log_channels()
-                if plan is not None:
-                    channels = {**channels, **plan.log_channels()}
-                for each in estimators:
-                    channels = {**channels, **each.log_channels(q, v)}
+                channels = {
+                    **chain.log_channels(q, v),
+                    **excess.take(controller.limits),
+                }
                 yield Instant(state, output, tau, channels)
             if end == start:  # the last row
                 return

@@ -13,7 +13,6 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError, SimulationError
 from hsp_control.common.version import __version__
-from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.controller import Controller
 from hsp_control.control.log_channel import LogChannel
 from hsp_control.control.output import ControlOutput
@@ -26,6 +25,7 @@ from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import FixedMetric, Metric
 from hsp_control.plans import RunningPlan
 from hsp_control.robot import Robot, RobotState
+from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.log_file import MAX_SIZE
 from hsp_control.simulation.rollout import FORMAT, Rollout, complete_columns
 from hsp_control.tasks import Task
@@ -43,7 +43,11 @@ _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
 
 class Recorder:
-    """Columns for a known number of rows; an incomplete row is never returned."""
+    """Columns for a known number of rows; an incomplete row is never returned.
+
+    Attributes:
+        plan: What the robot follows; its streams are recorded. None: no plan.
+    """
 
     def __init__(
         self,
@@ -64,7 +68,7 @@ class Recorder:
             SimulationError: If the log would be too large to be loaded.
         """
         self._controller = controller
-        self._plan = plan
+        self.plan = plan
         self._scene = scene
         self._rows = 0
         self._capacity = rows
@@ -112,6 +116,7 @@ class Recorder:
             column(
                 f"{prefix}.friction_used", (), "-", "largest ‖f_t‖/(μ f_n) of a point"
             )
+        self._excess = LimitExcess(robot)
         self._points, self._parents = _skeleton(robot, controller)
         column("skeleton", (len(self._parents), 3), "m", "joints and task frames")
         self._add_term_columns()
@@ -245,8 +250,9 @@ class Recorder:
             placement = pin.SE3ToXYZQUAT(obstacle.placement(state.t))
             columns[f"obstacle.{obstacle.name}"][i] = placement[:3]
             columns[f"obstacle.{obstacle.name}.quaternion"][i] = placement[3:]
-        if self._controller.limits is not None:
-            self._record_excess(self._controller.limits, state)
+        limits = self._controller.limits
+        self._excess.see(limits, state.q, state.v)
+        log_channels = {**self._excess.take(limits), **log_channels}
         if output is not None:
             self._record_law(state, output)
         for name, channel in log_channels.items():
@@ -255,26 +261,6 @@ class Recorder:
             )
             columns[name][i] = channel.value
         self._rows += 1
-
-    def _record_excess(self, limits: RobotLimits, state: RobotState) -> None:
-        """Record how far the robot is beyond its limits, whatever the status says.
-
-        The law keeps them for its model: a push that it does not know of, or a plant
-        that differs, can take the robot further than any effort could bring it back.
-        """
-        if "position_excess" not in self._columns:
-            unit, shape = self._joint_unit, (state.robot.nv,)
-            beyond = "how far beyond its"
-            self._add_column("position_excess", shape, unit, f"{beyond} position limit")
-            self._add_column(
-                "velocity_excess", shape, f"{unit}/s", f"{beyond} speed limit"
-            )
-        positions = self._columns["joint_positions"][self._rows]
-        beyond = np.maximum(positions - limits.upper, limits.lower - positions)
-        # A joint without a coordinate of its own has no position, and no limit.
-        self._columns["position_excess"][self._rows] = np.fmax(beyond, 0.0)
-        fast = np.abs(state.v) - limits.velocity
-        self._columns["velocity_excess"][self._rows] = np.maximum(fast, 0.0)
 
     def _record_law(self, state: RobotState, output: ControlOutput) -> None:
         i, columns, controller = self._rows, self._columns, self._controller
@@ -381,8 +367,8 @@ class Recorder:
         heard = {name: [list(s.record) for s in each] for name, each in streams.items()}
         lost = sum(s.unrecorded for each in streams.values() for s in each)
         found = _changes(self._controller) | ({"streams": heard} if heard else {})
-        if self._plan is not None:
-            planned = list(parts_within(self._plan.plan, Streamed))
+        if self.plan is not None:
+            planned = list(parts_within(self.plan.plan, Streamed))
             lost += sum(stream.unrecorded for stream in planned)
             if planned:
                 found["plan_streams"] = [list(stream.record) for stream in planned]

@@ -13,10 +13,11 @@ from hsp_control.common.exceptions import (
 from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
-from hsp_control.estimation import Estimator, begun
+from hsp_control.estimation import Estimator
 from hsp_control.geometry.scene import Scene
-from hsp_control.plans import Plan
+from hsp_control.plans import Plan, RunningPlan
 from hsp_control.robot.integrators import Dop853, Integrator
+from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.loops import continuous_loop, sampled_loop
 from hsp_control.simulation.plants import (
     ContinuousPlant,
@@ -122,13 +123,14 @@ def simulate(
             "estimators estimate once a period: they need a control_period [s], for "
             "example 0.001"
         )
-    running = None if plan is None else plan.begin(controller)
-    estimating = begun(estimators, controller, plant.inertial())
+    running: RunningPlan | None = None
     if isinstance(plant, ContinuousPlant):
         loop = continuous_loop(controller, plant, integrator, times, q, v)
     elif isinstance(plant, SampledPlant) and periods:
-        command = Command(controller, compensation)
-        loop = sampled_loop(command, plant, periods, times, q, v, running, estimating)
+        chain = ControlChain(Command(controller, compensation), plan, estimators)
+        chain.begin(plant.inertial())
+        running = chain.plan
+        loop = sampled_loop(chain, plant, periods, times, q, v)
     else:
         raise SimulationError(
             f"{type(plant).__name__} holds the effort during a period: it needs a "

@@ -6,6 +6,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 from hsp_control.simulation.log_series import (
     column_unit,
     distances,
@@ -78,6 +79,12 @@ def measures(rollout: Rollout) -> dict[str, Measure]:
     found["speed.max"] = Measure(
         _maximum(np.abs(rollout.v)), unit, "largest joint speed"
     )
+    for name, of in ((POSITION, "position"), (VELOCITY, "speed")):
+        if name in rollout.columns:
+            unit = column_unit(rollout, name)
+            most = _maximum(np.nan_to_num(rollout[name]))
+            meaning = f"farthest beyond a {of} limit"
+            found[f"{name}.max"] = Measure(most, unit, meaning)
     found["simulated_time"] = Measure(
         float(rollout.t[-1] - rollout.t[0]), "s", "simulated time"
     )

@@ -877,8 +877,8 @@ MUTANTS = (
     Mutant(
         "MuJoCo contacts: action without reaction",
         IN_MUJOCO + "engine.py",
-        "touched = [(-1.0, contact.geom1)",
-        "touched = [(1.0, contact.geom1)",
+        "sign = 1.0 if side == 1 else -1.0",
+        "sign = 1.0",
         UNIT + "simulation/test_mujoco_scene.py -k push_each_other",
     ),
 )

@@ -211,6 +211,30 @@ def test_the_loop_moves_as_the_simulation_does(loop: ControlLoop) -> None:
     assert loop.t == 0.0
 
 
+@pytest.mark.slow
+def test_a_loop_with_a_plan_moves_as_the_simulation_does() -> None:
+    """The step that is timed is that of a run: estimator, plan, and their contacts."""
+    pytest.importorskip("mujoco")
+    pytest.importorskip("example_robot_data")
+    brief = (
+        "estimators.base=true",
+        "simulation.duration=0.4",
+        "simulation.log_period=0.001",
+    )
+    run = hsp.load_experiment("whole_body/solo12_trot", *brief).run()
+    made = hsp.load_experiment("whole_body/solo12_trot", *brief)
+    given = made.controller, made.q0, made.v0, 0.001, made.plant
+    trot = ControlLoop(*given, made.scenario.plan, made.scenario.estimators)
+    for _ in range(2):  # a restart begins a run anew
+        for row in range(400):
+            np.testing.assert_allclose(trot.q, run.q[row], rtol=0, atol=1e-9)
+            trot.control()
+            np.testing.assert_allclose(trot.tau, run.tau[row], rtol=0, atol=1e-7)
+            trot.move()
+        trot.restart()
+    assert 2.0 in run["plan.phase"], "no foot swung"
+
+
 def test_a_measured_loop_did_the_same_steps_twice(
     loop: ControlLoop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -277,6 +301,19 @@ def test_bench_tells_and_draws(
     numbers = [float(word) for word in row.split()[-4:]]
     assert 0.0 < numbers[0] <= numbers[1] <= numbers[2] <= numbers[3]
     assert picture.is_file()
+
+
+@pytest.mark.slow
+def test_bench_names_what_the_step_consists_of(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("mujoco")
+    pytest.importorskip("example_robot_data")
+    quick = ["--seconds", "0.05", "--set", "estimators.base=true"]
+    assert main(["bench", "--latency", "whole_body/solo12_trot", *quick]) == 0
+    printed = capsys.readouterr().out
+    (row,) = [line for line in printed.splitlines() if line.startswith("step: ")]
+    assert row.startswith("step: estimators, plan, state and law ")
 
 
 @pytest.mark.parametrize(

@@ -270,8 +270,52 @@ def test_options_that_are_none(
     assert message in capsys.readouterr().err
 
 
-def test_a_floating_base_is_refused_before_anything_starts() -> None:
+def test_what_feet_feel_comes_over_the_wire(tmp_path: Path) -> None:
+    """Solo stands; a plan feels one of its feet, which the other process presses."""
+    pytest.importorskip("mujoco")
+    pytest.importorskip("example_robot_data")
+    experiment = hsp.load_experiment(
+        "whole_body/solo12_trunk",
+        "tasks.trunk.trajectory={type: hold}",
+        "plan={type: sensed, contacts: {front_left: {force: 0.5, starts: true}}}",
+        "simulation.control_period=0.001",
+    )
+    logs = tmp_path / "loop.journal", tmp_path / "robot.journal"
+    with RobotProcess(experiment, log=logs[1], log_period=0.001) as robot:
+        report = run_loop(
+            experiment.controller,
+            robot.hardware,
+            duration=0.5,
+            plan=experiment.scenario.plan,
+            settings=patient(),
+            log=logs[0],
+            log_period=0.001,
+        )
+        told = robot.wait(60.0)
+    assert report.ended == "completed", report.reason
+    assert told is not None
+    loop, true = (Rollout.load(log) for log in logs)
+    rows = {round(1000.0 * t): k for k, t in enumerate(true.t)}
+    running = loop["live.phase"] == Phase.RUNNING
+    pairs = [
+        (k, rows[n])
+        for k, t in enumerate(loop.t)
+        if running[k] and loop["live.measured"][k] and (n := round(1000.0 * t)) in rows
+    ]
+    assert len(pairs) > 50
+    mine, theirs = np.array(pairs).T
+    np.testing.assert_array_equal(loop.q[mine], true.q[theirs])
+    felt = loop["plan.front_left.felt"][mine]
+    pressed = true["plant.contact.FL_FOOT.force"][theirs, 2]
+    weight = 9.81 * sum(each.mass for each in experiment.robot.model.inertias)
+    assert felt[-1] == pytest.approx(pressed[-1], rel=0.05)
+    assert 0.1 * weight < felt[-1] < 0.5 * weight
+    assert_whole(true)
+    assert true.q[-1, 2] > 0.9 * experiment.q0[2], "it stands when all has ended"
+
+
+def test_a_floating_base_that_nothing_holds_is_refused_before_anything_starts() -> None:
     robot = {"name": "panda", "root": "free_flyer"}
     experiment = hsp.load_experiment(CONFIG | {"robot": robot, "base": "driven"})
-    with pytest.raises(LiveError, match="floating base"):
+    with pytest.raises(LiveError, match="floating base and no contacts"):
         RobotProcess(experiment)

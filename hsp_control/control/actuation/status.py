@@ -11,7 +11,9 @@ class Status(IntEnum):
     REDISTRIBUTED = 1
     """All of it, with contact forces chosen by a QP."""
     LIMITED = 2
-    """The nearest acceleration within the limits; all of them are kept."""
+    """The nearest acceleration within the limits. All of them are kept as far as the
+    model goes: whether a joint is beyond one, say the columns ``position_excess`` and
+    ``velocity_excess`` of the log, whatever the status."""
     RELAXED = 3
     """The limits contradict each other: they are relaxed as little as possible."""
 

@@ -3,7 +3,7 @@
 from hsp_control.visualization import palette
 
 ACTUAL, DESIRED = palette.ACTUAL, palette.DESIRED
-OBSTACLE = palette.OBSTACLE
+OBSTACLE, SOLID = palette.OBSTACLE, palette.SOLID
 LINK, JOINT = palette.LINK, palette.JOINT
 AXES = (palette.OBSTACLE, palette.TASK, palette.ACTUAL)
 """x, y and z axis of a target: like red, green, blue, but safe for colour blindness."""

@@ -10,6 +10,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearance
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 from hsp_control.simulation.recorder import logged_terms
 from hsp_control.visualization import palette
 from hsp_control.visualization.viewer.controller_analysis import from_the_start
@@ -84,6 +85,12 @@ def _activities(
     if "status" in rollout:
         limit = Band("limit active", "a limit is active", palette.DESIRED, [])
         yield limit, rollout["status"] >= _LIMITED
+    beyond = np.zeros(len(rollout), bool)
+    for name in (POSITION, VELOCITY):
+        if name in rollout:
+            beyond |= (rollout[name] > 0.0).any(axis=1)
+    words = "beyond a limit"
+    yield Band(words, f"a joint is {words}", palette.MUTED, []), beyond
     if "damped" in rollout:
         words = "bounded at a singularity"
         singular = Band(words, f"the law is {words}", palette.WARNING, [])

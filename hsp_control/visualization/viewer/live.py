@@ -197,7 +197,7 @@ def _preview(experiment: Experiment) -> Rollout:
             if not len(recorder.rows(0)["t"]):
                 raise
             break
-    return recorder.rollout("preview", "")
+    return recorder.rollout("preview", "", plant=experiment.plant.describe())
 
 
 def _shown(rate: float) -> str:

@@ -47,14 +47,15 @@ def logged_shape(about: Mapping[str, Any]) -> Shape | None:
     return None if radius is None else shapes.Sphere(float(radius))
 
 
-def obstacle(shape: Shape, extent: float) -> Json:
+def obstacle(shape: Shape, extent: float, color: str = OBSTACLE) -> Json:
     """Return a shape as a three.js object.
 
     Args:
         shape: The shape.
         extent: The edge of the square that shows a half-space [m].
+        color: Its colour.
     """
-    surface = material(OBSTACLE, opacity=OBSTACLE_OPACITY, glow=0.3)
+    surface = material(color, opacity=OBSTACLE_OPACITY, glow=0.3)
     pose = np.eye(4)
     match shape:
         case shapes.Sphere():

@@ -24,12 +24,14 @@ from hsp_control.visualization.viewer.obstacle_layer import ObstacleLayer
 from hsp_control.visualization.viewer.paths import Paths
 from hsp_control.visualization.viewer.robot_drawing import RobotDrawing, robot_entry
 from hsp_control.visualization.viewer.self_motion import SelfMotion
+from hsp_control.visualization.viewer.solid_layer import SolidLayer
 from hsp_control.visualization.viewer.target_markers import TargetMarkers
 
 LAYERS = (
     "paths",
     "targets",
     "obstacles",
+    "solids",
     "influence",
     "distances",
     "capsules",
@@ -64,6 +66,7 @@ def all_layers(
         "paths": Paths(motion, f"{root}/paths"),
         "targets": TargetMarkers(motion, f"{root}/targets"),
         "obstacles": obstacles,
+        "solids": SolidLayer(motion, f"{root}/solids"),
         "ellipsoid": Ellipsoid(robot, controller, f"{root}/ellipsoid"),
         "contacts": Contacts(robot, motion, f"{root}/contacts"),
     }
@@ -155,8 +158,9 @@ class RunDrawing:
         return np.concatenate([skeleton.reshape(-1, 3), paths])
 
     def obstacle_points(self) -> Array:
-        """Return points that enclose the obstacles in the run [m], shape (K, 3)."""
-        return ObstacleLayer(self.motion, "").points()
+        """Return points that enclose obstacles and solids in the run [m], (K, 3)."""
+        layers = ObstacleLayer(self.motion, ""), SolidLayer(self.motion, "")
+        return np.concatenate([each.points() for each in layers])
 
     def legend(self) -> list[LegendEntry]:
         """Return the legend's entries of all layers, and the robot's."""

@@ -10,6 +10,7 @@ from hsp_control.control.measurement import Measurement
 from hsp_control.plans import Plan, PlanParts, RunningPlan
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation import simulate
+from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.loops import sampled_loop
 from hsp_control.simulation.plants import (
     IntegratedPlant,
@@ -53,16 +54,22 @@ class Falls(Plan):
         return Listening(falls_at=0.02)
 
 
+class Listens(Falls):
+    """A plan that only listens."""
+
+    def begin(self, controller):
+        return Listening()
+
+
 def momentum_balance(plant, tolerance):
     """Assert m c'' = Σ F - m g, with c'' from one period to the next."""
     experiment = load_experiment("whole_body/solo12_trunk")
     robot, h = experiment.robot, 0.001
-    plan, times = Listening(), np.arange(60) * h
-    loop = sampled_loop(
-        Command(experiment.controller), plant, 1, times, experiment.q0,
-        experiment.v0, plan,
-    )  # fmt: skip
-    for _ in loop:
+    times = np.arange(60) * h
+    chain = ControlChain(Command(experiment.controller), Listens())
+    chain.begin(None)
+    plan = chain.plan
+    for _ in sampled_loop(chain, plant, 1, times, experiment.q0, experiment.v0):
         pass
     mass = sum(inertia.mass for inertia in robot.model.inertias)
     rates = [

@@ -69,6 +69,12 @@ def test_bands_are_the_logs_columns(obstacle: tuple[Experiment, Rollout]) -> Non
         "limit active": [pytest.approx((run.t[10], run.t[20]))],
         "inside an influence zone": [pytest.approx((run.t[30], run.t[40]))],
     }
+    excess = np.zeros((n, 7))
+    excess[42:46, 3] = 1e-3
+    beyond = altered(run, status=np.zeros(n), position_excess=excess)
+    assert {band.name: band.spans for band in bands_of(beyond, None)} == {
+        "beyond a limit": [pytest.approx((run.t[42], run.t[46]))]
+    }
     # Without the controller nobody knows where a zone begins.
     assert [band.name for band in bands_of(run, None)] == ["limit active"]
 

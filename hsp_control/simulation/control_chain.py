@@ -1,0 +1,161 @@
+"""What one control period computes: estimators, then the plan, then the effort."""
+
+from collections.abc import Mapping, Sequence
+from typing import Generic, Protocol, TypeVar
+
+from hsp_control.common.arrays import Array
+from hsp_control.control.controller import Controller
+from hsp_control.control.log_channel import LogChannel
+from hsp_control.control.measurement import Inertial, Measurement
+from hsp_control.control.output import ControlOutput
+from hsp_control.estimation import Estimator, RunningEstimator, begun
+from hsp_control.plans import Plan, RunningPlan
+from hsp_control.robot import RobotState
+
+
+class EffortSource(Protocol):
+    """Computes the efforts of a loop: a `Command`, or a wrapper around one.
+
+    One that has an attribute ``feels_contacts`` which is true gets the wrenches of
+    `Measurement` as a fifth argument of `effort`.
+
+    Attributes:
+        controller: The controller.
+        output: The controller's last output.
+        state: The state for which the controller computed it.
+    """
+
+    @property
+    def controller(self) -> Controller:
+        """The controller."""
+
+    @property
+    def output(self) -> ControlOutput:
+        """The controller's last output."""
+
+    @property
+    def state(self) -> RobotState:
+        """The state for which the controller computed it."""
+
+    def restart(self) -> None:
+        """Clear all memory: a new run begins."""
+
+    def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
+        """Return the effort, shape (nv,), for a measurement at time t [s].
+
+        Args:
+            t: Time [s].
+            q: Measured configuration, shape (nq,).
+            v: Measured velocity, shape (nv,).
+            period: How long the effort will be held [s].
+        """
+
+    def applied(self, tau: Array, period: float) -> None:
+        """Record the effort, shape (nv,), that the motors really apply.
+
+        Args:
+            tau: The effort after all limits, shape (nv,).
+            period: Time until the next effort [s].
+        """
+
+    def log_channels(self) -> Mapping[str, LogChannel]:
+        """Return what it logs of the last effort besides the controller, by name."""
+
+
+Source_co = TypeVar("Source_co", bound=EffortSource, covariant=True)
+
+
+class ControlChain(Generic[Source_co]):
+    """From a measurement to an effort, in simulations and on robots alike.
+
+        measurement → estimators → plan → command → effort
+
+    Attributes:
+        command: What computes the efforts.
+        plan: What runs of the plan; None without one, or before `begin`.
+    """
+
+    def __init__(
+        self,
+        command: Source_co,
+        plan: Plan | None = None,
+        estimators: Sequence[Estimator] = (),
+    ) -> None:
+        """Set the parts.
+
+        Args:
+            command: What computes the efforts; its controller is made of the plan's
+                parts.
+            plan: What writes references and switches contacts.
+            estimators: What completes each measurement.
+        """
+        self.command = command
+        self._plan, self._estimators = plan, tuple(estimators)
+        self._estimating: list[RunningEstimator] = []
+        self.plan: RunningPlan | None = None
+
+    @property
+    def needs_sensors(self) -> bool:
+        """Whether more is needed of a measurement than q and v."""
+        return bool(self._plan is not None or self._estimators or self._feels)
+
+    def begin(self, inertial: Inertial | None, state: RobotState | None = None) -> None:
+        """Begin a run: nothing is remembered of an earlier one.
+
+        Args:
+            inertial: A reading of the robot's inertial measurement unit, which says
+                where that is; None: there is no unit.
+            state: Where the robot is, so that the plan starts now; None: it starts
+                with the first effort.
+
+        Raises:
+            PlanError: If the controller has other parts than the plan, or the robot
+                cannot follow the plan from there.
+            EstimationError: If what an estimator needs is missing.
+        """
+        controller = self.command.controller
+        if self._plan is not None:
+            self.plan = self._plan.begin(controller)
+        self._estimating = begun(self._estimators, controller, inertial)
+        self.command.restart()
+        if self.plan is not None and state is not None:
+            self.plan.start(state)
+
+    def effort(self, measured: Measurement, period: float) -> Array:
+        """Return the effort to send now, shape (nv,); once a period, in order of time.
+
+        Args:
+            measured: What is measured.
+            period: Time until the next effort [s].
+
+        Raises:
+            EstimationError: If what an estimator needs is not measured.
+            PlanError: If what the plan needs is not measured.
+            FallError: If the plan finds that the robot falls.
+            HspControlError: If the measurement is not a valid state of the robot.
+        """
+        for each in self._estimating:
+            measured = each.update(measured)
+        if self.plan is not None:
+            self.plan.update(measured)
+        given = measured.t, measured.q, measured.v, period
+        felt = (measured.wrenches,) if self._feels else ()
+        return self.command.effort(*given, *felt)
+
+    def log_channels(self, q: Array, v: Array) -> Mapping[str, LogChannel]:
+        """Return what the command, the plan and the estimators log, by name.
+
+        Args:
+            q: The true configuration, shape (nq,), for the errors of estimates.
+            v: The true velocity, shape (nv,).
+        """
+        channels = self.command.log_channels()
+        if self.plan is not None:
+            channels = {**channels, **self.plan.log_channels()}
+        for each in self._estimating:
+            channels = {**channels, **each.log_channels(q, v)}
+        return channels
+
+    @property
+    def _feels(self) -> bool:
+        return bool(getattr(self.command, "feels_contacts", False))

@@ -1,0 +1,91 @@
+"""How far a robot is beyond its limits, whatever the law says of them."""
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.kernels import kernel
+from hsp_control.constraints.limits import RobotLimits
+from hsp_control.control.log_channel import LogChannel
+from hsp_control.robot import Robot
+
+POSITION, VELOCITY = "position_excess", "velocity_excess"
+
+
+class LimitExcess:
+    """The farthest that each joint was beyond its limits since that was last taken.
+
+    The law keeps limits for its model, and `Status` says so much. A push that the model
+    does not know, or a plant that differs, can take a joint beyond them: only the state
+    tells. It is seen once a control period, so that no row of a log misses it.
+
+    Attributes:
+        position: Beyond the position limits, shape (nv,) [rad or m].
+        velocity: Beyond the speed limits, shape (nv,) [rad/s or m/s].
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        """Begin with nothing seen."""
+        joints = [j for j in robot.joints.values() if j.nq == 1 and j.nv == 1]
+        # Only such a joint has a range; see `Robot.position_limits`.
+        self._coordinates = np.array([j.idx_q for j in joints], dtype=np.int64)
+        self._dofs = np.array([j.idx_v for j in joints], dtype=np.int64)
+        self._unit = " or ".join(dict.fromkeys(robot.units))
+        self.position, self.velocity = np.zeros(robot.nv), np.zeros(robot.nv)
+
+    def see(self, limits: RobotLimits | None, q: Array, v: Array) -> None:
+        """See a true state.
+
+        Args:
+            limits: The limits that are in force; None: there are none.
+            q: Configuration, shape (nq,).
+            v: Velocity, shape (nv,).
+        """
+        if limits is not None:
+            _see(
+                self._coordinates,
+                self._dofs,
+                q,
+                v,
+                limits.lower,
+                limits.upper,
+                limits.velocity,
+                self.position,
+                self.velocity,
+            )
+
+    def take(self, limits: RobotLimits | None) -> dict[str, LogChannel]:
+        """Return what to log, and begin anew; nothing without limits."""
+        if limits is None:
+            return {}
+        most, unit = "most since the row before", self._unit
+        found = {
+            POSITION: LogChannel(
+                self.position.copy(), unit, f"beyond the position limit, {most}"
+            ),
+            VELOCITY: LogChannel(
+                self.velocity.copy(), f"{unit}/s", f"beyond the speed limit, {most}"
+            ),
+        }
+        self.position[:] = self.velocity[:] = 0.0
+        return found
+
+
+@kernel
+def _see(
+    coordinates: Indices,
+    dofs: Indices,
+    q: Array,
+    v: Array,
+    lower: Array,
+    upper: Array,
+    speed: Array,
+    position: Array,
+    velocity: Array,
+) -> None:
+    """Write the largest excesses."""
+    for k in range(coordinates.shape[0]):
+        i = dofs[k]
+        x = q[coordinates[k]]
+        position[i] = max(position[i], x - upper[i], lower[i] - x)
+    for i in range(v.shape[0]):
+        velocity[i] = max(velocity[i], abs(v[i]) - speed[i])

@@ -1,0 +1,327 @@
+"""Robots on feet in a live loop: what is measured, how they stand, stop and fall."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live_rigs import panda, start, watched
+from numpy.typing import NDArray
+
+import hsp_control as hsp
+from hsp_control.cli.live_experiment import check_live, simulated_robot
+from hsp_control.common.exceptions import (
+    CompensationError,
+    EstimationError,
+    HardwareError,
+    LiveError,
+    PlanError,
+)
+from hsp_control.config import Experiment
+from hsp_control.control.compensation import Command
+from hsp_control.control.measurement import Inertial
+from hsp_control.live import (
+    InProcessRobot,
+    LoopReport,
+    Measurement,
+    OperatorRequests,
+    Phase,
+    run_loop,
+)
+from hsp_control.live.bearing_feet import BearingFeet
+from hsp_control.live.dead_reckoning import DeadReckoning
+from hsp_control.live.sensor_layout import SensorLayout
+from hsp_control.live.valid_measurement import valid_measurement
+
+pytest.importorskip("example_robot_data")
+pytest.importorskip("mujoco")
+Array = NDArray[np.float64]
+FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
+BRIEF = ("live.stop.coming_to_rest=0", "simulation.log_period=0.001")
+
+
+@cache
+def trotting(*overrides: str) -> Experiment:
+    return hsp.load_experiment("whole_body/solo12_trot", *overrides)
+
+
+class Watched(InProcessRobot):
+    """A robot that keeps the efforts and the velocities of all periods."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        super().__init__(simulated_robot(experiment))
+        self.rows: list[tuple[float, Phase, Array, Array]] = []
+
+    def read(self, timeout: float) -> Measurement:
+        robot = self.robot
+        before, found = robot.v.copy(), super().read(timeout)
+        if robot.t > 0.0:
+            self.rows.append((robot.t, robot.phase, robot.tau.copy(), before))
+        return found
+
+
+def live(
+    experiment: Experiment, log: Path | None = None, **options: object
+) -> tuple[LoopReport, Watched]:
+    robot, scenario = Watched(experiment), experiment.scenario
+    report = run_loop(
+        Command(experiment.controller, experiment.compensation),
+        robot,
+        plan=scenario.plan,
+        estimators=scenario.estimators,
+        settings=scenario.live,
+        log=log,
+        log_period=scenario.simulation.log_period,
+        scene=experiment.scene,
+        meta={"name": "live", "title": "", "config": experiment.config},
+        **options,  # type: ignore[arg-type]
+    )
+    return report, robot
+
+
+# --- plans and estimators ------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_live_plan_does_what_the_simulation_does(tmp_path: Path) -> None:
+    """The estimator's errors, the plan's phases and the efforts are those of a run."""
+    brief = ("estimators.base=true", "simulation.duration=0.6", *BRIEF)
+    experiment = trotting(*brief)
+    report, _ = live(experiment, tmp_path / "trot.journal", duration=0.6)
+    log = hsp.Rollout.load(tmp_path / "trot.journal")
+    run = hsp.load_experiment("whole_body/solo12_trot", *brief).run()
+    count = int((log["live.phase"] == Phase.RUNNING).sum())
+    assert 598 <= count <= 600
+    for name in ("q", "v", "tau", "plan.phase", "plan.velocity", "estimate.base"):
+        np.testing.assert_allclose(
+            log[name][:count], run[name][:count], rtol=1e-7, atol=1e-9, err_msg=name
+        )
+    assert 2.0 in run["plan.phase"], "no foot swung: the test would compare standing"
+    # A run of the log is a run of its configuration.
+    again = hsp.load_experiment(log.meta["config"]).run()
+    for name in ("q", "tau", "plan.phase"):
+        np.testing.assert_array_equal(again[name], run[name])
+    assert report.ended == "fault", "it was not given the time to come to rest"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("by", ["duration", "operator"])
+def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
+    experiment, requests = trotting(), OperatorRequests()
+
+    def stop(t: float) -> None:
+        if t > 0.7 and by == "operator":
+            requests.stop("enough")
+
+    duration = 0.7 if by == "duration" else None
+    report, robot = live(
+        experiment, duration=duration, requests=requests, on_period=stop
+    )
+    assert report.ended == {"duration": "completed", "operator": "operator"}[by]
+    assert report.at_rest
+    assert 0.7 < report.t < 0.7 + 4.0  # `StopSettings.coming_to_rest`
+    # It stands: the contacts bear its weight, and its trunk is level and high.
+    wrenches = robot.robot.measured().wrenches
+    assert set(wrenches) == set(FEET)
+    weight = 9.81 * sum(each.mass for each in experiment.robot.model.inertias)
+    total = sum(wrench[2] for wrench in wrenches.values())
+    assert total == pytest.approx(weight, rel=0.02)
+    assert robot.robot.q[2] > 0.9 * experiment.q0[2]
+
+
+@pytest.mark.slow
+def test_a_fall_is_found_said_and_ends_with_damped_joints() -> None:
+    push = "{frame: base_link, moment: [6, 0, 0], start: 0.3, duration: 0.3}"
+    shove = f"plant.pushes=[{push}]"
+    for plan in ("plan.speed=0.3", "plan=null"):
+        tasks = (
+            "tasks={trunk: {type: frame_orientation, frame: base_link}, "
+            "body: {type: center_of_mass}}",
+        )
+        own = tasks if plan == "plan=null" else ()
+        experiment = trotting(shove, "live.velocity_margin=20", plan, *own)
+        report, robot = live(experiment, duration=5.0)
+        assert report.ended == "fault"
+        assert "the robot falls: at t = 0." in report.reason
+        assert "base_link is tilted by" in report.reason
+        assert "at most 45°" in report.reason
+        stopped = [row for row in robot.rows if row[0] > report.t - 0.2]
+        assert len(stopped) > 100
+        for _, _, tau, v in robot.rows[-200:]:
+            assert not tau[:6].any()
+            # Damping takes energy out of the joints, within the limits.
+            assert tau @ v <= 1e-12
+        assert report.t < 4.0, "a fall must end the run"
+
+
+def test_what_a_plan_or_an_estimator_misses_is_said_before_the_run() -> None:
+    felt = "plan={type: sensed, contacts: {front_left: {force: 1}}}"
+    tasks = "tasks={trunk: {type: frame_orientation, frame: base_link}}"
+
+    class Deaf(InProcessRobot):
+        def read(self, timeout: float) -> Measurement:
+            return super().read(timeout)._replace(wrenches={}, inertial=None)
+
+    sensed = trotting(felt, tasks)
+    with pytest.raises(PlanError, match="nothing measures or estimates the force"):
+        run_loop(
+            sensed.controller, Deaf(simulated_robot(sensed)), plan=sensed.scenario.plan
+        )
+    based = trotting("estimators.base=true")
+    with pytest.raises(EstimationError, match="no inertial measurement unit is there"):
+        run_loop(
+            based.controller,
+            Deaf(simulated_robot(based)),
+            plan=based.scenario.plan,
+            estimators=based.scenario.estimators,
+        )
+    wipes = hsp.load_experiment("forces/panda_wipe")
+    with pytest.raises(CompensationError, match="no sensor measures the force at"):
+        run_loop(
+            Command(wipes.controller, wipes.compensation), Deaf(simulated_robot(wipes))
+        )
+
+
+@pytest.mark.slow
+def test_a_measured_force_is_fed_back(tmp_path: Path) -> None:
+    wipes = hsp.load_experiment("forces/panda_wipe", "simulation.duration=0.3")
+    report, _ = live(wipes, tmp_path / "wipe.journal", duration=0.3)
+    assert report.ended == "completed", report.reason
+    log, run = hsp.Rollout.load(tmp_path / "wipe.journal"), wipes.run()
+    for name in ("contact.wiper.measured", "contact.wiper.integral", "tau"):
+        np.testing.assert_allclose(log[name][:30], run[name][:30], rtol=1e-6, atol=1e-7)
+    assert run["contact.wiper.measured"][20:].min() > 1.0
+
+
+# --- the feet and the safe stop ------------------------------------------------------
+
+
+def test_joints_and_feet_exert_the_force_of_a_safe_stop() -> None:
+    """x = Sᵀ tau + Jᵀ f, and tau does the work of x while the feet stand still."""
+    experiment = trotting()
+    robot, contacts = experiment.robot, experiment.controller.contacts
+    state = robot.state(0.0, experiment.q0, experiment.v0)
+    feet, random = BearingFeet(robot, contacts), np.random.default_rng(3)
+    J = np.vstack([state.frame(each.frame).jacobian[:3] for each in contacts])
+    arms = [each.arms(state.frame(each.frame))[0] for each in contacts]
+    angular = [state.frame(each.frame).jacobian[3:] for each in contacts]
+    J -= np.vstack([np.cross(r, w, axis=0) for r, w in zip(arms, angular, strict=True)])
+    for _ in range(5):
+        force = random.standard_normal(robot.nv)
+        tau = feet.joint_effort(state, force)
+        assert not tau[:6].any()
+        forces, *_ = np.linalg.lstsq(J.T, force - tau)
+        np.testing.assert_allclose(J.T @ forces, force - tau, atol=1e-10)
+        v = random.standard_normal(robot.nv)
+        v -= np.linalg.pinv(J) @ (J @ v)
+        assert v @ tau == pytest.approx(v @ force, abs=1e-9)
+    rest = np.zeros(robot.nv)
+    held = feet.joint_effort(state, robot.inverse_dynamics(state.q, rest, rest))
+    law = experiment.controller.compute(state).tau
+    assert np.abs(held).max() < 3.0 * np.abs(law).max() + 1.0
+
+
+def test_feet_that_are_not_pressed_do_not_bear() -> None:
+    experiment = trotting()
+    feet = BearingFeet(experiment.robot, experiment.controller.contacts)
+    q, v = experiment.q0, experiment.v0
+    pressed = {name: np.zeros(6) for name in FEET}
+    pressed["HL_FOOT"][2] = 2.0
+    feet.feel(Measurement(1, 0.0, q, v, wrenches=pressed))
+    assert [each.frame for each in feet.contacts] == ["HL_FOOT"]
+    assert feet.hold
+    feet.feel(Measurement(1, 0.0, q, v))  # no sensors: their schedules count
+    assert len(feet.contacts) == 4
+    feet.lose()
+    assert not feet.hold
+    wall = replace(experiment.controller.contacts[0], normal=[1.0, 0.0, 0.5])
+    assert not BearingFeet(experiment.robot, [wall]).hold, "a wall may only be pushed"
+    assert BearingFeet(panda(), ()).hold
+
+
+def test_a_floating_base_that_is_not_measured_moves_on_as_it_moved() -> None:
+    experiment, h = trotting(), 0.001
+    reckoning = DeadReckoning(experiment.robot, h)
+    v = experiment.v0.copy()
+    v[0] = 0.5
+    reckoning.correct(0.0, experiment.q0, v)
+    for _ in range(10):
+        reckoning.predict(np.zeros(experiment.robot.nv))
+    np.testing.assert_array_equal(reckoning.state.v, v)
+    moved = experiment.robot.difference(experiment.q0, reckoning.state.q)
+    np.testing.assert_allclose(moved, 10 * h * v, atol=1e-12)
+
+
+def test_no_motor_of_a_floating_base_is_ever_sent_an_effort() -> None:
+    experiment = trotting()
+    limits = experiment.scenario.live.effort_limits(experiment.robot)
+    assert not limits[:6].any()
+    assert (limits[6:] > 0.0).all()
+    with pytest.raises(LiveError, match=r"live\.compensates_gravity: solo12 has a"):
+        check_live(trotting("live.compensates_gravity=true"))
+
+
+# --- what is measured ----------------------------------------------------------------
+
+
+def test_a_state_with_sensors_comes_back() -> None:
+    q, v = start(), np.arange(7.0)
+    wrench = np.arange(6.0)
+    for applied in (None, v + 20.0):
+        unit = Inertial("panda_link8", np.arange(3.0) + 30.0, np.arange(3.0) + 40.0)
+        sent = Measurement(
+            0, 0.0, q, v, applied=applied, inertial=unit,
+            wrenches={"a": wrench + 50.0, "b": wrench + 60.0},
+        )  # fmt: skip
+        layout = SensorLayout.of(sent)
+        assert layout == SensorLayout(("a", "b"), "panda_link8")
+        numbers = layout.pack(sent)
+        found = layout.unpack(numbers, panda())
+        np.testing.assert_array_equal(layout.pack(found), numbers)
+        for frame, given in sent.wrenches.items():
+            np.testing.assert_array_equal(found.wrenches[frame], given)
+        assert found.inertial is not None
+        np.testing.assert_array_equal(found.inertial.specific_force, unit[2])
+        assert (found.applied is None) == (applied is None)
+    for size, message in (
+        (20, r"the state's wrench at b has shape \(0,\); needs \(6,\)"),
+        (31, r"the state's specific force has shape \(2,\); needs \(3,\)"),
+        (33, r"the state's applied has shape \(1,\); needs \(7,\)"),
+    ):
+        with pytest.raises(HardwareError, match=message):
+            valid_measurement(layout.unpack(numbers[:size], panda()), panda(), 0.001)
+
+
+def test_the_wire_carries_what_the_robot_measures() -> None:
+    """Of a simulated robot on feet; one without sensors sends what it always did."""
+    robot = simulated_robot(trotting())
+    assert SensorLayout.of(robot.measured()) == SensorLayout(FEET, "base_link")
+    assert SensorLayout.of(watched().measured()) == SensorLayout()
+    before = robot.measured()
+    assert not any(wrench.any() for wrench in before.wrenches.values())
+    robot.advance([robot.tau])
+    after = robot.measured()
+    assert sum(wrench[2] for wrench in after.wrenches.values()) > 0.0
+    assert after.inertial is not None
+    assert after.t == 0.001
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"wrenches": {"a": np.full(6, np.nan)}}, r"not finite: wrench at a\[0\]"),
+        ({"wrenches": {"a": np.zeros(3)}}, r"wrench at a has shape \(3,\)"),
+        ({"inertial": (1, 2, 3)}, "inertial is of type tuple; needs an Inertial"),
+        (
+            {"inertial": Inertial("a", np.zeros(3), np.full(3, 1e9))},
+            r"absurd: specific force\[0\] is 1e\+09",
+        ),
+    ],
+)
+def test_a_sensor_that_cannot_be_right_is_refused(
+    changed: dict[str, object], message: str
+) -> None:
+    raw = Measurement(1, 0.0, start(), np.zeros(7))._replace(**changed)  # type: ignore[arg-type]
+    with pytest.raises(HardwareError, match=message):
+        valid_measurement(raw, panda(), 0.001)
