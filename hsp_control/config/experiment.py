@@ -248,6 +248,7 @@ class Experiment:
             plan=self.scenario.plan,
             estimators=self.scenario.estimators,
             scene=self.scene,
+            check_rate=False,  # checked when it was built, or not to be
             on_progress=on_progress,
             on_row=on_row,
             meta={

@@ -10,7 +10,7 @@ from hsp_control.common.exceptions import (
     HspControlError,
     SimulationError,
 )
-from hsp_control.control.compensation import Command, Compensation
+from hsp_control.control.compensation import Command, Compensation, check_impedances
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
 from hsp_control.estimation import Estimator, begun
@@ -51,6 +51,7 @@ def simulate(
     plan: Plan | None = None,
     estimators: Sequence[Estimator] = (),
     scene: Scene | None = None,
+    check_rate: bool = True,
     start_time: float = 0.0,
     on_progress: Callable[[float], None] | None = None,
     on_row: Callable[[Recorder], None] | None = None,
@@ -78,6 +79,8 @@ def simulate(
         estimators: What completes each measurement, for the plan and the controller;
             they need a control period.
         scene: Obstacles to log; None: those of the controller.
+        check_rate: Whether impedances that the control period does not bear are
+            refused.
         start_time: Time of the first row [s].
         on_progress: Called at every row with the fraction of the run that is done.
         on_row: Called with the recorder after every recorded row.
@@ -88,6 +91,7 @@ def simulate(
         computed so far; a fall ends it with the status ``stopped``.
 
     Raises:
+        UnstableRateError: If the control period does not bear an impedance.
         SimulationError: If durations, periods and plant do not fit, or the motion
             diverged; its ``rollout`` then holds what was computed.
         HspControlError: If q0 or v0 is not a valid state of the robot, or the plant
@@ -127,6 +131,8 @@ def simulate(
     if isinstance(plant, ContinuousPlant):
         loop = continuous_loop(controller, plant, integrator, times, q, v)
     elif isinstance(plant, SampledPlant) and periods:
+        if check_rate:
+            check_impedances(controller, q, log_period / periods, compensation)
         command = Command(controller, compensation)
         loop = sampled_loop(command, plant, periods, times, q, v, running, estimating)
     else:
