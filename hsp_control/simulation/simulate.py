@@ -9,6 +9,7 @@ from hsp_control.common.exceptions import (
     FallError,
     HspControlError,
     SimulationError,
+    StreamError,
 )
 from hsp_control.control.compensation import Command, Compensation, check_impedances
 from hsp_control.control.controller import Controller
@@ -88,7 +89,8 @@ def simulate(
 
     Returns:
         The rollout. Ctrl-C ends it early, with the status ``interrupted`` and all rows
-        computed so far; a fall ends it with the status ``stopped``.
+        computed so far; a fall ends it with the status ``stopped``, as silence of a
+        stream does.
 
     Raises:
         UnstableRateError: If the control period does not bear an impedance.
@@ -159,7 +161,8 @@ def simulate(
         status, message = "stopped", str(error)
     except HspControlError as error:
         failure = SimulationError(f"the simulation stopped: {error}")
-        failure.rollout = recorder.rollout("diverged", str(error), **meta)
+        status = "stopped" if isinstance(error, StreamError) else "diverged"
+        failure.rollout = recorder.rollout(status, str(error), **meta)
         raise failure from error
     return recorder.rollout(status, message, **meta)
 

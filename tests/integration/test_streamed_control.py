@@ -232,8 +232,12 @@ def test_the_reference_of_a_task_changes_to_a_stream_while_it_runs(
 def test_silence_stops_a_run_with_the_time(panda: hsp.Robot) -> None:
     stream = hsp.StreamPose(stop_after=0.2)
     controller = hsp.Controller(panda, [hsp.FramePose("panda_tcp", stream)])
-    with pytest.raises(SimulationError, match=r"no message for 0\.2.* s; stop_after"):
+    with pytest.raises(
+        SimulationError, match=r"no message for 0\.2.* s; stop_after"
+    ) as stopped:
         hsp.simulate(controller, panda.home(), duration=1.0, control_period=PERIOD)
+    assert stopped.value.rollout is not None
+    assert stopped.value.rollout.status == "stopped"  # nothing diverged
 
 
 def test_runs_that_begin_at_any_time(panda: hsp.Robot) -> None:

@@ -629,9 +629,7 @@ def test_bounds_that_contradict_each_other_are_refused() -> None:
 
 @pytest.mark.parametrize("kind", [Stream, StreamOrientation, StreamPose])
 def test_only_a_stream_that_begins_somewhere_counts(kind: Any) -> None:
-    with pytest.raises(
-        StreamError, match=rf"this {kind.__name__} begins where a robot"
-    ):
+    with pytest.raises(StreamError, match=f"this {kind.__name__} begins where"):
         kind().counts()
 
 
