@@ -430,7 +430,10 @@ def test_changes_to_come_are_checked_too() -> None:
 @pytest.mark.parametrize(
     ("spring", "message"),
     [
-        (Impedance(4e6), r"tasks\.hand\.impedance: .* use at most 0\.00\d+ times this"),
+        (
+            Impedance(4e6),
+            r"tasks\.hand\.impedance: .*; use at most [\d.]+ times this s",
+        ),
         # However far beyond: what is advised is stable.
         (
             Impedance(600.0, damping=3e6),
@@ -450,9 +453,10 @@ def test_a_simulation_refuses_what_its_period_does_not_bear(
     controller.at(2.0).impedance("hand", Impedance(4e6))
     with pytest.raises(hsp.errors.UnstableRateError, match=r"^changes: "):
         hsp.simulate(controller, q, control_period=1e-3, **how)
-    # Without a period nothing is held; and who knows it better may say so.
+    # Without a period nothing is held; and who knows better may say so.
     hsp.simulate(stiff(Impedance(4e6)), q, **how)
-    hsp.simulate(stiff(spring), q, control_period=1e-3, check_rate=False, **how)
+    how["check_rate"] = False
+    hsp.simulate(stiff(Impedance(4e6)), q, control_period=1e-3, **how)
 
 
 @pytest.mark.parametrize("kind", ["impedance", "gains", "null_space_gain", "add"])
