@@ -215,7 +215,9 @@ def _root(directions: Directions, k: int) -> float:
     """Return 1/√ρ of a direction: between its level's and the null space's."""
     roots, share = directions.roots, directions.share[k]
     own, free = roots[directions.level[k]], roots[roots.shape[0] - 1]
-    return float(own if share == 0.0 else own * (free / own) ** share)
+    if 0.0 < share < 1.0:
+        return float(own * (free / own) ** share)
+    return float(own)  # of the null space, that is its own
 
 
 @kernel

@@ -232,8 +232,9 @@ def _scale_null_space(
     for row in range(count):  # the directions of contacts have no rows
         share = directions.share[n - count + row]
         if share > 0.0:
+            factor = scale**share
             for j in range(problem.JT.shape[1]):
-                problem.JT[row, j] *= scale**share
+                problem.JT[row, j] *= factor
 
 
 @kernel
