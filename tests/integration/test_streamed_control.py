@@ -236,7 +236,7 @@ def test_silence_stops_a_run_with_the_time(panda: hsp.Robot) -> None:
         SimulationError, match=r"no message for 0\.2.* s; stop_after"
     ) as stopped:
         hsp.simulate(controller, panda.home(), duration=1.0, control_period=PERIOD)
-    assert stopped.value.rollout is not None
+    assert isinstance(stopped.value.rollout, hsp.Rollout)
     assert stopped.value.rollout.status == "stopped"  # nothing diverged
 
 
