@@ -77,7 +77,7 @@ def _run_and_save(experiment: Experiment, log: Path, screen: "Screen | None") ->
             at = f" at t = {rollout.t[-1]:g} s" if len(rollout) else ""
             print(f"hsp: stopped by the user{at}", file=sys.stderr)
             status = INTERRUPTED
-        elif rollout.status == "stopped":
+        elif rollout.status == "stopped" and not status:
             print(f"hsp: {rollout.meta['message']}", file=sys.stderr)
             status = 2
         if not len(rollout):

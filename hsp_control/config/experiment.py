@@ -223,6 +223,12 @@ class Experiment:
         )
         return text
 
+    @property
+    def hears(self) -> tuple[str, ...]:
+        """The addresses at which its streams hear other processes, in real time."""
+        streams = parts_within(self.scenario, Streamed)
+        return tuple(str(each.source) for each in streams if each.live)
+
     def run(
         self,
         on_progress: Callable[[float], None] | None = None,
@@ -233,7 +239,7 @@ class Experiment:
         If another process feeds a stream, the run keeps pace with real time.
         """
         settings = self.scenario.simulation
-        if any(stream.live for stream in parts_within(self.scenario, Streamed)):
+        if self.hears:
             on_row = in_real_time(settings.log_period, on_row)
         return simulate(
             self.controller,
@@ -248,6 +254,7 @@ class Experiment:
             plan=self.scenario.plan,
             estimators=self.scenario.estimators,
             scene=self.scene,
+            check_rate=False,  # checked when it was built, or not to be
             on_progress=on_progress,
             on_row=on_row,
             meta={

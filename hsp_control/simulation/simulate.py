@@ -9,8 +9,9 @@ from hsp_control.common.exceptions import (
     FallError,
     HspControlError,
     SimulationError,
+    StreamError,
 )
-from hsp_control.control.compensation import Command, Compensation
+from hsp_control.control.compensation import Command, Compensation, check_impedances
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
 from hsp_control.estimation import Estimator
@@ -52,6 +53,7 @@ def simulate(
     plan: Plan | None = None,
     estimators: Sequence[Estimator] = (),
     scene: Scene | None = None,
+    check_rate: bool = True,
     start_time: float = 0.0,
     on_progress: Callable[[float], None] | None = None,
     on_row: Callable[[Recorder], None] | None = None,
@@ -79,6 +81,8 @@ def simulate(
         estimators: What completes each measurement, for the plan and the controller;
             they need a control period.
         scene: Obstacles to log; None: those of the controller.
+        check_rate: Whether impedances that the control period does not bear are
+            refused.
         start_time: Time of the first row [s].
         on_progress: Called at every row with the fraction of the run that is done.
         on_row: Called with the recorder after every recorded row.
@@ -86,9 +90,11 @@ def simulate(
 
     Returns:
         The rollout. Ctrl-C ends it early, with the status ``interrupted`` and all rows
-        computed so far; a fall ends it with the status ``stopped``.
+        computed so far; a fall ends it with the status ``stopped``, as silence of a
+        stream does.
 
     Raises:
+        UnstableRateError: If the control period does not bear an impedance.
         SimulationError: If durations, periods and plant do not fit, or the motion
             diverged; its ``rollout`` then holds what was computed.
         HspControlError: If q0 or v0 is not a valid state of the robot, or the plant
@@ -127,6 +133,8 @@ def simulate(
     if isinstance(plant, ContinuousPlant):
         loop = continuous_loop(controller, plant, integrator, times, q, v)
     elif isinstance(plant, SampledPlant) and periods:
+        if check_rate:
+            check_impedances(controller, q, log_period / periods, compensation)
         chain = ControlChain(Command(controller, compensation), plan, estimators)
         chain.begin(plant.inertial())
         running = chain.plan
@@ -155,7 +163,8 @@ def simulate(
         status, message = "stopped", str(error)
     except HspControlError as error:
         failure = SimulationError(f"the simulation stopped: {error}")
-        failure.rollout = recorder.rollout("diverged", str(error), **meta)
+        status = "stopped" if isinstance(error, StreamError) else "diverged"
+        failure.rollout = recorder.rollout(status, str(error), **meta)
         raise failure from error
     return recorder.rollout(status, message, **meta)
 

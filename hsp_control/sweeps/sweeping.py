@@ -96,7 +96,13 @@ def sweep(
         insert(base, plan.changes(0))
         build(base)  # raises the same error, with the line of the file
         raise
-    identity = plan.identity(plan.experiment(first))
+    experiment = plan.experiment(first)
+    if experiment.hears:
+        raise SweepError(
+            f"a stream hears {experiment.hears[0]}, which only one run can; sweep the "
+            "log of a run, or give the stream a recording as its source"
+        )
+    identity = plan.identity(experiment)
     path = None if out is None else Path(out)
     if path is not None and path.suffix != ".parquet":
         raise SweepError(f"{path}: the name of a sweep's file must end with .parquet")

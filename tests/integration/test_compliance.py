@@ -415,16 +415,48 @@ def test_changes_to_come_are_checked_too() -> None:
     controller.at(2.0).ramp(0.5).impedance("hand", Impedance(4e6))
     with pytest.raises(
         hsp.errors.UnstableRateError,
-        match=r"impedance: .* of task 'hand' from t = 2.5 s on times the period is",
+        match=r"^changes: .* of task 'hand' from t = 2.5 s on times the period is",
     ):
         check_rate(controller, q, 0.001)
     gains = Controller(panda(), [position_hand()], limits=None)
     gains.at(1.0).ramp(0.0).gains("hand", hsp.Gains(natural_frequency=3000.0))
     with pytest.raises(
         hsp.errors.UnstableRateError,
-        match=r"tasks.hand.gains: .*ω0 of task 'hand' from t = 1 s on times the period",
+        match=r"^changes: .*ω0 of task 'hand' from t = 1 s on times the period",
     ):
         check_rate(gains, q, 0.001)
+
+
+@pytest.mark.parametrize(
+    ("spring", "message"),
+    [
+        (
+            Impedance(4e6),
+            r"tasks\.hand\.impedance: .*; use at most [\d.]+ times this s",
+        ),
+        # However far beyond: what is advised is stable.
+        (
+            Impedance(600.0, damping=3e6),
+            r"at most [\d.e-]+ times this .* a control_",
+        ),
+    ],
+    ids=["stiffness", "damping"],
+)
+def test_a_simulation_refuses_what_its_period_does_not_bear(
+    spring: Impedance, message: str
+) -> None:
+    q = panda().home()
+    how: dict[str, Any] = {"duration": 0.01, "integrator": Rk4(1e-3)}
+    with pytest.raises(hsp.errors.UnstableRateError, match=message):
+        hsp.simulate(stiff(spring), q, control_period=1e-3, **how)
+    controller = stiff(Impedance(100.0))
+    controller.at(2.0).impedance("hand", Impedance(4e6))
+    with pytest.raises(hsp.errors.UnstableRateError, match=r"^changes: "):
+        hsp.simulate(controller, q, control_period=1e-3, **how)
+    # Without a period nothing is held; and who knows better may say so.
+    hsp.simulate(stiff(Impedance(4e6)), q, **how)
+    how["check_rate"] = False
+    hsp.simulate(stiff(Impedance(4e6)), q, control_period=1e-3, **how)
 
 
 @pytest.mark.parametrize("kind", ["impedance", "gains", "null_space_gain", "add"])

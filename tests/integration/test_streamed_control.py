@@ -121,6 +121,37 @@ def test_a_target_out_of_reach_is_approached_within_all_limits(
     assert np.linalg.norm(run["task.panda_tcp.error"][-1]) < 1e-3
 
 
+@pytest.mark.parametrize(
+    ("goal", "largest"),
+    # Without a share of the null space in a direction that is being lost, efforts jump
+    # where it begins to be: by 138, 80 and 57 N·m.
+    [((0.0, 0.0, -1.0), 6.0), ((0.0, 0.0, 2.0), 15.0), ((0.6, 0.6, 0.9), 30.0)],
+)
+def test_efforts_do_not_jump_on_the_way_to_a_target_out_of_reach(
+    panda: hsp.Robot, goal: tuple[float, ...], largest: float
+) -> None:
+    stream = hsp.Stream()  # at up to 1 m/s, so that limits bind on the way
+    controller = hsp.Controller(
+        panda,
+        [hsp.FramePosition("panda_tcp", stream)],
+        hsp.JointCentering(),
+        null_space_gain=8,
+        singularity_threshold=0.1,
+    )
+    stream.send(goal)
+    run = hsp.simulate(
+        controller,
+        panda.home(),
+        duration=2.0,
+        control_period=PERIOD,
+        log_period=PERIOD,
+        integrator=hsp.integrators.SemiImplicitEuler(PERIOD),
+    )
+    assert run["status"].max() == 2.0
+    assert run["damped"].any()
+    assert np.abs(np.diff(run.tau, axis=0)).max() < largest
+
+
 def test_a_second_run_begins_anew(panda: hsp.Robot) -> None:
     stream = hsp.StreamPose()
     controller = hsp.Controller(panda, [hsp.FramePose("panda_tcp", stream)])
@@ -201,8 +232,12 @@ def test_the_reference_of_a_task_changes_to_a_stream_while_it_runs(
 def test_silence_stops_a_run_with_the_time(panda: hsp.Robot) -> None:
     stream = hsp.StreamPose(stop_after=0.2)
     controller = hsp.Controller(panda, [hsp.FramePose("panda_tcp", stream)])
-    with pytest.raises(SimulationError, match=r"no message for 0\.2.* s; stop_after"):
+    with pytest.raises(
+        SimulationError, match=r"no message for 0\.2.* s; stop_after"
+    ) as stopped:
         hsp.simulate(controller, panda.home(), duration=1.0, control_period=PERIOD)
+    assert isinstance(stopped.value.rollout, hsp.Rollout)
+    assert stopped.value.rollout.status == "stopped"  # nothing diverged
 
 
 def test_runs_that_begin_at_any_time(panda: hsp.Robot) -> None:

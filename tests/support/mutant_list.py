@@ -681,6 +681,13 @@ MUTANTS = (
         "_SHARE = 0.0",
         "tests/integration/test_limit_configurations.py -k swing",
     ),
+    Mutant(
+        "limits: a direction that is being lost is all the task's",
+        CONTROL + "actuation/deviation_cost.py",
+        "share[count] = lost * lost",
+        "share[count] = 0.0",
+        UNIT + "control/test_deviation_cost.py -k projector",
+    ),
     # ------------------------------------------------------------------ simulation
     Mutant(
         "RK4: weights of k3 and k4 swapped",

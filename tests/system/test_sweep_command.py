@@ -132,6 +132,12 @@ def test_a_mistake_in_the_file_is_told_with_its_line(
         hsp.sweep(MOVING, OVER, overrides=QUICK, out=tmp_path / "x.csv")
 
 
+def test_a_stream_from_another_process_cannot_be_swept() -> None:
+    heard = "tasks.tip.trajectory={type: stream, source: 'udp://127.0.0.1:5005'}"
+    with pytest.raises(SweepError, match=r"hears udp://127.0.0.1:5005, which only one"):
+        hsp.sweep(MOVING, OVER, overrides=[*QUICK, heard])
+
+
 def test_a_robot_beside_its_configuration_is_found_from_anywhere(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

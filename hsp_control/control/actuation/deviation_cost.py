@@ -25,6 +25,10 @@ and for several. The smaller it is, the stricter the priorities; at 1e-6 an erro
 _SHARE = 0.05
 """What the null space may cost where tasks must miss, of what the tasks cost [-]."""
 
+_LOST = 1e-3
+"""Singular value, relative to the threshold, below which rounding decides where a
+direction points; the null space has all of it but 2e-6."""
+
 
 class Directions(NamedTuple):
     """The directions of the law's levels and of the null space, and what they are from.
@@ -38,12 +42,15 @@ class Directions(NamedTuple):
         L: Cholesky factor of the metric, shape (nv, nv).
         form: The metric's form.
         ends: Where each level's rows end in the stack.
-        threshold: Singular value below which a direction belongs to no level.
+        threshold: Singular value below which a direction belongs to no level, or for
+            the last level only in part.
         wide: Scratch, shape (2, m, nv).
         square: Scratch, shape (m, m).
         remainders: Scratch, shape (nv,).
         N: The directions n_k as rows, shape (nv, nv).
         level: The level of each, the number of levels for the null space, shape (nv,).
+        share: How much of each the null space has: 0 for a level's own, 1 for its own,
+            shape (nv,).
         roots: 1/√ρ of each level and of the null space.
     """
 
@@ -57,6 +64,7 @@ class Directions(NamedTuple):
     remainders: Array
     N: Array
     level: Indices
+    share: Array
     roots: Array
 
     @classmethod
@@ -90,14 +98,24 @@ class Directions(NamedTuple):
             np.empty(n),
             np.empty((n, n)),
             np.empty(n, dtype=np.int64),
+            np.empty(n),
             whole ** (-0.5 * steps),
         )
 
 
 @kernel
 def write_directions(directions: Directions) -> None:
-    """Write the directions of all levels, and then those of the null space."""
-    J, L, form, ends, threshold, wide, square, remainders, N, level, _ = directions
+    """Write the directions of all levels, and then those of the null space.
+
+    Below the threshold the law's inverse is bounded: of a direction with the singular
+    value s, the projector on the null space has the share (1 - s²/threshold²)². A
+    direction of the last level belongs to the null space in that share, so that no
+    effort jumps where s passes the threshold. One of a level above others belongs to it
+    or not: what it lacks, the levels below may use.
+    """
+    J, L, form, ends, threshold, wide, square, remainders, N, level, share, _ = (
+        directions
+    )
     n = N.shape[0]
     count = start = 0
     whiten(J, L, form, wide[0])
@@ -113,8 +131,11 @@ def write_directions(directions: Directions) -> None:
             orthogonalise_rows(B, square[:0])
         for r in range(end - start):
             size = 1.0 if regular else np.sqrt(squared_norm(B[r]))
-            if count == n or not (regular or size > threshold):
+            least = _LOST * threshold if k == ends.shape[0] - 1 else threshold
+            if count == n or not (regular or size > least):
                 continue
+            lost = 0.0 if regular else max(1.0 - (size / threshold) ** 2, 0.0)
+            share[count] = lost * lost
             for i in range(n):
                 N[count, i] = Q[r, i] if regular else B[r, i] / size
             level[count] = k
@@ -122,7 +143,7 @@ def write_directions(directions: Directions) -> None:
         start = end
     _complete(N, count, remainders)
     for k in range(count, n):
-        level[k] = ends.shape[0]
+        level[k], share[k] = ends.shape[0], 1.0
 
 
 @kernel
@@ -174,18 +195,29 @@ def write_inverse_root(directions: Directions, first: int, JT: Array) -> int:
     Returns:
         The number of its rows.
     """
-    _, L, form, _, _, _, _, _, N, level, roots = directions
+    _, L, form, _, _, _, _, _, N, level, _, _ = directions
     n = N.shape[0]
     rows = 0
     for k in range(n):
         if level[k] < first:
             continue
+        root = _root(directions, k)
         for i in range(n):
-            JT[rows, i] = roots[level[k]] * N[k, i]
+            JT[rows, i] = root * N[k, i]
         if form != IDENTITY:
             solve_lower_transposed(L, JT[rows, :n])
         rows += 1
     return rows
+
+
+@kernel
+def _root(directions: Directions, k: int) -> float:
+    """Return 1/√ρ of a direction: between its level's and the null space's."""
+    roots, share = directions.roots, directions.share[k]
+    own, free = roots[directions.level[k]], roots[roots.shape[0] - 1]
+    if 0.0 < share < 1.0:
+        return float(own * (free / own) ** share)
+    return float(own)  # of the null space, that is its own
 
 
 @kernel
@@ -200,13 +232,14 @@ def null_space_scale(directions: Directions, deviation: Array) -> float:
         D² + ρ N² ≤ D₁² + ρ N₁²      with ρ N₁² = share D₁²
 
     the tasks then miss by (1 + share)^½ of the least that they must, at most. Where
-    they need not miss, D₁ = 0 and nothing changes.
+    they need not miss, D₁ = 0 and nothing changes. What belongs to both in part counts
+    for both in part.
 
     Args:
         directions: The directions.
         deviation: The first optimum, shape (at least nv,).
     """
-    _, L, form, ends, _, _, _, _, N, level, roots = directions
+    _, L, form, ends, _, _, _, _, N, _, share, roots = directions
     n = N.shape[0]
     missed = moved = 0.0
     for k in range(n):
@@ -217,10 +250,8 @@ def null_space_scale(directions: Directions, deviation: Array) -> float:
             else:
                 for i in range(j, n):
                     along += N[k, j] * L[i, j] * deviation[i]
-        if level[k] < ends.shape[0]:
-            missed += (along / roots[level[k]]) ** 2
-        else:
-            moved += along * along
+        missed += (1.0 - share[k]) * (along / _root(directions, k)) ** 2
+        moved += share[k] * along * along
     weight = roots[ends.shape[0]] ** -2.0
     if _SHARE * missed <= weight * moved or moved == 0.0:
         return 1.0
@@ -233,19 +264,19 @@ def write_null_space_rows(directions: Directions, A: Array) -> None:
 
     e_N' = -K_N e_N - P δ, up to terms that the law's correction cancels, so that
     d/dt ‖e_N‖_W ≤ -λ ‖e_N‖_W + ‖P δ‖_W: rows |(P δ)_j| ≤ λ s_j keep e_N bounded, and
-    δ = 0 always satisfies them. With m the columns of L⁻ᵀ N, P = Σ m_k (L n_k)ᵀ over
-    the directions of the null space.
+    δ = 0 always satisfies them. With m the columns of L⁻ᵀ N, P = Σ s_k m_k (L n_k)ᵀ
+    with the shares s_k of the null space: the law's own projector.
     """
-    _, L, form, ends, _, _, _, raised, N, level, _ = directions
+    _, L, form, _, _, _, _, raised, N, _, share, _ = directions
     n = N.shape[0]
     for i in range(n):
         for j in range(n):
             A[i, j] = 0.0
     for k in range(n):
-        if level[k] < ends.shape[0]:
+        if share[k] == 0.0:
             continue
         for i in range(n):
-            raised[i] = N[k, i]
+            raised[i] = share[k] * N[k, i]
         if form != IDENTITY:
             solve_lower_transposed(L, raised)
         for j in range(n):

@@ -227,13 +227,14 @@ def _write_law_factor(
 def _scale_null_space(
     directions: Directions, scale: float, count: int, problem: Problem
 ) -> None:
-    """Scale the rows of Jᵀ of the null space: the last of the law's."""
-    null_space = directions.ends.shape[0]
-    for k in range(directions.level.shape[0]):
-        if directions.level[k] == null_space:
-            count -= 1
+    """Scale the rows of Jᵀ by the null space's share; ``count`` are the law's."""
+    n = directions.share.shape[0]
+    for row in range(count):  # the directions of contacts have no rows
+        share = directions.share[n - count + row]
+        if share > 0.0:
+            factor = scale**share
             for j in range(problem.JT.shape[1]):
-                problem.JT[count, j] *= scale
+                problem.JT[row, j] *= factor
 
 
 @kernel

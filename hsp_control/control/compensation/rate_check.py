@@ -5,7 +5,7 @@ and filtered, this system has a spectral radius. The radius is exact for an exac
 and the nonlinear robot agrees closely with it (``docs/robustness.md``).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -94,6 +94,39 @@ def check_rate(
     return found
 
 
+def check_impedances(
+    controller: Controller,
+    q: Array,
+    period: float,
+    compensation: Compensation | None = None,
+) -> None:
+    """Check that a period bears the impedances of a controller, and what they become.
+
+    Args:
+        controller: The controller.
+        q: Configuration at which they are looked at, shape (nq,).
+        period: The control period [s].
+        compensation: The compensators; None: none.
+
+    Raises:
+        UnstableRateError: If it does not; with what would be stable.
+    """
+    compliant = [task for task in controller.tasks if impedance_of(task) is not None]
+    if not compliant:
+        return
+    compensation = Compensation() if compensation is None else compensation
+    known = compensation.predictor
+    efforts, sensors = (0, 0) if known is None else (
+        known.effort_delay, known.sensor_delay
+    )  # fmt: skip
+    state = controller.robot.state(0.0, q, np.zeros(controller.robot.nv))
+    delays = efforts, sensors, compensation
+    for finding in _task_findings(controller, compliant, state, period, delays):
+        if finding is not None and finding.unstable:
+            with within(*finding.path):
+                raise UnstableRateError(finding.message)
+
+
 def rate_findings(
     controller: Controller,
     q: Array,
@@ -132,7 +165,7 @@ def rate_findings(
     delays = effort_delay, sensor_delay, compensation
     state = controller.robot.state(0.0, q, np.zeros(controller.robot.nv))
     found = [
-        *_task_findings(controller, state, period, delays),
+        *_task_findings(controller, controller.tasks, state, period, delays),
         *_null_space_findings(controller, state, period, delays),
     ]
     if plant is not None and not any(each and each.unstable for each in found):
@@ -145,12 +178,16 @@ _Delays = tuple[int, int, Compensation]
 
 
 def _task_findings(
-    controller: Controller, state: RobotState, period: float, delays: _Delays
+    controller: Controller,
+    tasks: Sequence[Task],
+    state: RobotState,
+    period: float,
+    delays: _Delays,
 ) -> list["RateFinding | None"]:
     action = delays[2].integral_action
     integral = {} if action is None else action.gains(controller.tasks)
     found: list[RateFinding | None] = []
-    for task in controller.tasks:
+    for task in tasks:
         feedbacks = controller.linear_feedback(task.name, state)
         for since, (Kp, Kv, _) in feedbacks.items():
             Ki = integral.get(task.name, np.zeros_like(Kp))
@@ -185,6 +222,8 @@ def _findings_of(
             of += "" if since > -np.inf else " at the start"
             speed = _of_impedance(of, frequency, damped)
     delayed = delays[0] + delays[1] > 0 and delays[2].predictor is None
+    if since > -np.inf:  # a change makes them; the message says when, and of what
+        path = ("changes",)
     found = [_finding(path, loop, speed, RULE_DELAYED if delayed else RULE, "")]
     if Ki.any():
         found.append(_integral_finding(name, loop))
@@ -367,7 +406,8 @@ def _stabilising_changes(
         return replace(loop, kp=s * K @ A, kv=s * K + A)
 
     own, choices = loop.compensation, []
-    if (s := _largest(gains)) is not None:
+    least = 1e-3 / max(speed.rate * loop.period, 1.0)
+    if (s := _largest(gains, least)) is not None:
         choices.append(speed.at_most(s * speed.rate))
     if null_space is not None and null_space[1].max() > 1e-3 * speed.rate:
         K, A = null_space
@@ -377,7 +417,9 @@ def _stabilising_changes(
 
         if (s := _largest(weights)) is not None:
             choices.append(f"fields of at most {rounded_down(s)} times these weights")
-    if (s := _largest(lambda s: replace(loop, period=s * loop.period))) is not None:
+    if (
+        s := _largest(lambda s: replace(loop, period=s * loop.period), least)
+    ) is not None:
         choices.append(f"a control_period of at most {rounded_down(s * loop.period)} s")
     if own.momentum_observer is not None and own.momentum_observer.cancel:
         running = own.momentum_observer

@@ -37,7 +37,7 @@ _threads: dict[str, Thread] = {}
 
 def is_address(source: str) -> bool:
     """Return whether a source is another process, not a recording."""
-    return source.startswith(tuple(_KINDS))
+    return "://" in source
 
 
 def check_address(source: str) -> None:
@@ -84,4 +84,10 @@ def listening_inbox(source: str, space: Space) -> Inbox:
 
 
 def _kind(source: str) -> Kind:
-    return next(kind for scheme, kind in _KINDS.items() if source.startswith(scheme))
+    for scheme, kind in _KINDS.items():
+        if source.startswith(scheme):
+            return kind
+    raise StreamError(
+        f"source is {source!r}; an address begins with {' or '.join(_KINDS)}, and the "
+        "path of a recording contains no '://'"
+    )

@@ -185,7 +185,12 @@ class Streamed(Remembering, error=TrajectoryError):
         """Return the time since the last message [s], and how many there were.
 
         ``taken``: all valid ones; ``late``: of these, those that came too late to
-        count; ``rejected``: invalid ones, and those that no motion can follow.
+        count; ``rejected``: invalid ones, and those that no motion can follow. The
+        stream that a controller follows counts, ``controller.tasks[0].trajectory``.
+
+        Raises:
+            StreamError: If it begins where a robot starts, and no controller follows
+                it.
         """
         running = self.running
         return {
@@ -309,8 +314,20 @@ class Streamed(Remembering, error=TrajectoryError):
         return copy
 
     def _start(self) -> State:
-        """Return where the reference is before the first message."""
+        """Return where the reference is before the first message.
+
+        Raises:
+            StreamError: If only a controller knows it.
+        """
         raise NotImplementedError
+
+    def _placeless(self) -> StreamError:
+        """Return the error of a stream that begins where a robot starts."""
+        return StreamError(
+            f"this {type(self).__name__} begins where a robot starts, and no "
+            "controller follows it; that of a controller is its task's, for example "
+            "controller.tasks[0].trajectory"
+        )
 
     def _bounds(self) -> MotionBounds:
         """Return the bounds in the coordinates of the chart."""
@@ -360,6 +377,8 @@ class Stream(Streamed, Trajectory, type="stream"):
         return out
 
     def _start(self) -> State:
+        if self.start is None:
+            raise self._placeless()
         return Chart(self.dimension, False).begin(np.asarray(self.start), np.eye(3))
 
     def _bounds(self) -> MotionBounds:
@@ -417,7 +436,8 @@ class StreamOrientation(Turning, OrientationTrajectory, type="stream"):
         return out
 
     def _start(self) -> State:
-        assert self.rotation is not None
+        if self.rotation is None:
+            raise self._placeless()
         return Chart(0, True).begin(np.zeros(0), matrix_of(self.rotation))
 
     def _bounds(self) -> MotionBounds:
@@ -480,7 +500,8 @@ class StreamPose(Turning, PoseTrajectory, type="stream"):
         return out
 
     def _start(self) -> State:
-        assert self.rotation is not None
+        if self.position is None or self.rotation is None:
+            raise self._placeless()
         where = np.asarray(self.position)
         return Chart(3, True).begin(where, matrix_of(self.rotation))
 

@@ -97,19 +97,29 @@ def test_the_bound_leaves_the_law_alone(metric: str, seed: int) -> None:
     np.testing.assert_array_equal(out.tau, law.tau)
 
 
+@pytest.mark.parametrize("damped", [False, True])
 @pytest.mark.parametrize("metric", METRICS)
 @given(seeds)
 @settings(max_examples=10)
-def test_the_projector_is_the_law_s(metric: str, seed: int) -> None:
-    """P(g - v) is the law's own null-space error, to rounding."""
+def test_the_projector_is_the_law_s(metric: str, damped: bool, seed: int) -> None:
+    """P(g - v) is the law's own null-space error, to rounding.
+
+    Also where a direction is being lost: then the null space has the share of it that
+    the law's e_N keeps.
+    """
     robot, rng = panda(), np.random.default_rng(seed)
     state = robot.state(0.1, robot.random_configuration(rng), rng.standard_normal(7))
     controller = Controller(
-        robot, [hand()], JointCentering(), metric=METRICS[metric], limits=None
+        robot,
+        [hand()],
+        JointCentering(),
+        metric=METRICS[metric],
+        limits=None,
+        # The smallest singular value of the hand is between the two.
+        singularity_threshold=5.0 if damped else 1e-3,
     )
     out = controller.compute(state)
-    if out.damped:  # then e_N keeps a part of the direction that is being lost
-        return
+    assert bool(out.damped) == damped
     P = projector(controller.active_stack.resolution)
     e_N = P @ (out.field.g - state.v)
     np.testing.assert_allclose(e_N, out.null_space_error, rtol=0, atol=1e-9)

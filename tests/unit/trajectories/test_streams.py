@@ -601,6 +601,7 @@ def test_what_does_not_fit_the_task_is_counted_and_dropped() -> None:
     [
         ({"source": "udp://5005"}, "source is 'udp://5005'; needs udp://HOST:PORT"),
         ({"source": "udp://a:5005/x"}, "needs udp://HOST:PORT"),
+        ({"source": "tcp://a:5005"}, "an address begins with udp:// or ros2://, and"),
         ({"source": "a.jsonl", "messages": []}, "give either source or messages"),
         ({"messages": [{"value": [0.0]}]}, "message 0 of the recording: it needs the"),
         ({"messages": [{"at": 1.0, "valeu": [0.0]}]}, "has the key 'valeu'; known are"),
@@ -624,6 +625,12 @@ def test_bounds_that_contradict_each_other_are_refused() -> None:
         Stream([0.0] * 3, speed=[1.0, 2.0]).anchored(None).sample(0.0)
     with pytest.raises(TrajectoryError, match="origin: start"):
         Stream(origin="start").anchored([0.0])
+
+
+@pytest.mark.parametrize("kind", [Stream, StreamOrientation, StreamPose])
+def test_only_a_stream_that_begins_somewhere_counts(kind: Any) -> None:
+    with pytest.raises(StreamError, match=f"this {kind.__name__} begins where"):
+        kind().counts()
 
 
 def test_a_stream_that_hears_something_else_cannot_be_sent_to() -> None:
