@@ -26,6 +26,7 @@ from hsp_control.robot.kinematics import (
     mass_matrix_difference,
 )
 from hsp_control.robot.matrix_view import matrix_view
+from hsp_control.robot.pinocchio_calls import bind_pinocchio
 
 if TYPE_CHECKING:  # `Robot.state` makes a state, and a state names its robot
     from hsp_control.robot.robot import Robot
@@ -53,6 +54,7 @@ class RobotState:
         q: Configuration, shape (nq,).
         v: Velocity, shape (nv,).
         stamp_array: `stamp` as an array of shape (1,), for kernels.
+        effort: What `inverse_dynamics` wrote last, shape (nv,) [N·m or N].
         data: Pinocchio's data at (q, v), for terms that this class does not offer.
     """
 
@@ -63,17 +65,15 @@ class RobotState:
         self.q: Array = robot.neutral()
         self.v: Array = np.zeros(robot.nv)
         self.data: pin.Data = robot.model.createData()
-        self._compute_jacobians = partial(
-            pin.computeJointJacobiansTimeVariation,
-            robot.model,
-            self.data,
-            self.q,
-            self.v,
+        self.effort: Array = self.data.tau
+        self._compute_jacobians = bind_pinocchio(
+            "jacobians", robot.model, self.data, self.q, self.v
         )
-        self._inverse_dynamics = partial(
-            pin.rnea, robot.model, self.data, self.q, self.v
+        self._acceleration: Array = np.zeros(robot.nv)
+        self._inverse_dynamics = self.bind_inverse_dynamics(self._acceleration)
+        self._compute_mass_matrix = bind_pinocchio(
+            "crba", robot.model, self.data, self.q
         )
-        self._compute_mass_matrix = partial(pin.crba, robot.model, self.data, self.q)
         self._mass_matrix = matrix_view(self.data.M)
         self._world: WorldKinematics | None = None
         self._unit_blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
@@ -201,7 +201,15 @@ class RobotState:
 
     def inverse_dynamics(self, acceleration: Array) -> Array:
         """Return the effort M a + N, shape (nv,), for an acceleration (nv,) (RNEA)."""
-        return self._inverse_dynamics(acceleration)  # type: ignore[no-any-return]
+        self._acceleration[:] = acceleration
+        self._inverse_dynamics()
+        return self.effort
+
+    def bind_inverse_dynamics(self, acceleration: Array) -> Callable[[], object]:
+        """Return a call that writes `effort` for what this array (nv,) then holds."""
+        return bind_pinocchio(
+            "rnea", self.robot.model, self.data, self.q, self.v, acceleration
+        )
 
     @property
     def stamp(self) -> int:
