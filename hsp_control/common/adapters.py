@@ -237,13 +237,20 @@ def run(calls: Indices, when: Array, t: float) -> float:
     return value
 
 
+def entry_point(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
+    """Return a kernel for these types, as Python calls it without asking for them."""
+    compiled = cast("Any", function)
+    compiled.compile(kinds)
+    return compiled.overloads[kinds].entry_point
+
+
 @cache
 def entry() -> Callable[..., float]:
-    """Return `run` as Python calls it without asking for types."""
-    kinds = types.int64[:, ::1], types.float64[:, ::1], types.float64
-    compiled_run = cast("Any", run)
-    compiled_run.compile(kinds)
-    return cast("Callable[..., float]", compiled_run.overloads[kinds].entry_point)
+    """Return `run` as Python calls it."""
+    return cast(
+        "Callable[..., float]",
+        entry_point(run, (types.int64[:, ::1], types.float64[:, ::1], types.float64)),
+    )
 
 
 def _available() -> bool:

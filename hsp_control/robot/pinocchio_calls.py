@@ -153,7 +153,7 @@ def bind_pinocchio(
 def _native(
     what: str, addresses: tuple[int, int], arguments: tuple[Any, ...]
 ) -> NativeCall:
-    model, data, *vectors = arguments
+    _, data, *vectors = arguments
     references = [_reference(vector) for vector in vectors]
     words = [*addresses, *(words.ctypes.data for words in references)]
     if what in ("crba", "aba"):

@@ -269,17 +269,21 @@ class Actuation:
         contacts does, or the sum of both.
         """
         dynamics = state.bind_inverse_dynamics(a)
-        check = bind(_nothing, timed=True) if unlimited else bind(
-            _check,
-            state.q,
-            state.v,
-            a,
-            state.effort,
-            self._robot.dof_indices,
-            self._motion,
-            self._held.memory_of_kernels,
-            self._bounds,
-            timed=True,
+        check = (
+            bind(_nothing, timed=True)
+            if unlimited
+            else bind(
+                _check,
+                state.q,
+                state.v,
+                a,
+                state.effort,
+                self._robot.dof_indices,
+                self._motion,
+                self._held.memory_of_kernels,
+                self._bounds,
+                timed=True,
+            )
         )
         return one_call(dynamics, check)
 
