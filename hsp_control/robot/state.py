@@ -117,13 +117,16 @@ class RobotState:
         if not packed:
             q_in = as_numbers(q, self.robot.nq, "configuration q", self.robot)
             v_in = as_numbers(v, self.robot.nv, "velocity v", self.robot)
+        before, self.t = self.t, t  # calls in Python read it
         try:
             value = move(t, q_in, v_in)
-        except TypeError:  # t is no number
+        except TypeError:
+            if isinstance(t, float | int | np.number):
+                raise
             value = REFUSED
         if value == REFUSED:
+            self.t = before
             self._refuse(t, q, v)
-        self.t = t
         return value
 
     def bind_move(self, calls: Sequence[Callable[[float], Any]] = ()) -> Move:
